@@ -5,7 +5,6 @@ rows or listed poses -> the operation -> blocks of poses -> the text of the othe
 
 from __future__ import annotations
 
-from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -22,27 +21,24 @@ from frametool.stream.block_writer import writer_for
 from frametool.stream.column_stream import ColumnRows, move_along
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote, notes_of
-from frametool.stream.header import listed
 from frametool.stream.row_layout import POINT, POSE, Shape, Target
 from frametool.stream.row_poses import RowPoses, kept
 from frametool.stream.rows import Block, spans_of
 from frametool.stream.table import rename_of
-from frametool.stream.table_stream import TablePoses, begin_table, stamps_for
+from frametool.stream.table_stream import TableRows, begin_table, stamps_for
 from frametool.stream.writers import LEARNED
-from frametool.text.spans import Spans, framed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterator, Sequence
+    from collections.abc import Generator, Iterator
     from io import BufferedReader
 
-    from frametool.formats.rows.column_file import Batch
     from frametool.formats.rows.pose_rows import PoseBlock
     from frametool.formats.table import Poses
     from frametool.grammar.edges import Answers
     from frametool.grammar.result import Style
     from frametool.stream.block_writer import BlockWriter
     from frametool.stream.request import Request
-    from frametool.text.spans import Floats, Ints
+    from frametool.stream.table_stream import PlannedRows
 
 QUATERNION = notation("quaternion")
 
@@ -125,29 +121,30 @@ class FormatConverter:
         numbers = place.numbers(x, y, z)
         return zone_notes(place, numbers, lambda row: int(poses.lines[there[row]]))
 
-    def _settle(self, shape: Shape, plan: Plan, columns: str, line: int = 0) -> None:
+    def _settle(self, rows: PlannedRows, line: int = 0) -> None:
         """Decide what rows become: without a rotation points, where nobody asked for one; raises FormatError."""
+        shape, plan = rows.shape, rows.plan
         self.placed = plan.targets[0].unit is not None
         is_bare = shape.kind == POSE and shape.notation is None and bool(self.request.poses)
         has_none = is_bare and not plan.targets[0].notations
         if (is_bare and self.request.keeps_position and not has_none) or (has_none and not self.has_points):
-            message = f"no rotation among the columns {columns}: {self.style.format} is written of poses"
+            message = f"no rotation among the columns {rows.columns}: {self.style.format} is written of poses"
             raise FormatError(message, source=self.source, line=line)
         self.shape = shape._replace(kind=POINT) if has_none else shape
 
-    # --- tables ---
+    # --- rows of tables, and of columns of numbers ---
 
     def _rows(self, stream: BufferedReader, *, header: bool) -> Iterator[Step]:
         """Yield the rows of a table."""
         fmt, request = FORMATS[self.fmt].poses, self.request
         begun = begin_table(stream, self.fmt, request, source=self.source, header=header)
-        rows = TablePoses(begun.table, request, self.source)
-        self._settle(rows.shape, rows.plan, rows.columns, line=1)
+        rows = TableRows(begun.table, request, self.source)
+        self._settle(rows, line=1)
         count = 0
         none = RowPoses(np.empty((0, 7)), None, np.empty(0, np.int64), [None], [None], {})
         yield Step(none, Outcome(b"", lines=begun.lines, size=begun.taken))
         for block, _, outcome in rows.blocks(begun):
-            poses = self._with_place(block, lambda size: [*rows.inputs[:size]])
+            poses = self._with_place(block, rows)
             if self.looks_up_places:
                 poses = poses._replace(parents=EARTH_FRAMES[:1])
             stamps = stamps_for(poses, self.stamps, fmt, count)
@@ -166,8 +163,6 @@ class FormatConverter:
         has_room = not is_recording(self.style.format) and "stamps" in getattr(rows, "holds", ("stamps",))
         return stamps_ns if has_room or not counts else None
 
-    # --- columns of numbers ---
-
     def _columns(self, stream: BufferedReader) -> Iterator[Step]:
         """Yield the rows of columns of numbers."""
         file = InputFile(self.source if self.source != "stdin" else "-", stream)
@@ -175,11 +170,10 @@ class FormatConverter:
         opened = self.module.open_columns(file, Options(self.tally, Topics(), answers=self.answers))
         rows = ColumnRows(opened, self.request, self.source)
         move_along(opened, self.request)
-        self._settle(rows.shape, rows.plan, listed(rows.table.names or ("columns without names",)))
+        self._settle(rows)
         yield Step(rows.poses(opened.nothing()), Outcome(b""))
         for batch in opened.batches():
-            poses = rows.poses(batch)
-            poses = self._with_place(poses, partial(_numbers_of, batch, rows.layout.places, poses.lines))
+            poses = self._with_place(rows.poses(batch), rows)
             if not self.to_arrays and self.request.on_error != NULL:
                 there = np.flatnonzero(~np.isnan(poses.numbers[:, 0]))
                 self.without += len(poses.numbers) - len(there)
@@ -189,12 +183,13 @@ class FormatConverter:
             count = f"{self.without} {'row' if self.without == 1 else 'rows'}"
             warn(f"{self.source}: {count} without numbers left out: {self.style.format} has no place for them")
 
-    def _with_place(self, poses: RowPoses, numbers: Callable[[int], Sequence[Any]]) -> RowPoses:
+    def _with_place(self, poses: RowPoses, rows: PlannedRows) -> RowPoses:
         """Add to points of the Earth their lat, lon and alt as they were read, where these are written again."""
-        if not (is_recording(self.style.format) or self.style.place) or self.shape.place is None:
-            return poses
         operation = self.request.operation
-        read = operation.place_as_read(self.shape, numbers) if operation.keeps_frames else ()
+        if not (is_recording(self.style.format) or self.style.place) or not operation.keeps_frames:
+            return poses
+        rows.inputs[:, np.isnan(poses.numbers[:, 0])] = np.nan
+        read = operation.place_as_read(self.shape, lambda size: [*rows.inputs[:size]])
         return poses._replace(read=np.column_stack(read)) if read else poses
 
     # --- formats that list poses ---
@@ -230,16 +225,11 @@ class FormatConverter:
             own = each.names[0] is not None
             pairs = [rename(*(each.names[row] or (None, None))) for row in (good if own else good[:1])]
             parents, names = zip(*pairs, strict=True) if pairs else ((None,), (None,))
-            stamps = None if own or block.times is None else block.times[done.rows]
+            stamps = None if own else block.stamps[0][done.rows]
             poses = RowPoses(done.results, self._held(stamps, fmt), lines, parents, names, extras)
             found = sorted(faults + done.faults())
             yield Step(poses, Outcome(b"", found, len(each.lines) + len(faults), 0, notes=notes_of(done, block)))
             faults.clear()
-
-
-def _numbers_of(batch: Batch, places: Sequence[int], rows: Ints, count: int) -> list[Floats]:
-    """Return the first columns of some in some rows of a batch."""
-    return [batch.numbers(place).values[rows] for place in places[:count]]
 
 
 def _plan(request: Request) -> Plan:
@@ -255,9 +245,5 @@ def _plan(request: Request) -> Plan:
 def _block(poses: PoseBlock) -> Block:
     """Make a block of rows of poses."""
     count = len(poses.lines)
-    nothing = np.zeros((count, 0), np.int64)
-    lines = poses.lines
-    return Block(
-        Spans(framed(b""), nothing, nothing), (), np.arange(count), lambda row: lines[row] - 1,
-        values=np.array(poses.poses).T.copy(), times=poses.stamps_ns,
-    )  # fmt: skip
+    numbers, lines = np.array(poses.poses).T.copy(), poses.lines
+    return Block(numbers, (), np.arange(count), lambda row: lines[row] - 1, stamps=[poses.stamps_ns])

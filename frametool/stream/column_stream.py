@@ -19,25 +19,21 @@ from frametool.formats.rows.column_file import (
     OutColumn,
     StructuredBatch,
     not_finite,
-    plain_value,
     rows_of_batch,
 )
 from frametool.formats.table import FORMATS
-from frametool.grammar.names import NORMALS, in_nanoseconds, stamp_column
+from frametool.grammar.names import NORMALS, in_nanoseconds
 from frametool.stream.array_writer import ColumnsWriter
-from frametool.stream.faults import NULL, SKIP, STOP, Outcome
-from frametool.stream.layout import NAME, PARENT, Fixed, Kept, Named, New, Worded, quoted
+from frametool.stream.faults import SKIP, STOP, Outcome
+from frametool.stream.layout import Fixed, Kept, Named, New, Worded, quoted
 from frametool.stream.request import Operation, Request
-from frametool.stream.row_poses import RowPoses, objects, texts_of
-from frametool.stream.rows import Block, spans_of
-from frametool.stream.table import Table, unnamed
-from frametool.stream.table_plan import own_count, with_vectors
+from frametool.stream.row_poses import objects, taken
+from frametool.stream.rows import Block
+from frametool.stream.table import Table, coded_texts
 from frametool.stream.table_stream import PlannedRows
-from frametool.text.cells import Cells
-from frametool.text.spans import Spans, framed
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator, Mapping, Sequence
+    from collections.abc import Generator, Iterator, Sequence
 
     from frametool.formats.rows.column_file import Batch, ColumnWriter, Kind
     from frametool.geometry.types import Rigid
@@ -45,28 +41,24 @@ if TYPE_CHECKING:
     from frametool.recordings.messages import PointCloud
     from frametool.stream.evaluate import Run
     from frametool.stream.faults import Fault, RowNote
-    from frametool.stream.table import BlockNames
+    from frametool.stream.row_poses import RowPoses
     from frametool.text.spans import Flags, Floats, Ints
 
-NOTHING = np.zeros((0, 0), np.int64)
 DOUBLE = np.dtype(np.float64)
 
 
 class RowResults(NamedTuple):
     """What became of a batch: the rows that are written, in their order.
 
-    rows: (n,) which of the batch's rows they are; None for all
+    rows: (n,) which of the batch's rows they are
     numbers: (n, k) the results, nan if absent
     absent: (n,) for each shape, rows that have no numbers on purpose; None where all have
-    names: by role, the names of the results, one a row, where a column holds them
-    own_frames: the frames that the rows are expressed in
     """
 
-    rows: Ints | None
+    run: Run
+    rows: Ints
     numbers: Floats
     absent: Sequence[Flags | None]
-    names: Mapping[int, Sequence[str]]
-    own_frames: Sequence[str | None]
 
 
 class ColumnRows(PlannedRows):
@@ -81,8 +73,8 @@ class ColumnRows(PlannedRows):
         self.source = source
         names = file.names
         table = Table(b",", names, file.width, header=tuple(quoted(name, b",") for name in names or ()))
-        try:
-            super().__init__(table, with_vectors(names, request, file.vectors), source)
+        try:  # `t` or `time` of a cloud is what its sensor counts, in whatever unit
+            super().__init__(table, request, source, file.vectors, stamped=not file.vectors)
         except FormatError as error:
             error.line = 0  # the names of columns are in no line here
             raise
@@ -94,7 +86,7 @@ class ColumnRows(PlannedRows):
         self.narrow = {} if request.all_numbers else self._narrow()  # all of them are written as doubles
         self.numbers = sum(isinstance(column, New) for column in self.layout.columns)
 
-    def columns(self) -> list[OutColumn]:
+    def out_columns(self) -> list[OutColumn]:
         """Return the columns of the output; what is read as float32 is written so, what is new is a double."""
         found = []
         for column in self.layout.columns:
@@ -110,12 +102,12 @@ class ColumnRows(PlannedRows):
     def named_columns(self) -> list[OutColumn]:
         """Return the columns of the output, each with a name: those of a file without names get the usual ones."""
         if self.table.names:
-            return self.columns()
+            return self.out_columns()
         targets = self.plan.targets
         names = [name for each in targets for name in (*each.position_columns, *each.names)]
         kept = dict(zip(self.layout.places, names, strict=False))
         found = []
-        for at, (column, target) in enumerate(zip(self.columns(), self.layout.columns, strict=True), 1):
+        for at, (column, target) in enumerate(zip(self.out_columns(), self.layout.columns, strict=True), 1):
             ours = dict(enumerate(names)).get(target.number) if isinstance(target, New) else None
             if isinstance(target, (Kept, Named)):
                 ours = kept.get(target.place)
@@ -151,23 +143,27 @@ class ColumnRows(PlannedRows):
 
     def of_batch(self, batch: Batch) -> RowResults:
         """Return the results of a batch, and leave what is wrong with other rows in `faults`."""
-        size = batch.size
         values, absent, bad = self._read(batch)
-        gone = self._without_pose(absent)
-        present = None if gone is None else np.flatnonzero(~gone)
-        names = self._names(batch)
-        times, late = self._times(batch)
-        weights = self._weights(batch, late)
+        names, strays = self.naming.of_rows(batch.size, lambda place: coded_texts(batch.texts(place)))
+        stamps, late = self._stamps(batch)
         block = Block(
-            Spans(framed(b""), NOTHING, NOTHING), (), np.arange(size), lambda row: row,
-            bad={**late, **names.bad, **bad}, frames=names.frames, lost=names.lost, values=values, times=times,
-            weights=weights,
+            values, (), np.arange(batch.size), int, names=names, stamps=stamps, bad={**late, **strays, **bad},
+            gone=self._without_pose(absent),
         )  # fmt: skip
-        run = self.ran(block if present is None else _chosen(block, present))
+        run = self.ran(block)
         self._round(run)
         self.faults = run.faults()
-        self.notes = self.notes_of(run, block.frames)
-        return self._settled(run, size, present, absent, names)
+        self.notes = self.notes_of(run)
+        rows, numbers = run.settled()
+        if self.request.on_error == STOP and run.reasons:
+            stay = rows < min(run.reasons)
+            rows, numbers = rows[stay], numbers[stay]
+        null = np.isin(np.arange(batch.size), [*run.reasons]) if run.reasons else None
+        absent = [flags if flags is None else flags[rows] for flags in (_either(each, null) for each in absent)]
+        for flags, span in zip(absent, self._spans(), strict=True):
+            if flags is not None:
+                numbers[flags, span.start : span.stop] = np.nan
+        return RowResults(run, rows, numbers, absent)
 
     def outcome(self, batch: Batch, text: bytes = b"") -> Outcome:
         """Return what is written of the last batch, and what is said of it."""
@@ -176,36 +172,14 @@ class ColumnRows(PlannedRows):
 
     def poses(self, batch: Batch) -> RowPoses:
         """Return the results of a batch for another format, with what else its rows hold."""
-        results = self.of_batch(batch)
-        rows = np.arange(batch.size) if results.rows is None else results.rows
-        stamp_at = self.layout.time
-        found = stamp_column(self.table.names)
-        if stamp_at is None and found not in self.layout.frames and not self.file.vectors:
-            stamp_at = found  # `t` or `time` of a cloud is what its sensor counts, in whatever unit
-        stamps = None
-        if stamp_at is not None:
-            name = self.table.name(stamp_at)
-            stamps = batch.stamps(stamp_at, in_ns=in_nanoseconds(name))[0][rows]
-        used = {stamp_at, *self.layout.places, *self.naming.places}
-        extras = {
-            self.table.name(place): _cells(batch.column(place), rows)
-            for place in range(self.table.width)
-            if place not in used and self.table.names
-        }
-        names: list[Sequence[str | None]] = [[name] for name in unnamed(self.request, self.shape)]
-        for role, texts in results.names.items():
-            names[role] = [text or None for text in texts]
-        own = own_count(self.plan, results.numbers.shape[1])
-        for column in self.layout.columns:
-            if isinstance(column, New) and column.number >= own:
-                extras[column.name] = results.numbers[:, column.number]
-        return RowPoses(results.numbers[:, :own], stamps, rows, names[PARENT], names[NAME], extras, results.own_frames)
+        run, rows, numbers, _ = self.of_batch(batch)
+        return self.poses_of(run, rows, numbers, batch.column, rows)
 
     # --- what is read ---
 
     def _read(self, batch: Batch) -> tuple[Floats, list[Flags | None], dict[int, tuple[str, str]]]:
         """Return our numbers (n, c); for each shape which rows have none, which count as 0; and rows that are bad."""
-        places = self.layout.places
+        places, formula = self.layout.places, self.request.operation.formula
         columns = np.empty((len(places), batch.size))
         absent: list[Flags | None] = []
         bad: dict[int, tuple[str, str]] = {}
@@ -225,7 +199,7 @@ class ColumnRows(PlannedRows):
                     missing = _either(missing, invalid)
                 flags = _either(flags, missing)
             if flags is not None:
-                columns[first : first + shape.size, flags] = 0.0
+                columns[first : first + shape.size, flags] = 0.0 if formula is None else np.nan
             absent.append(flags)
             first += shape.size
         return columns.T, absent or [None], bad
@@ -241,56 +215,34 @@ class ColumnRows(PlannedRows):
                 bad[row] = self.plan.names[at], str(error)
         return [known.get(text, 0.0) for text in texts]
 
-    def _without_pose(self, absent: Sequence[Flags | None]) -> Flags | None:
+    def _without_pose(self, absent: Sequence[Flags | None]) -> Ints | None:
         """Return which rows cannot be computed: 0 is a point, but no rotation."""
         gone: Flags | None = None
         request = self.request
         for shape, flags in zip(self.plan.shapes, absent, strict=False):
             if shape.notation is not None or request.operation.formula is not None or request.gathered is not None:
                 gone = _either(gone, flags)
-        return gone
+        return None if gone is None else np.flatnonzero(gone)
 
-    def _names(self, batch: Batch) -> BlockNames:
-        """Read the names of rows, as the cells of a table."""
-        places = sorted({place for place in (*self.naming.places, *self.layout.frames) if place is not None})
-        texts = [[quoted(text, b",") for text in batch.texts(place)] for place in places]
-        spans = spans_of([text for each in texts for text in each])
-        starts = np.zeros((batch.size, self.table.width if places else 0), np.int64)
-        ends = starts.copy()
-        for at, place in enumerate(places):
-            rows = slice(at * batch.size, (at + 1) * batch.size)
-            starts[:, place], ends[:, place] = spans.starts[rows], spans.ends[rows]
-        none = np.zeros(0, np.int64)
-        return self.naming.of_block(Cells(spans.data, none, none, none, np.arange(batch.size), starts, ends))
-
-    def _times(self, batch: Batch) -> tuple[Ints | None, dict[int, tuple[str, str]]]:
-        """Read the stamps of rows, and which of them have none."""
-        if self.layout.time is None or self._weighs:
-            return None, {}
-        name = self.table.name(self.layout.time)
-        times, reasons = batch.stamps(self.layout.time, in_ns=in_nanoseconds(name))
-        if self.layout.below is not None:
-            below, more = batch.stamps(self.layout.below, in_ns=1)
-            times, reasons = times + below, {**more, **reasons}
-        return times, {row: (name, reason) for row, reason in reasons.items()}
-
-    @property
-    def _weighs(self) -> bool:
-        return self.request.gathered is not None and bool(self.request.extra_column)
-
-    def _weights(self, batch: Batch, bad: dict[int, tuple[str, str]]) -> Floats | None:
-        """Read the weights of rows; those that are none are bad."""
-        if self.layout.time is None or not self._weighs:
-            return None
-        if self.request.gathered is not None and self.request.gathered.labelled:
-            return np.array(batch.texts(self.layout.time), object)
-        weights, nulls = batch.numbers(self.layout.time)
+    def _stamps(self, batch: Batch) -> tuple[list[Any], dict[int, tuple[str, str]]]:
+        """Read the stamps, weights or labels of rows, and which of them have none."""
+        place, below, request = self.layout.time, self.layout.below, self.request
+        if place is None:
+            return [], {}
+        name = self.table.name(place)
+        if not request.weighs:
+            times, reasons = batch.stamps(place, in_ns=in_nanoseconds(name))
+            if below is not None:
+                nanoseconds, more = batch.stamps(below, in_ns=1)
+                times, reasons = times + nanoseconds, {**more, **reasons}
+            return [times], {row: (name, reason) for row, reason in reasons.items()}
+        if request.gathered is not None and request.gathered.labelled:
+            return [np.array(batch.texts(place), object)], {}
+        weights, nulls = batch.numbers(place)
         invalid = _either(nulls, not_finite(weights))
-        if invalid is not None:
-            name = self.table.name(self.layout.time)
-            bad |= dict.fromkeys(np.flatnonzero(invalid).tolist(), (name, "not finite"))
-            weights[invalid] = 0.0
-        return weights
+        bad = [] if invalid is None else np.flatnonzero(invalid).tolist()
+        weights[bad] = 0.0
+        return [weights], dict.fromkeys(bad, (name, "not finite"))
 
     # --- what becomes of it ---
 
@@ -301,34 +253,6 @@ class ColumnRows(PlannedRows):
                 beyond = ~np.isfinite(run.results[:, number].astype(kind))
             if beyond.any():
                 run.refuse(run.rows[beyond].tolist(), f"the result is too large for {kind}")
-
-    def _settled(
-        self, run: Run, size: int, present: Ints | None, absent: Sequence[Flags | None], names: BlockNames
-    ) -> RowResults:
-        """Put the results of the rows that could be computed at their places among all that are written."""
-        computed = run.rows if present is None else present[run.rows]
-        bad = np.array([run.block.line_of(row) for row in run.reasons], np.int64)
-        written = np.ones(size, np.bool_)
-        if run.lone is not None:
-            written[run.block.line_of(run.lone)] = False
-        if self.request.on_error == STOP and len(bad):
-            written[int(bad.min()) :] = False
-        elif self.request.on_error == NULL and len(bad):
-            absent = [_either(flags, np.isin(np.arange(size), bad)) for flags in absent]
-        else:
-            written[bad] = False
-        numbers, rows = run.results, None
-        if len(computed) < size:
-            numbers = np.full((size, run.results.shape[1]), np.nan)
-            numbers[computed] = run.results
-        for flags, span in zip(absent, self._spans(), strict=True):
-            if flags is not None:
-                numbers[flags, span.start : span.stop] = np.nan
-        if not written.all():
-            rows = np.flatnonzero(written)
-            numbers = numbers[rows]
-            absent = [flags if flags is None else flags[rows] for flags in absent]
-        return RowResults(rows, numbers, absent, self._texts(names, rows), names.frames)
 
     def _spans(self) -> list[range]:
         """Return which numbers of the result come from each shape: all of one, if there is one result."""
@@ -346,40 +270,6 @@ class ColumnRows(PlannedRows):
                 found = _either(found, flags)
         return found
 
-    def _texts(self, names: BlockNames, rows: Ints | None) -> dict[int, list[str]]:
-        """Return the names of the results by role."""
-        found = {}
-        for role in (PARENT, NAME):
-            if self.naming.places[role] is not None and names.spans:
-                texts = texts_of(names.spans[role])
-                found[role] = texts if rows is None else [texts[row] for row in rows.tolist()]
-        return found
-
-
-def _chosen(block: Block, rows: Ints) -> Block:
-    """Keep some rows of a block, which count on as they did."""
-    numbers = rows.tolist()
-    at = {row: place for place, row in enumerate(numbers)}
-    return block._replace(
-        values=None if block.values is None else block.values[rows],
-        places=np.arange(len(rows)),
-        line_of=numbers.__getitem__,
-        bad={at[row]: why for row, why in block.bad.items() if row in at},
-        frames=[block.frames[row] for row in numbers] if block.frames else (),
-        lost=[(at[row], name) for row, name in block.lost if row in at],
-        times=None if block.times is None else block.times[rows],
-        weights=None if block.weights is None else block.weights[rows],
-    )
-
-
-def _cells(column: Any, rows: Ints) -> Any:
-    """Return some of a column as it is; what is no number, truth value or time of numpy as plain values."""
-    if not isinstance(column, np.ndarray):
-        return objects([column[row] for row in rows.tolist()])
-    if column.ndim == 1 and column.dtype.kind in "fiubM":
-        return column[rows]
-    return objects(map(plain_value, column[rows].tolist()))
-
 
 def _either(first: Flags | None, second: Flags | None) -> Flags | None:
     if first is None or second is None:
@@ -392,7 +282,7 @@ def run_columns(
 ) -> Generator[Outcome]:
     """Yield what becomes of a file's batches in a file of the same format, or in that of a module, `into`."""
     rows = ColumnRows(file, request, source)
-    columns = rows.columns() if into is None else rows.named_columns()
+    columns = rows.out_columns() if into is None else rows.named_columns()
     move_along(file, request)
     if rows.narrow and not request.gathered:
         kinds = ", ".join(sorted({kind.name for kind in rows.narrow.values()}))
@@ -408,7 +298,8 @@ def run_columns(
         if other is not None:
             text = other.of_columns(len(results.numbers), _in_other_format(columns, rows, batch, results))
         elif writer is not None:
-            text = writer.of_rows(batch, results.rows, made_of(columns, rows, results))
+            chosen = None if len(results.rows) == batch.size else results.rows
+            text = writer.of_rows(batch, chosen, made_of(columns, rows, results))
         yield rows.outcome(batch, text)
     if other is not None and not other.begun:
         empty = file.nothing()
@@ -461,7 +352,6 @@ def _in_other_format(
 ) -> dict[str, Made]:
     """Return the columns of a batch by name, for a file of another format."""
     new = iter(made_of(columns, rows, results))
-    chosen = np.arange(batch.size) if results.rows is None else results.rows
     found = {}
     for column in columns:
         if column.passed is None:
@@ -469,9 +359,10 @@ def _in_other_format(
             found[column.name] = made if isinstance(made.values, np.ndarray) else Made(objects(made.values))
         elif column.kind is not None and column.kind.kind in FLOATS:
             values, nulls = batch.numbers(column.passed)
-            found[column.name] = Made(values.astype(column.kind)[chosen], None if nulls is None else nulls[chosen])
+            absent = None if nulls is None else nulls[results.rows]
+            found[column.name] = Made(values.astype(column.kind)[results.rows], absent)
         else:
-            found[column.name] = Made(_cells(batch.column(column.passed), chosen))
+            found[column.name] = Made(taken(batch.column(column.passed), results.rows))
     return found
 
 
@@ -492,7 +383,8 @@ def made_of(columns: Sequence[OutColumn], rows: ColumnRows, results: RowResults)
                 values = results.numbers[:, target.number].astype(column.kind or DOUBLE)
             made.append(Made(values, rows.absent_in(target.number, results)))
         elif isinstance(target, Named):
-            made.append(Made(results.names.get(target.role, ())))
+            texts = [text or "" for text in results.run.block.names.texts(target.role, results.rows)]
+            made.append(Made(texts * (len(results.rows) if len(texts) == 1 else 1)))
         elif isinstance(target, Worded):
             made.append(Made([target.words[int(number)] for number in results.numbers[:, target.number].tolist()]))
         elif isinstance(target, Fixed):

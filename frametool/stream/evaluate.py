@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
 from frametool.errors import FrametoolError, ValueInvalid
+from frametool.frames.stamps import BILLION
 from frametool.geometry import arrays, floats, quaternion, uncertainty
 from frametool.geometry.batch_validation import read_rotations
 from frametool.grammar.names import in_nanoseconds
 from frametool.grammar.rotation_spelling import FEW_DIGITS
 from frametool.stream.faults import DEGREES, NULL, STOP, Fault, RowNote
 from frametool.stream.layout import Const, In, Instead, Out, Word
-from frametool.stream.request import PAIR, START, thing_pose
+from frametool.stream.request import PAIR, START, no_step, thing_pose
 from frametool.stream.row_layout import (
     FLAT,
     IDENTITY,
@@ -27,16 +28,9 @@ from frametool.stream.row_layout import (
     doubt,
     wrong_tail,
 )
+from frametool.stream.row_poses import texts_of
 from frametool.stream.rows import assemble, chosen, number_spans, numbers_or_null, separators, texts_as_rows
-from frametool.stream.stamp_columns import (
-    NOWHERE,
-    by_frame,
-    by_time,
-    read_stamps,
-    seconds_before,
-    stamps_of,
-    weights_of,
-)
+from frametool.stream.stamp_columns import NOWHERE, by_frame, by_time, read_stamps
 from frametool.text.numbers import parse_number, read_number_or_angle
 from frametool.text.parse import half_units, parse_floats
 from frametool.text.spans import Spans
@@ -50,6 +44,7 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Target
     from frametool.stream.rows import Block
+    from frametool.stream.stamp_source import Timed
     from frametool.text.spans import Flags, Floats, Ints
 
 
@@ -120,7 +115,7 @@ class Run:
         numbers = self._read()
         if any(shape.covariance for shape in plan.shapes):
             self._check_covariances(numbers)
-        self.outside = self._outside(*self.request.window) if self.request.window and self.count else set[int]()
+        self.outside = self._outside()
         movers = self._movers()
         self.lone: int | None = None
         self.columns = list(np.ascontiguousarray(numbers.T))
@@ -129,8 +124,7 @@ class Run:
             self._doubt_turns(moved)
             self.results, self.locked = self._results(moved)
         self.rows = np.arange(self.count)
-        weighs = self.request.gathered and self.request.extra_column
-        weights = weights_of(self.block, self.request, self._blame) if weighs else None
+        weights = self._weights() if self.request.weighs and self.count else None
         if self.outside:
             self.reasons = {row: why for row, why in self.reasons.items() if row not in self.outside}
             self.mended = [row for row in self.mended if row not in self.outside]
@@ -151,17 +145,17 @@ class Run:
 
     def _read(self) -> Floats:
         """Read all numbers; those that are none are nan."""
-        if self.block.values is not None:
-            return self.block.values
-        words = self.plan.words
-        numbers, bad = parse_floats(self.block.numbers)
+        cells, words = self.block.numbers, self.plan.words
+        if not isinstance(cells, Spans):
+            return cells
+        numbers, bad = parse_floats(cells)
         if not (len(bad) or words):
             return numbers
         invalid = [each for place in bad.tolist() if (each := divmod(place, numbers.shape[1]))[1] not in words]
         invalid += [(row, column) for column in words for row in range(self.count)]  # also those that look like numbers
         known: dict[tuple[int, str], float] = {}
         for row, column in invalid:
-            text = self.block.numbers.text(row, column).decode("utf-8", "replace").strip(" \t")
+            text = cells.text(row, column).decode("utf-8", "replace").strip(" \t")
             try:
                 if column not in words:
                     read = self.plan.marked.get(column)
@@ -232,16 +226,14 @@ class Run:
         sources = [[plan.source]] if plan.source else block.sources
         edges = list(map(self._edge, sources)) or [None] * shapes
         if self.request.timed is not None and self.count:
-            frames = sources or [block.frames or [None]]
-            if block.times is not None:
-                return [by_time(self.request.timed, block.times, frames[0], self._blame, plan.frame_column)] * shapes
+            frames = sources or [block.names.frames or [None]]
             movers = [  # the rows of a table have one stamp for all their points
-                by_time(self.request.timed, stamps, names, self._blame, plan.frame_column) if stamps else edge
-                for stamps, names, edge in zip(block.stamps, frames, edges[: len(block.stamps)], strict=True)
+                self._by_time(self.request.timed, at, names) if len(block.stamps[at]) else edges[at]
+                for at, names in enumerate(frames)
             ]
             return movers * (shapes // len(movers))
         if plan.edge_of is not None and self.count and not sources:
-            return [by_frame(plan.edge_of, block.frames, self._blame, plan.frame_column)] * shapes
+            return [by_frame(plan.edge_of, block.names.frames, self._blame, plan.frame_column)] * shapes
         return edges
 
     def _edge(self, frames: Sequence[str | None]) -> Rigid | None:
@@ -250,6 +242,11 @@ class Run:
         if edge_of is None or not self.count:
             return None
         return edge_of(frames[0]) if len(frames) == 1 else by_frame(edge_of, frames, self._blame)
+
+    def _by_time(self, timed: Timed, at: int, frames: Sequence[str | None]) -> Rigid:
+        times = self._times(at)
+        rows = np.delete(np.arange(self.count), [*self.reasons])
+        return by_time(timed, times, rows, frames, self._blame, self.plan.frame_column)
 
     def _compute(self, columns: list[Floats], movers: Sequence[Rigid | None], state: State) -> list[Components]:
         """Apply the operation to each point or pose of the rows."""
@@ -278,17 +275,37 @@ class Run:
             yield shape, tuple(columns[first : first + shape.size]), partial(self._rotation, shape, first)
             first += shape.size
 
-    def _times(self, at: int) -> Ints:
+    def _times(self, at: int = 0) -> Ints:
         """Read the stamps of the rows."""
-        if self.block.times is not None:
-            return self.block.times
+        stamps = self.block.stamps[at]
+        if not isinstance(stamps, tuple):
+            return stamps
+        if not stamps:
+            raise ValueInvalid("rows have no stamps; there is no velocity")
         timed, extra = self.request.timed, self.request.extra_column or ""
-        stamps, column = self.block.stamps[at], timed.column if timed else extra
         in_ns = timed.in_ns if timed else len(stamps) == 1 and in_nanoseconds(extra)
         times, reasons = read_stamps(stamps, in_ns=in_ns)
         for row, reason in reasons.items():
-            self._blame(row, column, reason)
+            self._blame(row, timed.column if timed else extra, reason)
         return times
+
+    def _weights(self) -> Any:
+        """Return the weights of rows, or their labels; a row with none, or a negative weight, is bad."""
+        weights: Any = self.block.stamps[0]
+        name = self.request.extra_column or ""
+        cells = weights[0] if isinstance(weights, tuple) else None
+        if self.request.gathered is not None and self.request.gathered.labelled:
+            return weights if cells is None else np.array(texts_of(cells), object)
+        if cells is not None:
+            weights, bad = parse_floats(cells)
+            for row in bad.tolist():
+                try:
+                    weights[row] = parse_number(cells.text(row).decode("utf-8", "replace").strip(" \t\"'"))
+                except ValueInvalid as error:
+                    self._blame(row, name, str(error))
+        for row in np.flatnonzero(weights < 0.0).tolist():
+            self._blame(row, name, f"weight {weights[row]:g} is negative")
+        return weights
 
     def _why_no_value(self, row: int) -> str | FrametoolError:
         """Evaluate an expression for one row alone, which says why it has no value there."""
@@ -308,10 +325,14 @@ class Run:
     def _good(self) -> list[int]:
         return [row for row in range(self.count) if row not in self.reasons and row not in self.outside]
 
-    def _outside(self, first: int, last: int) -> set[int]:
-        """Return the rows before the first or after the last of the times that are wanted."""
-        times = self._times(0)
-        return {*np.flatnonzero((times < first) | (times > last)).tolist()} - {*self.reasons}
+    def _outside(self) -> set[int]:
+        """Return the rows without numbers, and those before the first or after the last time that is wanted."""
+        gone = set[int]() if self.block.gone is None else {*self.block.gone.tolist()}
+        if self.request.window is None or not self.count:
+            return gone
+        first, last = self.request.window
+        times = self._times()
+        return gone | ({*np.flatnonzero((times < first) | (times > last)).tolist()} - {*self.reasons})
 
     def _with_before(self, pose: Rigid, state: State) -> list[Any]:
         """Return the good row before each row, or the first of all, and the row; the very first row's is itself."""
@@ -331,13 +352,19 @@ class Run:
 
     def _seconds(self, state: State) -> Floats:
         """Return the time since the good row before each; the very first row has no velocity and no result."""
-        name = self.request.extra_column or ""
-        stamps = stamps_of(self.block, name, self._blame)
-        good = self._good()
-        seconds = seconds_before(stamps, good, state.stamp_ns, name, self._blame)
-        if good:
-            self.lone = good[0] if state.stamp_ns is None else None
-            state.stamp_ns = int(stamps[good[-1]])
+        seconds = np.ones(self.count)
+        stamps = self._times() if self.count else seconds
+        if not (good := self._good()):
+            return seconds
+        at, known = stamps[good], state.stamp_ns
+        before = np.concatenate([[at[0] - BILLION if known is None else known], at[:-1]])
+        steps = at - before
+        for index in np.flatnonzero(steps <= 0).tolist():
+            reason = no_step(int(before[index]), int(at[index]))
+            self._blame(good[index], self.request.extra_column or "", reason)
+        seconds[good] = np.where(steps > 0, steps, BILLION) / BILLION
+        self.lone = good[0] if known is None else None
+        state.stamp_ns = int(at[-1])
         return seconds
 
     def _rotation(self, shape: Shape, first: int, numbers: Components) -> Components:
@@ -350,7 +377,8 @@ class Run:
             self._check_tail(numbers, names, shape.joined.tail)
         found = read_rotations(shape.notation, values, degrees=shape.degrees, normalize=self.request.normalize)
         rule = shape.notation.representation.batch
-        if rule and rule.explained and self.block.values is None and (found.mended.size or found.reasons):
+        is_text = isinstance(self.block.numbers, Spans)
+        if is_text and rule and rule.explained and (found.mended.size or found.reasons):
             self._take_as_meant(rule, values, [first + at for at in shape.rotation_at], {*found.mended, *found.reasons})
             found = read_rotations(shape.notation, values, degrees=shape.degrees, normalize=self.request.normalize)
         for row, reason in found.reasons.items():
@@ -368,7 +396,7 @@ class Run:
 
     def _take_as_meant(self, rule: BatchRule, values: list[Floats], places: Sequence[int], rough: set[int]) -> None:
         """Replace the rotations of rows that are off by no more than the digits they are written with."""
-        rows, cells = np.array(sorted(rough), np.int64), self.block.numbers
+        rows, cells = np.array(sorted(rough), np.int64), cast("Spans", self.block.numbers)
         own = [column[rows] for column in values]
         halves = [half_units(Spans(cells.data, cells.starts[rows, at], cells.ends[rows, at])) for at in places]
         meant = rule.explained is not None and rule.explained(own, halves, arrays)
@@ -428,7 +456,9 @@ class Run:
         results += 0.0  # none is -0.0
         if not np.isfinite(results.sum()):
             wrong = np.isinf(results) if self.operation.shown else ~np.isfinite(results)  # nan may be a formula's
-            for row in np.flatnonzero(wrong.any(axis=1)).tolist():
+            rows = np.asarray(wrong.any(axis=1))
+            rows[[*self.outside]] = False
+            for row in np.flatnonzero(rows).tolist():
                 if row not in self.reasons:
                     self._blame(row, *self._why_not_finite(row, moved))
         return results, locked
@@ -461,6 +491,17 @@ class Run:
         for row in rows:
             self._blame(row, "", reason)
         self._keep(~np.isin(self.rows, rows))
+
+    def settled(self) -> tuple[Ints, Floats]:
+        """Return the rows that stay, and their numbers: nan in those that have none on purpose, or are null."""
+        if len(self.rows) == self.count:
+            return self.rows, self.results
+        gone = [] if self.block.gone is None else self.block.gone.tolist()
+        nulls = self.reasons if self.request.on_error == NULL else ()
+        rows = np.array(sorted({*self.rows.tolist(), *gone, *nulls}), np.int64)
+        numbers = np.full((len(rows), self.results.shape[1]), np.nan)
+        numbers[np.searchsorted(rows, self.rows)] = self.results
+        return rows, numbers
 
     def first_fault(self) -> int | None:
         """Return the place of the first bad row, if the run stops there."""

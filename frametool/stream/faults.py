@@ -175,7 +175,7 @@ def notes_of(run: Run, block: Block) -> list[RowNote]:
     from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
 
     notes = [*run.rounded, *starmap(run.note_of_degrees, run.doubted[:1])]
-    notes += [RowNote.of_lost_name(block.line_of(row), name) for row, name in block.lost]
+    notes += [RowNote.of_lost_name(block.line_of(row), name) for row, name in block.names.lost]
     if run.plan.shapes and run.plan.shapes[0].notation is UPPER_ROWS and run.off > PROJECTED_IN_SILENCE:
         notes.append(RowNote(block.line_of(0), "projected", projection(run.off)))
     return sorted(notes)

@@ -197,11 +197,12 @@ def _of_table(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
     """Yield the rows of a table."""
     from frametool.geometry.representations import notation
     from frametool.stream.row_poses import results_of
-    from frametool.stream.table_stream import TablePoses, begin_table
+    from frametool.stream.table_stream import TableRows, begin_table
 
-    request = request._replace(operation=MOVED, notations=(notation("quaternion"),), keep_sign=True)
+    quaternion = (notation("quaternion"),)
+    request = request._replace(operation=MOVED, notations=quaternion, keep_sign=True, all_numbers=True)
     begun = begin_table(cast("ByteStream", file.stream), file.format, request, source=file.name)
-    rows = TablePoses(begun.table, request, file.name)
+    rows = TableRows(begun.table, request, file.name)
     if rows.shape.notation is None and rows.shape.unit is None:
         raise FormatError(f"no pose among the columns {rows.columns}; {LIKE}", source=file.name, line=1)
     if rows.shape.notation is None:

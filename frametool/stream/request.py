@@ -420,6 +420,11 @@ class Request(NamedTuple):
         return self._replace(operation=operation._replace(inverse=not operation.inverse), rename=renamed)
 
     @property
+    def weighs(self) -> bool:
+        """Return True if the extra column holds weights or labels rather than stamps."""
+        return self.gathered is not None and bool(self.extra_column)
+
+    @property
     def in_order(self) -> bool:
         """Return True if a row's result depends on the rows before it."""
         takes_first = self.earth is not None and self.earth[0] is not None and self.earth[0].place is None

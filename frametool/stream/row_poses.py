@@ -83,9 +83,10 @@ def first_of(block: RowPoses) -> RowPoses:
 
 def kept(block: RowPoses, rows: slice | Ints) -> RowPoses:
     """Return some poses of a block."""
-    at = np.arange(len(block.numbers))[rows].tolist()
+    at = np.arange(len(block.numbers))[rows]
     parents, names = (
-        [each[row] for row in at] if len(each) == len(block.numbers) else each for each in (block.parents, block.names)
+        [each[row] for row in at.tolist()] if len(each) == len(block.numbers) else each
+        for each in (block.parents, block.names)
     )
     return block._replace(
         numbers=block.numbers[rows],
@@ -94,11 +95,20 @@ def kept(block: RowPoses, rows: slice | Ints) -> RowPoses:
         read=None if block.read is None else block.read[rows],
         parents=parents,
         names=names,
-        extras={
-            name: Spans(each.data, each.starts[rows], each.ends[rows]) if isinstance(each, Spans) else each[rows]
-            for name, each in block.extras.items()
-        },
+        extras={name: taken(each, at) for name, each in block.extras.items()},
     )
+
+
+def taken(cells: Any, rows: Ints) -> Cells:
+    """Return some cells of a column; what is no number, truth value or time of numpy as plain values."""
+    if isinstance(cells, Spans):
+        return Spans(cells.data, cells.starts[rows], cells.ends[rows])
+    if isinstance(cells, np.ndarray) and cells.ndim == 1 and cells.dtype.kind in "fiubM":
+        return cells[rows]
+    from frametool.formats.rows.column_file import plain_value
+
+    is_array = isinstance(cells, np.ndarray)
+    return objects(map(plain_value, cells[rows].tolist() if is_array else [cells[row] for row in rows.tolist()]))
 
 
 def block_of(results: Sequence[Result], *, placed: bool = True) -> RowPoses:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from operator import itemgetter
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from frametool.text.write import fixed_spans, shortest_spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from frametool.errors import FrametoolError
     from frametool.stream.layout import Piece
@@ -32,40 +34,56 @@ class Broken(NamedTuple):
     reason: str
 
 
+class BlockNames(NamedTuple):
+    """The names of a block's rows.
+
+    frames: the one each row is expressed in, or for look-ups the two, parted by NUL
+    pairs, results: the parents and names that there are, and those of their results; of_row: (n,) those of a row
+    lost: the first row whose result cannot name a frame, and that frame
+    """
+
+    frames: Sequence[str | None] = ()
+    pairs: Sequence[tuple[str, str]] = (("", ""),)
+    results: Sequence[tuple[str, str]] = (("", ""),)
+    of_row: Ints | None = None
+    lost: Sequence[tuple[int, str]] = ()
+
+    def texts(self, role: int, rows: Ints) -> list[str | None]:
+        """Return the parents (0) or names (1) of the results of rows, or one for all."""
+        texts = [pair[role] or None for pair in self.results]
+        return texts if len(texts) == 1 or self.of_row is None else [texts[at] for at in self.of_row[rows].tolist()]
+
+
 class Block(NamedTuple):
     """What a format found in a block of text.
 
-    numbers: (n, c) the cells with our numbers
+    numbers: (n, c) the cells with our numbers, or the numbers themselves
     parts: spans (n,) that pieces refer to
     places: (n,) where each row is among all that the block holds
     line_of: the line of a row, from 0
     unchanged: place and text of what passes as it is
     broken: rows that have no numbers
-    frames: the name of the frame each row is expressed in, if rows say so
-    stamps: for each shape the spans (n,) of its stamp: one, or seconds and nanoseconds; none where it has none
-    bad: rows whose names do not fit: column and reason
-    lost: the first row whose result cannot name a frame, and that frame
-    values, times: (n, c) and (n,) the numbers and the stamps in nanoseconds themselves, where they are no text
-    weights: (n,) the numbers with them, where they are no text
+    names: those of the rows, and of their results
+    stamps: for each shape the spans (n,) of its stamp, one, or seconds and nanoseconds (none where it has none), or the
+        nanoseconds; of rows that are gathered their weights or labels
+    bad: rows that are bad by what is no number: column and reason
     sources: for each shape the name of the frame each row is expressed in, or one for all
     place_of: line, from 0, and column, from 1, of one of a row's numbers, where columns have no names
+    gone: rows that have no numbers on purpose, and no result
     """
 
-    numbers: Spans
+    numbers: Spans | Floats
     parts: Sequence[Spans]
     places: Ints
     line_of: Callable[[int], int]
     unchanged: Sequence[tuple[int, bytes]] = ()
     broken: Sequence[Broken] = ()
-    frames: Sequence[str | None] = ()
-    stamps: Sequence[tuple[Spans, ...]] = ()
+    names: BlockNames = BlockNames()
+    stamps: Sequence[tuple[Spans, ...] | NDArray[Any]] = ()
     bad: Mapping[int, tuple[str, FrametoolError | str]] = MappingProxyType({})
-    lost: Sequence[tuple[int, str]] = ()
-    values: Floats | None = None
-    times: Ints | None = None
-    weights: Floats | None = None
     place_of: Callable[[int, int], tuple[int, str]] | None = None
     sources: Sequence[Sequence[str | None]] = ()
+    gone: Ints | None = None
 
 
 def number_spans(values: Floats, precision: int | None, separators: bytes, *, yaml: bool = False) -> Spans:

@@ -6,28 +6,22 @@ Stamps are read in bulk, decimal seconds or nanoseconds to integer nanoseconds, 
 from __future__ import annotations
 
 from itertools import zip_longest
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.frames.stamps import BILLION, nanoseconds_each, tell_size
-from frametool.grammar.names import in_nanoseconds
-from frametool.stream.request import no_step
 from frametool.stream.row_layout import IDENTITY
 from frametool.stream.stamp_source import read_header_stamp, read_stamp
-from frametool.text.cells import without_quotes
 from frametool.text.digits import ZEROS, first_point, not_digits, read_eight_digits
-from frametool.text.numbers import parse_number
-from frametool.text.parse import LOWEST, parse_floats, trimmed
+from frametool.text.parse import LOWEST, trimmed
 from frametool.text.spans import windows
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.geometry.types import Rigid
-    from frametool.stream.request import Request
-    from frametool.stream.rows import Block
     from frametool.stream.stamp_source import Timed
     from frametool.text.spans import Bytes, Flags, Floats, Ints, Spans, Words
 
@@ -113,66 +107,6 @@ def _fraction(data: Bytes, starts: Ints, length: Ints) -> tuple[Ints, Flags]:
     return nanoseconds.view(np.int64), sure & (rest % _BELOW_NS == 0) & (length <= 16)
 
 
-def stamps_of(block: Block, name: str, blame: Blame) -> Ints:
-    """Return the stamps of rows in nanoseconds; a row without one is bad."""
-    count = len(block.places)
-    if not count:
-        return np.zeros(0, np.int64)
-    if block.times is not None:
-        return block.times
-    if not block.stamps or not block.stamps[0]:
-        raise ValueInvalid("rows have no stamps; there is no velocity")
-    stamps, reasons = read_stamps(block.stamps[0], in_ns=in_nanoseconds(name))
-    for row, reason in reasons.items():
-        blame(row, name, reason)
-    return stamps
-
-
-def seconds_before(stamps: Ints, good: Sequence[int], before_ns: int | None, name: str, blame: Blame) -> Floats:
-    """Return the seconds since the good row before each row; a row at which time does not advance is bad.
-
-    before_ns: the stamp of the last good row of the block before; None for the first block, whose first row gets 1.
-    """
-    seconds = np.ones(len(stamps))
-    rows = np.array(good, np.int64)
-    if not len(rows):
-        return seconds
-    at = stamps[rows]
-    before = np.concatenate([[at[0] - BILLION if before_ns is None else before_ns], at[:-1]])
-    steps = at - before
-    for index in np.flatnonzero(steps <= 0).tolist():
-        blame(good[index], name, no_step(int(before[index]), int(at[index])))
-    seconds[rows] = np.where(steps > 0, steps, BILLION) / BILLION
-    return seconds
-
-
-def weights_of(block: Block, request: Request, blame: Blame) -> Any:
-    """Return the weights of rows, or their labels; a row with none, or a negative weight, is bad."""
-    if not len(block.places):
-        return np.zeros(0)
-    name = request.extra_column or ""
-    if request.gathered is not None and request.gathered.labelled:
-        cells = without_quotes(block.stamps[0][0]) if block.weights is None else None
-        return block.weights if cells is None else np.array(
-            [cells.text(row).decode().strip() for row in range(len(cells.starts))], object
-        )  # fmt: skip
-    weights = _parsed(block.stamps[0][0], name, blame) if block.weights is None else block.weights
-    for row in np.flatnonzero(weights < 0.0).tolist():
-        blame(row, name, f"weight {weights[row]:g} is negative")
-    return weights
-
-
-def _parsed(cells: Spans, name: str, blame: Blame) -> Floats:
-    """Read cells as numbers; a row with another cell is bad."""
-    numbers, bad = parse_floats(cells)
-    for row in bad.tolist():
-        try:
-            numbers[row] = parse_number(cells.text(row).decode("utf-8", "replace").strip(" \t\"'"))
-        except ValueInvalid as error:
-            blame(row, name, str(error))
-    return numbers
-
-
 NOWHERE = (0.0, 0.0, 0.0, *IDENTITY)
 
 
@@ -200,22 +134,16 @@ def _edge(edge_of: Callable[..., Rigid], name: str | None) -> tuple[Rigid, Frame
 
 
 def by_time(
-    timed: Timed, stamps: tuple[Spans, ...] | Ints, frames: Sequence[str | None], blame: Blame, column: str = ""
+    timed: Timed, times: Ints, rows: Ints, frames: Sequence[str | None], blame: Blame, column: str = ""
 ) -> Rigid:
-    """Return the pose of each row at its stamp; a row without a stamp or without data then is bad.
+    """Return the pose of each of some rows at its stamp, nan of others; a row without data then is bad.
 
-    stamps: one for each row, or its seconds and nanoseconds; or the nanoseconds themselves
+    times: the stamp of each row, nanoseconds
     frames: one a row, or one for all (None: the one SOURCE); column: the one that names them
     """
-    if isinstance(stamps, np.ndarray):
-        times, reasons = stamps, dict[int, str]()
-    else:
-        times, reasons = read_stamps(stamps, in_ns=timed.in_ns)
-    for row, reason in reasons.items():
-        blame(row, timed.column, reason)
     poses = np.full((timed.width, len(times)), np.nan)
-    for frame, rows in _by_frame(frames, np.delete(np.arange(len(times)), list(reasons))):
-        _fill(poses, timed, frame, rows, times, blame, column)
+    for frame, some in _by_frame(frames, rows):
+        _fill(poses, timed, frame, some, times, blame, column)
     return tuple(poses)  # type: ignore[return-value]
 
 

@@ -9,8 +9,7 @@ Knows how a table is written, which frames its rows name, and which columns a tr
 from __future__ import annotations
 
 from functools import cache
-from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -20,15 +19,15 @@ from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import UPPER_ROWS, notation
 from frametool.grammar.names import EARTH_FRAMES, in_nanoseconds, stamp_column
 from frametool.stream.header import Columns, PoseColumns, has_pose_column
-from frametool.stream.layout import ADDED, NAME, NAMED, PARENT, quoted
-from frametool.stream.rows import Block, Broken
+from frametool.stream.layout import ADDED, NAMED, quoted
+from frametool.stream.rows import Block, BlockNames, Broken, spans_of
 from frametool.stream.stamp_columns import read_stamps
 from frametool.stream.stamp_source import replaced, stamp_text
 from frametool.text.cells import split_blank, split_delimited, torn_record, without_quotes
-from frametool.text.spans import MARGIN, Spans, framed
+from frametool.text.spans import MARGIN, Spans
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
 
     from frametool.stream.layout import Layout
     from frametool.stream.request import Request
@@ -37,24 +36,10 @@ if TYPE_CHECKING:
     from frametool.text.spans import Ints
     Names = tuple[str | None, str | None]  # parent, name
     Texts = tuple[str, str]
+    Bad = dict[int, tuple[str, str | FrametoolError]]
     Rename = Callable[[str | None, str | None], Names]
 
 COUNTER = "frame"  # such a column often counts pictures
-
-
-class BlockNames(NamedTuple):
-    """The names of a block's rows.
-
-    frames: the one each row is expressed in, or for look-ups the two, parted by NUL
-    spans: the names of the results, by role
-    bad: rows whose names do not fit: column and reason
-    lost: the first row whose result cannot name a frame, and that frame
-    """
-
-    frames: Sequence[str | None] = ()
-    spans: tuple[Spans, ...] = ()
-    bad: Mapping[int, tuple[str, str | FrametoolError]] = MappingProxyType({})
-    lost: Sequence[tuple[int, str]] = ()
 
 
 class Naming:
@@ -75,34 +60,32 @@ class Naming:
         self.consecutive = request.operation.looks_back
         self.before: str | None = None
 
-    def of_block(self, cells: Cells) -> BlockNames:
-        """Read the names of a block's rows and name the results."""
+    def of_rows(self, size: int, column: Callable[[int], Coded]) -> tuple[BlockNames, Bad]:
+        """Read the names of so many rows and name the results; return also the rows whose names do not fit."""
         if self.places == (None, None):
-            if not self.layout.frames:
-                return BlockNames()
-            columns = [_coded(cells, place) for place in self.layout.frames]
-            texts = [[column.texts[code] for code in column.codes.tolist()] for column in columns]
-            return BlockNames(["\0".join(names) for names in zip(*texts, strict=True)])
-        parents, names = (_coded(cells, place) for place in self.places)
-        size = len(names.texts)
-        found, of_row = np.unique(parents.codes * size + names.codes, return_inverse=True)
-        pairs = [(parents.texts[code // size], names.texts[code % size]) for code in found.tolist()]
+            if not (size and self.layout.frames):
+                return BlockNames(), {}
+            texts = [each.each() for each in map(column, self.layout.frames)]
+            return BlockNames(["\0".join(names) for names in zip(*texts, strict=True)]), {}
+        none = Coded([""], np.zeros(size, np.int64))
+        parents, names = (column(place) if size and place is not None else none for place in self.places)
+        count = len(names.texts)
+        found, of_row = np.unique(parents.codes * count + names.codes, return_inverse=True)
+        pairs = [(parents.texts[code // count], names.texts[code % count]) for code in found.tolist()]
         results = [self._result(*pair) for pair in pairs]
-        bad: dict[int, tuple[str, str | FrametoolError]] = {}
-        for row in np.flatnonzero(np.array([isinstance(each, FrametoolError) for each in results])[of_row]).tolist():
-            bad[row] = self.column, results[of_row[row]]
-        emptied = np.array([bool(self._lost(*each)) for each in zip(pairs, results, strict=True)])[of_row]
-        lost = [
-            (row, self._lost(pairs[of_row[row]], results[of_row[row]])) for row in np.flatnonzero(emptied)[:1].tolist()
-        ]
+        named = [pair if isinstance(each, FrametoolError) else each for pair, each in zip(pairs, results, strict=True)]
+        bad: Bad = {
+            int(row): (self.column, each)
+            for at, each in enumerate(results) if isinstance(each, FrametoolError)
+            for row in np.flatnonzero(of_row == at)
+        }  # fmt: skip
+        lost = {at: frame for at, each in enumerate(zip(pairs, named, strict=True)) if (frame := self._lost(*each))}
+        first = np.flatnonzero(np.isin(of_row, [*lost]))[:1].tolist() if lost else ()
         if self.consecutive:
-            bad |= self._breaks([parents.texts[code] for code in parents.codes.tolist()])
-        frames = [None if not text or self._is_counter(text) else text for text in parents.texts]
-        spans = tuple(
-            self._spans(cells, role, pairs, [_named(*each) for each in zip(results, pairs, strict=True)], of_row)
-            for role in (PARENT, NAME)
-        )
-        return BlockNames([frames[code] for code in parents.codes.tolist()], spans, bad, lost)
+            bad |= self._breaks(parents.each())
+        known = [None if not text or self._is_counter(text) else text for text in parents.texts]
+        frames = [known[code] for code in parents.codes.tolist()]
+        return BlockNames(frames, pairs, named, of_row, [(row, lost[of_row[row]]) for row in first]), bad
 
     def _is_counter(self, name: str) -> bool:
         return self.counts is not None and self.counts(name)
@@ -125,33 +108,23 @@ class Naming:
             return error
         return parent if counter else new[0] or "", new[1] or ""
 
-    def _lost(self, pair: Texts, result: Texts | FrametoolError) -> str:
+    def _lost(self, pair: Texts, result: Texts) -> str:
         """Return the frame that a cell named and the result does not; "" if absent."""
-        named = zip(self.places, pair, _named(result, pair), strict=True)
+        named = zip(self.places, pair, result, strict=True)
         return next((old for place, old, new in named if place is not None and old and not new), "")
 
-    def _spans(
-        self, cells: Cells, role: int, pairs: Sequence[Texts], results: Sequence[Texts], of_row: Ints
-    ) -> Spans:
+    def spans(self, cells: Cells, role: int, names: BlockNames) -> Spans:
         """Write names as cells; one that does not change stays as it is written."""
-        place = self.places[role]
-        if place is None:
-            return Spans(cells.data, of_row, of_row)
-        texts = [quoted(result[role], self.layout.delimiter) for result in results]
-        data = framed(b"".join(texts))
-        lengths = np.array([len(text) for text in texts], np.int64)
-        ends = np.cumsum(lengths) + MARGIN
-        starts, ends = (ends - lengths)[of_row], ends[of_row]
-        same = np.array([pair[role] == result[role] for pair, result in zip(pairs, results, strict=True)])[of_row]
-        if same.any():
-            data = np.concatenate([data, cells.data])
-            starts = np.where(same, cells.starts[:, place] + len(data) - len(cells.data), starts)
-            ends = np.where(same, cells.ends[:, place] + len(data) - len(cells.data), ends)
-        return Spans(data, starts, ends)
-
-
-def _named(result: Texts | FrametoolError, pair: Texts) -> Texts:
-    return pair if isinstance(result, FrametoolError) else result
+        place, of_row = self.places[role] or 0, names.of_row
+        new = spans_of([quoted(result[role], self.layout.delimiter) for result in names.results])
+        starts, ends = new.starts[of_row], new.ends[of_row]
+        pairs = zip(names.pairs, names.results, strict=True)
+        same = np.array([old[role] == result[role] for old, result in pairs])[of_row]
+        if not same.any():
+            return Spans(new.data, starts, ends)
+        data, behind = np.concatenate([new.data, cells.data]), len(new.data)
+        starts = np.where(same, cells.starts[:, place] + behind, starts)
+        return Spans(data, starts, np.where(same, cells.ends[:, place] + behind, ends))
 
 
 def rename_of(request: Request) -> Rename | None:
@@ -178,24 +151,26 @@ class Coded(NamedTuple):
     texts: Sequence[str]
     codes: Ints
 
-
-def _coded(cells: Cells, place: int | None) -> Coded:
-    """Read the texts of a column; where all are the same, as frames often are, that is one text."""
-    rows = len(cells.rows)
-    if place is None or not rows:
-        return Coded([""], np.zeros(rows, np.int64))
-    return coded(cells.column(place))
+    def each(self) -> list[str]:
+        """Return the text of each row."""
+        return [self.texts[code] for code in self.codes.tolist()]
 
 
 def coded(cells: Spans) -> Coded:
-    """Read cells (n,), not none, as texts."""
+    """Read cells (n,), not none, as texts; where all are the same, as frames often are, that is one text."""
     column, rows = without_quotes(cells), len(cells.starts)
     if _is_constant(column):
         return Coded([_text(column.text(0))], np.zeros(rows, np.int64))
-    data, known = column.data.tobytes(), dict[bytes, int]()
+    data = column.data.tobytes()
     spans = zip(column.starts.tolist(), column.ends.tolist(), strict=True)
-    codes = np.fromiter((known.setdefault(data[start:end], len(known)) for start, end in spans), np.int64, rows)
-    return Coded([_text(each) for each in known], codes)
+    return coded_texts([data[start:end] for start, end in spans], _text)
+
+
+def coded_texts(cells: Sequence[Any], text: Callable[[Any], str] = str) -> Coded:
+    """Return cells as the distinct texts and the number of each."""
+    known: dict[Any, int] = {}
+    codes = np.fromiter((known.setdefault(each, len(known)) for each in cells), np.int64, len(cells))
+    return Coded([*map(text, known)], codes)
 
 
 def _text(cell: bytes) -> str:
@@ -251,7 +226,7 @@ def _euroc(names: Sequence[str], known: Sequence[str], source: str) -> PoseColum
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 COMMENT = b"#"
-NEWLINE = 10
+NEWLINE, QUOTE = b'\n"'
 UNCLOSED = "a quote is opened here and not closed"
 
 
@@ -399,18 +374,17 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def table_block(table: Table, layout: Layout, text: bytes, naming: Naming) -> Block:
+def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming) -> Block:
     """Find the rows of a block, their numbers, their names, and the stretches of text that pass."""
-    cells = table.split(text)
     places = layout.places
     is_run = places and places == tuple(range(places[0], places[0] + len(places)))  # then nothing is copied
     columns = slice(places[0], places[-1] + 1) if is_run else list(places)
     numbers = Spans(cells.data, cells.starts[:, columns], cells.ends[:, columns])
-    if b'"' in text and layout.places:
+    if places and (cells.data == QUOTE).any():
         numbers = without_quotes(numbers)
-    names = naming.of_block(cells)
+    names, bad = naming.of_rows(len(cells.rows), lambda place: coded(cells.column(place)))
     parts = [
-        names.spans[begin] if kind == NAMED else _stretch(cells, begin, end, kind, until)
+        naming.spans(cells, begin, names) if kind == NAMED else _stretch(cells, begin, end, kind, until)
         for begin, end, kind, until in layout.stretches
     ]
     times = [place for place in (layout.time, layout.below) if place is not None]
@@ -426,10 +400,8 @@ def table_block(table: Table, layout: Layout, text: bytes, naming: Naming) -> Bl
             else:
                 reason = f"expected {table.width} cells{named}, found {int(cells.counts[line])}"
                 broken.append(Broken(line, lines_before(line), "", reason))
-    return Block(
-        numbers, parts, cells.rows, lambda row: lines_before(int(cells.rows[row])), unchanged, broken, names.frames,
-        stamps, names.bad, names.lost,
-    )  # fmt: skip
+    lines = lambda row: lines_before(int(cells.rows[row]))  # noqa: E731
+    return Block(numbers, parts, cells.rows, lines, unchanged, broken, names, stamps, bad)
 
 
 def at_other_times(table: Table, layout: Layout, text: bytes, offset_ns: int) -> bytes:

@@ -18,7 +18,7 @@ from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge, Samples
 from frametool.stream.faults import BadRow, Fault
 from frametool.stream.request import Request
-from frametool.stream.table_stream import TablePoses, begin_table, stamps_for
+from frametool.stream.table_stream import TableRows, begin_table, stamps_for
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -39,9 +39,10 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
     fmt = FORMATS[file.format].poses
     if what := not_text(file.head()):
         raise FormatError(what, source=file.name)
-    request = Request(normalize=options.normalize, notations=(notation("quaternion"),), keep_sign=True)
+    quaternion = (notation("quaternion"),)
+    request = Request(normalize=options.normalize, notations=quaternion, keep_sign=True, all_numbers=True)
     begun = begin_table(cast("ByteStream", file.stream), file.format, request, source=file.name)
-    rows = TablePoses(begun.table, request, file.name)
+    rows = TableRows(begun.table, request, file.name)
     _check(rows, fmt, file, options)
     stamps = StampFile(options.answers.stamps) if options.answers.stamps else None
     count = 0
@@ -60,7 +61,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
     _tell(rows, fmt, options, count)
 
 
-def _check(rows: TablePoses, fmt: Poses, file: InputFile, options: Options) -> None:
+def _check(rows: TableRows, fmt: Poses, file: InputFile, options: Options) -> None:
     """Refuse a table that is no poses, or poses without time and names."""
     if rows.shape.notation is None:
         message = f"no rotation among the columns {rows.columns}: points are no frames"
@@ -100,7 +101,7 @@ def _pieces(
     options.tally.axes |= dict.fromkeys(names, options.answers.camera_axes or fmt.axes)
 
 
-def _tell(rows: TablePoses, fmt: Poses, options: Options, count: int) -> None:
+def _tell(rows: TableRows, fmt: Poses, options: Options, count: int) -> None:
     """Keep what is worth telling: what was taken for granted, rotations that were not quite."""
     if len(rows.roles) < 2:
         describe(options, fmt, count)

@@ -5,21 +5,21 @@ from __future__ import annotations
 from contextlib import suppress
 from itertools import chain
 from shlex import quote
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
 from frametool.errors import FormatError, FrametoolError, Misused, listing
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
-from frametool.grammar.names import NORMAL_NAMES, in_nanoseconds, stamp_places
+from frametool.grammar.names import NORMALS, in_nanoseconds, stamp_places
 from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import NULL, Fault, Outcome, RowNote, notes_of
+from frametool.stream.faults import Fault, Outcome, RowNote, notes_of
 from frametool.stream.header import listed
-from frametool.stream.layout import NAMED, New
+from frametool.stream.layout import New
 from frametool.stream.row_layout import POSE, Shape
-from frametool.stream.row_poses import NO_STAMP, RowPoses
-from frametool.stream.rows import chosen, written
+from frametool.stream.row_poses import NO_STAMP, RowPoses, taken
+from frametool.stream.rows import written
 from frametool.stream.stamp_columns import read_stamps
 from frametool.stream.table import (
     BYTE_ORDER_MARK,
@@ -28,7 +28,6 @@ from frametool.stream.table import (
     Naming,
     as_trajectory,
     at_other_times,
-    coded,
     open_table,
     table_block,
     unnamed,
@@ -38,7 +37,7 @@ from frametool.text.cells import RecordEnds, torn_record
 from frametool.text.lines import read_blocks, whole_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator, Sequence
+    from collections.abc import Callable, Generator, Iterator, Sequence
 
     from frametool.formats.rows.pose_rows import StampFile
     from frametool.formats.table import Poses
@@ -46,8 +45,9 @@ if TYPE_CHECKING:
     from frametool.stream.rows import Block
     from frametool.stream.stamp_source import Timed
     from frametool.stream.table import Table
+    from frametool.text.cells import Cells
     from frametool.text.lines import ByteStream
-    from frametool.text.spans import Ints, Spans
+    from frametool.text.spans import Floats, Ints, Spans
 
 
 def run_table(
@@ -55,12 +55,10 @@ def run_table(
 ) -> Generator[Outcome]:
     """Yield the outcomes of a table's blocks, the first one its head."""
     begun = begin_table(stream, fmt, request, source=source, header=header)
-    names = begun.table.names
-    request = request if NORMAL_NAMES.isdisjoint(names or ()) else with_vectors(names, request)
     rows = TableRows(begun.table, request, source)
     yield Outcome(begun.table.opening(rows.layout), lines=begun.lines, size=begun.taken)
     for text in begun.texts():
-        run, outcome = rows.of_text(text)
+        run, outcome, _ = rows.of_text(text)
         yield outcome._replace(text=written(run.groups(run.first_fault())))
 
 
@@ -134,12 +132,22 @@ def _stamp_column(table: Table, source: str, who: str) -> str:
 class PlannedRows:
     """Rows that are planned: what is done with each, what it is called, and what one block leaves for the next.
 
+    A request for all numbers makes poses of them; its notations say which numbers come out.
     off: how far the worst rotation was from one; mended: how many were normalised
+    stamp_at: the column of stamps that are read of each row, whoever needs them
+    inputs: the numbers of the last rows that became poses as read, a row a column
     """
 
-    def __init__(self, table: Table, request: Request, source: str) -> None:
-        """Plan the rows of a table; raises FormatError or Misused where they do not fit what is asked for."""
+    def __init__(
+        self, table: Table, request: Request, source: str, vectors: Sequence[tuple[str, ...]] = NORMALS, *,
+        stamped: bool = True,
+    ) -> None:  # fmt: skip
+        """Plan the rows of a table; raises FormatError or Misused where they do not fit what is asked for.
+
+        vectors: the columns of vectors that turn with points; stamped: a column with the name of a stamp is one
+        """
         self.table = table
+        request = with_vectors(table.names, request, vectors)
         self.request, self.unasked = settle_stamps(table, request, source)
         self.plan, self.layout = plan_table(table, self.request, source)
         self.shape = self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
@@ -148,6 +156,23 @@ class PlannedRows:
             request.gathered.stamped |= stamp_places(table.names)[0] is not None
         self.state = State()
         self.mended, self.off = 0, 0.0
+        if request.all_numbers and self.layout.time is None and stamped:
+            time, below = stamp_places(table.names)
+            if not table.names and not request.columns and min(self.layout.places, default=0) == 1:
+                time = 0  # what is before the numbers that --from speaks of
+            if time not in self.layout.frames:
+                self.layout = self.layout._replace(time=time, below=below)
+        self.stamp_at = self.layout.time
+
+    @property
+    def columns(self) -> str:
+        """List the columns there are."""
+        return listed(self.table.names or ("columns without names",))
+
+    @property
+    def roles(self) -> list[int]:
+        """Return whether columns name the parent (0) and what a row is the pose of (1)."""
+        return [role for role, place in enumerate(self.naming.places) if place is not None]
 
     def ran(self, block: Block) -> Run:
         """Return what becomes of a block."""
@@ -156,115 +181,69 @@ class PlannedRows:
         self.off = max(self.off, run.off)
         return run
 
-    def notes_of(self, run: Run, frames: Sequence[str | None]) -> list[RowNote]:
-        """Return warnings about the rows of a block; frames: that they are expressed in."""
+    def notes_of(self, run: Run) -> list[RowNote]:
+        """Return warnings about the rows of a block."""
         notes = notes_of(run, run.block)
-        if self.unasked is not None and run.count and moves_in_time(self.unasked, {*frames} or {None}):
+        frames = {*run.block.names.frames} or {None}
+        if self.unasked is not None and run.count and moves_in_time(self.unasked, frames):
             remedy = f"give --time-column {quote(self.unasked.name)}, or --at TIME"
             ignored = f"column {self.unasked.name!r} is not looked at, rows move at the latest time; {remedy}"
             notes.append(RowNote(run.block.line_of(0), "latest", ignored))
             self.unasked = None
         return sorted(notes)
 
+    def poses_of(self, run: Run, rows: Ints, numbers: Floats, column: Callable[[int], Any], lines: Ints) -> RowPoses:
+        """Return the results of some rows of a block as poses; column: returns the cells of one for all rows."""
+        layout, block = self.layout, run.block
+        self.inputs = np.reshape(run.columns, (len(run.columns), run.count))[:, rows]
+        used = {layout.time, layout.below, *layout.places, *self.naming.places}
+        names = [*map(self.table.name, range(self.table.width))]
+        extras = {name: taken(column(place), rows) for place, name in enumerate(names) if place not in used}
+        own = own_count(self.plan, numbers.shape[1])
+        beside = [each for each in layout.columns if isinstance(each, New) and each.number >= own]
+        extras |= {each.name: numbers[:, each.number] for each in beside}
+        parents, called = (
+            block.names.texts(role, rows) if role in self.roles else [name]
+            for role, name in enumerate(unnamed(self.request, self.shape))
+        )
+        stamps: Any = None if self.stamp_at is None else block.stamps[0]
+        stamps = None if stamps is None else stamps[rows]
+        return RowPoses(numbers[:, :own], stamps, lines, parents, called, extras, block.names.frames)
+
 
 class TableRows(PlannedRows):
-    """The rows of a table, block by block.
+    """The rows of a table, block by block."""
 
-    stamp_at: the column of stamps that are read of each row, whoever needs them; stamps_ns: those of the last block
-    """
-
-    stamp_at: int | None = None
-    stamps_ns: Ints | None = None
-
-    def of_text(self, text: bytes) -> tuple[Run, Outcome]:
+    def of_text(self, text: bytes) -> tuple[Run, Outcome, Cells]:
         """Return what becomes of a block, and its outcome; behind a quote that is not closed nothing is read."""
         torn = torn_record(text, self.table.delimiter) if self.table.delimiter else None
         body = at_other_times(self.table, self.layout, text[:torn], self.request.offset_ns)
-        block = table_block(self.table, self.layout, body, self.naming)
-        if self.stamp_at is not None and block.stamps:
+        cells = self.table.split(body)
+        block = table_block(self.table, self.layout, cells, self.naming)
+        if self.request.all_numbers and self.stamp_at is not None:
             name = self.table.name(self.stamp_at)
-            self.stamps_ns, reasons = read_stamps(block.stamps[0], in_ns=in_nanoseconds(name))
-            self.stamps_ns[list(reasons)] = NO_STAMP
-            block = block._replace(bad={**{row: (name, reason) for row, reason in reasons.items()}, **block.bad})
+            stamps, reasons = read_stamps(cast("tuple[Spans, ...]", block.stamps[0]), in_ns=in_nanoseconds(name))
+            stamps[[*reasons]] = NO_STAMP
+            bad = {row: (name, reason) for row, reason in reasons.items()}
+            block = block._replace(stamps=[stamps], bad={**bad, **block.bad})
         run = self.ran(block)
         faults = run.faults()
         if torn is not None:
             faults.append(Fault(text.count(b"\n", 0, torn), "", UNCLOSED, final=True))
-        notes = self.notes_of(run, block.frames)
         rows = len(block.places) + len(block.broken)
-        return run, Outcome(b"", faults, rows, text.count(b"\n"), len(run.mended), notes, len(text))
-
-
-class TablePoses(TableRows):
-    """Turn one block of a table after the other into poses.
-
-    inputs: the numbers of the last block's good rows as read, a row a column
-    """
-
-    def __init__(self, table: Table, request: Request, source: str) -> None:
-        """Plan the rows; the request's notations say which numbers come out.
-
-        Raises FormatError for a table without a pose, Misused for a request that does not fit.
-        """
-        super().__init__(table, with_vectors(table.names, request)._replace(all_numbers=True), source)
-        layout = self.layout
-        self.unnamed = unnamed(request, self.shape)
-        self.roles = [role for role, place in enumerate(self.naming.places) if place is not None]
-        if layout.time is None:
-            time, below = stamp_places(table.names)
-            if not table.names and not request.columns and min(layout.places, default=0) == 1:
-                time = 0  # what is before the numbers that --from speaks of
-            layout = layout._replace(time=None if time in layout.frames else time, below=below)
-        self.stamp_at = layout.time
-        used = {layout.time, layout.below, *layout.places, *self.naming.places}
-        self.kept = [place for place in range(table.width) if place not in used]
-        stretches = [(place, place, "cell", "cell") for place in self.kept]
-        stretches += [(role, role, NAMED, NAMED) for role in self.roles]
-        self.layout = layout._replace(stretches=tuple(stretches), pieces=())
-
-    @property
-    def columns(self) -> str:
-        """List the columns there are."""
-        return listed(self.table.names or ("columns without names",))
+        return run, Outcome(b"", faults, rows, text.count(b"\n"), len(run.mended), self.notes_of(run), len(text)), cells
 
     def blocks(self, begun: Begun) -> Iterator[tuple[RowPoses, int, Outcome]]:
         """Yield the poses of all blocks of a table, each with the line, from 1, at which it begins."""
         line = 1 + begun.lines
         for text in begun.texts():
-            poses, outcome = self.of_block(text)
-            yield poses, line, outcome
+            run, outcome, cells = self.of_text(text)
+            rows, numbers = run.settled()
+            lines = run.block.places[rows]
+            if b'"' in text:  # a cell may hold line ends
+                lines = np.array([*map(run.block.line_of, rows.tolist())], np.int64)
+            yield self.poses_of(run, rows, numbers, cells.column, lines), line, outcome
             line += outcome.lines
-
-    def of_block(self, text: bytes) -> tuple[RowPoses, Outcome]:
-        """Return the poses of a block, and what is said of it."""
-        run, outcome = self.of_text(text)
-        rows, results, block = run.rows, run.results, run.block
-        if self.request.on_error == NULL and run.reasons:
-            rows = np.array(sorted({*run.rows.tolist(), *run.reasons}), np.int64)
-            results = np.full((len(rows), run.results.shape[1]), np.nan)
-            results[np.searchsorted(rows, run.rows)] = run.results
-        self.inputs = np.reshape(run.columns, (len(run.columns), run.count))[:, rows]
-        parts = block.parts if len(rows) == run.count else [chosen(part, rows) for part in block.parts]
-        texts: dict[str, Any] = {self.table.name(place): part for place, part in zip(self.kept, parts, strict=False)}
-        own = own_count(self.plan, results.shape[1])
-        extra = [each for each in self.layout.columns if isinstance(each, New) and each.number >= own]
-        texts |= {each.name: results[:, each.number] for each in extra}
-        names: list[Sequence[str | None]] = [[name] for name in self.unnamed]
-        for role, part in zip(self.roles, parts[len(self.kept) :], strict=True):
-            names[role] = _texts(part)
-        lines = block.places[rows]
-        if b'"' in text:
-            lines = np.array([block.line_of(row) for row in rows.tolist()], np.int64)
-        stamps = None if self.stamps_ns is None else self.stamps_ns[rows]
-        return RowPoses(results[:, :own], stamps, lines, names[0], names[1], texts, block.frames), outcome
-
-
-def _texts(part: Spans) -> Sequence[str | None]:
-    """Return names, one for all rows where all are the same."""
-    if not len(part.starts):
-        return [None]
-    texts, codes = coded(part)
-    return [texts[0] or None] if len(texts) == 1 else [texts[code] or None for code in codes.tolist()]
 
 
 def stamps_for(block: RowPoses, file: StampFile | None, fmt: Poses, before: int) -> Ints | None:
