@@ -6,11 +6,12 @@ The points of a message are such a file too: moved by one pose, and written as a
 from __future__ import annotations
 
 from importlib import import_module
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import FormatError, Misused, ValueInvalid, listing, warn
+from frametool.errors import FormatError, Misused, listing, warn
 from frametool.formats.rows import pcd
 from frametool.formats.rows.column_file import (
     FLOATS,
@@ -25,11 +26,11 @@ from frametool.formats.table import FORMATS
 from frametool.grammar.names import NORMALS, in_nanoseconds
 from frametool.stream.array_writer import ColumnsWriter
 from frametool.stream.faults import SKIP, STOP, Outcome
-from frametool.stream.layout import Fixed, Kept, Named, New, Worded, quoted
+from frametool.stream.layout import Fixed, Kept, Named, New, quoted
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_poses import objects, taken
-from frametool.stream.rows import Block
-from frametool.stream.table import Table, coded_texts
+from frametool.stream.rows import Block, coded_texts
+from frametool.stream.table import Table
 from frametool.stream.table_stream import PlannedRows
 
 if TYPE_CHECKING:
@@ -48,17 +49,11 @@ DOUBLE = np.dtype(np.float64)
 
 
 class RowResults(NamedTuple):
-    """What became of a batch: the rows that are written, in their order.
-
-    rows: (n,) which of the batch's rows they are
-    numbers: (n, k) the results, nan if absent
-    absent: (n,) for each shape, rows that have no numbers on purpose; None where all have
-    """
+    """What became of a batch: the rows (n,) that are written, and their numbers (n, k), nan if absent."""
 
     run: Run
     rows: Ints
     numbers: Floats
-    absent: Sequence[Flags | None]
 
 
 class ColumnRows(PlannedRows):
@@ -84,60 +79,46 @@ class ColumnRows(PlannedRows):
         self.faults: list[Fault] = []
         self.notes: list[RowNote] = []
         self.narrow = {} if request.all_numbers else self._narrow()  # all of them are written as doubles
-        self.numbers = sum(isinstance(column, New) for column in self.layout.columns)
 
-    def out_columns(self) -> list[OutColumn]:
-        """Return the columns of the output; what is read as float32 is written so, what is new is a double."""
+    def out_columns(self, *, named: bool = False) -> list[OutColumn]:
+        """Return the columns of the output; what is read as float32 is written so, what is new is a double.
+
+        named: those of a file without names get the usual ones
+        """
+        names = self.table.names
+        usual = [name for each in self.plan.targets for name in (*each.position_columns, *each.names)]
+        ours = dict(zip(self.layout.places, usual, strict=False))
         found = []
-        for column in self.layout.columns:
-            if isinstance(column, Kept):
-                found.append(OutColumn(self._name(column.place), self.file.kind(column.place), column.place))
-            elif isinstance(column, New):
-                found.append(OutColumn(column.name if self.table.names else "", self._kind_of(column)))
+        for at, column in enumerate(self.layout.columns, 1):
+            place = column.place if isinstance(column, (Kept, Named)) else None
+            if names or isinstance(column, Fixed):
+                name = names[place] if names and place is not None else column.name  # type: ignore[union-attr]
+            elif isinstance(column, New) and column.number < len(usual):
+                name = usual[column.number]
             else:
-                name = self._name(column.place) if isinstance(column, Named) else column.name
-                found.append(OutColumn(name, None))
+                name = ours.get(-1 if place is None else place, f"column_{at}")
+            kind = self.file.kind(column.place) if isinstance(column, Kept) else None
+            if isinstance(column, New) and not column.words:
+                kind = self._kind_of(column)
+            found.append(OutColumn(name * bool(names or named), kind, place if isinstance(column, Kept) else None))
         return found
-
-    def named_columns(self) -> list[OutColumn]:
-        """Return the columns of the output, each with a name: those of a file without names get the usual ones."""
-        if self.table.names:
-            return self.out_columns()
-        targets = self.plan.targets
-        names = [name for each in targets for name in (*each.position_columns, *each.names)]
-        kept = dict(zip(self.layout.places, names, strict=False))
-        found = []
-        for at, (column, target) in enumerate(zip(self.out_columns(), self.layout.columns, strict=True), 1):
-            ours = dict(enumerate(names)).get(target.number) if isinstance(target, New) else None
-            if isinstance(target, (Kept, Named)):
-                ours = kept.get(target.place)
-            elif isinstance(target, (Worded, Fixed)):
-                ours = target.name
-            found.append(column._replace(name=ours or f"column_{at}"))
-        return found
-
-    def _name(self, place: int) -> str:
-        return self.table.names[place] if self.table.names else ""
 
     def _kind_of(self, column: New) -> Kind:
         """Return the type of a result's numbers: that of the column it replaces; raises Misused for integers."""
-        place = self._replaced(column)
-        kind = DOUBLE if place is None else self.file.kind(place)
+        names = self.table.names
+        kind: Kind | None = DOUBLE
+        if names is None and getattr(self.file.kind(0), "kind", "") in FLOATS:  # an array of one type
+            kind = self.file.kind(0)
+        elif names and column.name in names:
+            kind = self.file.kind(names.index(column.name))
         if kind is None or kind.kind not in FLOATS:
             whole = f"column {column.name} holds {kind}, where the result would be rounded"
             raise Misused(f"{whole}; --keep puts it beside, -f csv writes text", source=self.source)
         return kind
 
-    def _replaced(self, column: New) -> int | None:
-        """Return the place of the input's column whose numbers a result's replace."""
-        names = self.table.names
-        if names is None:  # an array of one type
-            return 0 if getattr(self.file.kind(0), "kind", "") in FLOATS else None
-        return names.index(column.name) if column.name in names else None
-
     def _narrow(self) -> dict[int, Kind]:
         """Return which numbers of the result are rounded to fewer digits than they are computed with."""
-        news = [column for column in self.layout.columns if isinstance(column, New)]
+        news = [column for column in self.layout.columns if isinstance(column, New) and not column.words]
         kinds = {column.number: self._kind_of(column) for column in news}
         return {number: kind for number, kind in kinds.items() if kind.itemsize < DOUBLE.itemsize}
 
@@ -158,12 +139,13 @@ class ColumnRows(PlannedRows):
         if self.request.on_error == STOP and run.reasons:
             stay = rows < min(run.reasons)
             rows, numbers = rows[stay], numbers[stay]
-        null = np.isin(np.arange(batch.size), [*run.reasons]) if run.reasons else None
-        absent = [flags if flags is None else flags[rows] for flags in (_either(each, null) for each in absent)]
-        for flags, span in zip(absent, self._spans(), strict=True):
+        ends = np.cumsum([target.size for target in self.plan.targets]).tolist()
+        several = len(ends) > 1  # results, each of a shape of its own
+        for at, flags in enumerate(absent):
             if flags is not None:
-                numbers[flags, span.start : span.stop] = np.nan
-        return RowResults(run, rows, numbers, absent)
+                first, last = (ends[at] - self.plan.targets[at].size, ends[at]) if several else (0, numbers.shape[1])
+                numbers[flags[rows], first:last] = np.nan
+        return RowResults(run, rows, numbers)
 
     def outcome(self, batch: Batch, text: bytes = b"") -> Outcome:
         """Return what is written of the last batch, and what is said of it."""
@@ -172,7 +154,7 @@ class ColumnRows(PlannedRows):
 
     def poses(self, batch: Batch) -> RowPoses:
         """Return the results of a batch for another format, with what else its rows hold."""
-        run, rows, numbers, _ = self.of_batch(batch)
+        run, rows, numbers = self.of_batch(batch)
         return self.poses_of(run, rows, numbers, batch.column, rows)
 
     # --- what is read ---
@@ -188,7 +170,8 @@ class ColumnRows(PlannedRows):
             flags: Flags | None = None
             for at in range(first, first + shape.size):
                 if at in self.plan.words:
-                    columns[at] = self._words(batch, at, bad)
+                    columns[at], reasons = coded_texts(batch.texts(places[at])).numbers(self.plan.words[at])
+                    bad |= {row: (self.plan.names[at], reason) for row, reason in reasons.items()}
                     continue
                 columns[at], missing = batch.numbers(places[at])
                 invalid = not_finite(columns[at])
@@ -203,17 +186,6 @@ class ColumnRows(PlannedRows):
             absent.append(flags)
             first += shape.size
         return columns.T, absent or [None], bad
-
-    def _words(self, batch: Batch, at: int, bad: dict[int, tuple[str, str]]) -> list[float]:
-        """Read a column of words, each of which encodes a number."""
-        read, texts = self.plan.words[at], [str(text) for text in batch.texts(self.layout.places[at])]
-        known: dict[str, float] = {}
-        for row, text in enumerate(texts):
-            try:
-                known[text] = known[text] if text in known else read(text)
-            except ValueInvalid as error:
-                bad[row] = self.plan.names[at], str(error)
-        return [known.get(text, 0.0) for text in texts]
 
     def _without_pose(self, absent: Sequence[Flags | None]) -> Ints | None:
         """Return which rows cannot be computed: 0 is a point, but no rotation."""
@@ -254,22 +226,6 @@ class ColumnRows(PlannedRows):
             if beyond.any():
                 run.refuse(run.rows[beyond].tolist(), f"the result is too large for {kind}")
 
-    def _spans(self) -> list[range]:
-        """Return which numbers of the result come from each shape: all of one, if there is one result."""
-        targets = self.plan.targets
-        ends = np.cumsum([target.size for target in targets]).tolist()
-        if len(targets) == 1:
-            return [range(self.numbers)] * max(len(self.plan.shapes), 1)
-        return [range(end - target.size, end) for target, end in zip(targets, ends, strict=True)]
-
-    def absent_in(self, number: int, results: RowResults) -> Flags | None:
-        """Return which rows have no number in a column of the result."""
-        found: Flags | None = None
-        for flags, span in zip(results.absent, self._spans(), strict=True):
-            if number in span:
-                found = _either(found, flags)
-        return found
-
 
 def _either(first: Flags | None, second: Flags | None) -> Flags | None:
     if first is None or second is None:
@@ -282,7 +238,7 @@ def run_columns(
 ) -> Generator[Outcome]:
     """Yield what becomes of a file's batches in a file of the same format, or in that of a module, `into`."""
     rows = ColumnRows(file, request, source)
-    columns = rows.out_columns() if into is None else rows.named_columns()
+    columns = rows.out_columns(named=into is not None)
     move_along(file, request)
     if rows.narrow and not request.gathered:
         kinds = ", ".join(sorted({kind.name for kind in rows.narrow.values()}))
@@ -317,7 +273,7 @@ class MergedClouds:
     def __init__(self, files: Sequence[tuple[ColumnFile, Request, str]], style: Style) -> None:
         """Plan the rows of files, each with what is done with it and its name; raises as `run_columns`."""
         self.parts = [(file, ColumnRows(file, request, source)) for file, request, source in files]
-        every = [{column.name: column for column in rows.named_columns()} for _, rows in self.parts]
+        every = [{column.name: column for column in rows.out_columns(named=True)} for _, rows in self.parts]
         self.writer = ColumnsWriter(style)
         self.kinds: dict[str, Kind | None] = {}
         for name in every[0]:
@@ -335,7 +291,7 @@ class MergedClouds:
     def outcomes(self, at: int) -> Iterator[Outcome]:
         """Yield what becomes of the batches of one file."""
         file, rows = self.parts[at]
-        columns = rows.named_columns()
+        columns = rows.out_columns(named=True)
         for batch in file.batches():
             results = rows.of_batch(batch)
             made = _in_other_format(columns, rows, batch, results)
@@ -378,15 +334,16 @@ def made_of(columns: Sequence[OutColumn], rows: ColumnRows, results: RowResults)
     """Return what is in the columns that are made, in their order."""
     made = []
     for column, target in zip(columns, rows.layout.columns, strict=True):
-        if isinstance(target, New):
+        if isinstance(target, New) and target.words:
+            codes = np.nan_to_num(results.numbers[:, target.number]).tolist()
+            made.append(Made([target.words[int(code)] for code in codes]))
+        elif isinstance(target, New):
             with np.errstate(invalid="ignore"):
                 values = results.numbers[:, target.number].astype(column.kind or DOUBLE)
-            made.append(Made(values, rows.absent_in(target.number, results)))
+            made.append(Made(values, not_finite(values)))
         elif isinstance(target, Named):
             texts = [text or "" for text in results.run.block.names.texts(target.role, results.rows)]
             made.append(Made(texts * (len(results.rows) if len(texts) == 1 else 1)))
-        elif isinstance(target, Worded):
-            made.append(Made([target.words[int(number)] for number in results.numbers[:, target.number].tolist()]))
         elif isinstance(target, Fixed):
             made.append(Made([target.word] * len(results.numbers)))
     return made
@@ -417,28 +374,11 @@ class MessageColumns(ColumnFile):
         raise NotImplementedError
 
 
-class _GridOfForm:
-    """A format in which the grid of a cloud is kept, and the pose of its sensor, where it has room for them."""
-
-    def __init__(self, fmt: str, cloud: PointCloud, pose: Rigid) -> None:
-        """Take the cloud and the pose that moves it."""
-        self.module: Any = import_module(FORMATS[fmt].writer)
-        self.cloud = cloud
-        self.pose = pose
-        if hasattr(self.module, "misfit"):
-            self.misfit = self.module.misfit
-
-    def create(self, columns: Sequence[OutColumn], count: int | None, style: Style) -> ColumnWriter:
-        """Return what writes the points."""
-        del count
-        cloud = self.cloud
-        kept = {"grid": (cloud.width, cloud.height), "sensor": self.pose} if self.module is pcd else {}
-        writer: ColumnWriter = self.module.create(columns, len(cloud.rows), style, **kept)
-        return writer
-
-
 def moved_cloud(cloud: PointCloud, pose: Rigid, style: Style, source: str) -> Iterator[Outcome]:
     """Yield what a cloud becomes when a pose moves it, in the format of a style."""
+    module: Any = import_module(FORMATS[style.format].writer)
+    kept = {"grid": (cloud.width, cloud.height), "sensor": pose} if module is pcd else {}  # it has room for them
+    create = lambda columns, _count, style: module.create(columns, len(cloud.rows), style, **kept)  # noqa: E731
+    into = SimpleNamespace(**{**vars(module), "create": create})
     request = Request(Operation(left=pose, moves=True))
-    into = _GridOfForm(style.format, cloud, pose)
     yield from run_columns(MessageColumns(cloud), request, style, source=source, into=into)

@@ -29,7 +29,7 @@ from frametool.stream.row_layout import (
     wrong_tail,
 )
 from frametool.stream.row_poses import texts_of
-from frametool.stream.rows import assemble, chosen, number_spans, numbers_or_null, separators, texts_as_rows
+from frametool.stream.rows import assemble, chosen, coded, number_spans, numbers_or_null, separators, texts_as_rows
 from frametool.stream.stamp_columns import NOWHERE, by_frame, by_time, read_stamps
 from frametool.text.numbers import parse_number, read_number_or_angle
 from frametool.text.parse import half_units, parse_floats
@@ -151,21 +151,20 @@ class Run:
         numbers, bad = parse_floats(cells)
         if not (len(bad) or words):
             return numbers
-        invalid = [each for place in bad.tolist() if (each := divmod(place, numbers.shape[1]))[1] not in words]
-        invalid += [(row, column) for column in words for row in range(self.count)]  # also those that look like numbers
-        known: dict[tuple[int, str], float] = {}
-        for row, column in invalid:
+        for row, column in (divmod(place, numbers.shape[1]) for place in bad.tolist()):
+            if column in words:
+                continue
             text = cells.text(row, column).decode("utf-8", "replace").strip(" \t")
+            read = self.plan.marked.get(column)
             try:
-                if column not in words:
-                    read = self.plan.marked.get(column)
-                    numbers[row, column] = read(text) if read else self._with_unit(text, column)
-                    continue
-                if (column, text) not in known:
-                    known[column, text] = words[column](text)
-                numbers[row, column] = known[column, text]
+                numbers[row, column] = read(text) if read else self._with_unit(text, column)
             except ValueInvalid as error:
                 self._blame(row, self.plan.names[column], str(error))
+        for column, word in words.items() if self.count else ():  # also those that look like numbers
+            own = coded(Spans(cells.data, cells.starts[:, column], cells.ends[:, column]))
+            numbers[:, column], reasons = own.numbers(word)
+            for row, reason in reasons.items():
+                self._blame(row, self.plan.names[column], reason)
         return numbers
 
     def _check_covariances(self, numbers: Floats) -> None:

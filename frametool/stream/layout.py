@@ -90,18 +90,11 @@ class Kept(NamedTuple):
 
 
 class New(NamedTuple):
-    """A number of the result, under its name."""
+    """A number of the result, under its name; words: those that it encodes."""
 
     number: int
     name: str
-
-
-class Worded(NamedTuple):
-    """A number of the result, under its name, as the word that it encodes."""
-
-    number: int
-    name: str
-    words: tuple[str, ...]
+    words: tuple[str, ...] = ()
 
 
 class Fixed(NamedTuple):
@@ -122,8 +115,8 @@ PARENT, NAME = 0, 1  # roles of names
 NAMED = "named"  # a stretch that is no text of the input but the name of a role
 
 
-Column: TypeAlias = Kept | New | Worded | Fixed | Named
-ADDED = (New, Worded, Fixed)  # no columns of the input
+Column: TypeAlias = Kept | New | Fixed | Named
+ADDED = (New, Fixed)  # no columns of the input
 
 
 class Layout(NamedTuple):
@@ -172,8 +165,7 @@ def lay_out(
     stretches: list[Stretch] = []
     groups: list[list[Column]] = []
     for column in columns:  # columns that follow one another, and numbers that do, go together
-        before = groups[-1][-1] if groups else None
-        if isinstance(column, (Kept, New)) and type(before) is type(column) and column[0] == before[0] + 1:
+        if groups and _goes_on(groups[-1][-1], column):
             groups[-1].append(column)
         else:
             groups.append([column])
@@ -190,10 +182,11 @@ def lay_out(
         elif isinstance(first, Named):
             stretches += [(first.place, first.place, "cell", "cell"), (first.role, first.role, NAMED, NAMED)]
             pieces.append(Instead(len(stretches) - 2, len(stretches) - 1))
-        elif isinstance(first, New):
-            pieces.append(Out(first.number, first.number + len(group), between))
+        elif isinstance(first, Fixed):
+            pieces.append(Const(first.word.encode()))
         else:
-            pieces.append(Const(first.word.encode()) if isinstance(first, Fixed) else Word(first.number, first.words))
+            run = Out(first.number, first.number + len(group), between)
+            pieces.append(Word(first.number, first.words) if first.words else run)
         if follows:
             pieces.append(Const(between))
     if not stretches or stretches[-1][3] != "line":
@@ -201,6 +194,14 @@ def lay_out(
         pieces.append(In(len(stretches) - 1))
     null = b"" if delimiter else b"nan"
     return Layout(tuple(columns), tuple(places), tuple(frames), tuple(pieces), tuple(stretches), delimiter, null)
+
+
+def _goes_on(before: Column, column: Column) -> bool:
+    if isinstance(column, Kept):
+        return isinstance(before, Kept) and column.place == before.place + 1
+    if not (isinstance(column, New) and isinstance(before, New)) or column.words or before.words:
+        return False
+    return column.number == before.number + 1
 
 
 def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from frametool.errors import ValueInvalid
 from frametool.stream.layout import Const, IfLocked, In, Instead, Out, Word
+from frametool.text.cells import without_quotes
 from frametool.text.spans import MARGIN, Spans, framed, join
 from frametool.text.write import fixed_spans, shortest_spans
 
@@ -84,6 +86,57 @@ class Block(NamedTuple):
     place_of: Callable[[int, int], tuple[int, str]] | None = None
     sources: Sequence[Sequence[str | None]] = ()
     gone: Ints | None = None
+
+
+class Coded(NamedTuple):
+    """A column of texts as the distinct ones and the number of each row's."""
+
+    texts: Sequence[str]
+    codes: Ints
+
+    def numbers(self, read: Callable[[str], float]) -> tuple[Floats, dict[int, str]]:
+        """Read the number that each encodes, nan if none, and why a row has none."""
+        known, reasons = np.full(len(self.texts), np.nan), dict[int, str]()
+        for at, text in enumerate(self.texts):
+            try:
+                known[at] = read(text)
+            except ValueInvalid as error:
+                reasons |= dict.fromkeys(np.flatnonzero(self.codes == at).tolist(), str(error))
+        return known[self.codes], reasons
+
+    def each(self) -> list[str]:
+        """Return the text of each row."""
+        return [self.texts[code] for code in self.codes.tolist()]
+
+
+def coded(cells: Spans) -> Coded:
+    """Read cells (n,), not none, as texts; where all are the same, as frames often are, that is one text."""
+    column, rows = without_quotes(cells), len(cells.starts)
+    if _is_constant(column):
+        return Coded([_text(column.text(0))], np.zeros(rows, np.int64))
+    data = column.data.tobytes()
+    spans = zip(column.starts.tolist(), column.ends.tolist(), strict=True)
+    return coded_texts([data[start:end] for start, end in spans], _text)
+
+
+def coded_texts(cells: Sequence[Any], text: Callable[[Any], str] = str) -> Coded:
+    """Return cells as the distinct texts and the number of each."""
+    known: dict[Any, int] = {}
+    codes = np.fromiter((known.setdefault(each, len(known)) for each in cells), np.int64, len(cells))
+    return Coded([*map(text, known)], codes)
+
+
+def _text(cell: bytes) -> str:
+    return cell.decode("utf-8", "replace").strip().replace('""', '"')
+
+
+def _is_constant(column: Spans) -> bool:
+    """Return True if all cells hold the same bytes."""
+    length = int(column.ends[0] - column.starts[0])
+    if length > MARGIN or (column.ends - column.starts != length).any():
+        return False
+    first = column.data[column.starts[0] : column.ends[0]]
+    return all(bool((column.data[column.starts + offset] == byte).all()) for offset, byte in enumerate(first))
 
 
 def number_spans(values: Floats, precision: int | None, separators: bytes, *, yaml: bool = False) -> Spans:

@@ -9,7 +9,7 @@ Knows how a table is written, which frames its rows name, and which columns a tr
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from frametool.geometry.representations import UPPER_ROWS, notation
 from frametool.grammar.names import EARTH_FRAMES, in_nanoseconds, stamp_column
 from frametool.stream.header import Columns, PoseColumns, has_pose_column
 from frametool.stream.layout import ADDED, NAMED, quoted
-from frametool.stream.rows import Block, BlockNames, Broken, spans_of
+from frametool.stream.rows import Block, BlockNames, Broken, Coded, coded, spans_of
 from frametool.stream.stamp_columns import read_stamps
 from frametool.stream.stamp_source import replaced, stamp_text
 from frametool.text.cells import split_blank, split_delimited, torn_record, without_quotes
@@ -143,47 +143,6 @@ def unnamed(request: Request, shape: Shape) -> Names:
     own = EARTH_FRAMES[0] if shape.place is not None else None
     rename = rename_of(request.for_kind(shape.kind))
     return (own, None) if rename is None else rename(own, None)
-
-
-class Coded(NamedTuple):
-    """A column of texts as the distinct ones and the number of each row's."""
-
-    texts: Sequence[str]
-    codes: Ints
-
-    def each(self) -> list[str]:
-        """Return the text of each row."""
-        return [self.texts[code] for code in self.codes.tolist()]
-
-
-def coded(cells: Spans) -> Coded:
-    """Read cells (n,), not none, as texts; where all are the same, as frames often are, that is one text."""
-    column, rows = without_quotes(cells), len(cells.starts)
-    if _is_constant(column):
-        return Coded([_text(column.text(0))], np.zeros(rows, np.int64))
-    data = column.data.tobytes()
-    spans = zip(column.starts.tolist(), column.ends.tolist(), strict=True)
-    return coded_texts([data[start:end] for start, end in spans], _text)
-
-
-def coded_texts(cells: Sequence[Any], text: Callable[[Any], str] = str) -> Coded:
-    """Return cells as the distinct texts and the number of each."""
-    known: dict[Any, int] = {}
-    codes = np.fromiter((known.setdefault(each, len(known)) for each in cells), np.int64, len(cells))
-    return Coded([*map(text, known)], codes)
-
-
-def _text(cell: bytes) -> str:
-    return cell.decode("utf-8", "replace").strip().replace('""', '"')
-
-
-def _is_constant(column: Spans) -> bool:
-    """Return True if all cells hold the same bytes."""
-    length = int(column.ends[0] - column.starts[0])
-    if length > MARGIN or (column.ends - column.starts != length).any():
-        return False
-    first = column.data[column.starts[0] : column.ends[0]]
-    return all(bool((column.data[column.starts + offset] == byte).all()) for offset, byte in enumerate(first))
 
 
 def as_trajectory(table: Table, fmt: str, request: Request, source: str) -> Table:

@@ -30,7 +30,7 @@ from frametool.stream.header import (
     row_shape,
     wholes_of,
 )
-from frametool.stream.layout import NAME, PARENT, Fixed, Kept, Named, New, Worded, lay_out, refuse_repeated
+from frametool.stream.layout import NAME, PARENT, Fixed, Kept, Named, New, lay_out, refuse_repeated
 from frametool.stream.request import PLAIN
 from frametool.stream.row_layout import POINT, POSE, RATE, SIX, VECTOR, Shape, place_of, six_names
 from frametool.stream.table import rename_of
@@ -418,7 +418,7 @@ def _new_columns(
     extras = [request.prefix + name for name in request.extras(shape)]
     words = (request.operation.shown or target.place or PLAIN).words
     named = [*enumerate((*moved, *turned, *extras))]
-    new: list[Column] = [Worded(at, name, words[at]) if at in words else New(at, name) for at, name in named]
+    new: list[Column] = [New(at, name, words.get(at, ())) for at, name in named]
     first, last = len(moved), len(moved) + len(turned)
     axes: list[Column] = []
     if target.place is not None and turned and not (target.place == shape.place and AXES_KEY in target.place.fields):
