@@ -115,7 +115,8 @@ class Run:
         numbers = self._read()
         if any(shape.covariance for shape in plan.shapes):
             self._check_covariances(numbers)
-        self.outside = self._outside()
+        is_cut = self.request.window or block.gone is not None
+        self.outside = self._outside() if is_cut and self.count else set[int]()
         movers = self._movers()
         self.lone: int | None = None
         self.columns = list(np.ascontiguousarray(numbers.T))
@@ -327,7 +328,7 @@ class Run:
     def _outside(self) -> set[int]:
         """Return the rows without numbers, and those before the first or after the last time that is wanted."""
         gone = set[int]() if self.block.gone is None else {*self.block.gone.tolist()}
-        if self.request.window is None or not self.count:
+        if self.request.window is None:
             return gone
         first, last = self.request.window
         times = self._times()

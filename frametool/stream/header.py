@@ -169,22 +169,16 @@ def has_pose_column(names: Iterable[str]) -> bool:
 def find_positions(header: Header) -> list[Columns]:
     """Return every three columns that can be a position."""
     named = {(match.prefix, match.suffix) for match in _named_maps(header)}
-    turns: dict[int, set[int]] = {}
-    for at, match in enumerate(match for row in ROTATIONS.values() for match in header.match(row.columns)):
-        for place in match.places:
-            turns.setdefault(place, set()).add(at)
-    found: list[Columns] = []
+    turns = [{*match.places} for row in ROTATIONS.values() for match in header.match(row.columns)]
+    found: dict[tuple[int, ...], Columns] = {}
     for base in POSITIONS:
         for match in header.match(base, range(3)):
-            units = {spot[1] for spot in match.spots if spot}
-            if (match.prefix, match.suffix) in named or not units.isdisjoint((*ANGLES, "s")):
-                continue
-            in_rotation = set.intersection(*(turns.get(place, set()) for place in match.places))
-            if in_rotation or match.prefix.lower().endswith(TURNED):
-                continue
-            if match.places not in [each.places for each in found]:
-                found.append(_position(match))
-    return [each for each in found if any(word in each.prefix.lower() for word in TELLING)] or found
+            other = (match.prefix, match.suffix) in named or match.prefix.lower().endswith(TURNED)
+            other = other or any(spot[1] in (*ANGLES, "s") for spot in match.spots if spot and spot[1])
+            if not (other or any(each.issuperset(match.places) for each in turns)):
+                found.setdefault(match.places, _position(match))
+    every = [*found.values()]
+    return [each for each in every if any(word in each.prefix.lower() for word in TELLING)] or every
 
 
 def _position(columns: Columns) -> Columns:
@@ -280,7 +274,12 @@ def find_poses(names: Sequence[str], expected: Notation | None, count: int, sour
     if len(positions) > 1:
         positions = [each for each in positions if each.names not in NORMALS]
     if len(positions) <= 1 and len(rotations) <= 1 and count == 1:
-        return [_only_pose(header, positions, rotations, expected, source)]
+        if not rotations and (half := _half_rotation(header, expected)):
+            raise _refusal(half, source)
+        if not (positions or rotations):
+            none = f"no columns of a point or pose among: {listed(header.names)}; name them with --columns"
+            raise _refusal(none, source)
+        return [_joined(header, positions, rotations)]
     poses = _paired(positions, rotations) if max(len(positions), len(rotations)) <= count else []
     if len(poses) == count:
         return poses
@@ -300,18 +299,22 @@ def plain_pose(names: tuple[str, ...], *, affixed: bool) -> PoseColumns:
     header.found = {word: {bare: spots[bare]} for word, spots in header.found.items() if bare in spots}
     positions = find_positions(header) or (find_positions(full) if affixed else [])
     rotations = find_rotations(header, None) or (find_rotations(full, None) if affixed else [])
-    if len(rotations) > 1 or len(positions) > 1:
-        what = "rotation" if len(rotations) > 1 else "position"
-        shown = " and ".join(each.shown for each in (rotations if len(rotations) > 1 else positions))
-        raise ValueInvalid(f"expected one {what}, found {shown}")
-    rotation = rotations[0] if rotations else None
-    if rotation is None and (half := _half_rotation(header, None)):
+    for what, found in (("rotation", rotations), ("position", positions)):
+        if len(found) > 1:
+            raise ValueInvalid(f"expected one {what}, found {' and '.join(each.shown for each in found)}")
+    if not rotations and (half := _half_rotation(header, None)):
         reason = half.partition(", or add --")[0]
         raise ValueInvalid(reason.replace("choose with --columns", "leave it out").replace("columns", "keys"))
-    position = positions[0] if positions and not (rotation and rotation.whole) else None
-    if position is None and rotation and not rotation.whole:
-        position = _half_position(full if affixed else header, rotation)
-    return PoseColumns(position, rotation)
+    return _joined(full if affixed else header, positions, rotations)
+
+
+def _joined(header: Header, positions: Sequence[Columns], rotations: Sequence[Columns]) -> PoseColumns:
+    """Put the one position and the one rotation together, or the half of a position that a rotation has."""
+    rotation = rotations[0] if rotations else None
+    if rotation is None or rotation.whole:
+        return PoseColumns(positions[0] if positions and rotation is None else None, rotation)
+    apart = [each for each in positions if not {*rotation.places}.intersection(each.places)]
+    return PoseColumns(apart[0] if apart else _half_position(header, rotation), rotation)
 
 
 def _refusal(reason: str, source: str) -> FormatError:
@@ -322,25 +325,6 @@ def listed(names: Sequence[str]) -> str:
     """List the columns there are, the first of very many."""
     more = f", .. ({len(names)} columns)" if len(names) > MOST_LISTED else ""
     return ", ".join(map(bare, names[:MOST_LISTED])) + more
-
-
-def _only_pose(
-    header: Header, positions: Sequence[Columns], rotations: Sequence[Columns], expected: Notation | None, source: str
-) -> PoseColumns:
-    """Put the one position and the one rotation together; raise FormatError where a rotation is there by half."""
-    rotation = rotations[0] if rotations else None
-    taken = set(rotation.places) if rotation else set()
-    whole = rotation is not None and rotation.whole
-    position = positions[0] if positions and not whole and taken.isdisjoint(positions[0].places) else None
-    if rotation is None and (half := _half_rotation(header, expected)):
-        raise _refusal(half, source)
-    if position is None and rotation and not whole:
-        position = _half_position(header, rotation)
-    if position is rotation is None:
-        raise _refusal(
-            f"no columns of a point or pose among: {listed(header.names)}; name them with --columns", source
-        )
-    return PoseColumns(position, rotation)
 
 
 def _half_rotation(header: Header, expected: Notation | None) -> str:
@@ -492,9 +476,9 @@ def named_pose(
     if count == len(places):
         return PoseColumns(None, rotation)
     match = _chosen(header, places[: len(places) - count])
-    if len(match.spots) == len(XYZ):
-        return PoseColumns(_position(match), rotation)
-    return PoseColumns(_position(match._replace(spots=(*match.spots, None), absent=(2,))), rotation)
+    if len(match.spots) < len(XYZ):
+        match = match._replace(spots=(*match.spots, None), absent=(2,))
+    return PoseColumns(_position(match), rotation)
 
 
 def wholes_of(expected: Notation | None) -> list[Notation]:
@@ -506,14 +490,12 @@ def wholes_of(expected: Notation | None) -> list[Notation]:
 
 def _chosen(header: Header, places: Sequence[int]) -> Columns:
     """Take columns as they were chosen, with the units that their names say."""
-    bare = [header.names[place] for place in places]
-    units = [bracket[1] if (bracket := re.search(BRACKETS, name)) else _unit_at_end(name) for name in bare]
-    return header.columns([*zip(places, units, strict=True)])
-
-
-def _unit_at_end(name: str) -> str:
-    said = UNITS.match(name.lower(), name.rfind("_")) if "_" in name else None
-    return (said[1] or said[2]) if said else ""
+    spots = []
+    for place in places:
+        name = header.names[place]
+        bracket, said = re.search(BRACKETS, name), UNITS.match(name.lower(), max(name.rfind("_"), 0))
+        spots.append((place, bracket[1] if bracket else (said[1] or said[2]) if said else ""))
+    return header.columns(spots)
 
 
 def _chosen_rotation(header: Header, places: Sequence[int], expected: Notation | None) -> tuple[int, Columns | None]:

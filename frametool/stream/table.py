@@ -239,7 +239,8 @@ def open_table(
     row = FORMATS[fmt]
     delimiter = (row.delimiter or "").encode()
     mark = BYTE_ORDER_MARK if block.startswith(BYTE_ORDER_MARK) else b""
-    comments, rest = _comments(block[len(mark) :])
+    rest = without_comments(block[len(mark) :])
+    comments = block[len(mark) : len(block) - len(rest)]
     line = _first_record(rest, delimiter)
     if delimiter and torn_record(line, delimiter) is not None:
         raise FormatError(UNCLOSED, source=source, line=1)
@@ -262,14 +263,14 @@ def open_table(
     return table, rest[len(line) :]
 
 
-def _comments(text: bytes) -> tuple[bytes, bytes]:
-    """Split a text behind the comments and empty lines at its start."""
+def without_comments(text: bytes) -> bytes:
+    """Leave out the comments and empty lines at the start of a text."""
     end = 0
     for line in text.splitlines(keepends=True):
         if line.strip() and not line.startswith(COMMENT):
             break
         end += len(line)
-    return text[:end], text[end:]
+    return text[end:]
 
 
 def _named_comment(
@@ -363,12 +364,10 @@ def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming) -> B
     return Block(numbers, parts, cells.rows, lines, unchanged, broken, names, stamps, bad)
 
 
-def at_other_times(table: Table, layout: Layout, text: bytes, offset_ns: int) -> bytes:
+def at_other_times(table: Table, layout: Layout, time: int, text: bytes, offset_ns: int) -> bytes:
     """Return rows with so much added to their stamps; what is no stamp stays unchanged and is reported when read."""
-    if not offset_ns or layout.time is None:
-        return text
-    cells, name = table.split(text), table.name(layout.time)
-    columns = [without_quotes(cells.column(place)) for place in (layout.time, layout.below) if place is not None]
+    cells, name = table.split(text), table.name(time)
+    columns = [without_quotes(cells.column(place)) for place in (time, layout.below) if place is not None]
     in_ns = in_nanoseconds(name)
     stamps, reasons = read_stamps(tuple(columns), in_ns=in_ns)
     edits = []

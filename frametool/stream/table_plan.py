@@ -54,8 +54,11 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     on_earth = bool(poses) and poses[0].position is not None and place_of(poses[0].position.unit) is not None
     if request.poses == 1 and only_turned and not (request.all_numbers or on_earth):
         poses = [_without_position(poses[0], request, table, source)]
-    for wrong in [columns.wrong for pose in poses for columns in pose if columns and columns.wrong]:
-        raise FormatError(wrong, source=source, line=1)
+    places: tuple[int, ...] = ()
+    for columns in [columns for pose in poses for columns in pose if columns]:
+        if columns.wrong:
+            raise FormatError(columns.wrong, source=source, line=1)
+        places += columns.places
     asked = tuple(_place(name, _names_or_numbers(table), source) for name in request.operation.columns)
     shapes = _shapes(poses, request, len(asked))
     if on_earth:
@@ -78,7 +81,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         check_formula(request, source, on_earth=on_earth)
     several = request.operation.moves and len(shapes) > 1
     targets = tuple(map(request.target, shapes)) if several else (request.target(shapes[0] if shapes else Shape(POSE)),)
-    places = (*(place for pose in poses for columns in pose if columns for place in columns.places), *extra, *asked)
+    places += (*extra, *asked)
     frames = _frame_columns(table, request, source, on_earth=on_earth)
     stays = not request.poses or (request.operation.moves and request.rename is None)
     name = None if stays else _first_called(NAME_KEYS, table)
@@ -88,18 +91,18 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     words, marked = readers_of(shapes[0]) if on_earth else ({}, dict.fromkeys(asked_at, number_or_none))
     named = ({frames[0]: PARENT} if frames and request.poses else {}) | ({} if name is None else {name: NAME})
     poses = [_written(pose) for pose in poses] if on_earth else poses
-    columns = (_several if several else _columns)(table, poses, shapes, targets, request, named)
+    written = (_several if several else _columns)(table, poses, shapes, targets, request, named)
     if extra and not request.keep:
         from frametool.stream.extra_numbers import with_entries_at
 
-        columns = with_entries_at(extra, columns, len(request.operation.carried(shapes[0])))
+        written = with_entries_at(extra, written, len(request.operation.carried(shapes[0])))
     if request.operation.turns and table.names and poses and poses[0].rotation:
         from frametool.stream.extra_numbers import with_rates
 
-        shapes, targets, places, columns = with_rates(table, request, shapes, targets, places, columns, source)
+        shapes, targets, places, written = with_rates(table, request, shapes, targets, places, written, source)
     if table.header:
-        refuse_repeated(columns, table.names or ())
-    layout = lay_out(columns, places, frames, table.width, table.delimiter)
+        refuse_repeated(written, table.names or ())
+    layout = lay_out(written, places, frames, table.width, table.delimiter)
     time = _time_column(table, request, source)
     below = None if time is None or not table.names else nanoseconds_beside(table.names, time)
     layout = layout._replace(time=time, below=below, name=name)
@@ -174,9 +177,11 @@ def with_vectors(
     names: Sequence[str] | None, request: Request, vectors: Sequence[tuple[str, ...]] = NORMALS
 ) -> Request:
     """Ask for the vectors that turn with the points of a file, where its points are not named otherwise."""
-    there = [columns for columns in vectors if {*(names or ())} >= {*XYZ, *columns}]  # without x, y, z it is no point
-    operation = request.operation
-    if not there or request.columns or request.kind not in ("", POINT):
+    known, operation = {*(names or ())}, request.operation
+    if not known >= {*XYZ} or request.columns or request.kind not in ("", POINT):
+        return request
+    there = [columns for columns in vectors if known >= {*columns}]
+    if not there:
         return request
     if operation.turns and (operation.left is not None or operation.mirrors):
         named = ", ".join(map(" ".join, there))

@@ -23,7 +23,6 @@ from frametool.stream.rows import written
 from frametool.stream.stamp_columns import read_stamps
 from frametool.stream.table import (
     BYTE_ORDER_MARK,
-    COMMENT,
     UNCLOSED,
     Naming,
     as_trajectory,
@@ -31,6 +30,7 @@ from frametool.stream.table import (
     open_table,
     table_block,
     unnamed,
+    without_comments,
 )
 from frametool.stream.table_plan import own_count, plan_table, with_vectors
 from frametool.text.cells import RecordEnds, torn_record
@@ -94,8 +94,7 @@ def _first_rows(blocks: Iterator[bytes]) -> bytes | None:
     text = b""
     for block in blocks:
         text += block
-        lines = text.removeprefix(BYTE_ORDER_MARK).splitlines()
-        if any(line.strip() and not line.startswith(COMMENT) for line in lines):
+        if without_comments(text.removeprefix(BYTE_ORDER_MARK)):
             return text
     return text or None
 
@@ -217,7 +216,9 @@ class TableRows(PlannedRows):
     def of_text(self, text: bytes) -> tuple[Run, Outcome, Cells]:
         """Return what becomes of a block, and its outcome; behind a quote that is not closed nothing is read."""
         torn = torn_record(text, self.table.delimiter) if self.table.delimiter else None
-        body = at_other_times(self.table, self.layout, text[:torn], self.request.offset_ns)
+        body = text[:torn]
+        if self.request.offset_ns and self.layout.time is not None:
+            body = at_other_times(self.table, self.layout, self.layout.time, body, self.request.offset_ns)
         cells = self.table.split(body)
         block = table_block(self.table, self.layout, cells, self.naming)
         if self.request.all_numbers and self.stamp_at is not None:
