@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Shape
-    from frametool.stream.table import Table
     from frametool.text.spans import Floats
 
     Reader: TypeAlias = Callable[[str], float]
@@ -403,30 +402,25 @@ def check_rows(
     return request, (shape._replace(unit=place._replace(level=level)),)
 
 
-def check_formula(request: Request, source: str, *, on_earth: bool) -> None:
-    """Stop where an expression does not fit rows of places, or has a result elsewhere that is asked for at places.
+def settle(
+    request: Request, shapes: tuple[Shape, ...], names: Sequence[str], source: str, *, on_earth: bool
+) -> tuple[Request, tuple[Shape, ...]]:
+    """Check what rows on the Earth need; stop where places are asked for of results whose frame is not the Earth's.
 
     Raises FormatError, CalcError.
     """
-    frame = None if request.rename is None else request.rename(ECEF if on_earth else None, None)[0]
-    try:
-        if request.place is not None:
-            check_in_ecef(frame, request.place)
-    except ValueInvalid as error:
-        raise FormatError(str(error), source=source, line=1) from None
-
-
-def refuse_elsewhere(table: Table, request: Request, source: str) -> None:
-    """Stop where places are asked for of rows whose frame is not the Earth's, or is not said.
-
-    Raises FormatError.
-    """
-    if request.place is None or request.frames or request.operation.formula is not None:
-        return  # a look-up looks at each row, an expression at its own frames
-    frame = request.rename(None, None)[0] if request.operation.moves and request.rename else None
-    if frame is None and any(name in PARENT_COLUMNS for name in table.names or ()) and not request.operation.moves:
-        return  # each row says its own
+    if on_earth:
+        request, shapes = check_rows(request, shapes, names, source)
+    operation = request.operation
+    is_formula = operation.formula is not None
+    stays = not (is_formula or operation.moves)
+    says_itself = stays and (on_earth or not {*PARENT_COLUMNS}.isdisjoint(names))
+    if request.place is None or says_itself or (request.frames and not is_formula):
+        return request, shapes  # a look-up looks at each row, an expression at its own frames
+    rename = (request.for_kind(shapes[0].kind) if shapes else request).rename
+    frame = None if stays or rename is None else rename(ECEF if on_earth and is_formula else None, None)[0]
     try:
         check_in_ecef(frame, request.place)
     except ValueInvalid as error:
         raise FormatError(str(error), source=source, line=1) from None
+    return request, shapes

@@ -61,24 +61,16 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         places += columns.places
     asked = tuple(_place(name, _names_or_numbers(table), source) for name in request.operation.columns)
     shapes = _shapes(poses, request, len(asked))
-    if on_earth:
-        from frametool.stream.earth_columns import check_rows, readers_of
+    if on_earth or request.place is not None:
+        from frametool.stream.earth_columns import readers_of, settle
 
-        request, shapes = check_rows(request, shapes, table.names or (), source)
-    if request.place is not None and (request.operation.moves or not on_earth):
-        from frametool.stream.earth_columns import refuse_elsewhere
-
-        refuse_elsewhere(table, request, source)
+        request, shapes = settle(request, shapes, table.names or (), source, on_earth=on_earth)
     extra: tuple[int, ...] = ()
     if any(map(may_be_uncertain, table.names or ())):
         from frametool.stream.extra_numbers import covariance_columns
 
         extra, shapes = covariance_columns(table, request, shapes, source)
     request = request.for_kind(shapes[0].kind) if shapes else request
-    if request.operation.formula is not None and (on_earth or request.place is not None):
-        from frametool.stream.earth_columns import check_formula
-
-        check_formula(request, source, on_earth=on_earth)
     several = request.operation.moves and len(shapes) > 1
     targets = tuple(map(request.target, shapes)) if several else (request.target(shapes[0] if shapes else Shape(POSE)),)
     places += (*extra, *asked)
