@@ -6,7 +6,7 @@ rows or listed poses -> the operation -> blocks of poses -> the text of the othe
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from frametool.formats.table import FORMATS, is_recording, is_trajectory
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Diagnostics, Options, Topics, stop
 from frametool.grammar.names import EARTH_FRAMES
-from frametool.stream.block_writer import writer_for
 from frametool.stream.column_stream import ColumnRows, move_along
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote, notes_of
@@ -26,7 +25,7 @@ from frametool.stream.row_poses import RowPoses, kept
 from frametool.stream.rows import Block, spans_of
 from frametool.stream.table import rename_of
 from frametool.stream.table_stream import TableRows, begin_table, stamps_for
-from frametool.stream.writers import LEARNED
+from frametool.stream.writers import LEARNED, writer_for
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator
@@ -36,18 +35,13 @@ if TYPE_CHECKING:
     from frametool.formats.table import Poses
     from frametool.grammar.edges import Answers
     from frametool.grammar.result import Style
-    from frametool.stream.block_writer import BlockWriter
     from frametool.stream.request import Request
     from frametool.stream.table_stream import PlannedRows
+    from frametool.stream.writers import BlockWriter
+
+    Step: TypeAlias = tuple[RowPoses, Outcome]  # what a block became, and what is reported about it
 
 QUATERNION = notation("quaternion")
-
-
-class Step(NamedTuple):
-    """What a block became: its poses, and what is reported about it."""
-
-    poses: RowPoses
-    outcome: Outcome
 
 
 class FormatConverter:
@@ -75,16 +69,15 @@ class FormatConverter:
     def outcomes(self, stream: BufferedReader, *, header: bool = True) -> Generator[Outcome]:
         """Yield the text of the results, block by block, and what comes behind the last."""
         writer: BlockWriter | None = None
-        for step in self.steps(stream, header=header):
-            poses, outcome = step
+        for made, outcome in self.steps(stream, header=header):
             if self.request.gathered is not None:
                 yield outcome
                 continue
             if writer is None:
                 writer = self._writer()
+            poses = made
             if self.request.on_error == STOP and outcome.faults:
-                before = int(np.searchsorted(poses.lines, outcome.faults[0].line))
-                poses = kept(poses, slice(0, before))
+                poses = kept(made, slice(0, int(np.searchsorted(made.lines, outcome.faults[0].line))))
             text = writer.of_block(poses)
             yield outcome._replace(text=text, notes=[*outcome.notes, *self._zones(poses)])
         if writer is None and self.request.gathered is None:
@@ -142,7 +135,7 @@ class FormatConverter:
         self._settle(rows, line=1)
         count = 0
         none = RowPoses(np.empty((0, 7)), None, np.empty(0, np.int64), [None], [None], {})
-        yield Step(none, Outcome(b"", lines=begun.lines, size=begun.taken))
+        yield none, Outcome(b"", lines=begun.lines, size=begun.taken)
         for block, _, outcome in rows.blocks(begun):
             poses = self._with_place(block, rows)
             if self.looks_up_places:
@@ -150,7 +143,7 @@ class FormatConverter:
             stamps = stamps_for(poses, self.stamps, fmt, count)
             poses = poses._replace(stamps_ns=self._held(stamps, fmt) if fmt.counted else stamps)
             count += len(poses.numbers)
-            yield Step(poses, outcome)
+            yield poses, outcome
         if self.stamps:
             self.stamps.finish(count, self.source)
         if is_trajectory(self.fmt):
@@ -171,14 +164,14 @@ class FormatConverter:
         rows = ColumnRows(opened, self.request, self.source)
         move_along(opened, self.request)
         self._settle(rows)
-        yield Step(rows.poses(opened.nothing()), Outcome(b""))
+        yield rows.poses(opened.nothing()), Outcome(b"")
         for batch in opened.batches():
             poses = self._with_place(rows.poses(batch), rows)
             if not self.to_arrays and self.request.on_error != NULL:
                 there = np.flatnonzero(~np.isnan(poses.numbers[:, 0]))
                 self.without += len(poses.numbers) - len(there)
                 poses = kept(poses, there)
-            yield Step(poses, rows.outcome(batch))
+            yield poses, rows.outcome(batch)
         if self.without:
             count = f"{self.without} {'row' if self.without == 1 else 'rows'}"
             warn(f"{self.source}: {count} without numbers left out: {self.style.format} has no place for them")
@@ -228,7 +221,7 @@ class FormatConverter:
             stamps = None if own else block.stamps[0][done.rows]
             poses = RowPoses(done.results, self._held(stamps, fmt), lines, parents, names, extras)
             found = sorted(faults + done.faults())
-            yield Step(poses, Outcome(b"", found, len(each.lines) + len(faults), 0, notes=notes_of(done, block)))
+            yield poses, Outcome(b"", found, len(each.lines) + len(faults), 0, notes=notes_of(done, block))
             faults.clear()
 
 

@@ -273,9 +273,7 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
 
     Raises Misused for names that are not there, or a count that the place does not have.
     """
-    numbers = {name: at for at, name in reversed([*enumerate(names or ())])}
-    places = [at for word in spec.split(",") for at in places_named(word.strip(), numbers, width)]
-    called = names or [f"column {at + 1}" for at in range(width)]
+    called, places = places_named(spec, names, width)
     most = _count(request.given_place, request.earth or Earth())
     try:
         position = chosen(places[:most], called, request.given_place, request.earth or Earth())

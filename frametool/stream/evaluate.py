@@ -507,7 +507,7 @@ class Run:
         """Return the place of the first bad row, if the run stops there."""
         if self.request.on_error != STOP or not (self.reasons or self.block.broken):
             return None
-        return int(min([*self.block.places[[*self.reasons]].tolist(), *(each.place for each in self.block.broken)]))
+        return int(min([*self.block.places[[*self.reasons]].tolist(), *(place for place, _ in self.block.broken)]))
 
     def groups(self, end: int | None) -> list[tuple[Ints, list[Spans]]]:
         """Return what is written before place `end`: results, rows without one, and what passes."""
@@ -542,7 +542,7 @@ class Run:
     def faults(self) -> list[Fault]:
         """Return what is wrong, line by line."""
         found = [Fault.of(self.block.line_of(row), column, reason) for row, (column, reason) in self.reasons.items()]
-        return sorted(found + [Fault(each.line, each.column, each.reason, skipped=True) for each in self.block.broken])
+        return sorted(found + [fault for _, fault in self.block.broken])
 
 
 def _checked(shape: Shape, own: Components) -> Components:

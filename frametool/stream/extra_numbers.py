@@ -256,9 +256,7 @@ def with_own(
     entries, rest = extra[:size], extra[size:]
     if mirrors and size > 1:
         raise ValueInvalid(MIRRORED)
-    if shape.sigma:
-        entries = expanded(shape, entries)
-    elif size == uncertainty.POINT:  # of the position, or of the turn, alone: they turn as that of a vector
+    if size == uncertainty.POINT:  # of the position, or of the turn, alone: they turn as that of a vector
         if mover is not None and len(mover) > EXACT:
             raise ValueInvalid(f"covariance has {size} numbers; 36 are needed (6x6) where others count too")
         count = sum(shape.covariance)
@@ -285,22 +283,19 @@ def of_multiple(
     return inverse((*pose, s)) if shape.inverse else (*pose, s)
 
 
-def along_ecef(shape: Shape, own: Components, extra: Components) -> tuple[Shape, Components]:
-    """Return what comes with a place with its covariance along the axes of ECEF, from the axes there."""
+def in_full(shape: Shape, own: Components, extra: Components) -> tuple[Shape, Components]:
+    """Return what comes with a row with its covariance in full, that of sigmas too, and at a place along ECEF."""
     size, place = shape.covariance[0], shape.place
     entries = extra[:size]
     if shape.sigma:
-        entries = expanded(shape, entries)
+        zero = entries[0] - entries[0]
+        entries = of_sigmas([zero if at < 0 else in_unit(entries[at], unit) for at, unit in shape.sigma])
         entries = entries if shape.kind == POSE else tuple(entries[6 * i + j] for i in range(3) for j in range(3))
-    turn = place._replace(level=False).turned(own[: place.size], IDENTITY) if place is not None else IDENTITY
-    made = shape._replace(covariance=(len(entries), *shape.covariance[1:]), sigma=())
-    return made, (*uncertainty.rotate_covariance(entries, *turn), *extra[size:])
-
-
-def expanded(shape: Shape, numbers: Components) -> Components:
-    """Return the covariance of a row's sigmas."""
-    zero = numbers[0] - numbers[0]
-    return of_sigmas([zero if at < 0 else in_unit(numbers[at], unit) for at, unit in shape.sigma])
+    if place is not None:
+        turn = place._replace(level=False).turned(own[: place.size], IDENTITY)
+        entries = uncertainty.rotate_covariance(entries, *turn)
+    full = shape._replace(covariance=(len(entries), *shape.covariance[1:]), sigma=())
+    return full, (*entries, *extra[size:])
 
 
 def move(shape: Shape, own: Components, extra: Components, mover: Components, *, mirrors: bool) -> Components:
@@ -308,10 +303,6 @@ def move(shape: Shape, own: Components, extra: Components, mover: Components, *,
     pose, kind = pose_of(mover), shape.kind
     if mirrors and shape.covariance:
         raise ValueInvalid(MIRRORED)
-    if shape.sigma:
-        entries = expanded(shape, extra)
-        extra = (*(entries[6 * i + j] for i in range(3) for j in range(3)), *extra[shape.covariance[0] :])
-        shape = shape._replace(covariance=(uncertainty.POINT,), sigma=())
     if len(mover) == SCALED:
         if kind not in SCALED_ALONE or shape.covariance:
             what = "a covariance" if shape.covariance else f"a {kind}"

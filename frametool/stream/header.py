@@ -463,11 +463,8 @@ def named_pose(
 
     Raises Misused for names that are not there, or a count that says nothing.
     """
-    numbers: dict[str, int] = {}
-    for place, name in enumerate(names or ()):
-        numbers.setdefault(name, place)
-    places = [place for word in spec.split(",") for place in places_named(word.strip(), numbers, width)]
-    header = Header(names or [f"column {place + 1}" for place in range(width)])
+    called, places = places_named(spec, names, width)
+    header = Header(called)
     if twice := sorted(header.names[place] for place, count in Counter(places).items() if count > 1):
         raise Misused(f"--columns: {', '.join(twice)} appears twice")
     if kind in SIX:
@@ -531,8 +528,14 @@ def _by_names(header: Header, places: Sequence[int], expected: Notation | None) 
     return None
 
 
-def places_named(word: str, numbers: dict[str, int], width: int) -> list[int]:
-    """Return the places of a column's name, or of a number or range from 1."""
+def places_named(spec: str, names: Sequence[str] | None, width: int) -> tuple[Sequence[str], list[int]]:
+    """Return what columns are called, and the places of those that are chosen by names, numbers or ranges from 1."""
+    numbers = {name: place for place, name in reversed([*enumerate(names or ())])}
+    places = [place for word in spec.split(",") for place in _places(word.strip(), numbers, width)]
+    return names or [f"column {place + 1}" for place in range(width)], places
+
+
+def _places(word: str, numbers: dict[str, int], width: int) -> list[int]:
     if word in numbers:
         return [numbers[word]]
     first, dash, last = word.partition("-")

@@ -256,10 +256,10 @@ class Operation(NamedTuple):
         seconds: the time since the row before, of which velocities are made; times_ns: its own time
         """
         own, extra = numbers[: shape.own_size], tuple(numbers[shape.own_size :])
-        if shape.covariance and shape.place is not None:
-            from frametool.stream.extra_numbers import along_ecef
+        if shape.sigma or (shape.covariance and shape.place is not None):
+            from frametool.stream.extra_numbers import in_full
 
-            shape, extra = along_ecef(shape, own, extra)
+            shape, extra = in_full(shape, own, extra)
         if shape.multiple:
             from frametool.stream.extra_numbers import of_multiple
 

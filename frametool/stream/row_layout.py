@@ -110,10 +110,14 @@ class Shape(NamedTuple):
         return place_of(self.unit)
 
     @property
+    def _there(self) -> list[int]:
+        """Return which numbers of position and rotation have a column."""
+        return [place for place in range(self._full) if place not in self.absent]
+
+    @property
     def position_size(self) -> int:
         """Count the numbers of the position in a row."""
-        count = count_of(self.unit)
-        return 0 if self.whole else count - sum(place < count for place in self.absent)
+        return 0 if self.whole else sum(place < count_of(self.unit) for place in self._there)
 
     @property
     def rotation_at(self) -> tuple[int, ...]:
@@ -126,15 +130,13 @@ class Shape(NamedTuple):
         """Return where in a row a number of the rotation is that has a column."""
         if self.joined:
             return self.rotation_at[index]
-        full = index + count_of(self.unit)
-        return full - sum(each < full for each in self.absent)
+        return self._there.index(index + count_of(self.unit))
 
     def in_degrees(self, place: int) -> bool | None:
         """Return True if a row's number is an angle in degrees; None if it is no angle."""
         if place >= self.own_size:
             return None
-        there = [each for each in range(self._full) if each not in self.absent]
-        index = there[place] - count_of(self.unit)
+        index = self._there[place] - count_of(self.unit)
         if self.whole or self.notation is None or index not in self.notation.representation.angles:
             return None
         return self.degrees and index not in self.radians_at
@@ -143,8 +145,7 @@ class Shape(NamedTuple):
         """Return True if a row's number is a length in metres, of a point, a vector or a position."""
         if self.place is not None or place >= self.position_size:
             return False
-        there = [each for each in range(3) if each not in self.absent]
-        return bool(_each(self.unit or 1.0)[there[place]] == 1.0)
+        return bool(_each(self.unit or 1.0)[self._there[place]] == 1.0)
 
     def position(self, numbers: Sequence[Any]) -> Components:
         """Return x, y, z in metres; 0 where there is no position."""

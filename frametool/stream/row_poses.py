@@ -44,7 +44,6 @@ class RowPoses(NamedTuple):
     lines: (n,) from 0
     parents, names: one a row, one for all, or none
     extras: columns that are not ours, by name: cells of text, numbers as they are, or objects (see `objects`)
-    own_frames: the frames that the rows of the input are expressed in
     read: (n, 3) lat lon alt of positions on the Earth that nothing has moved, as they were read
     """
 
@@ -54,7 +53,6 @@ class RowPoses(NamedTuple):
     parents: Sequence[str | None]
     names: Sequence[str | None]
     extras: Mapping[str, Cells]
-    own_frames: Sequence[str | None] = ()
     read: Floats | None = None
 
     def for_each(self, names: Sequence[str | None]) -> Sequence[str | None]:

@@ -23,17 +23,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from frametool.errors import FrametoolError
+    from frametool.stream.faults import Fault
     from frametool.stream.layout import Piece
     from frametool.text.spans import Floats, Ints
-
-
-class Broken(NamedTuple):
-    """A row that no number can be read from: its place, its line, the column and the reason."""
-
-    place: int
-    line: int
-    column: str
-    reason: str
 
 
 class BlockNames(NamedTuple):
@@ -64,7 +56,7 @@ class Block(NamedTuple):
     places: (n,) where each row is among all that the block holds
     line_of: the line of a row, from 0
     unchanged: place and text of what passes as it is
-    broken: rows that have no numbers
+    broken: place and fault of rows that no number can be read from
     names: those of the rows, and of their results
     stamps: for each shape the spans (n,) of its stamp, one, or seconds and nanoseconds (none where it has none), or the
         nanoseconds; of rows that are gathered their weights or labels
@@ -79,7 +71,7 @@ class Block(NamedTuple):
     places: Ints
     line_of: Callable[[int], int]
     unchanged: Sequence[tuple[int, bytes]] = ()
-    broken: Sequence[Broken] = ()
+    broken: Sequence[tuple[int, Fault]] = ()
     names: BlockNames = BlockNames()
     stamps: Sequence[tuple[Spans, ...] | NDArray[Any]] = ()
     bad: Mapping[int, tuple[str, FrametoolError | str]] = MappingProxyType({})
@@ -121,9 +113,14 @@ def coded(cells: Spans) -> Coded:
 
 def coded_texts(cells: Sequence[Any], text: Callable[[Any], str] = str) -> Coded:
     """Return cells as the distinct texts and the number of each."""
-    known: dict[Any, int] = {}
-    codes = np.fromiter((known.setdefault(each, len(known)) for each in cells), np.int64, len(cells))
+    known, codes = numbered(cells)
     return Coded([*map(text, known)], codes)
+
+
+def numbered(values: Sequence[Any]) -> tuple[dict[Any, int], Ints]:
+    """Return the distinct ones of some values, numbered, and the number of each."""
+    known: dict[Any, int] = {}
+    return known, np.fromiter((known.setdefault(each, len(known)) for each in values), np.int64, len(values))
 
 
 def _text(cell: bytes) -> str:

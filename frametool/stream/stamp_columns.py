@@ -13,6 +13,7 @@ import numpy as np
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.frames.stamps import BILLION, nanoseconds_each, tell_size
 from frametool.stream.row_layout import IDENTITY
+from frametool.stream.rows import numbered
 from frametool.stream.stamp_source import read_header_stamp, read_stamp
 from frametool.text.digits import ZEROS, first_point, not_digits, read_eight_digits
 from frametool.text.parse import LOWEST, trimmed
@@ -112,17 +113,13 @@ NOWHERE = (0.0, 0.0, 0.0, *IDENTITY)
 
 def by_frame(edge_of: Callable[..., Rigid], frames: Sequence[str | None], blame: Blame, column: str = "") -> Rigid:
     """Return the pose of each row by its frame's name; a row whose frame has none is bad."""
-    table: list[Rigid] = []
-    known: dict[str | None, tuple[int, FrametoolError | None]] = {}
-    for row, name in enumerate(frames):
-        if name not in known:
-            edge, error = _edge(edge_of, name)
-            known[name] = len(table), error
-            table.append(edge)
-        if problem := known[name][1]:
-            blame(row, column, problem)
-    chosen_rows = np.array([known[name][0] for name in frames], np.int64)
-    return tuple(np.array(column)[chosen_rows] for column in zip_longest(*table, fillvalue=0.0))  # type: ignore[return-value]
+    known, codes = numbered(frames)
+    edges = [_edge(edge_of, name) for name in known]
+    for at, (_, problem) in enumerate(edges):
+        for row in np.flatnonzero(codes == at).tolist() if problem else ():
+            blame(row, column, problem or "")
+    columns = zip_longest(*(edge for edge, _ in edges), fillvalue=0.0)
+    return tuple(np.array(each)[codes] for each in columns)  # type: ignore[return-value]
 
 
 def _edge(edge_of: Callable[..., Rigid], name: str | None) -> tuple[Rigid, FrametoolError | None]:
@@ -151,9 +148,8 @@ def _by_frame(frames: Sequence[str | None], rows: Ints) -> list[tuple[str | None
     """Part rows by their frames."""
     if len(set(frames)) == 1:
         return [(frames[0], rows)]
-    numbers = {frame: number for number, frame in enumerate(dict.fromkeys(frames))}
-    of_row = np.fromiter((numbers[frame] for frame in frames), np.int64, len(frames))[rows]
-    return [(frame, rows[of_row == number]) for frame, number in numbers.items()]
+    known, codes = numbered(frames)
+    return [(frame, rows[codes[rows] == number]) for frame, number in known.items()]
 
 
 def _fill(poses: Floats, timed: Timed, frame: str | None, rows: Ints, times: Ints, blame: Blame, column: str) -> None:

@@ -18,9 +18,10 @@ from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import UPPER_ROWS, notation
 from frametool.grammar.names import EARTH_FRAMES, in_nanoseconds, stamp_column
+from frametool.stream.faults import Fault
 from frametool.stream.header import Columns, PoseColumns, has_pose_column
 from frametool.stream.layout import ADDED, NAMED, quoted
-from frametool.stream.rows import Block, BlockNames, Broken, Coded, coded, spans_of
+from frametool.stream.rows import Block, BlockNames, Coded, coded, spans_of
 from frametool.stream.stamp_columns import read_stamps
 from frametool.stream.stamp_source import replaced, stamp_text
 from frametool.text.cells import split_blank, split_delimited, torn_record, without_quotes
@@ -359,7 +360,7 @@ def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming) -> B
                 unchanged.append((line, raw))
             else:
                 reason = f"expected {table.width} cells{named}, found {int(cells.counts[line])}"
-                broken.append(Broken(line, lines_before(line), "", reason))
+                broken.append((line, Fault(lines_before(line), "", reason, skipped=True)))
     lines = lambda row: lines_before(int(cells.rows[row]))  # noqa: E731
     return Block(numbers, parts, cells.rows, lines, unchanged, broken, names, stamps, bad)
 

@@ -207,7 +207,7 @@ class PlannedRows:
         )
         stamps: Any = None if self.stamp_at is None else block.stamps[0]
         stamps = None if stamps is None else stamps[rows]
-        return RowPoses(numbers[:, :own], stamps, lines, parents, called, extras, block.names.frames)
+        return RowPoses(numbers[:, :own], stamps, lines, parents, called, extras)
 
 
 class TableRows(PlannedRows):

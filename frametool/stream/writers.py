@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from importlib import import_module
 from itertools import chain, pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -59,8 +59,12 @@ if TYPE_CHECKING:
     from frametool.geometry.place import Place
     from frametool.geometry.types import Components
     from frametool.grammar.result import Style
+    from frametool.stream.array_writer import ArrayWriter
+    from frametool.stream.recording_writer import RecordingWriter
     from frametool.stream.row_poses import RowPoses
     from frametool.text.spans import Floats
+
+    BlockWriter: TypeAlias = "TextWriter | ArrayWriter | RecordingWriter"
 
 LEARNED = ("csv", "json", "yaml")
 PROBE_NS = 1234567890987654321
@@ -336,6 +340,23 @@ class TextWriter:
         known = "" if not self.count else self.write([first], self.style)
         text = self.write(results if not self.count else [first, *results], self.style)
         return text[len(known) :].encode()
+
+
+def writer_for(style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> BlockWriter:
+    """Return what writes blocks in the format of a style: text, columns of numbers, or messages of a recording.
+
+    kind: pose, point, ..; extras: the numbers with each; placed: whether poses have a position
+    """
+    writes = FORMATS[style.format].writes
+    if "arrays" in writes:
+        from frametool.stream.array_writer import ArrayWriter
+
+        return ArrayWriter(style, kind, extras, placed=placed)
+    if "recording" in writes:
+        from frametool.stream.recording_writer import RecordingWriter
+
+        return RecordingWriter(style, kind, extras, placed=placed)
+    return TextWriter(style, kind, extras, placed=placed)
 
 
 def refuse_scale_in(fmt: str, extra: Iterable[str]) -> None:
