@@ -149,23 +149,22 @@ class Run:
         cells, words = self.block.numbers, self.plan.words
         if not isinstance(cells, Spans):
             return cells
-        numbers, bad = parse_floats(cells)
-        if not (len(bad) or words):
-            return numbers
-        for row, column in (divmod(place, numbers.shape[1]) for place in bad.tolist()):
-            if column in words:
-                continue
-            text = cells.text(row, column).decode("utf-8", "replace").strip(" \t")
-            read = self.plan.marked.get(column)
-            try:
-                numbers[row, column] = read(text) if read else self._with_unit(text, column)
-            except ValueInvalid as error:
-                self._blame(row, self.plan.names[column], str(error))
+        numbers = self._parsed(cells, self.plan.names, self._read_one)
         for column, word in words.items() if self.count else ():  # also those that look like numbers
             own = coded(Spans(cells.data, cells.starts[:, column], cells.ends[:, column]))
             numbers[:, column], reasons = own.numbers(word)
             for row, reason in reasons.items():
                 self._blame(row, self.plan.names[column], reason)
+        return numbers
+
+    def _parsed(self, cells: Spans, names: Sequence[str], read_one: Callable[[str, int], float]) -> Floats:
+        """Read cells (n, c) as numbers; read_one: reads what is no plain number in a column, or raises ValueInvalid."""
+        numbers, bad = parse_floats(cells)
+        for row, column in (divmod(place, len(names)) for place in bad.tolist()):
+            try:
+                numbers[row, column] = read_one(cells.text(row, column).decode("utf-8", "replace").strip(" \t"), column)
+            except ValueInvalid as error:
+                self._blame(row, names[column], str(error))
         return numbers
 
     def _check_covariances(self, numbers: Floats) -> None:
@@ -202,16 +201,17 @@ class Run:
             if len(operation.carried(shape)) < 36 or operation.uncertain or not self.count:
                 continue
             columns = [np.broadcast_to(np.asarray(part), self.count) for part in parts[-36:]]
-            rows = np.flatnonzero(columns[21] + columns[28] + columns[35] > uncertainty.WIDE**2)
-            entries = np.stack([column[rows] for column in columns], axis=-1)
-            widest = np.linalg.eigvalsh(entries.reshape(-1, 6, 6)[:, 3:, 3:])[:, 2]
-            for at in np.flatnonzero(widest > (0.999 * uncertainty.WIDE) ** 2).tolist():
-                if message := uncertainty.doubt(entries[at].tolist()):
-                    self.rounded.append(RowNote(self.block.line_of(int(rows[at])), uncertainty.WIDE_RULE, message))
+            for row in np.flatnonzero(columns[21] + columns[28] + columns[35] > uncertainty.WIDE**2).tolist():
+                if message := uncertainty.doubt([float(column[row]) for column in columns]):
+                    self.rounded.append(RowNote(self.block.line_of(row), uncertainty.WIDE_RULE, message))
                     break
 
-    def _with_unit(self, text: str, column: int) -> float:
-        """Read an angle, or a length where metres are wanted, which may say its own unit."""
+    def _read_one(self, text: str, column: int) -> float:
+        """Read an angle, or a length where metres are wanted, which may say its own unit; words are read elsewhere."""
+        if column in self.plan.words:
+            return 0.0
+        if column in self.plan.marked:
+            return self.plan.marked[column](text)
         for shape in self.plan.shapes:
             if column < shape.size:
                 return read_number_or_angle(text, shape.in_degrees(column), metres=shape.in_metres(column))
@@ -297,12 +297,8 @@ class Run:
         if self.request.gathered is not None and self.request.gathered.labelled:
             return weights if cells is None else np.array(texts_of(cells), object)
         if cells is not None:
-            weights, bad = parse_floats(cells)
-            for row in bad.tolist():
-                try:
-                    weights[row] = parse_number(cells.text(row).decode("utf-8", "replace").strip(" \t\"'"))
-                except ValueInvalid as error:
-                    self._blame(row, name, str(error))
+            column = Spans(cells.data, cells.starts[:, None], cells.ends[:, None])
+            weights = self._parsed(column, [name], lambda text, _: parse_number(text.strip("\"'")))[:, 0]
         for row in np.flatnonzero(weights < 0.0).tolist():
             self._blame(row, name, f"weight {weights[row]:g} is negative")
         return weights

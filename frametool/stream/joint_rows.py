@@ -1,14 +1,10 @@
-"""Forward kinematics over rows: values of joints in columns or under keys, a pose with them.
-
-In the CSV of the echo tools each row is a JointState that names its joints.
-"""
+"""Forward kinematics over rows: values of joints in columns or under keys, a pose with them."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import parse_documents
-from frametool.documents.source import Source
 from frametool.errors import (
     BadAnswer,
     FormatError,
@@ -24,27 +20,17 @@ from frametool.errors import (
 from frametool.formats.robots.joints import find_joint_columns
 from frametool.formats.robots.model import TURNING, JointValue
 from frametool.formats.table import FORMATS
-from frametool.geometry import floats
-from frametool.grammar.edges import Diagnostics
-from frametool.grammar.pose import Pose
-from frametool.grammar.readers import Misfit
-from frametool.grammar.result import Result
 from frametool.ros import messages
-from frametool.ros.message_stream import TextMessage, line_texts, read_messages
-from frametool.stream.faults import Fault
 from frametool.stream.record_text import without_noise
 from frametool.stream.row_layout import POSE
 from frametool.stream.splitter import Splitter
-from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-    from typing import BinaryIO
+    from collections.abc import Sequence
 
     from frametool.formats.robots.joints import JointState
     from frametool.formats.robots.model import Joint, Robot
     from frametool.geometry.types import Components, Namespace, Number
-    from frametool.stream.faults import BadRows
 
 SLACK = 1e-9  # by which a value may lie beyond a limit
 
@@ -146,42 +132,12 @@ def names_in(begin: bytes, fmt: str, source: str, *, header: bool = True) -> lis
     """
     if "records" in FORMATS[fmt].reads:
         return keys_in(begin, fmt, source, "a key for each joint, or JointState messages")
-    if echoed(begin):
-        return _echoed_names(begin, source)
     from frametool.stream.table import open_table
 
     table, _ = open_table(begin, fmt, header=header, source=source)
     if table.names is None:
         raise FormatError("the columns have no names, so that none is a joint", source=source, line=1)
     return list(table.names)
-
-
-def echoed(begin: bytes) -> str:
-    """Return which echo tool wrote a table: `csv1` with a header, `csv2` without; "" for any other."""
-    first = _lines_of(begin)[:1] or [""]
-    if first[0].startswith("%time,"):
-        return "csv1"
-    return "csv2" if messages.looks_like_row(first[0]) else ""
-
-
-def _lines_of(begin: bytes) -> list[str]:
-    return [line for line in begin.decode("utf-8", "replace").splitlines() if line.strip()]
-
-
-def _echoed_names(begin: bytes, source: str) -> list[str]:
-    """Return the joints that the first row names."""
-    lines = _lines_of(begin)
-    try:
-        if echoed(begin) == "csv2":
-            state = messages.of_row(messages.unquoted(lines[0]))
-        else:
-            header = lines[0].split(",")
-            cells = lines[1].split(",") if len(lines) > 1 else []
-            names = [name.removeprefix("field.") for name in header]
-            state = messages.of_numbered(dict(zip(names, cells, strict=False)))
-        return [joint for joint, *_ in messages.positions(state)]
-    except Misfit as misfit:
-        raise FormatError(str(misfit), source=source, line=1) from None
 
 
 def keys_in(begin: bytes, fmt: str, source: str, wanted: str) -> list[str]:
@@ -208,40 +164,3 @@ def _flat_keys(value: dict[str, Any], prefix: str = "") -> dict[str, None]:
         else:
             found[prefix + key] = None
     return found
-
-
-def joint_poses(stream: BinaryIO, rows: JointRows, bad: BadRows, *, numbered: bool) -> Iterator[Result]:
-    """Yield the pose for each row with its stamp; rows without one go to `bad`.
-
-    numbered: they are those of `rostopic echo -p`, under its header; else those of `ros2 topic echo --csv`
-    """
-    count = 0
-    for message in _messages(stream, bad.source, numbered=numbered):
-        count += 1
-        try:
-            if isinstance(message, FormatError):
-                raise message
-            value: Any = message.value
-            state = messages.of_numbered(value) if numbered else messages.of_row(messages.unquoted(value))
-            stamp_ns = messages.stamp_of_state(state)
-            stamp = {} if stamp_ns is None else {"stamp_ns": stamp_ns}
-            yield Result(Pose.of(_pose(state, rows), rows.tip, rows.base), stamp)
-        except (FormatError, ValueInvalid) as error:
-            line = error.line if isinstance(error, FormatError) else getattr(message, "line", 0)
-            reason = error.message if isinstance(error, FormatError) else str(error)
-            bad.take([Fault(line, "", reason)])
-    bad.finish(count)
-
-
-def _messages(stream: BinaryIO, name: str, *, numbered: bool) -> Iterator[TextMessage | FormatError]:
-    if numbered:
-        return read_messages(stream, name, "csv1", Diagnostics())
-    return (TextMessage(row, Source(name, row), at, cells=True) for at, row in line_texts(stream, name, Diagnostics()))
-
-
-def _pose(state: dict[str, Any], rows: JointRows) -> Any:
-    """Return the pose for one message."""
-    found = {joint: parse_number(text) for joint, text, _ in messages.positions(state)}
-    if missing := [joint for joint in rows.columns if joint not in found]:
-        raise Misfit(f"no position of {listing(missing)} in it")
-    return rows.result("", (), [found[joint] for joint in rows.columns], None, floats)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import re
 from pathlib import Path
@@ -113,27 +111,6 @@ def test_what_the_tools_print_between_messages_is_passed_over(form: tuple[str, .
     done = run(*FK, *form, "--quiet", stdin=f"WARNING: no messages received\nIs /clock being published?\n{yaml_of(state)}")
     assert done.status == 0, done.err
     assert f"{expected(ROWS[0])[0]!r}" in done.out
-
-
-ECHOED = {
-    "rostopic echo -p": "%time,field.header.seq,field.header.stamp,field.header.frame_id,"
-    + ",".join(f"field.name{at}" for at in range(4)) + "," + ",".join(f"field.position{at}" for at in range(4))
-    + "\n" + "".join(f"9,1,3000000005,,{','.join(JOINTS)},{','.join(map(repr, row))}\n" for row in ROWS),
-    "ros2 topic echo --csv": "".join(f"3,5,,{','.join(JOINTS)},{','.join(map(repr, row))}\n" for row in ROWS),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", ECHOED)
-def test_the_csv_of_the_echo_tools_names_its_joints_in_each_row(name: str, run: Run) -> None:
-    done = run(*FK, "-f", "csv", stdin=ECHOED[name])
-    assert done.status == 0, done.err
-    for line, row in zip(csv.DictReader(io.StringIO(done.out)), ROWS, strict=True):
-        assert line["stamp_ns"] == "3000000005"
-        numbers = [line[key] for key in ("x", "y", "z", "qx", "qy", "qz", "qw")]
-        assert canonical(numbers) == pytest.approx(canonical(expected(row)), abs=1e-15)
-    broken = ECHOED[name].replace("0.5", "0.5x")
-    assert run(*FK, "-f", "csv", "--on-error", "skip", stdin=broken).status == 3
-    assert run(*FK, "-f", "csv", stdin=broken).status == 1
 
 
 def test_units_stand_in_the_names_of_columns(run: Run) -> None:

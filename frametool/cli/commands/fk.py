@@ -9,13 +9,12 @@ from click import UsageError
 from frametool.cli.command import FILE, Inputs, argument, command_named, refuse
 from frametool.cli.options import STREAMED, reading_options, result_options, whole_pose_options
 from frametool.cli.output import Output
-from frametool.cli.streaming import RECORDS, Stream, stream_options
+from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.trees import FRAME, frame_name, opened, state
 from frametool.formats.detect import detect
 from frametool.formats.robots.urdf import robot_of
 from frametool.formats.table import holds_arrays
-from frametool.stream.faults import ROWS_SKIPPED
-from frametool.stream.joint_rows import JointRows, echoed, joint_poses, names_in
+from frametool.stream.joint_rows import JointRows, names_in
 from frametool.stream.request import Operation, Request
 
 if TYPE_CHECKING:
@@ -64,11 +63,5 @@ def _added(stream: Stream, output: Output, rows: JointRows, file: FrameFile) -> 
     rows.bind(names, name, fixed=frozenset(file.answers.joints))
     file.tally.assumed = ""  # rows say where each joint on the way is
     state([file])
-    echo_format = "" if fmt in RECORDS else echoed(begin)
-    if not echo_format:
-        operation = Operation(moves=True, formula=rows)
-        return stream.run(Request(operation, poses=0, degrees=inputs.deg, normalize=inputs.normalize), output)
-    bad = stream.policy(name)
-    with stream.opened() as source:
-        output.poses_as_they_come(joint_poses(source, rows, bad, numbered=echo_format == "csv1"))
-    return ROWS_SKIPPED if bad.count else 0
+    operation = Operation(moves=True, formula=rows)
+    return stream.run(Request(operation, poses=0, degrees=inputs.deg, normalize=inputs.normalize), output)
