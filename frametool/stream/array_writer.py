@@ -20,7 +20,7 @@ from frametool.formats.rows.column_file import STAMP_NS, WHOLE, Made, OutColumn,
 from frametool.formats.table import FORMATS
 from frametool.geometry import arrays
 from frametool.stream.row_layout import POSE, SIX, TWIST, WRENCH, six_names
-from frametool.stream.row_poses import NO_STAMP, objects, plain_cells, text_of, texts_of
+from frametool.stream.row_poses import NO_STAMP, is_typed, objects, plain_cells, text_of, texts_of
 from frametool.stream.writers import target_in
 from frametool.text.parse import parse_floats
 from frametool.text.spans import Spans
@@ -75,7 +75,7 @@ class ColumnsWriter:
         """Return what is written of a block of so many rows, perhaps nothing yet."""
         self.waiting.append((size, made))
         if self.writer is None:
-            is_open = any(not _is_typed(each.values) for each in made.values())
+            is_open = any(not is_typed(each.values) for each in made.values())
             if not size or (is_open and sum(count for count, _ in self.waiting) < sizes.TYPED):
                 return b""
         return b"".join(self._written(is_all=False))
@@ -113,7 +113,7 @@ class ColumnsWriter:
             if column.kind is None and not is_all:
                 column = column._replace(longest=max(SPARE, 2 * column.longest))
             reason = self._misfit(column)
-            as_cells = not (FORMATS[self.style.format].texts or all(map(_is_typed, parts)))  # read everywhere
+            as_cells = not (FORMATS[self.style.format].texts or all(map(is_typed, parts)))  # read everywhere
             if (reason or as_cells) and _is_exact(column.kind, parts):
                 column = column._replace(kind=DOUBLE)
                 reason = self._misfit(column)
@@ -138,7 +138,7 @@ class ColumnsWriter:
 
     def _column(self, name: str, parts: Sequence[Cells], *, has_gaps: bool) -> OutColumn:
         """Return of which type a column is."""
-        if parts and all(map(_is_typed, parts)):
+        if parts and all(map(is_typed, parts)):
             own: Kind = parts[0].dtype.newbyteorder("=")  # type: ignore[union-attr]
             return OutColumn(name, DOUBLE if own.kind == "f" and own.itemsize > DOUBLE.itemsize else own)
         values = [value for part in parts for value in _values(part)]
@@ -152,16 +152,17 @@ class ColumnsWriter:
             if kinds:
                 return OutColumn(name, kinds[0])
         is_json = any(isinstance(value, (dict, list)) for value in there)
-        longest = max((len(_text(value, is_json=is_json)) for value in there), default=1)
+        text = dump if is_json else text_of
+        longest = max((len(text(value)) for value in there), default=1)
         return OutColumn(name, None, None, longest, is_json)
 
     def _typed(self, column: OutColumn, made: Made) -> Made:
         """Return a column of a block in its type; raises ValueInvalid for a cell that is of another one."""
         cells, kind = made.values, column.kind
         if kind is None:
-            values = _values(cells)
-            return Made(["" if value is None else _text(value, is_json=column.is_json) for value in values])
-        if _is_typed(cells):
+            text = dump if column.is_json else text_of
+            return Made(["" if value is None else text(value) for value in _values(cells)])
+        if is_typed(cells):
             if kind == DOUBLE and not _is_exact(cells.dtype, [cells]) and cells.dtype.kind in WHOLE:
                 raise self._another(column, str(max(cells.tolist(), key=abs)))
             return Made(cells.astype(kind, copy=False), made.absent)
@@ -186,33 +187,20 @@ class ColumnsWriter:
         return ValueInvalid(f"{found}; -f csv keeps it as it is")
 
 
-def _is_typed(cells: Cells) -> bool:
-    """Return True if cells are numbers, truth values or times of numpy, one a row."""
-    return isinstance(cells, np.ndarray) and cells.ndim == 1 and cells.dtype.kind in "fiubM"
-
-
 def _is_exact(kind: Kind | None, parts: Sequence[Any]) -> bool:
     """Return True if whole numbers are floats to the bit."""
     if kind is None or kind.kind not in WHOLE:
         return False
-    return all(
-        -EXACT < number < EXACT  # of the least int64 there is no absolute value
-        for part in parts
-        for number in ([part.min(), part.max()] if _is_typed(part) and part.size else map(int, _numbers(part)))
-    )
+    numbers: list[Any] = []
+    for part in parts:
+        is_array = is_typed(part) and part.size
+        numbers += [part.min(), part.max()] if is_array else [int(each) for each in plain_cells(part) if each is not None]
+    return all(-EXACT < number < EXACT for number in numbers)  # of the least int64 there is no absolute value
 
 
 def _values(cells: Cells) -> list[Any]:
     """Return cells of text as texts, all else as plain values."""
     return texts_of(cells) if isinstance(cells, Spans) else plain_cells(cells)
-
-
-def _numbers(part: Cells) -> list[str]:
-    return [value for value in plain_cells(part) if value is not None]
-
-
-def _text(value: Any, *, is_json: bool) -> str:
-    return dump(value) if is_json else text_of(value)
 
 
 def _in_columns(name: str, cells: Cells) -> dict[str, Made]:

@@ -537,8 +537,10 @@ class Run:
 
     def faults(self) -> list[Fault]:
         """Return what is wrong, line by line."""
-        found = [Fault.of(self.block.line_of(row), column, reason) for row, (column, reason) in self.reasons.items()]
-        return sorted(found + [fault for _, fault in self.block.broken])
+        found = [fault for _, fault in self.block.broken]
+        for row, (column, reason) in self.reasons.items():
+            found.append(Fault.of(self.block.line_of(row), column, reason))
+        return sorted(found)
 
 
 def _checked(shape: Shape, own: Components) -> Components:

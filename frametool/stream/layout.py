@@ -207,10 +207,9 @@ def _goes_on(before: Column, column: Column) -> bool:
 def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:
     """Raise Misused if a new column would be called as one that stays, or as another new one."""
     new = [column.name for column in columns if isinstance(column, ADDED)]
-    if not new:
-        return
     kept = [names[column.place] for column in columns if not isinstance(column, ADDED)]
-    if twice := sorted({name for name in new if new.count(name) > 1}):
+    if len({*new}) < len(new):
+        twice = sorted({name for name in new if new.count(name) > 1})
         if {"x", "y", "z"} <= {*twice}:
             hint = "a point with a weight: --columns x,y,z; a rotation: name it qx, qy, qz, qw"
             raise Misused(f"columns x, y, z, w are a quaternion, its position would have their names; {hint}")

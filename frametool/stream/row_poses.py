@@ -24,7 +24,7 @@ from frametool.text.spans import Spans
 from frametool.text.write import rounded_to_single, shortest_spans
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -101,12 +101,17 @@ def taken(cells: Any, rows: Ints) -> Cells:
     """Return some cells of a column; what is no number, truth value or time of numpy as plain values."""
     if isinstance(cells, Spans):
         return Spans(cells.data, cells.starts[rows], cells.ends[rows])
-    if isinstance(cells, np.ndarray) and cells.ndim == 1 and cells.dtype.kind in "fiubM":
-        return cells[rows]
+    if is_typed(cells):
+        return cells[rows]  # type: ignore[no-any-return]
     from frametool.formats.rows.column_file import plain_value
 
     is_array = isinstance(cells, np.ndarray)
     return objects(map(plain_value, cells[rows].tolist() if is_array else [cells[row] for row in rows.tolist()]))
+
+
+def is_typed(cells: Any) -> bool:
+    """Return True if cells are numbers, truth values or times of numpy, one a row."""
+    return isinstance(cells, np.ndarray) and cells.ndim == 1 and cells.dtype.kind in "fiubM"
 
 
 def block_of(results: Sequence[Result], *, placed: bool = True) -> RowPoses:
@@ -191,20 +196,11 @@ def _written(value: float) -> str:
 def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -> list[Result]:
     """Return a block as results, one a pose."""
     names, parents = map(block.for_each, (block.names, block.parents))
-    others = {name: plain_cells(cells) for name, cells in block.extras.items()}
-    stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
     made = []
-    own = 7 if placed else 4
-    null: list[Any] = [*NOWHERE[-own:], *[None] * len(extras)]
-    for at, found in enumerate(block.numbers.tolist()):
-        numbers = null if isnan(found[0]) else found
-        pose = Pose.of(tuple(numbers[:7]) if placed else (0.0, 0.0, 0.0, *numbers[:4]), names[at], parents[at])
-        said = with_entries(dict(zip(extras, numbers[own:], strict=True)))
-        if stamps is not None:
-            said["stamp_ns"] = None if stamps[at] == NO_STAMP else stamps[at]
-        said |= {name: texts[at] for name, texts in others.items()}
-        pose = pose._replace(read=block.spot(at))
-        made.append((NoResult if numbers is null else Result)(pose if placed else pose._replace(position=None), said))
+    for at, (numbers, said) in enumerate(_each(block, extras)):
+        own = NOWHERE if numbers is None else tuple(numbers) if placed else (0.0, 0.0, 0.0, *numbers)
+        pose = Pose.of(own, names[at], parents[at])._replace(read=block.spot(at))
+        made.append((NoResult if numbers is None else Result)(pose if placed else pose._replace(position=None), said))
     return made
 
 
@@ -213,22 +209,28 @@ def points_of(
 ) -> list[dict[str, Any]]:
     """Return a block of points or vectors as mappings, one each, or of points on the Earth at a place."""
     frames = block.for_each(block.parents)
-    others = {name: plain_cells(cells) for name, cells in block.extras.items()}
-    stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
     made = []
-    for at, numbers in enumerate(block.numbers.tolist()):
-        named: dict[str, Any] = {"frame": frames[at]} if frames[at] else {}
-        stamp = {} if stamps is None else {"stamp_ns": None if stamps[at] == NO_STAMP else stamps[at]}
-        is_null, size = isnan(numbers[0]), len(numbers) - len(extras)
-        if place is not None and not is_null:
+    for at, (numbers, said) in enumerate(_each(block, extras)):
+        if place is not None and numbers is not None:
             from frametool.grammar.place import point_entry
 
-            own, named = point_entry(frames[at], numbers[:size], place, block.spot(at)), {}
+            made.append(point_entry(frames[at], numbers, place, block.spot(at)) | said)
         else:
-            own = spelled(kind, None if is_null else numbers[:size])
-        own |= with_entries(dict(zip(extras, [None] * len(extras) if is_null else numbers[size:], strict=True)))
-        made.append(named | own | stamp | {name: texts[at] for name, texts in others.items()})
+            named: dict[str, Any] = {"frame": frames[at]} if frames[at] else {}
+            made.append(named | spelled(kind, numbers) | said)
     return made
+
+
+def _each(block: RowPoses, extras: Sequence[str]) -> Iterator[tuple[list[float] | None, dict[str, Any]]]:
+    """Yield the numbers of each row, None in one without a result, and what else it says."""
+    others = {name: plain_cells(cells) for name, cells in block.extras.items()}
+    stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
+    for at, numbers in enumerate(block.numbers.tolist()):
+        is_null, own = isnan(numbers[0]), len(numbers) - len(extras)
+        said = with_entries(dict(zip(extras, [None] * len(extras) if is_null else numbers[own:], strict=True)))
+        if stamps is not None:
+            said["stamp_ns"] = None if stamps[at] == NO_STAMP else stamps[at]
+        yield None if is_null else numbers[:own], said | {name: cells[at] for name, cells in others.items()}
 
 
 def spelled(kind: str, numbers: Sequence[float] | None) -> dict[str, Any]:
