@@ -193,8 +193,8 @@ def _is_exact(kind: Kind | None, parts: Sequence[Any]) -> bool:
         return False
     numbers: list[Any] = []
     for part in parts:
-        is_array = is_typed(part) and part.size
-        numbers += [part.min(), part.max()] if is_array else [int(each) for each in plain_cells(part) if each is not None]
+        known = plain_cells(part) if not (is_typed(part) and part.size) else [part.min(), part.max()]
+        numbers += [int(each) for each in known if each is not None]
     return all(-EXACT < number < EXACT for number in numbers)  # of the least int64 there is no absolute value
 
 
