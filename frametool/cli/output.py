@@ -176,7 +176,7 @@ class Output:
 
     def _blocks(self, batches: Iterator[list[Value] | RowPoses]) -> Iterator[bytes]:
         """Yield a trajectory, columns of numbers or a recording, block after block of things of one kind."""
-        from frametool.stream.writers import writer_for
+        from frametool.stream.as_poses import writer_for
 
         first = next(batches, [])
         turns = [each for each in first if isinstance(each, Result) and each.pose.position is None]

@@ -25,23 +25,42 @@ from frametool.stream.row_poses import RowPoses, kept
 from frametool.stream.rows import Block, spans_of
 from frametool.stream.table import rename_of
 from frametool.stream.table_stream import TableRows, begin_table, stamps_for
-from frametool.stream.writers import LEARNED, writer_for
+from frametool.stream.writers import LEARNED, TextWriter
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator
+    from collections.abc import Generator, Iterator, Sequence
     from io import BufferedReader
 
     from frametool.formats.rows.pose_rows import PoseBlock
     from frametool.formats.table import Poses
     from frametool.grammar.edges import Answers
     from frametool.grammar.result import Style
+    from frametool.stream.array_writer import ArrayWriter
+    from frametool.stream.recording_writer import RecordingWriter
     from frametool.stream.request import Request
     from frametool.stream.table_stream import PlannedRows
-    from frametool.stream.writers import BlockWriter
 
     Step: TypeAlias = tuple[RowPoses, Outcome]  # what a block became, and what is reported about it
+    BlockWriter: TypeAlias = "TextWriter | ArrayWriter | RecordingWriter"
 
 QUATERNION = notation("quaternion")
+
+
+def writer_for(style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> BlockWriter:
+    """Return what writes blocks in the format of a style: text, columns of numbers, or messages of a recording.
+
+    kind: pose, point, ..; extras: the numbers with each; placed: whether poses have a position
+    """
+    writes = FORMATS[style.format].writes
+    if "arrays" in writes:
+        from frametool.stream.array_writer import ArrayWriter
+
+        return ArrayWriter(style, kind, extras, placed=placed)
+    if "recording" in writes:
+        from frametool.stream.recording_writer import RecordingWriter
+
+        return RecordingWriter(style, kind, extras, placed=placed)
+    return TextWriter(style, kind, extras, placed=placed)
 
 
 class FormatConverter:

@@ -194,9 +194,7 @@ def assemble(
         if isinstance(piece, (In, Instead)):
             found.append(parts[piece.part if isinstance(piece, In) else piece.new])
         elif isinstance(piece, Out) and values is not None:
-            ends = values.ends[:, piece.first : piece.last].copy()
-            ends[:, -1] -= 1
-            found.append(Spans(values.data, values.starts[:, piece.first : piece.last], ends))
+            found += _numbers(values, piece)
         elif isinstance(piece, Word) and results is not None:
             found.append(worded(results[:, piece.number], piece))
         else:
@@ -204,6 +202,18 @@ def assemble(
             shown = text.starts + locked * (text.ends - text.starts) if isinstance(piece, IfLocked) else text.ends
             found.append(text._replace(ends=shown))
     return found
+
+
+def _numbers(values: Spans, piece: Out) -> list[Spans]:
+    """Return the spans of neighbouring numbers, with what is between them."""
+    own = slice(piece.first, piece.last)
+    starts, ends = values.starts[:, own], values.ends[:, own].copy()
+    if len(piece.between) == 1:
+        ends[:, -1] -= 1
+        return [Spans(values.data, starts, ends)]
+    between = constant(piece.between, len(ends))
+    each = [Spans(values.data, start, end) for start, end in zip(starts.T, ends.T - 1, strict=True)]
+    return [each[0], *(part for number in each[1:] for part in (between, number))]
 
 
 def worded(numbers: Floats, piece: Word) -> Spans:

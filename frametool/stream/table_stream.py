@@ -199,8 +199,8 @@ class PlannedRows:
         names = [*map(self.table.name, range(self.table.width))]
         extras = {name: taken(column(place), rows) for place, name in enumerate(names) if place not in used}
         own = own_count(self.plan, numbers.shape[1])
-        beside = [each for each in layout.columns if isinstance(each, New) and each.number >= own]
-        extras |= {each.name: numbers[:, each.number] for each in beside}
+        extra = [each for each in layout.columns if isinstance(each, New) and each.number >= own]
+        extras |= {each.name: numbers[:, each.number] for each in extra}
         parents, called = (
             block.names.texts(role, rows) if role in self.roles else [name]
             for role, name in enumerate(unnamed(self.request, self.shape))

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 from importlib import import_module
-from itertools import chain, pairwise
-from typing import TYPE_CHECKING, Any, TypeAlias
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -38,6 +38,7 @@ from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.result import Result, with_entries
 from frametool.stream.header import XYZ
+from frametool.stream.layout import Const, In, Out
 from frametool.stream.row_layout import POSE, SIX, Target
 from frametool.stream.row_poses import (
     block_of,
@@ -50,7 +51,7 @@ from frametool.stream.row_poses import (
     spelled,
     texts_of,
 )
-from frametool.stream.rows import constant, number_spans, spans_of
+from frametool.stream.rows import assemble, number_spans, separators, spans_of
 from frametool.text.spans import Spans, join
 
 if TYPE_CHECKING:
@@ -59,12 +60,9 @@ if TYPE_CHECKING:
     from frametool.geometry.place import Place
     from frametool.geometry.types import Components
     from frametool.grammar.result import Style
-    from frametool.stream.array_writer import ArrayWriter
-    from frametool.stream.recording_writer import RecordingWriter
+    from frametool.stream.layout import Piece
     from frametool.stream.row_poses import RowPoses
     from frametool.text.spans import Floats
-
-    BlockWriter: TypeAlias = "TextWriter | ArrayWriter | RecordingWriter"
 
 LEARNED = ("csv", "json", "yaml")
 PROBE_NS = 1234567890987654321
@@ -181,26 +179,23 @@ class TextWriter:
 
     def _joined(self, fmt: RowForm, values: Floats, block: RowPoses) -> bytes:
         """Put the rows of a block together."""
-        after = bytearray()
-        for piece in fmt.row:
-            if isinstance(piece, Numbers):
-                after += (piece.between[:1] or b",") * piece.size
         if not np.isfinite(values).all():
             raise ValueInvalid("a result is too large for a double")
-        numbers = number_spans(
-            np.ascontiguousarray(values), self.style.precision, bytes(after), yaml=self.style.format == "yaml"
-        )
-        size, first = len(values), 0
-        parts = [constant(fmt.between, size)] if fmt.between else []
+        pieces: list[Piece] = [Const(fmt.between)] if fmt.between else []
+        parts: list[Spans] = []
+        first = 0
         for piece in fmt.row:
             if isinstance(piece, bytes):
-                parts.append(constant(piece, size))
+                pieces.append(Const(piece))
             elif isinstance(piece, Numbers):
-                parts += _numbers(numbers, first, piece)
+                pieces.append(Out(first, first + piece.size, piece.between))
                 first += piece.size
             else:
+                pieces.append(In(len(parts)))
                 parts.append(self._field(piece, block, fmt.first))
-        text = join(parts)
+        after, is_yaml = separators(pieces, first), self.style.format == "yaml"
+        numbers = number_spans(np.ascontiguousarray(values), self.style.precision, after, yaml=is_yaml)
+        text = join(assemble(pieces, parts, numbers, np.zeros(len(values), np.int64)))
         return text if self.count else fmt.head + text[len(fmt.between) :]
 
     def _field(self, name: str, block: RowPoses, first: int) -> Spans:
@@ -342,23 +337,6 @@ class TextWriter:
         return text[len(known) :].encode()
 
 
-def writer_for(style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> BlockWriter:
-    """Return what writes blocks in the format of a style: text, columns of numbers, or messages of a recording.
-
-    kind: pose, point, ..; extras: the numbers with each; placed: whether poses have a position
-    """
-    writes = FORMATS[style.format].writes
-    if "arrays" in writes:
-        from frametool.stream.array_writer import ArrayWriter
-
-        return ArrayWriter(style, kind, extras, placed=placed)
-    if "recording" in writes:
-        from frametool.stream.recording_writer import RecordingWriter
-
-        return RecordingWriter(style, kind, extras, placed=placed)
-    return TextWriter(style, kind, extras, placed=placed)
-
-
 def refuse_scale_in(fmt: str, extra: Iterable[str]) -> None:
     """Stop where a format has no place for the scale of a similarity, which would then be a pose."""
     if SCALE in extra and fmt not in ("text", *LEARNED):
@@ -374,18 +352,3 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
     """Return the text of single poses in a format that says what its rows are."""
     writer = TextWriter(style)
     return b"".join((writer.of_block(block_of(list(results))), *writer.end())).decode()
-
-
-def _numbers(numbers: Spans, first: int, piece: Numbers) -> list[Spans]:
-    """Return the spans of neighbouring numbers, with what is between them."""
-    last = first + piece.size
-    ends = numbers.ends[:, first:last].copy()
-    if len(piece.between) == 1:
-        ends[:, -1] -= 1
-        return [Spans(numbers.data, numbers.starts[:, first:last], ends)]
-    ends -= 1
-    each = [Spans(numbers.data, numbers.starts[:, at], ends[:, at - first]) for at in range(first, last)]
-    between = constant(piece.between, len(ends))
-    return list(chain(*([part, between] for part in each)))[:-1]
-
-
