@@ -32,7 +32,6 @@ from frametool.view.scene import EYES, FrameScene, Projection, can_be_drawn
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from frametool.formats.robots.model import Mimic
     from frametool.formats.robots.solids import Solid
     from frametool.frames.track import MovingTrack
     from frametool.geometry.types import Rigid
@@ -193,13 +192,10 @@ def write_page(
 
 def _shown(scene: FrameScene, eye: tuple[float, float] | None) -> dict[str, Any]:
     """Return the initial view of the page."""
-    shown: dict[str, Any] = {"fixed": scene.fixed, "path": scene.path_only}
-    shown |= {key: name for key, name in (("target", scene.target), ("source", scene.source)) if name}
-    if scene.at_ns is not None:
-        shown["t"] = format_stamp(scene.at_ns)
-    if scene.chosen is not None and not scene.path_only:
-        shown["only"] = [name for name in scene.names if name in scene.chosen]
-    return shown | ({"view": eye} if eye else {})
+    only = None if scene.chosen is None or scene.path_only else [name for name in scene.names if name in scene.chosen]
+    time = None if scene.at_ns is None else format_stamp(scene.at_ns)
+    shown = {"fixed": scene.fixed, "path": scene.path_only, "target": scene.target, "source": scene.source}
+    return shown | {"t": time, "only": only, "view": eye}
 
 
 def _data(scene: FrameScene) -> tuple[dict[str, Any], bytes]:
@@ -229,27 +225,26 @@ def joint_sliders(scene: FrameScene) -> dict[str, list[dict[str, Any]]]:
     index = {name: number for number, name in enumerate(scene.names)}
     joints: list[dict[str, Any]] = []
     moved: list[dict[str, Any]] = []
-    places: dict[str, int] = {}
-    mimics: list[tuple[dict[str, Any], Mimic]] = []
     for values, links, _ in scene.tree.robots:
         for link in links:
             known = [values.get(joint.name) for joint in link.joints]
             if not known or link.child not in index or not all(isinstance(value, JointValue) for value in known):
                 continue
-            numbers = range(len(joints), len(joints) + len(known))
-            places |= zip((joint.name for joint in link.joints), numbers, strict=True)
-            moved.append({"frame": index[link.child], "joints": [*numbers], "origin": link.origin, "after": link.after,
-                          "inverted": link.inverted})  # fmt: skip
+            numbers = [*range(len(joints), len(joints) + len(known))]
+            placed = {key: getattr(link, key) for key in LINK_KEYS}
+            moved.append({"frame": index[link.child], "joints": numbers} | placed)
             for joint, value in zip(link.joints, known, strict=True):
                 joints.append({key: getattr(joint, key) for key in SLIDER_KEYS} | {"value": float(value.plain)})
-                mimics += [(joints[-1], joint.mimic)] * (joint.mimic is not None)
-    for joint, mimic in mimics:
-        if mimic.joint in places:
+    places = {joint["name"]: number for number, joint in enumerate(joints)}
+    for joint in joints:
+        mimic = joint.pop("mimic")
+        if mimic is not None and mimic.joint in places:
             joint["mimic"] = [places[mimic.joint], mimic.multiplier, mimic.offset]
     return {"joints": joints, "links": moved}
 
 
-SLIDER_KEYS = ("name", "kind", "axis", "anchor", "rest", "lower", "upper")
+SLIDER_KEYS = ("name", "kind", "axis", "anchor", "rest", "lower", "upper", "mimic")
+LINK_KEYS = ("origin", "after", "inverted")
 
 
 MESH_PART = 0.35  # of the usual distance between frames is the least edge of a box
