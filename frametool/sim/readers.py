@@ -23,11 +23,11 @@ from frametool.documents.source import Source, error_at
 from frametool.errors import FormatError, ValueInvalid, alternatives, shown
 from frametool.formats.detect import detect
 from frametool.formats.rows.csv import split_line
-from frametool.frames.stamps import BILLION, format_stamp, parse_stamp
+from frametool.frames.stamps import BILLION, format_stamp, parse_time
 from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
 from frametool.ros.message_stream import NOISE
 from frametool.sim.drivers import KEYS
-from frametool.sim.scene import LONGEST, LONGEST_NS
+from frametool.sim.scene import nanoseconds
 from frametool.sim.turtle import Twist
 from frametool.text.numbers import parse_number, read_number_or_angle
 
@@ -84,44 +84,30 @@ def known_keys(value: Any, keys: Collection[str], what: str) -> dict[str, Any]:
     return mapping
 
 
-def _stamp(text: str) -> int:
-    stamp_ns = parse_stamp(text)
-    if stamp_ns > LONGEST_NS:
-        raise ValueInvalid(f"{text} s is more than {LONGEST} s")
-    return stamp_ns
-
-
 def _time(text: str) -> int:
-    stamp_ns = _stamp(text)
+    stamp_ns = parse_time(text)
     if stamp_ns < 0:
         raise ValueInvalid(f"{text} s is before the start, which is 0")
     return stamp_ns
 
 
-def _integer(text: str) -> int:
-    if not re.fullmatch(r"[0-9]{1,30}", text):
-        raise ValueInvalid(f"expected a whole number, found {shown(text)}")
+def _whole(text: str, most: int) -> int:
+    if not re.fullmatch(r"[0-9]{1,30}", text) or int(text) > most:
+        raise ValueInvalid(f"expected a whole number 0 .. {most}, found {shown(text)}")
     return int(text)
 
 
-def _byte(text: str) -> float:
-    value = parse_number(text)
-    if not (0.0 <= value <= 255.0 and value.is_integer()):
-        raise ValueInvalid(f"expected a whole number 0 .. 255, found {text}")
-    return value
-
-
 read_number = text_reader(parse_number, "a number")
-read_byte = text_reader(_byte, "a whole number 0 .. 255")
+read_byte = text_reader(partial(_whole, most=255), "a whole number 0 .. 255")
 read_angle = text_reader(partial(read_number_or_angle, degrees=False), "an angle in radians, or like 90deg")
-read_stamp = text_reader(_stamp, "a time in seconds")
+read_stamp = text_reader(parse_time, "a time in seconds")
 read_time = text_reader(_time, "a time in seconds")
 read_duration = text_reader(
     lambda text: None if text in ("inf", ".inf") else _time(text), "a duration in seconds, or inf"
 )
 read_boolean = one_of(FLAGS)
 read_flag = text_reader(lambda text: parse_number(FLAGS.get(text, text)), "true or false")
-read_integer = text_reader(_integer, "a whole number")
+read_seed = text_reader(partial(_whole, most=1 << 64), "a whole number")
 
 
 def parse_spawn(text: str) -> Place:
@@ -142,8 +128,7 @@ def parse_seconds(text: str) -> float:
     Raises ValueInvalid if it is negative or longer than stamps allow.
     """
     seconds = parse_number(text)
-    if not 0.0 <= seconds <= LONGEST:
-        raise ValueInvalid(f"expected 0 or more, and at most {LONGEST}, found {seconds:g}")
+    nanoseconds("a time", seconds)
     return seconds
 
 

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     Place = tuple[float, float, float]
 
 TUTORIAL_SPAWN: Place = (4.0, 2.0, 0.0)
-LONGEST_NS = FURTHEST_NS  # of any time in a scene: the range of the buffer's stamps
-LONGEST = LONGEST_NS // BILLION  # seconds
+LONGEST = FURTHEST_NS // BILLION  # seconds: the range of the buffer's stamps
 
 
 class Follow(NamedTuple):

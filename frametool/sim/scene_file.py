@@ -54,7 +54,7 @@ READERS: dict[str, Callable[[Any], Any]] = {
     "duration": readers.read_duration,
     "turtlesim": readers.one_of(VARIANTS),
     "holonomic": readers.read_boolean,
-    "seed": readers.read_integer,
+    "seed": readers.read_seed,
     "spawn": _place,
     "follow": _name,
     "law": readers.one_of(LAWS),

@@ -272,7 +272,6 @@ class RunSummary:
         self.walls: dict[str, int] = {}
         self.distances: dict[str, float] = {}
         self.reached_ns: dict[str, int] = {}
-        self.gone: dict[str, tuple[str, int]] = {}  # follower -> which of the two left the world, and when
         self._follows = scene.followers
 
     def watch(self, step: SimulationStep) -> None:
@@ -286,9 +285,8 @@ class RunSummary:
                 self.distances[name] = distance
                 if distance <= self.reach:
                     self.reached_ns.setdefault(name, step.t_ns)
-            elif step.is_tick and name in self.distances:
-                del self.distances[name]
-                self.gone[name] = (follow.leader if name in step.states else name, step.t_ns)
+            elif step.is_tick:  # one of them has left the world
+                self.distances.pop(name, None)
 
     def lines(self) -> Iterator[str]:
         """Yield the summary: one line per follower, then the walls; names are escaped for a terminal."""
@@ -301,15 +299,11 @@ class RunSummary:
 
     def _line(self, name: str, follow: Follow) -> str:
         target = follow.leader if follow.target == "leader" else f"the {follow.target} of {follow.leader}"
-        if name not in self.distances and name not in self.gone:
-            return f"{name}: never in the world together with {follow.leader}"
         reached = self.reached_ns.get(name)
         near = f"within {self.reach:g} m"
         soon = f"never {near}" if reached is None else f"{near} after {_seconds(reached)}"
-        if name in self.distances:
-            return f"{name}: final distance to {target} {self.distances[name]:.4f} m; {soon}"
-        who, when_ns = self.gone[name]
-        return f"{name}: no final distance, {who} left the world at {_seconds(when_ns)}; {soon}"
+        distance = f"final distance to {target} {self.distances[name]:.4f} m" if name in self.distances else ""
+        return f"{name}: {distance or f'not in the world together with {follow.leader}'}; {soon}"
 
 
 def goal(leader: TurtleState, follow: Follow, now_ns: int) -> TurtleState:

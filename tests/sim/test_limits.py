@@ -107,12 +107,12 @@ def test_what_a_service_cannot_take_as_float32_is_refused(place: tuple[float, fl
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("turtles: {a: , b: {follow: a, delay: 1e300}}", "s.yaml:1:38: 1e300 s is more than 4611686018 s"),
-        ("turtles: {a: }\nduration: 1e300", "s.yaml:2:11: 1e300 s is more than"),
-        ("turtles: {a: }\nseed: " + "9" * 100, "s.yaml:2:7: expected a whole number, found '999"),
-        ("turtles: {a: }\nevents: [{t: 1e300, clear: }]", "s.yaml:2:14: 1e300 s is more than"),
+        ("turtles: {a: , b: {follow: a, delay: 1e300}}", "s.yaml:1:38: stamp "),
+        ("turtles: {a: }\nduration: 1e300", "s.yaml:2:11: stamp "),
+        ("turtles: {a: }\nseed: " + "9" * 100, "s.yaml:2:7: expected a whole number 0 .. 18446744073709551616, found '999"),
+        ("turtles: {a: }\nevents: [{t: 1e300, clear: }]", "s.yaml:2:14: stamp "),
         ("turtles: {a: }\nevents: [{t: 0, spawn: {x: 1e39, y: 0}}]", "s.yaml:2:24: x must be a number within float32"),
-        ("turtles: {a: {leader: [{t: 1e300, linear: 1}]}}", "s.yaml:1:28: 1e300 s is more than"),
+        ("turtles: {a: {leader: [{t: 1e300, linear: 1}]}}", "s.yaml:1:28: stamp "),
     ],
 )
 def test_times_and_places_that_cannot_be_are_refused_where_they_stand(text: str, message: str) -> None:
