@@ -138,20 +138,14 @@ def _animation(scene: FrameScene, index: dict[str, int], part: BinaryPart) -> di
 
 def _keys(track: MovingTrack, first_ns: int) -> tuple[list[float], list[Sequence[float]], list[Sequence[float]]]:
     """Return increasing float32 seconds, positions, and quaternions with continuous signs."""
-    seconds: list[float] = []
-    places: list[Sequence[float]] = []
-    rotations: list[Sequence[float]] = []
+    keys: dict[float, Rigid] = {}
     for stamp_ns, _, sample in track.walk():
-        second = single((stamp_ns - first_ns) / BILLION)
-        if seconds and second <= seconds[-1]:
-            continue
-        rotation = sample[3:]
-        if rotations and sum(map(mul, rotation, rotations[-1])) < 0.0:
-            rotation = tuple(-each for each in rotation)
-        seconds.append(second)
-        places.append(sample[:3])
-        rotations.append(rotation)
-    return seconds, places, rotations
+        keys.setdefault(single((stamp_ns - first_ns) / BILLION), sample)
+    rotations: list[Sequence[float]] = []
+    for *_, x, y, z, w in keys.values():
+        sign = -1.0 if rotations and sum(map(mul, (x, y, z, w), rotations[-1])) < 0.0 else 1.0
+        rotations.append((sign * x, sign * y, sign * z, sign * w))
+    return [*keys], [sample[:3] for sample in keys.values()], rotations
 
 
 SCRIPTS = ("begin", "kernels", "frames", "state", "camera", "picture", "labels", "panel", "hands")
