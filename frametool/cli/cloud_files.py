@@ -9,9 +9,8 @@ from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from frametool.cli.command import inputs, refuse
+from frametool.cli.command import refuse
+from frametool.cli.options import for_each
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say, say_warning
 from frametool.errors import FormatError, FrametoolError, FrametoolWarning, heard_by, shown
@@ -36,7 +35,7 @@ PLACES: dict[str, Callable[[PointCloud], str]] = {
     "frame": lambda cloud: cloud.frame,
 }  # {NAME} in -o -> what replaces it
 _HEAD = 64
-_WRITTEN = ", ".join(writers("arrays"))
+_WRITTEN = f"formats: {', '.join(writers('arrays'))}"
 BAGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
 _MAGICS: list[Any] = [what for name in BAGS for kind, what in FORMATS[name].magic if kind == "magic"]
 
@@ -50,34 +49,26 @@ class BagOfClouds:
         from frametool.recordings.messages import cloud_topics
         from frametool.recordings.read import opened_recording
 
-        self.path = path
-        self.output = output
-        stream.inputs.ask("input_path")
-        self.stream = stream
-        if output.path in (None, "-") or not holds_arrays(output.chosen or ""):
-            raise click.UsageError(f"each cloud of a bag is a file: -o 'scan_{{stamp_ns}}.pcd'; formats: {_WRITTEN}")
-        self.pattern = str(output.path)
-        for place in {*re.findall(r"\{(\w*)\}", self.pattern)} - {*PLACES}:
-            known = ", ".join(f"{{{each}}}" for each in PLACES)
-            raise click.UsageError(f"-o {self.pattern}: {{{place}}} has no meaning; there are {known}")
-        self.tally = Diagnostics()
-        chosen = inputs().topics
+        self.path, self.output, self.stream, inputs = path, output, stream, stream.inputs
+        inputs.ask("input_path")
+        is_one = output.path in (None, "-") or not holds_arrays(output.chosen or "")
+        refuse(is_one, f"each cloud of a bag is a file: -o 'scan_{{stamp_ns}}.pcd'; {_WRITTEN}")
+        self.tally, self.names = Diagnostics(), dict[str, int]()
+        chosen = inputs.topics
         with ExitStack() as opened:
             self.reader = opened.enter_context(opened_recording(path, self.tally))
             self.topics = cloud_topics(self.reader, chosen)
             self.opened = opened.pop_all()
         clouds = {topic.strip("/") for topic in self.topics}
-        inputs().leave(topics=tuple(topic for topic in chosen if topic.strip("/") not in clouds))
-        self.names: dict[str, int] = {}
+        inputs.leave(topics=tuple(topic for topic in chosen if topic.strip("/") not in clouds))
 
     def run(self, way: Way, *, alone: bool) -> int:
         """Move and write cloud after cloud; return the exit status.  alone: there is nothing else to do."""
         from frametool.recordings.messages import read_clouds
 
-        refuse(way.uncertain, "--covariance: clouds have no place for one")
-        refuse(not alone, "the clouds of a bag move at their own stamps, from their own frames; no records")
+        refuse(way.uncertain or not alone, "the clouds of a bag are moved whole, each at its own stamp; no records")
         bad = self.stream.policy(self.path, "message")
-        inputs().refuse_idle()
+        self.stream.inputs.refuse_idle()
         count = points = 0
         once: Any = cache(say_warning)
         with self.opened, heard_by(once):
@@ -85,16 +76,15 @@ class BagOfClouds:
                 count += 1
                 if isinstance(cloud, FormatError):
                     bad.take([Fault(cloud.line, "", cloud.message)])
-                    continue
-                points += self._write(cloud, way, bad)
+                else:
+                    points += self._write(cloud, way, bad)
             for finding in self.tally.findings():
                 once(f"{self.path}: {finding.message}", finding.rule, FrametoolWarning)
         if not count:
             raise FormatError(f"no messages on {', '.join(self.topics)}", source=self.path)
         if not self.stream.inputs.quiet:
             files = f"{len(self.names)} {'file' if len(self.names) == 1 else 'files'}"
-            where = f" in {way.target}" if way.target else ""
-            say(f"{self.path}: {points} points{where}, metres, in {files} ({', '.join(self.topics)})")
+            say(f"{self.path}: {points} points{_where(way)}, metres, in {files} ({', '.join(self.topics)})")
         return bad.finish(count)
 
     def _write(self, cloud: PointCloud, way: Way, bad: BadRows) -> int:
@@ -120,12 +110,15 @@ class BagOfClouds:
     def _name(self, cloud: PointCloud) -> str:
         """Return the name of a cloud's file; raises FormatError for one that another has."""
         texts = {place: re.sub(r"[/\0]|^\.+", "_", text(cloud)) for place, text in PLACES.items()}  # no other folder
-        name = re.sub(r"\{(\w+)\}", lambda found: texts[found[1]], self.pattern)
+        name = re.sub(r"\{(\w+)\}", lambda found: texts.get(found[1], found[0]), str(self.output.path))
         if name in self.names:
             both = f"messages {self.names[name]} and {cloud.number} would both become {shown(name)}"
-            remedy = "{number}" if "{" in self.pattern else "{stamp_ns}"
-            raise FormatError(f"{both}; put {remedy} into its name", source=self.path)
+            raise FormatError(f"{both}; put {{stamp_ns}} or {{number}} into its name", source=self.path)
         return name
+
+
+def _where(way: Way) -> str:
+    return f" in {way.target}" if way.target else ""
 
 
 class SeveralClouds:
@@ -133,21 +126,16 @@ class SeveralClouds:
 
     def __init__(self, output: Output, stream: Stream) -> None:
         """Take --frames and the --in of clouds; the tree may not have them too.  Raises click.UsageError."""
-        self.output = output
-        self.stream = stream
-        self.paths: Sequence[str] = stream.inputs.input_path
-        refuse("-" in self.paths, "-i - among several: standard input holds one cloud; name files")
-        if bags := [path for path in self.paths if is_bag(path)]:
-            raise click.UsageError(f"{bags[0]} is a bag, whose clouds become files of their own; give it alone")
-        formats = inputs().input_formats
+        self.output, self.stream, inputs = output, stream, stream.inputs
+        self.paths: Sequence[str] = inputs.input_path
+        others = [path for path in self.paths if path == "-" or is_bag(path)]
+        refuse(others, f"-i {''.join(others[:1])}: several -i are files of one cloud each")
+        refuse(not holds_arrays(output.chosen or ""), f"several clouds become one: -o all.ply, or -f; {_WRITTEN}")
+        formats = inputs.input_formats
         named = [fmt for fmt in formats if "arrays" in FORMATS[fmt].reads]
-        if len(named) not in (0, 1, len(self.paths)):
-            raise click.UsageError(f"--in is given {len(named)} times for {len(self.paths)} clouds; once, or once each")
-        self.formats = named * (len(self.paths) if len(named) == 1 else 1) or [""] * len(self.paths)
-        self.frames = [name.strip() for text in inputs().named_frames for name in text.split(",")]
-        inputs().leave(input_formats=[fmt for fmt in formats if fmt not in named], named_frames=())
-        if self.frames and len(self.frames) != len(self.paths):
-            raise click.UsageError(f"--frames names {len(self.frames)} frames for {len(self.paths)} clouds; one each")
+        self.formats = for_each(named, len(self.paths))
+        self.frames = [name.strip() for text in inputs.named_frames for name in text.split(",")]
+        inputs.leave(input_formats=[fmt for fmt in formats if fmt not in named], named_frames=())
 
     def run(self, way: Way, *, alone: bool) -> int:
         """Move all and write them as one; return the exit status.  alone: there is nothing else to do."""
@@ -159,16 +147,14 @@ class SeveralClouds:
         from frametool.stream.faults import run
         from frametool.stream.request import Operation, Request
 
+        count, frames, inputs = len(self.paths), self.frames, self.stream.inputs
         is_more = way.uncertain or not alone
-        refuse(is_more, "several clouds are moved whole; no records, --covariance or --explain beside them")
-        if way.has_source == bool(self.frames):
-            both = "SOURCE is one frame for all, --frames one for each; give one of them"
-            each = f"say what each cloud is given in: --frames A,B (one for each of the {len(self.paths)}), or SOURCE"
-            raise click.UsageError(both if way.has_source else each)
-        on_error = self.stream.inputs.on_error
+        refuse(is_more, "several clouds are moved whole, without records, --covariance or --explain")
+        is_open = way.has_source == bool(frames) or len(frames) not in (0, count)
+        refuse(is_open, f"name SOURCE, the frame of all clouds, or --frames A,B with one for each of the {count}")
         with ExitStack() as opened:
             planned = []
-            for path, named, frame in zip(self.paths, self.formats, self.frames or [""] * len(self.paths), strict=True):
+            for path, named, frame in zip(self.paths, self.formats, frames or [""] * count, strict=True):
                 file = InputFile(path)
                 opened.callback(file.close)
                 file.format = fmt = named or detect(file.head(), "records", "rows", "arrays", name=path)[0]
@@ -177,12 +163,9 @@ class SeveralClouds:
                     raise FormatError(f"{FORMATS[fmt].summary}, no cloud; {hint}", source=path)
                 reading = Options(Diagnostics(), Topics(), answers=answers())
                 columns = import_module(FORMATS[fmt].reader).open_columns(file, reading)
-                request = Request(Operation(left=way.from_frame(frame or None, None), moves=True), on_error=on_error)
-                planned.append((columns, request, path))
-            into = self.output.chosen or fmt
-            refuse(not holds_arrays(into), f"several clouds become one cloud: -o all.ply, or -f; formats: {_WRITTEN}")
-            refuse(self.output.path is self.output.chosen is None, "several clouds become one file: give -o all.ply")
-            merged = MergedClouds(planned, self.output.style.with_format(into))
+                operation = Operation(left=way.from_frame(frame or None, None), moves=True)
+                planned.append((columns, Request(operation, on_error=inputs.on_error), path))
+            merged = MergedClouds(planned, self.output.style)
             status = 0
             with writing(self.output.path, force=self.output.force) as write:
                 for at, path in enumerate(self.paths):
@@ -190,10 +173,9 @@ class SeveralClouds:
                     status = max(status, run(merged.outcomes(at), write, policy, lambda _rows, _size: None))
                 for piece in merged.writer.end():
                     write(piece)
-        if not self.stream.inputs.quiet:
-            where = f" in {way.target}" if way.target else ""
-            froms = f", from {', '.join(self.frames)}" if self.frames else ""
-            say(f"{len(self.paths)} clouds{where} as one{froms}; metres")
+        if not inputs.quiet:
+            froms = f", from {', '.join(frames)}" if frames else ""
+            say(f"{count} clouds{_where(way)} as one{froms}; metres")
         return status
 
 

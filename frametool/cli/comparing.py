@@ -9,6 +9,7 @@ import click
 
 from frametool.cli.command import Inputs, option, refuse, refuse_two_readers, together
 from frametool.cli.command import inputs as running
+from frametool.cli.options import for_each
 from frametool.cli.stderr import say_error
 from frametool.cli.trees import answers
 from frametool.errors import ValueInvalid, shown, warn
@@ -121,19 +122,13 @@ def trajectory(
     return found, name, any(bad.count for bad in made)
 
 
-def formats_of(files: int) -> list[str]:
-    """Return the format of each of several files as --in says, the last for the rest; "" where it says none."""
-    formats = list(running().input_formats)
-    refuse(len(formats) > files, f"--in is given {len(formats)} times for {files} files")
-    return formats + (formats[-1:] * (files - len(formats)) or [""] * files)
-
-
 def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Comparison], bool]:
     """Compare estimates with a reference as the options say, with warnings. Also: whether rows were skipped."""
     from frametool.fit.comparison import compare
 
     refuse_two_readers([ref, *ests])
-    on_error, formats, chosen = inputs.on_error, formats_of(1 + len(ests)), _settings(inputs)
+    on_error, chosen = inputs.on_error, _settings(inputs)
+    formats = for_each(inputs.input_formats, 1 + len(ests))
     reference, ref_name, skipped = trajectory(ref, on_error, formats[0])
     found = []
     for argument, fmt in zip(ests, formats[1:], strict=True):

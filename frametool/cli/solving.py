@@ -6,7 +6,8 @@ from math import degrees, hypot, sqrt
 from typing import TYPE_CHECKING, Any
 
 from frametool.cli.command import Inputs, refuse
-from frametool.cli.comparing import formats_of, trajectory
+from frametool.cli.comparing import trajectory
+from frametool.cli.options import for_each
 from frametool.cli.stderr import say, say_error
 from frametool.cli.trees import answers, load_tree, opened, state
 from frametool.errors import ValueInvalid, alternatives, first_of, shown, warn
@@ -126,7 +127,7 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
 
     eye_to_hand = inputs.eye_to_hand
     if len(files) == 1:
-        fmt, columns, normalize = formats_of(1)[0], inputs.columns or (), inputs.normalize
+        fmt, columns, normalize = for_each(inputs.input_formats, 1)[0], inputs.columns or (), inputs.normalize
         samples = read_samples(files[0], eye_to_hand=eye_to_hand, normalize=normalize, fmt=fmt, columns=columns)
     else:
         samples = _paired(inputs, files)
@@ -160,7 +161,7 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
 def _paired(inputs: Inputs, files: Sequence[str]) -> HandEyeSamples:
     from frametool.fit.alignment import paired_samples
 
-    named, gap = zip(files, formats_of(2), strict=True), inputs.max_gap_ns
+    named, gap = zip(files, for_each(inputs.input_formats, 2), strict=True), inputs.max_gap_ns
     read = [trajectory(file, STOP, fmt, normalize=inputs.normalize)[:2] for file, fmt in named]
     (gripper, first), (target, second) = read
     for each, name in read:
@@ -176,7 +177,7 @@ def solved_points(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solu
     def policy(name: str) -> BadRows:
         return BadRows(name, STOP, tell=lambda error: say_error(error, in_json=False))
 
-    named = zip(files, formats_of(2), strict=True)
+    named = zip(files, for_each(inputs.input_formats, 2), strict=True)
     a, b = (read_points(file, fmt=fmt, answers=answers(), policy=policy) for file, fmt in named)
     found_names = (a.frame, b.frame) if a.frame and b.frame and a.frame != b.frame else ("A", "B")
     names = target, source = tuple(inputs.names or found_names)

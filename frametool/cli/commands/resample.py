@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.cli import options
 from frametool.cli.command import Inputs, argument, command_named, option, refuse
-from frametool.cli.comparing import formats_of, read_delta, read_span, trajectory, trajectory_options, write_trajectory
+from frametool.cli.comparing import read_delta, read_span, trajectory, trajectory_options, write_trajectory
 from frametool.cli.options import limit_options, read_times, reading_options, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.stderr import say
@@ -47,7 +47,7 @@ def command(inputs: Inputs) -> int:
     refuse(sum(each is not None for each in (rate, times, every)) != 1, "give one of --rate, --at and --every")
     refuse(rate is not None and rate <= 0, "--rate is more than 0")
     output = Output(inputs, "poses", otherwise=by_name(path, writers("poses")) or "csv")
-    found, name, skipped = trajectory(path, inputs.on_error, formats_of(1)[0])
+    found, name, skipped = trajectory(path, inputs.on_error, options.for_each(inputs.input_formats, 1)[0])
     from frametool.fit.alignment import resampled, stamps_at_rate, stamps_every
 
     found = _in_order(found, name)
