@@ -131,35 +131,6 @@ class AxesName(Text):
         return {f"{begun}{joint}{name}" if joint else name: about for name, about in known.items() if name != begun}
 
 
-class ColumnNames(Text):
-    """Columns of the input, or keys of its records, with commas between them."""
-
-    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:
-        """Offer those of the file that -i names."""
-        done, comma, _ = incomplete.rpartition(",")
-        path = ctx.params.get("input_path")
-        path = path[0] if isinstance(path, tuple) and path else path
-        found = _names_in(str(path)) if path and path != "-" else []
-        return dict.fromkeys((done + comma + name for name in found), "")
-
-
-def _names_in(path: str) -> list[str]:
-    """Return the names of a table's columns, or the outermost keys of records; none for what cannot be read."""
-    from frametool.documents.source import HEAD
-    from frametool.formats.detect import Beginning, detect
-    from frametool.stream.table import open_table
-
-    try:
-        with open(path, "rb") as file:
-            head = file.read(HEAD)
-        fmt, _ = detect(head, "rows", "records", name=path)
-        if not FORMATS[fmt].is_table:
-            return sorted(".".join(each) for each in Beginning(head).json_paths)
-        return list(open_table(head, fmt, header=True, source=path)[0].names or ())
-    except (OSError, FrametoolError):
-        return []  # nothing to offer, and a completion must not print
-
-
 def tree_on_the_line(ctx: click.Context) -> str | None:
     """Return the first file of frames; behind an option click has not come to the arguments."""
     named = ctx.params.get("files") or ctx.params.get("arguments") or ctx.args
@@ -169,21 +140,17 @@ def tree_on_the_line(ctx: click.Context) -> str | None:
 class JointSetting(Text):
     """A joint of a robot and its value."""
 
-    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:
-        """Offer the joints of the robot on the line with their limits; behind the = the limits."""
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
+        """Offer the joints of the robot on the line with their limits."""
         from frametool.formats.load import load
 
         try:
             with heard_by(lambda *_: None):
                 robots = load(tree_on_the_line(ctx) or "").robots
         except FrametoolError:
-            return {}  # as for columns
+            return {}  # a completion must not print
         joints = [joint for _, links, _ in robots for link in links for joint in link.joints]
-        ends = {each.name: [str(end) for end in (each.lower, each.upper) if end is not None] for each in joints}
-        name, equals, _ = incomplete.partition("=")
-        if equals:
-            return {f"{name}={end}": "a limit" for end in ends.get(name, ())}
-        return {f"{each}=": " .. ".join(both) for each, both in ends.items()}
+        return {f"{each.name}=": f"{each.lower} .. {each.upper}" for each in joints}
 
 
 UTF8 = Utf8()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from functools import partial
 from io import BufferedReader
@@ -15,7 +16,16 @@ from frametool.cli.command import Inputs, option, refuse, say_if_typed, together
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD, Source, has_line, has_record, opened
 from frametool.errors import FormatError
-from frametool.formats.table import FORMATS, has_no_text, holds_arrays, is_recording, is_trajectory, readers
+from frametool.formats.table import (
+    BAG,
+    FORMATS,
+    by_suffix,
+    has_no_text,
+    holds_arrays,
+    is_recording,
+    is_trajectory,
+    readers,
+)
 from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRow, BadRows
 
 if TYPE_CHECKING:
@@ -28,7 +38,8 @@ if TYPE_CHECKING:
     About = Callable[[], str] | None  # what else there is to say of a format
 
 TOP = 2  # lines of a table up to its first row: what is bad there may be bad in every row
-BAGS = (".bag", ".mcap", ".db3")
+BAGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
+_MAGICS: list[Any] = [what for name in BAGS for kind, what in FORMATS[name].magic if kind == "magic"]
 _STREAMS = ", ".join(readers(*options.STREAMED))
 RECORDS = readers("records")
 
@@ -37,7 +48,7 @@ _of_rows = partial(option, under="Rows")
 _ROWS = (
     option("--from REP", "representation of bare numbers", options.Notations(), name="from_rep", under="Rotations"),
     _of_rows("--columns NAME,..", "pose columns by name or number, once per pose; or one key of records, a.b",
-             options.ColumnNames(), multiple=True),
+             multiple=True),
     _of_rows("--keep", "append result columns, keep the input's"),
     _of_rows("--prefix TEXT", "prefix of the result's column names", options.UTF8, default=""),
     _of_rows("--on-error", "bad rows", ON_ERROR, default=STOP),
@@ -106,8 +117,6 @@ class Stream:
         """
         if self._opened is not None or not self.path or not _may_be_bag(self.path):
             return self._opened
-        from frametool.cli.cloud_files import is_bag
-
         if not is_bag(self.path):
             return None
         from frametool.grammar.edges import Diagnostics
@@ -396,7 +405,7 @@ def _then_closed(stream: Any, results: Iterable[Any]) -> Iterator[Any]:
 
 def _may_be_bag(path: str) -> bool:
     """Recognize a bag by its suffix, or a folder."""
-    return path.endswith(BAGS) or os.path.isdir(path)
+    return by_suffix(path, BAGS) is not None or os.path.isdir(path)
 
 
 def _signed(begin: bytes, name: str) -> str:
@@ -416,3 +425,14 @@ def _format_of(path: str) -> str:
             return detect(file.read(HEAD), *options.STREAMED, name=path)[0]
     except (OSError, ValueError):
         return ""
+
+
+def is_bag(path: str) -> bool:
+    """Recognize a bag by its first bytes, or as a folder."""
+    if not os.path.isfile(path):
+        from frametool.formats.detect import of_folder
+
+        return of_folder(path) in BAGS
+    with open(path, "rb") as file:
+        head = file.read(HEAD)
+    return re.match(b"|".join(_MAGICS), head, re.DOTALL) is not None if head else by_suffix(path, BAGS) is not None

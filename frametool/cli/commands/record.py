@@ -8,8 +8,7 @@ import click
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.options import pose_options, reading_options, verbose_option
-from frametool.cli.output import opened_place
-from frametool.cli.recording import copied_as, folder_of, refuse_input
+from frametool.cli.output import copied_as, folder_of, opened_place, refuse_input
 from frametool.cli.stderr import say, say_error
 from frametool.cli.trees import FRAME, load_tree, tree_file
 from frametool.errors import BadAnswer, FileProblem, FormatError, ValueInvalid, listing, shown, warn

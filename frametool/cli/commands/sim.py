@@ -2,32 +2,248 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
-from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from itertools import combinations
+from time import monotonic, sleep
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli import sim_output
-from frametool.cli.command import EXIT_CODES, Command, Inputs, argument, misuse, option, refuse
+from frametool.cli.command import EXIT_CODES, Command, Inputs, argument, misuse, option, refuse, say_if_typed, together
 from frametool.cli.commands import Group
 from frametool.cli.explaining import explain_option, significant
+from frametool.cli.options import FULL, PRECISION, file_with, suffix_of
 from frametool.cli.poses import inline_misuse, source_of
 from frametool.cli.signals import clean_up
-from frametool.cli.sim_output import LEADER, SimOutput, follow_options, leader_of, output_options, parse_duration
-from frametool.cli.sink import writing
+from frametool.cli.sink import is_special, refuse_existing, writing
 from frametool.cli.stderr import say
+from frametool.documents.source import Source, read_text
+from frametool.errors import FileProblem, alternatives, shown
 from frametool.formats.table import by_suffix
 from frametool.frames.stamps import BILLION
-from frametool.sim.drivers import FollowController, Mailbox, keys_in, meaning_of
+from frametool.grammar.result import Style
+from frametool.sim.drivers import (
+    LAWS,
+    LEADERS,
+    TARGETS,
+    FollowController,
+    Mailbox,
+    built_in,
+    keys_in,
+    meaning_of,
+    scripted,
+)
+from frametool.sim.readers import lines_as_they_come, parse_seconds, parse_spawn, read_commands, read_script
 from frametool.sim.scene import Scene, duration_ns, tutorial
 from frametool.sim.scene_file import read_scene
+from frametool.sim.simulate import RunSummary, SimulationStep, simulate
+from frametool.sim.step_writer import EMITS, FORMS, StepWriter
+from frametool.sim.turtle import VARIANTS
+from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from frametool.sim.drivers import MakeLeader
+    from frametool.sim.scene import Scene
+    Watch = Callable[[SimulationStep], object]
+
+
+def parse_duration(text: str) -> float:
+    """Read seconds, or inf."""
+    return math.inf if text == "inf" else parse_seconds(text)
+
+
+_LEADER = "still, circle, square, figure8, random, a file of commands, or - for standard input"
+LEADER = option("--leader NAME|FILE|-", _LEADER, default="still")
+_of_turtles = partial(option, under="Turtles")
+
+
+def follow_options(duration: str) -> Callable[[Any], Any]:
+    """Add to a command the options of followers; `duration` is how long it runs by default."""
+    return together(
+        option("--followers N", "each follows the previous one, the first follows turtle1", click.IntRange(0, 1000),
+               default=1),
+        option("--law", "the tutorial's listener: 10 Hz and gains 0.5, 4 (ros1), or 1 Hz and 0.5, 1 (ros2)", (*LAWS,),
+               default="ros1"),
+        option("--rate HZ", "control steps per second", parse_number),
+        _of_turtles("--gain-linear K", "speed for each metre of distance", parse_number),
+        _of_turtles("--gain-angular K", "turn rate for each radian of bearing", parse_number),
+        _of_turtles("--max-linear V", "fastest speed in m/s  [default: none]", parse_number),
+        _of_turtles("--max-angular W", "fastest turn in rad/s  [default: none]", parse_number),
+        _of_turtles("--target", "the leader, a carrot 2 m to its left, or a carrot that circles it at 10 m", TARGETS,
+                    default="leader"),
+        _of_turtles("--delay S", "follow the target's past position, looked up through world  [default: 0]",
+                    parse_seconds, default=0.0),
+        option("--spawn X,Y,THETA", "start of turtle2: metres, radians (or 90deg)", parse_spawn, default="4,2,0"),
+        option("--duration S", "simulated seconds, or inf", parse_duration, default=duration),
+        _of_turtles("--turtlesim", "whose turtlesim", VARIANTS, default="ros1"),
+        _of_turtles("--holonomic", "use linear.y in ROS 2, like the node's parameter"),
+        _of_turtles("--seed", "seed of the random leader", click.IntRange(0), default=0),
+    )  # fmt: skip
+
+
+output_options = together(  # what is shown of a run
+    option("--emit", "velocity commands of followers, poses of all turtles, or transforms for `lookup -`", EMITS,
+           default="commands"),
+    _of_turtles("--reach D", "distance in metres at which the target is reached", parse_number, default=0.5),
+    _of_turtles("--realtime", "run in real time, instead of as fast as possible"),
+    option("--live", "draw the turtles in the terminal, in real time"),
+    option("--view FILE.html", "show the frames over time on a page, like `view`", file_with(".html")),
+    option("-f --format", "format of the records  [default: text on a terminal, yaml otherwise]", FORMS,
+           name="format_name"),
+    PRECISION,
+    option("-o --output FILE", "write to this file instead of stdout, atomically", under="Result"),
+    option("--plot FILE", "draw the result into a .svg, .html or .png", file_with(".svg", ".html", ".png")),
+    option("--force", "let --output and --plot overwrite files", requires=("output", "plot", "view"),
+           under="Result"),
+)  # fmt: skip
+
+
+class SimOutput:
+    """What is shown of a run, and where: what the options of a command say."""
+
+    def __init__(self, inputs: Inputs, *, leaders: bool = False) -> None:
+        """Check what can be checked before anything runs; raises click.UsageError, FileProblem."""
+        self.style, self.leaders = style_of(inputs), leaders
+        self.output: str | None = None if inputs.output == "-" else inputs.output
+        self.emit, self.reach, self.realtime, self.live = inputs.emit, inputs.reach, inputs.realtime, inputs.live
+        self.plot, self.view, self.force = inputs.plot, inputs.view, inputs.force
+        refuse(self.reach < 0.0, f"--reach must be 0 or more, found {self.reach:g}")
+        if self.live and not (sys.stdout.isatty() or sys.stderr.isatty()):
+            raise click.UsageError("--live draws in a terminal, and neither stdout nor stderr is one; see --plot")
+        named = (("--output", self.output), ("--plot", self.plot), ("--view", self.view))
+        files = [(name, path) for name, path in named if path]
+        for (name, path), (other, same) in combinations(files, 2):
+            if os.path.realpath(path) == os.path.realpath(same) and not is_special(path):
+                raise click.UsageError(f"{name} and {other} are the same file: {shown(path)}")
+        for _, path in files:
+            refuse_existing(path, force=self.force)
+            if path != "-" and not os.path.isdir(os.path.dirname(path) or "."):
+                raise FileProblem(f"{path}: no directory {os.path.dirname(path)}")
+        if suffix_of(self.plot or "") == ".png":
+            from frametool.view.pictures import require_matplotlib
+
+            require_matplotlib()
+
+    def run(self, scene: Scene) -> None:
+        """Run a scene to its end and sum it up on stderr.
+
+        Raises KeyboardInterrupt after the summary if it was interrupted.
+        """
+        summary = RunSummary(scene, self.reach)
+        pictures = self._pictures(scene)
+        interrupted = False
+        try:
+            with ExitStack() as stack:
+                watchers = [summary.watch, *self._watchers(scene, stack), *(watch for watch, _ in pictures.values())]
+                for step in simulate(scene):
+                    for watch in watchers:
+                        watch(step)
+        except KeyboardInterrupt:  # leaves no file: what it holds is not the whole run
+            interrupted = True
+        for line in summary.lines():
+            say(line)
+        for path, (_, content) in pictures.items():
+            with writing(path, force=self.force) as write:
+                write(content())
+        if interrupted:
+            raise KeyboardInterrupt
+
+    def _pictures(self, scene: Scene) -> dict[str, tuple[Watch, Callable[[], str | bytes]]]:
+        """Return what is written after the run, by file: what watches the steps, and what then makes the content."""
+        pictures: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
+        if self.plot:
+            from frametool.view.pictures import write_picture
+            from frametool.view.run_plot import Drawing, run_picture
+
+            run, suffix = Drawing(scene), suffix_of(self.plot)
+            pictures[self.plot] = run.watch, lambda: write_picture(run_picture(run), suffix)
+        if self.view:
+            from frametool.view.exports import RunPage
+
+            page = RunPage()
+            pictures[self.view] = page.watch, page.content
+        return pictures
+
+    def _watchers(self, scene: Scene, stack: ExitStack) -> Iterator[Watch]:
+        """Open what the steps go to; the stack closes it."""
+        if self.realtime or self.live:
+            yield real_time()
+        if self.live:
+            from frametool.view.terminal import Screen
+
+            clean_up()  # the terminal's cursor
+            yield stack.enter_context(Screen(scene, to_stderr=not sys.stdout.isatty())).watch
+        else:
+            yield log_events()
+        if self.output is not None or not (self.live and sys.stdout.isatty()):
+            several = self.leaders or self.emit == "poses" or len(scene.followers) > 1
+            writer = StepWriter(self.emit, self.style, leaders=self.leaders, labelled=several)
+            write = stack.enter_context(writing(self.output, force=self.force))
+            # each record at once, so that a reader at the other end of a pipe sees it
+            yield lambda step: [write(text) for text in writer.write(step)]
+
+
+def real_time() -> Watch:
+    """Return what keeps simulated time from running ahead of the clock, which starts now."""
+    start = monotonic()
+    return lambda step: sleep(max(0.0, step.t_ns / BILLION - (monotonic() - start)))
+
+
+def log_events() -> Watch:
+    """Return what prints on stderr what turtlesim and the followers log; a wall once for each contact."""
+    at_wall: set[str] = set()
+
+    def watch(step: SimulationStep) -> None:
+        new = (str(hit) for hit in step.walls if hit.turtle not in at_wall)
+        for line in (*step.log, *new):
+            say(f"{step.t_ns / BILLION:.3f} s: {line}")
+        if step.is_tick:
+            at_wall.clear()
+            at_wall.update(hit.turtle for hit in step.walls)
+
+    return watch
+
+
+def style_of(inputs: Inputs) -> Style:
+    """Choose the format: that of --format, else by the file's suffix, else text for a terminal and YAML for a pipe."""
+    output, precision = inputs.output, inputs.precision
+    is_text = suffix_of(output or "") == ".txt" or (output is None and sys.stdout.isatty())
+    fmt = inputs.format_name or by_suffix(output, ("yaml", "json", "csv")) or ("text" if is_text else "yaml")
+    return Style(fmt, precision=None if precision == FULL else precision)
+
+
+def leader_of(inputs: Inputs) -> MakeLeader:
+    """Return the leader that the options name; in real time what comes from standard input acts when it arrives.
+
+    Raises FormatError; FileProblem; click.UsageError for a name that is neither a leader nor a file.
+    """
+    argument, seed, paced = inputs.leader, inputs.seed, inputs.realtime or inputs.live
+    if argument in LEADERS:
+        return built_in(argument, seed)
+    if argument == "-":
+        return _from_stdin(paced=paced)
+    if not os.path.exists(argument) and not os.path.splitext(argument)[1]:
+        raise click.UsageError(f"no leader {shown(argument)}{alternatives(argument, LEADERS, 'leaders')}, or a file")
+    return scripted(read_script(Source(argument, read_text(argument))))
+
+
+def _from_stdin(*, paced: bool) -> MakeLeader:
+    """Read commands as they come: by their times, or in real time whenever they arrive."""
+    if sys.stdin is None:
+        raise FileProblem("standard input is closed")
+    say_if_typed()
+    if not paced:
+        return scripted(read_commands(lines_as_they_come(sys.stdin.buffer, "stdin"), "stdin"))
+    mailbox = Mailbox()
+    mailbox.fill_from(read_commands(lines_as_they_come(sys.stdin.buffer, "stdin"), "stdin", period_ns=0))
+    return mailbox
+
 
 INSTEAD = "pipe key names into frametool sim follow --leader -"
 SUBCOMMANDS = {
@@ -100,7 +316,7 @@ def _explain(inputs: Inputs) -> None:
     from frametool.explain.derive import DerivationStyle, derive_follow
     from frametool.sim.followed import follow_steps
 
-    plan = DerivationStyle(sim_output.style_of(inputs), significant(inputs.precision))
+    plan = DerivationStyle(style_of(inputs), significant(inputs.precision))
     text = derive_follow(plan, follow_steps(scene, inputs.explain_step)).render(inputs.explain or "text")
     with writing(inputs.output, force=bool(inputs.force)) as write:
         write(text)

@@ -3,22 +3,206 @@
 from __future__ import annotations
 
 import os
+from math import degrees, hypot, sqrt
 from os.path import realpath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, refuse_two_readers
-from frametool.cli.comparing import read_span
-from frametool.cli.options import ColumnNames, file_with, reading_options, result_options, suffix_of, whole_pose_options
+from frametool.cli.comparing import read_span, trajectory
+from frametool.cli.options import file_with, for_each, reading_options, result_options, suffix_of, whole_pose_options
 from frametool.cli.output import Output
 from frametool.cli.sink import refuse_existing, writing
-from frametool.cli.stderr import tell
-from frametool.errors import ValueInvalid, shown, warn
+from frametool.cli.stderr import say, say_error, tell
+from frametool.cli.trees import answers, load_tree, opened, state
+from frametool.errors import ValueInvalid, alternatives, first_of, shown, warn
+from frametool.geometry.rigid import IDENTITY
+from frametool.stream.faults import STOP, BadRows
+from frametool.view.fit_text import Solution, SolvedFrame, SolvedRow
 
 if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Sequence
 
-    from frametool.view.fit_text import Solution
+    from frametool.geometry.transform import Transform
+    from frametool.geometry.types import Array, Components
+    from frametool.stream.measurements import Measurement
+    from frametool.stream.samples import HandEyeSamples
+
+
+NAMES = ("base", "gripper", "camera", "target")
+SHARES = 1000  # of the way, as progress counts it
+UNSURE = 1.2  # times: given sigmas that are smaller than that are reported
+
+
+def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
+    """Solve the tree of the measurements in files, with its fixed edges."""
+    from frametool.fit.measured_tree import solve_tree
+    from frametool.view.progress import ProgressBar
+
+    measurements = _measurements(inputs, files)
+    fixed = _fixed_edges(inputs, {name for each in measurements for name in each[:2]}) if inputs.fix else []
+    with ProgressBar(SHARES, quiet=inputs.quiet, counted="") as bar:
+        found = solve_tree(
+            measurements, root=inputs.root, fixed=fixed, robust=robust,
+            progress=lambda share: bar.advance(0, round(SHARES * share) - bar.size),
+        )  # fmt: skip
+    if found.sigma_factor > UNSURE:
+        warn(f"the given sigmas are {found.sigma_factor:.2g} times too small for what the used rows are off")
+    frames = []
+    for name in sorted(found.frames, key=lambda name: name != found.root):
+        track = found.tree.track(name)  # in the root, or as --fix has it
+        pose = IDENTITY if track is None else track.components
+        seen = found.rows[name], found.frame_checked[name], name in found.fixed
+        covariance = found.tree.covariances.get(name)
+        frames.append(SolvedFrame(name, found.parents.get(name), _numbers(pose), covariance, *seen))
+    unknown = [each.name for each in frames if each.parent and not each.fixed and not each.covariance]
+    if unknown:
+        warn(f"no covariance of {first_of(unknown, 5)}: neither loops nor sigmas say how sure that is")
+    if (alone := [m.place for m, checked in zip(found.measurements, found.checked, strict=True) if not checked]):
+        _report_taken(inputs, f"in no loop, cannot be cross-checked: {first_of(alone, 5)}")
+    labels = [(m.place, m.id, m.parent, m.child) for m in found.measurements]
+    rows = _rows(found, labels, checked=list(map(bool, found.checked)), fits=found.fits)
+    return Solution("tree", found.root, found.dof, found.rms_distance, found.rms_angle, found.sigma, frames, rows)
+
+
+def _report_taken(inputs: Inputs, *texts: str | None) -> None:
+    """Report how an input was taken, unless --quiet."""
+    for text in () if inputs.quiet else filter(None, texts):
+        say(text)
+
+
+def _fixed_edges(inputs: Inputs, measured: Collection[str]) -> list[tuple[str, str, Any, Components | None]]:
+    """Return the edges of --fix trees."""
+    from frametool.formats.load import Rules
+
+    tree = load_tree(inputs.fix[0], inputs.fix[1:], Rules(normalize=inputs.normalize))
+    if moving := next((track.child for track in tree.tracks() if not track.is_static), None):
+        raise ValueInvalid(f"{tree.name}: {shown(moving)} moves; fixed frames must be static (tree --at TIME)")
+    if not {*tree.frames} & {*measured}:
+        known = alternatives(one := tree.frames[0], measured, "frames")
+        raise ValueInvalid(f"{tree.name}: no frame of it is measured: {shown(one)}{known}")
+    return [(each.parent, each.child, each.components, tree.covariances.get(each.child)) for each in tree.tracks()]
+
+
+def _measurements(inputs: Inputs, files: Sequence[str]) -> list[Measurement]:
+    from frametool.stream.measurements import parted, read_measurements, without
+
+    recordings = opened(files)
+    found = read_measurements(recordings, normalize=inputs.normalize)
+    state(recordings)
+    for each in recordings:
+        own = [row for row in found if parted(row.place)[0] == each.name]
+        first = f": {own[0].parent}<-{own[0].child} .." if own else ""
+        rows = f"{len(own)} row{'s' * (len(own) != 1)}"
+        _report_taken(inputs, f"{each.name}: {rows}, each the pose of child in parent{first}")
+    return without(found, inputs.without)
+
+
+def _listed(covariance: Array | None) -> Components | None:
+    return None if covariance is None else tuple(covariance.ravel().tolist())
+
+
+def _numbers(components: Iterable[Any]) -> Any:
+    """Return components as floats; none is -0.0."""
+    return tuple(float(part) + 0.0 for part in components)
+
+
+def _side(parent: str, name: str, pose: Transform, covariance: Array | None, rows: int) -> list[SolvedFrame]:
+    """Return a root and the one frame in it."""
+    root = SolvedFrame(parent, None, IDENTITY, None, rows, checked=True)
+    return [root, SolvedFrame(name, parent, _numbers(pose.components), _listed(covariance), rows, checked=True)]
+
+
+def _rows(found: Any, labels: Iterable[tuple[str, str | None, str, str]], **more: Sequence[Any]) -> list[SolvedRow]:
+    """Return the rows of a report: how far each is off in metres, and in radians where it has turned.
+
+    labels: place, id, parent and child of each
+    """
+    rows = []
+    for at, (place, name, parent, child) in enumerate(labels):
+        parts, said = found.residuals[at].tolist(), {key: values[at] for key, values in more.items()}
+        metres, angle = hypot(*parts[:3]), hypot(*parts[3:]) if len(parts) > 3 else None
+        used = bool(found.used[at])
+        rows.append(SolvedRow(place, at + 1, name, parent, child, metres, angle, float(found.u[at]), used, **said))
+    return rows
+
+
+def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
+    """Solve where a camera is on a hand, or next to a robot: two files of poses, or one of samples."""
+    from frametool.stream.samples import read_samples
+
+    eye_to_hand = inputs.eye_to_hand
+    if len(files) == 1:
+        fmt, columns, normalize = for_each(inputs.input_formats, 1)[0], inputs.columns or (), inputs.normalize
+        samples = read_samples(files[0], eye_to_hand=eye_to_hand, normalize=normalize, fmt=fmt, columns=columns)
+    else:
+        samples = _paired(inputs, files)
+    named = [each or name for each, name in zip(samples.names, NAMES, strict=True)]
+    called = base, gripper, camera, target = tuple(inputs.names or named)
+    if len({*called}) < len(NAMES):
+        raise ValueInvalid(f"two of the frames {', '.join(called)} are called alike; give --names")
+    holder, other = (base, gripper) if eye_to_hand else (gripper, base)
+    second, number = f"; {samples.files[1]}:" if len(files) > 1 else ",", len(samples.places)
+    taken = f"{samples.files[0]}: {base}<-{gripper}{second} {camera}<-{target}; {number} sample{'s' * (number != 1)}"
+    _report_taken(inputs, taken, samples.taken, f"solving for {holder}<-{camera} and {other}<-{target}")
+    for each in samples.warnings:
+        say(each)
+    from frametool.fit.hand_eye import solve_hand_eye
+
+    found = solve_hand_eye(samples.gripper, samples.target, eye_to_hand=eye_to_hand, robust=robust, names=called)
+    count = int(found.used.sum())
+    sigmas: list[Any] = [found.covariance_x, found.covariance_z]
+    if not samples.placed:
+        sure = " and ".join(f"{degrees(sqrt(each[3:, 3:].trace() / 3)):.2g} deg" for each in sigmas)
+        warn(f"no positions: only the rotations are solved (sigma {sure}); xyz 0, 0, 0 stands for what is not known")
+        sigmas = [None, None]
+    frames = _side(holder, camera, found.x, sigmas[0], count)
+    frames += _side(other, target, found.z, sigmas[1], count)
+    labels = [(place, None, camera, target) for place in samples.places]
+    rows = _rows(found, labels, checked=[found.dof > 0] * number)
+    numbers = found.dof, found.rms_distance, found.rms_angle, found.sigma
+    return Solution("hand-eye", None, *numbers, frames, rows, noise_at=found.noise_at, turns=found.turns)
+
+
+def _paired(inputs: Inputs, files: Sequence[str]) -> HandEyeSamples:
+    from frametool.fit.alignment import paired_samples
+
+    named, gap = zip(files, for_each(inputs.input_formats, 2), strict=True), inputs.max_gap_ns
+    read = [trajectory(file, STOP, fmt, normalize=inputs.normalize)[:2] for file, fmt in named]
+    (gripper, first), (target, second) = read
+    for each, name in read:
+        refuse(gap is not None and each.stamps_ns is None, f"--max-gap is not used: {name} has no stamps")
+    return paired_samples(gripper, target, (first, second), gap)
+
+
+def solved_points(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
+    """Solve the transform between two files of matched points."""
+    from frametool.fit.closed_forms import solve_points
+    from frametool.stream.samples import matched, read_points
+
+    def policy(name: str) -> BadRows:
+        return BadRows(name, STOP, tell=lambda error: say_error(error, in_json=False))
+
+    named = zip(files, for_each(inputs.input_formats, 2), strict=True)
+    a, b = (read_points(file, fmt=fmt, answers=answers(), policy=policy) for file, fmt in named)
+    found_names = (a.frame, b.frame) if a.frame and b.frame and a.frame != b.frame else ("A", "B")
+    names = target, source = tuple(inputs.names or found_names)
+    pairs = matched(a, b)
+    how, ids = "by row" if pairs.ids is None or a.ids is None or b.ids is None else "by id", pairs.ids
+    matched_as = f"{len(pairs.places)} matched {how}"
+    _report_taken(inputs, f"{a.file}: points in {target}; {b.file}: points in {source}; {matched_as}")
+    for each in pairs.warnings:
+        say(each)
+    weights, scale = pairs.weights, inputs.scale
+    found = solve_points(pairs.target, pairs.source, weights=weights, scale=scale, robust=robust, names=names)
+    frames = _side(target, source, found.transform, found.covariance, int(found.used.sum()))
+    labels = [(place, ids[at] if ids else None, target, source) for at, place in enumerate(pairs.places)]
+    counted = (found.used | found.left_out).tolist()
+    rows = _rows(found, labels, checked=[found.dof > 0] * len(labels), counted=counted)
+    numbers = found.dof, found.rms_distance, None, (found.sigma, None)
+    return Solution("points", target, *numbers, frames, rows, scale=found.scale, scale_sigma=found.scale_sigma)
+
 
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, not solvable or undecided, 2 usage, 5 file."
 SHAPES = ("hand_eye", "points")
@@ -41,7 +225,7 @@ def _read_names(text: str) -> list[str]:
 @option("--eye-to-hand", "the camera is static, the target moves", requires=("hand_eye",))
 @option("--max-gap TIME", "longest time between paired stamps  [default: 50ms]", read_span,
     name="max_gap_ns", requires=("hand_eye",))  # fmt: skip
-@option("--columns NAME,..", "columns of GRIPPER, then of TARGET, in one table", ColumnNames(),
+@option("--columns NAME,..", "columns of GRIPPER, then of TARGET, in one table",
     multiple=True, requires=("hand_eye",), under="Rows")  # fmt: skip
 @option("--points", "A<-B from matched points")
 @option("--scale", "estimate the scale from A to B too", requires=("points",))
@@ -81,9 +265,7 @@ def command(inputs: Inputs) -> None:
     output = Output(inputs, "tree", "trajectory")
     if points and inputs.scale and output.style.format not in FORMATS_OF_SCALE:
         raise ValueInvalid(f"{output.style.format} has no place for a scale; write json, yaml or csv")
-    from frametool.cli import solving
-
-    solve = solving.solved_hand_eye if hand_eye else solving.solved_points if points else solving.solved_tree
+    solve = solved_hand_eye if hand_eye else solved_points if points else solved_tree
     found = solve(inputs, files, robust=not inputs.no_robust)
     from frametool.view.fit_text import write_left_out, write_solution
 
