@@ -53,7 +53,7 @@ def test_the_form_follows_the_equals_sign(form: str, begins: str, run: Callable[
     (["apply", "--transform", POSE, "--explain"], "a stream, or several records; --explain derives one record"),
     (["apply", "--transform", POSE, "1", "2", "3", "4", "5", "6", "--explain"], "a stream, or several records"),
     (["sim", "follow", "--explain"], "--explain needs --explain-step"),
-    (["sim", "follow", "--explain-step", "1", "--format", "csv"], "leave the format csv out"),
+    (["sim", "follow", "--explain-step", "1", "--format", "csv"], "--explain-step writes text, not csv"),
     (["sim", "follow", "--explain-step", "1", "--emit", "tf", "--plot", "a.svg"], "--emit, --plot have no effect here"),
 ])  # fmt: skip
 def test_what_is_no_single_record_in_words_is_misuse(arguments: list[str], message: str, run: Callable[..., Outcome]) -> None:

@@ -7,7 +7,6 @@ import os
 import sys
 from contextlib import ExitStack, contextmanager
 from functools import partial
-from itertools import combinations
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
@@ -16,27 +15,16 @@ import click
 from frametool.cli.command import EXIT_CODES, Command, Inputs, argument, misuse, option, refuse, say_if_typed, together
 from frametool.cli.commands import Group
 from frametool.cli.explaining import explain_option, significant
-from frametool.cli.options import FULL, PRECISION, file_with, suffix_of
+from frametool.cli.options import PRECISION, file_with, suffix_of
+from frametool.cli.output import Output
 from frametool.cli.poses import inline_misuse, source_of
 from frametool.cli.signals import clean_up
-from frametool.cli.sink import is_special, refuse_existing, writing
+from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.documents.source import Source, read_text
 from frametool.errors import FileProblem, alternatives, shown
-from frametool.formats.table import by_suffix
 from frametool.frames.stamps import BILLION
-from frametool.grammar.result import Style
-from frametool.sim.drivers import (
-    LAWS,
-    LEADERS,
-    TARGETS,
-    FollowController,
-    Mailbox,
-    built_in,
-    keys_in,
-    meaning_of,
-    scripted,
-)
+from frametool.sim import drivers
 from frametool.sim.readers import lines_as_they_come, parse_seconds, parse_spawn, read_commands, read_script
 from frametool.sim.scene import Scene, duration_ns, tutorial
 from frametool.sim.scene_file import read_scene
@@ -49,8 +37,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from frametool.sim.drivers import MakeLeader
-    from frametool.sim.scene import Scene
+
     Watch = Callable[[SimulationStep], object]
+
+
+_of_turtles = partial(option, under="Turtles")
 
 
 def parse_duration(text: str) -> float:
@@ -58,25 +49,20 @@ def parse_duration(text: str) -> float:
     return math.inf if text == "inf" else parse_seconds(text)
 
 
-_LEADER = "still, circle, square, figure8, random, a file of commands, or - for standard input"
-LEADER = option("--leader NAME|FILE|-", _LEADER, default="still")
-_of_turtles = partial(option, under="Turtles")
-
-
 def follow_options(duration: str) -> Callable[[Any], Any]:
     """Add to a command the options of followers; `duration` is how long it runs by default."""
     return together(
         option("--followers N", "each follows the previous one, the first follows turtle1", click.IntRange(0, 1000),
                default=1),
-        option("--law", "the tutorial's listener: 10 Hz and gains 0.5, 4 (ros1), or 1 Hz and 0.5, 1 (ros2)", (*LAWS,),
-               default="ros1"),
+        option("--law", "the tutorial's listener: 10 Hz and gains 0.5, 4 (ros1), or 1 Hz and 0.5, 1 (ros2)",
+               (*drivers.LAWS,), default="ros1"),
         option("--rate HZ", "control steps per second", parse_number),
         _of_turtles("--gain-linear K", "speed for each metre of distance", parse_number),
         _of_turtles("--gain-angular K", "turn rate for each radian of bearing", parse_number),
         _of_turtles("--max-linear V", "fastest speed in m/s  [default: none]", parse_number),
         _of_turtles("--max-angular W", "fastest turn in rad/s  [default: none]", parse_number),
-        _of_turtles("--target", "the leader, a carrot 2 m to its left, or a carrot that circles it at 10 m", TARGETS,
-                    default="leader"),
+        _of_turtles("--target", "the leader, a carrot 2 m to its left, or a carrot that circles it at 10 m",
+                    drivers.TARGETS, default="leader"),
         _of_turtles("--delay S", "follow the target's past position, looked up through world  [default: 0]",
                     parse_seconds, default=0.0),
         option("--spawn X,Y,THETA", "start of turtle2: metres, radians (or 90deg)", parse_spawn, default="4,2,0"),
@@ -109,19 +95,16 @@ class SimOutput:
 
     def __init__(self, inputs: Inputs, *, leaders: bool = False) -> None:
         """Check what can be checked before anything runs; raises click.UsageError, FileProblem."""
-        self.style, self.leaders = style_of(inputs), leaders
+        self.style, self.leaders = Output(inputs, "report").style, leaders
         self.output: str | None = None if inputs.output == "-" else inputs.output
         self.emit, self.reach, self.realtime, self.live = inputs.emit, inputs.reach, inputs.realtime, inputs.live
         self.plot, self.view, self.force = inputs.plot, inputs.view, inputs.force
         refuse(self.reach < 0.0, f"--reach must be 0 or more, found {self.reach:g}")
         if self.live and not (sys.stdout.isatty() or sys.stderr.isatty()):
             raise click.UsageError("--live draws in a terminal, and neither stdout nor stderr is one; see --plot")
-        named = (("--output", self.output), ("--plot", self.plot), ("--view", self.view))
-        files = [(name, path) for name, path in named if path]
-        for (name, path), (other, same) in combinations(files, 2):
-            if os.path.realpath(path) == os.path.realpath(same) and not is_special(path):
-                raise click.UsageError(f"{name} and {other} are the same file: {shown(path)}")
-        for _, path in files:
+        files = [*filter(None, (self.output, self.plot, self.view))]
+        refuse(len({*map(os.path.realpath, files)}) < len(files), "the same file: --output, --plot or --view")
+        for path in files:
             refuse_existing(path, force=self.force)
             if path != "-" and not os.path.isdir(os.path.dirname(path) or "."):
                 raise FileProblem(f"{path}: no directory {os.path.dirname(path)}")
@@ -210,27 +193,20 @@ def log_events() -> Watch:
     return watch
 
 
-def style_of(inputs: Inputs) -> Style:
-    """Choose the format: that of --format, else by the file's suffix, else text for a terminal and YAML for a pipe."""
-    output, precision = inputs.output, inputs.precision
-    is_text = suffix_of(output or "") == ".txt" or (output is None and sys.stdout.isatty())
-    fmt = inputs.format_name or by_suffix(output, ("yaml", "json", "csv")) or ("text" if is_text else "yaml")
-    return Style(fmt, precision=None if precision == FULL else precision)
-
-
 def leader_of(inputs: Inputs) -> MakeLeader:
     """Return the leader that the options name; in real time what comes from standard input acts when it arrives.
 
     Raises FormatError; FileProblem; click.UsageError for a name that is neither a leader nor a file.
     """
     argument, seed, paced = inputs.leader, inputs.seed, inputs.realtime or inputs.live
-    if argument in LEADERS:
-        return built_in(argument, seed)
+    if argument in drivers.LEADERS:
+        return drivers.built_in(argument, seed)
     if argument == "-":
         return _from_stdin(paced=paced)
     if not os.path.exists(argument) and not os.path.splitext(argument)[1]:
-        raise click.UsageError(f"no leader {shown(argument)}{alternatives(argument, LEADERS, 'leaders')}, or a file")
-    return scripted(read_script(Source(argument, read_text(argument))))
+        known = alternatives(argument, drivers.LEADERS, "leaders")
+        raise click.UsageError(f"no leader {shown(argument)}{known}, or a file")
+    return drivers.scripted(read_script(Source(argument, read_text(argument))))
 
 
 def _from_stdin(*, paced: bool) -> MakeLeader:
@@ -239,8 +215,8 @@ def _from_stdin(*, paced: bool) -> MakeLeader:
         raise FileProblem("standard input is closed")
     say_if_typed()
     if not paced:
-        return scripted(read_commands(lines_as_they_come(sys.stdin.buffer, "stdin"), "stdin"))
-    mailbox = Mailbox()
+        return drivers.scripted(read_commands(lines_as_they_come(sys.stdin.buffer, "stdin"), "stdin"))
+    mailbox = drivers.Mailbox()
     mailbox.fill_from(read_commands(lines_as_they_come(sys.stdin.buffer, "stdin"), "stdin", period_ns=0))
     return mailbox
 
@@ -278,11 +254,12 @@ def command() -> None:
 
 
 LAW_OPTIONS = ("rate", "gain_linear", "gain_angular", "max_linear", "max_angular")
-SCENE_OPTIONS = ("followers", "spawn", "target", "delay", "duration", "turtlesim", "holonomic")
+SCENE_OPTIONS = ("followers", "spawn", "target", "delay", "duration", "turtlesim")
 
 
 @command.command("follow", cls=Command)
-@LEADER
+@option("--leader NAME|FILE|-", "still, circle, square, figure8, random, a file of commands, or - for standard input",
+        default="still")
 @follow_options("20")
 @output_options
 @option("--explain-step N", "derive the command of step N, from 0", click.IntRange(0), under="Result")
@@ -311,25 +288,22 @@ def follow(inputs: Inputs) -> None:
 def _explain(inputs: Inputs) -> None:
     """Write the derivation of one control step of the followers."""
     scene = scene_of(inputs, leader_of(inputs))
-    fmt = inputs.format_name or by_suffix(inputs.output, ("yaml", "json", "csv"))
-    refuse(fmt not in (None, "text"), f"--explain-step derives one step in words; leave the format {fmt} out")
+    output = Output(inputs, "report", otherwise="text")
+    refuse(output.style.format != "text", f"--explain-step writes text, not {output.style.format}")
     from frametool.explain.derive import DerivationStyle, derive_follow
     from frametool.sim.followed import follow_steps
 
-    plan = DerivationStyle(style_of(inputs), significant(inputs.precision))
-    text = derive_follow(plan, follow_steps(scene, inputs.explain_step)).render(inputs.explain or "text")
-    with writing(inputs.output, force=bool(inputs.force)) as write:
-        write(text)
+    plan = DerivationStyle(output.style, significant(inputs.precision))
+    output.text(derive_follow(plan, follow_steps(scene, inputs.explain_step)).render(inputs.explain or "text"))
 
 
 def scene_of(inputs: Inputs, leader: MakeLeader) -> Scene:
     """Return the scene of a leader and followers; what cannot be is a usage error."""
     chosen = {name: getattr(inputs, name) for name in SCENE_OPTIONS}
-    if chosen["holonomic"] and chosen["turtlesim"] == "ros1":
-        raise click.UsageError("--holonomic is for --turtlesim ros2; in ROS 1 linear.y always counts")
+    holonomic = chosen["turtlesim"] == "ros2" and inputs.holonomic  # in ROS 1 linear.y always counts
     with misuse():
-        law = FollowController(inputs.law, **{name: getattr(inputs, name) for name in LAW_OPTIONS})
-        return tutorial(leader=leader, law=law, **chosen)
+        law = drivers.FollowController(inputs.law, **{name: getattr(inputs, name) for name in LAW_OPTIONS})
+        return tutorial(leader=leader, law=law, holonomic=holonomic, **chosen)
 
 
 @command.command("run", cls=Command)
@@ -367,9 +341,6 @@ def run(inputs: Inputs) -> None:
     output.run(chosen)
 
 
-QUIT = b"qQ\x04"
-
-
 @command.command("teleop", cls=Command)
 @follow_options("inf")
 @output_options
@@ -385,14 +356,14 @@ def teleop(inputs: Inputs) -> None:
     g t r e d c v b around f turn to a heading. When stdout is no terminal, every command goes there.
     """
     refuse(sys.stdin is None or not sys.stdin.isatty(), f"standard input is no terminal; {INSTEAD}")
-    mailbox = Mailbox()
+    mailbox = drivers.Mailbox()
     output, scene = SimOutput(inputs.but(live=True), leaders=True), scene_of(inputs, mailbox)
     with keyboard(mailbox, headings=scene.variant == "ros2"):
         output.run(scene)
 
 
 @contextmanager
-def keyboard(mailbox: Mailbox, *, headings: bool) -> Iterator[None]:
+def keyboard(mailbox: drivers.Mailbox, *, headings: bool) -> Iterator[None]:
     """Read single keys from the terminal into a mailbox; the terminal is as before afterwards."""
     try:
         import termios
@@ -411,13 +382,13 @@ def keyboard(mailbox: Mailbox, *, headings: bool) -> Iterator[None]:
         termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
 
 
-def _listen(mailbox: Mailbox, headings: bool) -> None:
+def _listen(mailbox: drivers.Mailbox, headings: bool) -> None:
     """Post what keys mean until the key that ends it."""
     while data := os.read(sys.stdin.fileno(), 64):
-        for key in keys_in(data):
-            if key in QUIT:
+        for key in drivers.keys_in(data):
+            if key in b"qQ\x04":
                 mailbox.close()
                 return
-            command = meaning_of(key, headings=headings)
+            command = drivers.meaning_of(key, headings=headings)
             if command is not None:
                 mailbox.post(command)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from math import degrees, hypot, sqrt
-from os.path import realpath
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -259,7 +258,7 @@ def command(inputs: Inputs) -> None:
     wanted, named = (4, "four names, BASE,GRIPPER,CAMERA,TARGET") if hand_eye else (2, "two names, A,B")
     refuse(len(inputs.peek("names") or ()) not in (0, wanted), f"--names takes {named}")
     report, path, force = inputs.report, inputs.output, inputs.force
-    refuse(report and path and realpath(report) == realpath(path), "--report and -o name one file")
+    refuse(report and path and os.path.realpath(report) == os.path.realpath(path), "--report and -o name one file")
     for name in filter(None, (report, path)):
         refuse_existing(name, force=force)
     output = Output(inputs, "tree", "trajectory")
