@@ -32,27 +32,21 @@ STREAMED = ("records", "rows", "arrays")
 READ = readers("tree", "records", "rows", "arrays", "joints", "drawing")
 
 
-class Utf8(Text):
-    """Text that will be part of a result."""
-
-    def read(self, text: str) -> str:
-        """Refuse bytes that are no text."""
-        try:
-            text.encode()
-        except UnicodeEncodeError:
-            raise ValueInvalid(f"{shown(text)} is not UTF-8 text") from None
-        return text
+def utf8(text: str) -> str:
+    """Return text that will be part of a result; bytes that are no text are refused."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise ValueInvalid(f"{shown(text)} is not UTF-8 text") from None
+    return text
 
 
 FULL = -1  # digits: as many as the number has
 
 
-class Digits(Text):
-    """How many digits follow the point: a number, or `full`."""
-
-    def read(self, text: str) -> Any:
-        """Take the word for all, or count."""
-        return FULL if text == "full" else click.IntRange(0, 30)(text)
+def _digits(text: str) -> Any:
+    """Read how many digits follow the point: a number, or `full`."""
+    return FULL if text == "full" else click.IntRange(0, 30)(text)
 
 
 class Notations(Text):
@@ -153,9 +147,6 @@ class JointSetting(Text):
         return {f"{each.name}=": f"{each.lower} .. {each.upper}" for each in joints}
 
 
-UTF8 = Utf8()
-
-
 # --- inputs --------------------------------------------------------------------------------------------------------
 
 _of_files, _of_times, _of_rotations, _of_results, _of_formats = (
@@ -227,7 +218,7 @@ def say_if_verbose(text: str) -> None:
 
 # --- results -------------------------------------------------------------------------------------------------------
 
-PRECISION = _of_results("--precision N|full", "decimals  [default: full; a terminal shows 9 digits]", Digits())
+PRECISION = _of_results("--precision N|full", "decimals  [default: full; a terminal shows 9 digits]", _digits)
 _PLACE = (
     _of_results("-o --output FILE", "write to this file, atomically"),
     _of_results("--force", "let --output overwrite a file", requires=("output", "report")),
@@ -336,38 +327,28 @@ class Skipped:
         return total.exit_code
 
 
-class Time(Text):
-    """A time in seconds, or in nanoseconds with `ns`; `latest` where that is a choice."""
+def read_limit(text: str) -> int:
+    """Return the nanoseconds of a time in seconds, or in nanoseconds with `ns`."""
+    from frametool.frames.stamps import parse_time  # few calls say a time
 
-    def __init__(self, *, latest: bool = True) -> None:
-        """Keep whether `latest` is a choice."""
-        self.latest = latest
-
-    def read(self, text: str) -> Any:
-        """Return nanoseconds, or `latest`."""
-        if self.latest and text == LATEST:
-            return text
-        from frametool.frames.stamps import NotATime, parse_time  # few calls say a time
-
-        try:
-            return parse_time(text)
-        except NotATime as error:
-            raise ValueInvalid(f"{error}{', or latest' * self.latest}") from None
+    return parse_time(text)
 
 
-class Offset(Time):
-    """A time that is added to others; `first` makes the first of them 0."""
-
-    def read(self, text: str) -> Any:
-        """Return nanoseconds, or what is added like them."""
-        if text != "first":
-            return super().read(text)
-        from frametool.frames.stamps import FromFirst
-
-        return FromFirst()
+def read_time(text: str) -> Any:
+    """Return nanoseconds, or `latest`."""
+    if text == LATEST:
+        return text
+    try:
+        return read_limit(text)
+    except ValueInvalid as error:
+        raise ValueInvalid(f"{error}, or latest") from None
 
 
-TIME = Time()
+def _offset(text: str) -> Any:
+    """Return the nanoseconds that are added to other times, or what makes the first of them 0."""
+    from frametool.frames.stamps import FromFirst
+
+    return FromFirst() if text == "first" else read_limit(text)
 
 
 def at_ns(chosen: int | str | None) -> int | None:
@@ -375,19 +356,18 @@ def at_ns(chosen: int | str | None) -> int | None:
     return chosen if isinstance(chosen, int) else None
 
 
-LIMIT = Time(latest=False)
 # how moving frames are taken
 rules_options = together(
     _of_times("--moving", "an edge with one timestamp is valid only at that time"),
-    _of_times("--cache SECONDS", "drop older transforms  [default: none]", LIMIT),
+    _of_times("--cache SECONDS", "drop older transforms  [default: none]", read_limit),
 )
 _TIMES = "several: T,T,.., START:STOP:STEP, or the stamps of FILE"
 times_option = _of_times("--times TIMES", _TIMES, excludes=("explain",))
 _OFFSET = "add this to all timestamps read; first: start at 0"
-offset_option = _of_times("--time-offset SECONDS|first", _OFFSET, Offset(latest=False))
+offset_option = _of_times("--time-offset SECONDS|first", _OFFSET, _offset)
 limit_options = together(
-    _of_times("--start TIME", "ignore everything before", LIMIT),
-    _of_times("--stop TIME", "ignore everything after", LIMIT),
+    _of_times("--start TIME", "ignore everything before", read_limit),
+    _of_times("--stop TIME", "ignore everything after", read_limit),
     offset_option,
 )
 # a command of files of frames; of one tree whose frames may move; and one that writes poses of it

@@ -19,7 +19,7 @@ from frametool.cli.command import refuse
 from frametool.cli.options import FULL
 from frametool.cli.sink import filling, in_colour, is_special, writing
 from frametool.cli.stderr import say
-from frametool.errors import FileProblem, FrametoolError, ValueInvalid, first_of, listing, printable, shown, warn
+from frametool.errors import FrametoolError, ValueInvalid, first_of, listing, printable, shown, warn
 from frametool.formats import table
 from frametool.formats.table import FORMATS, by_name, is_folder, writers
 from frametool.geometry.representations import EARTH_FRAMES, Notation, notation
@@ -85,20 +85,6 @@ def copied_as(fmt: str, path: str, output: str | None, named: str | None) -> tup
         what = f"{path} is copied as {'a ROS 1 bag' if fmt == 'bag1' else 'mcap or bag2'}, not as {copy}"
         raise UsageError(f"{what}; rosbags-convert --src {path} --dst {output} makes that of it")
     return copy, place
-
-
-def refuse_input(output: str, inputs: Iterable[str]) -> None:
-    """Raise FileProblem where a result would be written over what it is made of, or over a folder that this is in."""
-    place = os.path.realpath(output)
-    for path in filter(os.path.exists, inputs):
-        files = [path, *(os.path.join(path, name) for name in os.listdir(path))] if os.path.isdir(path) else [path]
-        if os.path.exists(place) and any(os.path.samefile(each, place) for each in files):
-            raise FileProblem(f"{printable(output)}: is {printable(path)}, which is read; give another name")
-        read = os.path.realpath(path)
-        for inner, outer in ((read, place), (place, read)):
-            if os.path.isdir(outer) and inner.startswith(f"{outer}{os.sep}"):
-                inside = f"{printable(inner)} lies in {printable(outer)}"
-                raise FileProblem(f"{printable(output)}: {inside}; give another name")
 
 
 BATCH = 256  # poses

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import re
 from contextlib import contextmanager
-from functools import partial
+from functools import lru_cache, partial
 from io import BufferedReader, BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -58,6 +58,7 @@ def is_pasted(text: str, notation: Notation | None = None) -> bool:
     return has_key or rewritten(Source(INLINE, text), notation) is not None
 
 
+@lru_cache(8)  # an argument is looked at before it is read, and warned of once
 def rewritten(
     source: Source, notation: Notation | None = None, *, normalize: bool = False, points: bool = False
 ) -> Source | None:

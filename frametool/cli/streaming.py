@@ -50,7 +50,7 @@ _ROWS = (
     _of_rows("--columns NAME,..", "pose columns by name or number, once per pose; or one key of records, a.b",
              multiple=True),
     _of_rows("--keep", "append result columns, keep the input's"),
-    _of_rows("--prefix TEXT", "prefix of the result's column names", options.UTF8, default=""),
+    _of_rows("--prefix TEXT", "prefix of the result's column names", options.utf8, default=""),
     _of_rows("--on-error", "bad rows", ON_ERROR, default=STOP),
     _of_rows("--max-errors N", "report at most N bad rows, but count all", click.IntRange(0), default=MOST),
     _of_rows("--no-header", "table without a header; columns are numbered", name="header",

@@ -219,7 +219,7 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @EXPLAIN
 @option("--frame-column NAME", "column with the frame of each row, without SOURCE")
 @option("--time-column NAME", "column or key with the time of each row", excludes=("at",))
-@option("--at TIME", "one time for all  [default: latest]", options.TIME)
+@option("--at TIME", "one time for all  [default: latest]", options.read_time)
 @options.rules_options
 @options.offset_option
 @options.reading_options(streams=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option
-from frametool.cli.options import TIME, at_ns, file_options, list_options
+from frametool.cli.options import at_ns, file_options, list_options, read_time
 from frametool.cli.output import Output
 from frametool.cli.stderr import say
 from frametool.cli.trees import FRAME, frame_name, load_sides
@@ -26,7 +26,7 @@ EXIT_CODES = "Exit codes: 0 the same, 1 different, 2 trouble of any kind, with f
 @argument("b", FILE)
 @option("--with-a FILE", "merge this file into A; may be repeated", multiple=True)
 @option("--with-b FILE", "merge this file into B; may be repeated", multiple=True)
-@option("--at TIME", "compare at this time: seconds, nanoseconds with ns  [default: the latest of each]", TIME)
+@option("--at TIME", "compare at this time: seconds, nanoseconds with ns  [default: the latest of each]", read_time)
 @option("--seen-from FRAME", "also show motion as seen from this frame  [default: the root of A]", FRAME)
 @option("--tolerance LENGTH,ANGLE", "largest difference that is ignored, e.g. 1mm,0.1deg  [default: 1e-9 m, 1e-9 rad]",
     parse_tolerance, default=Tolerance())  # fmt: skip

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse
-from frametool.cli.options import LIMIT, Skipped, result_options, rules, tree_options
+from frametool.cli.options import Skipped, read_limit, result_options, rules, tree_options
 from frametool.cli.output import Output
 from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.errors import NoDataAt, warn
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 @argument("source", FRAME)
 @option("--rate HZ", "blocks per second, in the time of the recording", lambda text: checked_rate(parse_number(text)),
         default=1.0)
-@option("--start T", "begin there  [default: when all edges have data]", LIMIT, under="Time")
-@option("--stop T", "end there  [default: when the first edge has no more]", LIMIT, under="Time")
+@option("--start T", "begin there  [default: when all edges have data]", read_limit, under="Time")
+@option("--stop T", "end there  [default: when the first edge has no more]", read_limit, under="Time")
 @option("-l --limit N", "print at most N blocks", click.IntRange(1))
 @option("--with FILE", "merge this file too; may be repeated", name="more", multiple=True, under="Files")
 @tree_options

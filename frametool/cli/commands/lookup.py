@@ -39,8 +39,8 @@ def _column_option(end: str, *excludes: str) -> Adds:
 @argument("target", FRAME, required=False, metavar="TARGET")
 @argument("source", FRAME, required=False, metavar="SOURCE")
 @option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files")
-@option("--at TIME", "seconds, nanoseconds with ns  [default: latest]", options.TIME, excludes=MANY)
-@option("--source-at TIME", "the time at SOURCE, with --fixed; --at: at TARGET", options.TIME, requires=("fixed",),
+@option("--at TIME", "seconds, nanoseconds with ns  [default: latest]", options.read_time, excludes=MANY)
+@option("--source-at TIME", "the time at SOURCE, with --fixed; --at: at TARGET", options.read_time, requires=("fixed",),
         excludes=MANY)  # fmt: skip
 @option("--fixed FRAME", "static frame between the two times: map", FRAME, excludes=MANY, requires=("source_at",))
 @option("--covariance", "also the covariance, from the edges' sigmas (help covariance)", excludes=("explain", "fixed"))

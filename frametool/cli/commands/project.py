@@ -56,7 +56,7 @@ camera_options = together(
     options.result_options("points"),
     option("--time-column NAME", "column or key with the time of each row", excludes=("at",),
            under="Time"),
-    option("--at TIME", "one time for all  [default: latest]", options.TIME, under="Time"),
+    option("--at TIME", "one time for all  [default: latest]", options.read_time, under="Time"),
     options.rules_options,
     options.offset_option,
     options.reading_options(streams=True, camera_axes=_AXES),

@@ -8,7 +8,7 @@ import click
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.options import pose_options, reading_options, verbose_option
-from frametool.cli.output import copied_as, folder_of, opened_place, refuse_input
+from frametool.cli.output import copied_as, folder_of, opened_place
 from frametool.cli.stderr import say, say_error
 from frametool.cli.trees import FRAME, load_tree, tree_file
 from frametool.errors import BadAnswer, FileProblem, FormatError, ValueInvalid, listing, shown, warn
@@ -81,7 +81,6 @@ def command(inputs: Inputs) -> int:
         raise FileProblem("stdin: a recording cannot be read from a pipe; name its file")
     fmt = _format_of(path)
     copy, place = copied_as(fmt, path, inputs.output, inputs.format_name)
-    refuse_input(place, (path, *map(tree_file, more)))
     tally, edges = Diagnostics(), load_tree(more[0], more[1:], Rules(normalize=normalize)) if more else None
     if edges is not None and (resting := [name for *_, names in edges.robots for name in names]):
         raise BadAnswer(f"joints without a value would be static: {listing(resting)}; --joint NAME=VALUE gives it")

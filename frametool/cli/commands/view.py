@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse
-from frametool.cli.options import TIME, at_ns, color_option, moving_options, rules
+from frametool.cli.options import at_ns, color_option, moving_options, read_time, rules
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.cli.trees import FRAME, frame_name, load_tree, opened, tree_file
@@ -42,7 +42,7 @@ def _eye(text: str) -> Eye:
 @argument("source", FRAME, required=False)
 @option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files")
 @option("--frame FIXED", "reference frame  [default: TARGET, or the root of most frames]", FRAME, name="fixed")
-@option("--at TIME", "seconds, nanoseconds with ns  [default: first time at which all edges have data]", TIME)
+@option("--at TIME", "seconds, nanoseconds with ns  [default: first time at which all edges have data]", read_time)
 @option("--below FRAME", "only this frame and its descendants", FRAME)
 @option("--only REGEX", "only frames whose name matches")
 @option("--path", "only the frames between TARGET and SOURCE", name="path_only")
