@@ -55,13 +55,11 @@ def is_pasted(text: str, notation: Notation | None = None) -> bool:
     if _inverted(text):
         return True
     has_key = "\n" in text or re.match(r"\w+: *[\[{]", text) is not None
-    return has_key or rewritten(Source(INLINE, text), notation) is not None
+    return has_key or rewritten(Source(INLINE, text), notation, normalize=False, points=False) is not None
 
 
 @lru_cache(8)  # an argument is looked at before it is read, and warned of once
-def rewritten(
-    source: Source, notation: Notation | None = None, *, normalize: bool = False, points: bool = False
-) -> Source | None:
+def rewritten(source: Source, notation: Notation | None, *, normalize: bool, points: bool) -> Source | None:
     """Return a text that was pasted as one of the grammar; None for one that is."""
     if re.match(_PLAIN, source.text) and "\n" not in source.text.strip():
         return None
