@@ -12,7 +12,8 @@ import numpy as np
 
 from frametool.documents.source import InputFile
 from frametool.errors import FormatError, Misused, ValueInvalid, warn
-from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, blocks, describe, rows_of
+from frametool.formats.rows.pose_lists import StampFile, blocks, describe, form_of
+from frametool.formats.rows.pose_rows import IMAGE, NUMBER, rows_of
 from frametool.formats.table import FORMATS, is_recording, is_trajectory
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Diagnostics, Options, Topics, stop
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Sequence
     from io import BufferedReader
 
-    from frametool.formats.rows.pose_rows import PoseBlock
+    from frametool.formats.rows.pose_lists import PoseBlock
     from frametool.formats.table import Poses
     from frametool.grammar.edges import Answers
     from frametool.grammar.result import Style
@@ -214,8 +215,8 @@ class FormatConverter:
         if self.request.on_error != STOP:
             report = lambda error: faults.append(Fault(max(error.line, 1) - 1, "", error.message))  # noqa: E731
         options = Options(self.tally, Topics(), report, normalize=self.request.normalize, answers=self.answers)
-        has_kinds = hasattr(self.module, "form_of")
-        fmt: Poses = self.module.form_of(file, options) if has_kinds else FORMATS[self.fmt].poses
+        file.format = self.fmt
+        fmt = form_of(file, options)
         request = self.request
         if request.frames:
             raise ValueInvalid("poses do not say their frame; name SOURCE")
@@ -225,22 +226,23 @@ class FormatConverter:
         plan = _plan(request)
         state = State()
         rename = rename_of(request) or (lambda parent, name: (parent, name))
-        for each in blocks(self.module.poses(file, options), fmt, file, options, named=False):
+        for each in blocks(file, options, named=False):
             block = _block(each._replace(stamps_ns=each.stamps_ns + request.offset_ns))
             done = Run(plan, block, state)
             good = done.rows.tolist()
-            images = [each.images[row] for row in good]
+            written = [each.rows[row] for row in good]
+            images = [row.image for row in written]
             extras = {IMAGE: spans_of([image.encode() for image in images])} if any(images) else {}
             if self.fmt == self.style.format:
-                extras[NUMBER] = spans_of([b"%d" % each.numbers[row] for row in good])
-            lines = np.array(each.lines, np.int64)[done.rows]
-            own = each.names[0] is not None
-            pairs = [rename(*(each.names[row] or (None, None))) for row in (good if own else good[:1])]
+                extras[NUMBER] = spans_of([b"%d" % row.number for row in written])
+            lines = np.array([row.line for row in written], np.int64)
+            own = any(row.names for row in written)
+            pairs = [rename(*(row.names or (None, None))) for row in (written if own else written[:1])]
             parents, names = zip(*pairs, strict=True) if pairs else ((None,), (None,))
             stamps = None if own else block.stamps[0][done.rows]
             poses = RowPoses(done.results, self._held(stamps, fmt), lines, parents, names, extras)
             found = sorted(faults + done.faults())
-            yield poses, Outcome(b"", found, len(each.lines) + len(faults), 0, notes=notes_of(done, block))
+            yield poses, Outcome(b"", found, len(each.rows) + len(faults), 0, notes=notes_of(done, block))
             faults.clear()
 
 
@@ -256,6 +258,5 @@ def _plan(request: Request) -> Plan:
 
 def _block(poses: PoseBlock) -> Block:
     """Make a block of rows of poses."""
-    count = len(poses.lines)
-    numbers, lines = np.array(poses.poses).T.copy(), poses.lines
-    return Block(numbers, (), np.arange(count), lambda row: lines[row] - 1, stamps=[poses.stamps_ns])
+    numbers, rows = np.array(poses.poses).T.copy(), poses.rows
+    return Block(numbers, (), np.arange(len(rows)), lambda row: rows[row].line - 1, stamps=[poses.stamps_ns])

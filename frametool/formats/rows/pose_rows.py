@@ -1,35 +1,24 @@
 """How formats write poses, one after another: the text around the numbers, and what they cannot store.
 
 `("seconds", b" ", Numbers(7), b"\\n")` is a row of a TUM trajectory, 1305031102.175800000 1.0 2.0 3.0 0.0 0.0 0.0 1.0.
-`frametool.stream.writers` fills in the table, for one pose or a million.  Also the common part of reading files of
-poses of one body: lines in, blocks of poses out; checked rotations, direction, axes of cameras, stamps, frames.
+`frametool.stream.writers` fills in the table, for one pose or a million.
 """
 
 from __future__ import annotations
 
-import re
 from importlib import import_module
-from itertools import chain, islice
-from typing import TYPE_CHECKING, Any, NamedTuple
+from itertools import chain
+from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.documents.chunks import lines
-from frametool.documents.document import format_error
-from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
+from frametool.errors import ValueInvalid, listing, warn
 from frametool.formats.table import FORMATS
-from frametool.frames.stamps import BILLION, format_stamp, parse_stamp, whole_stamp
+from frametool.frames.stamps import format_stamp
 from frametool.geometry import quaternion, rigid
-from frametool.geometry.representations import notation
-from frametool.grammar.edges import Samples
-from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable
 
-    from frametool.documents.source import InputFile
-    from frametool.formats.table import Poses
     from frametool.geometry.types import Components
-    from frametool.grammar.edges import Options
-    from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
 
 
@@ -170,183 +159,3 @@ def rows_of(spec: str) -> RowForm | None:
     """Return how all poses are written in a format; None if each result has a text of its own."""
     found = getattr(import_module(FORMATS[spec].writer), "ROWS", None)
     return found[spec] if isinstance(found, dict) else found
-
-
-BLOCK = 1 << 12  # poses
-NUMBERED = 1 << 33  # above this, a number times a second exceeds a stamp
-
-
-class Written(NamedTuple):
-    """One pose as written.
-
-    numbers: x, y, z, then those of the rotation
-    number: its number in the file
-    line: its line; path: its path, in a document
-    image: the name of its image, if it has one
-    names: of its reference frame and its body, if each has its own
-    """
-
-    numbers: tuple[float, ...]
-    number: int
-    line: int = 0
-    image: str = ""
-    path: Path = ()
-    names: tuple[str, str] | None = None
-
-
-class PoseBlock(NamedTuple):
-    """Checked poses of a body in the world.
-
-    poses: tx, ty, tz, x, y, z, w, arrays of n; stamps_ns: int64 of n
-    lines: of each; images: the names of their images, "" for none; numbers: in the file
-    names: the two frames of each, or None if all have the same
-    """
-
-    poses: Components
-    stamps_ns: Any
-    lines: Sequence[int]
-    images: Sequence[str]
-    numbers: Sequence[int]
-    names: Sequence[tuple[str, str] | None]
-
-
-def samples(rows: Iterator[Written], spec: Poses, file: InputFile, options: Options) -> Iterator[Samples]:
-    """Yield the poses of a file as samples of one frame; assumptions are reported with the file's name."""
-    parent, child = options.answers.names(*spec.frames)
-    for block in blocks(rows, spec, file, options):
-        columns = [part.tolist() for part in block.poses]
-        yield Samples(parent, child, block.stamps_ns.tolist(), list(zip(*columns, strict=True)), block.lines)
-    options.tally.axes[child] = options.answers.camera_axes or spec.axes
-
-
-def blocks(
-    rows: Iterator[Written], spec: Poses, file: InputFile, options: Options, *, named: bool = True
-) -> Iterator[PoseBlock]:
-    """Yield the poses of a file, checked, block by block.
-
-    named: the two frames have the names of the format or --frames, with a note
-    Raises or reports FormatError with the place of an invalid rotation.
-    """
-    stamps = StampFile(options.answers.stamps) if options.answers.stamps else None
-    count = 0
-    while some := list(islice(rows, BLOCK)):
-        good, poses = _checked(some, spec, file, options)
-        times = [stamps.at(count + at) if stamps else _counted(some[at], file) for at in range(len(some))]
-        count += len(some)
-        yield _block(some, good, poses, times)
-    if stamps:
-        stamps.finish(count, file.name)
-    describe(options, spec, count, named=named)
-
-
-def describe(options: Options, spec: Poses, count: int, *, named: bool = True) -> None:
-    """Record the assumptions about a trajectory, to be reported with the name of its file."""
-    parent, child = options.answers.names(*spec.frames)
-    said = []
-    if named and not options.answers.frames:
-        said.append(f"{count} {'pose' if count == 1 else 'poses'} of {child} in {parent} (--frames)")
-    if spec.counted and not options.answers.stamps:
-        said.append(f"seconds are {spec.counted} (--stamps)")
-    options.tally.assumed = ", ".join(said)
-
-
-def _checked(some: Sequence[Written], spec: Poses, file: InputFile, options: Options) -> tuple[Any, Components]:
-    """Return the valid rows, and the poses of the body in the world."""
-    import numpy as np
-
-    from frametool.geometry import rigid
-    from frametool.geometry.batch_validation import read_rotations
-
-    columns = np.array([row.numbers for row in some], np.float64).T
-    found = read_rotations(notation(spec.rotation), list(columns[3:]), normalize=options.normalize)
-    for at, reason in sorted(found.reasons.items()):
-        options.report(error_at(file, some[at], reason))
-    if spec.rotation == "matrix":
-        options.tally.projected = max(options.tally.projected, found.off)
-    else:
-        options.tally.rough += [some[at].line for at in found.mended.tolist()]
-    poses: Components = (*columns[:3], *found.quaternions)
-    if spec.inverse:
-        poses = rigid.inverse(*poses)
-    return [at for at in range(len(some)) if at not in found.reasons], poses
-
-
-def _block(some: Sequence[Written], good: Sequence[int], poses: Components, times: Sequence[int]) -> PoseBlock:
-    import numpy as np
-
-    stamps = np.array(times, np.int64)
-    if len(good) < len(some):
-        poses, stamps = tuple(part[list(good)] for part in poses), stamps[list(good)]
-        some = [some[at] for at in good]
-    _, numbers, lines, images, _, names = zip(*some, strict=True)
-    return PoseBlock(poses, stamps, lines, images, numbers, names)
-
-
-def _counted(row: Written, file: InputFile) -> int:
-    """Return the number of a pose as seconds."""
-    if row.number >= NUMBERED:
-        raise error_at(file, row, f"{row.number} is too large to count seconds; give --stamps FILE")
-    return row.number * BILLION
-
-
-def error_at(file: InputFile, row: Written, message: str) -> FormatError:
-    """Return the error for a pose of a file."""
-    if row.path:
-        return format_error(file.source, row.path, message)
-    return FormatError(message, source=file.name, line=row.line)
-
-
-class StampFile:
-    """Timestamps of poses, one per line: decimal seconds, or nanoseconds with `ns`, to the nanosecond."""
-
-    def __init__(self, path: str) -> None:
-        """Read the file; raises FileProblem, FormatError."""
-        from frametool.documents.source import read_text
-
-        self.path = path
-        self.stamps: list[int] = []
-        for number, line in enumerate(read_text(path).splitlines(), 1):
-            bare = line.strip()
-            if bare and not bare.startswith("#"):
-                try:
-                    self.stamps.append(whole_stamp(parse_stamp(bare)))
-                except ValueInvalid as error:
-                    raise FormatError(str(error), source=path, line=number) from None
-
-    def at(self, index: int) -> int:
-        """Return the time of a pose, counted from 0."""
-        if index >= len(self.stamps):
-            message = f"{len(self.stamps)} times are too few for the poses; one a line is wanted"
-            raise FormatError(message, source=self.path)
-        return self.stamps[index]
-
-    def finish(self, count: int, name: str) -> None:
-        """Check that there was one time per pose."""
-        if count != len(self.stamps):
-            raise FormatError(f"{len(self.stamps)} times for the {count} poses of {name}", source=self.path)
-
-
-def text_lines(file: InputFile) -> Iterator[tuple[int, str]]:
-    """Yield the lines of a file with their numbers, in bounded memory."""
-    for piece in lines(file.stream, file.name):
-        yield from enumerate(piece.text.removesuffix("\n").split("\n"), piece.line)
-
-
-def position_and_turn(rows: Sequence[Sequence[float]]) -> tuple[float, ...]:
-    """Return the numbers of a pose from the rows of its matrix, as in `Written`."""
-    return (*(row[3] for row in rows[:3]), *(number for row in rows[:3] for number in row[:3]))
-
-
-def whole_in(file: InputFile, line: int, word: str, what: str) -> int:
-    """Read a word as an integer, which errors call `what`; raises FormatError."""
-    if not re.fullmatch("[0-9]{1,18}", word):
-        raise FormatError(f"expected {what}, a whole number, found {shown(word)}", source=file.name, line=line)
-    return int(word)
-
-
-def numbers_in(file: InputFile, line: int, words: Sequence[str]) -> list[float]:
-    """Read the words of a line as numbers; raises FormatError."""
-    try:
-        return [parse_number(word) for word in words]
-    except ValueInvalid as error:
-        raise FormatError(str(error), source=file.name, line=line) from None
