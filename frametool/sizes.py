@@ -11,6 +11,5 @@ LEARNED = 64  # records from which a common layout is learned, to compute them t
 TABLE = 1 << 24  # bytes of a table of results kept in memory until its columns are known; a longer one in a file
 TYPED = 1 << 18  # rows whose cells determine the types of columns
 GROUP = 3 << 26  # bytes of a group of rows of a column file that is read as a whole, four times in all: below 1 GB
-PIECE = 1 << 20  # bytes of a file of documents that are read at once
 STRETCH = 1 << 17  # characters of a recording that are parsed at once
 ASIDE = 1 << 16  # characters of YAML: plain lists in shorter texts are not worth a separate reader

@@ -9,17 +9,34 @@ of each.  Knows syntax only.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any, NamedTuple
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from frametool.documents.json import json_events, looks_like_json, parse_json
-from frametool.documents.source import END, LEAF, MAP, Source, check_text, error_at, find_marks, mark_of, places_of
+from frametool.documents.source import (
+    END,
+    LEAF,
+    MAP,
+    MOST_CHARACTERS,
+    UTF16,
+    Source,
+    check_text,
+    decode,
+    error_at,
+    find_marks,
+    mark_of,
+    places_of,
+)
 from frametool.errors import FormatError
+from frametool.text.lines import read_blocks, whole_lines
 from frametool.text.numbers import odd_characters
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterator, Sequence
+    from typing import BinaryIO
 
     from frametool.documents.source import Event, Path
+    from frametool.text.lines import ByteStream
 
 _BYTE_ORDER_MARK = "\ufeff"
 _TIGHT_COLON = r"([\w./-]+):(?=[^\s:/])"
@@ -202,3 +219,53 @@ def parse_nodes(text: str) -> list[Node]:
         else:
             roots.append(node)
     return roots
+
+
+# --- text in pieces that end at a document or a line: recordings of any size in bounded memory ---
+
+
+class Piece(NamedTuple):
+    """Complete documents or lines of a text, and the number of their first line, from 1."""
+
+    text: str
+    line: int
+
+
+def lines(stream: BinaryIO, name: str, whole: Callable[[bytes], int] = whole_lines) -> Iterator[Piece]:
+    """Split a stream after line ends; a piece has as many lines as arrived in one block.
+
+    whole: as in `read_blocks`.  Line ends become those of Unix, which does not change line numbers.
+    Raises FormatError if it is not UTF-8, and for a line or document that is too long.
+    """
+    line = 1
+    is_wide = stream.peek(2).startswith(UTF16)  # type: ignore[attr-defined]
+    found = read_blocks(cast("ByteStream", stream), whole=whole, longest=MOST_CHARACTERS)
+    for block in (stream.read(),) if is_wide else found:
+        with counted_from(line):
+            text = decode(block, name)
+        yield Piece(text.replace("\r\n", "\n") if "\r" in text else text, line)
+        line += text.count("\n")
+
+
+def documents(stream: BinaryIO, name: str) -> Iterator[Piece]:
+    """Split a stream after lines that end in `---`; a piece has as many documents as arrived in one block."""
+    return lines(stream, name, _whole_documents)
+
+
+def _whole_documents(text: bytes) -> int:
+    """Return the number of bytes up to the last line that ends in `---`; negative: that many lines have none.
+
+    `ros2 topic echo` appends the three dashes to its note about a lost message.
+    """
+    ends = (text.rfind(end) + len(end) for end in (b"---\n", b"---\r\n") if end in text)
+    return max(ends, default=-whole_lines(text))
+
+
+@contextmanager
+def counted_from(line: int) -> Iterator[None]:
+    """Make errors of a piece name the line in the whole file; `line` is the number of the piece's first line."""
+    try:
+        yield
+    except FormatError as error:
+        error.line += line - 1 if error.line else 0
+        raise

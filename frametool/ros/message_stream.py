@@ -17,8 +17,7 @@ import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool import sizes
-from frametool.documents.chunks import Piece, counted_from, documents, lines
-from frametool.documents.document import parse_documents
+from frametool.documents.document import Piece, counted_from, documents, lines, parse_documents
 from frametool.documents.json import strict_json
 from frametool.documents.source import Source, check_text
 from frametool.errors import FormatError, first_of, shown

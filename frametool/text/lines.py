@@ -35,18 +35,17 @@ def whole_lines(text: bytes) -> int:
 
 
 def read_blocks(
-    stream: ByteStream,
-    *,
-    whole: Callable[[bytes], int] = whole_lines,
+    stream: ByteStream, *, whole: Callable[[bytes], int] = whole_lines, longest: int = 0
 ) -> Iterator[bytes]:
     """Yield blocks of whole lines, in order; only the very last may lack its line end.
 
     A block has `sizes.BLOCK` bytes if the stream delivers as fast as they are processed.
     whole: returns the number of bytes in complete records, for records of several lines; negative: that many bytes
         begin a record that continues after them, and need not be scanned again.
-    Raises FormatError if one record is longer than `sizes.RECORD`, independent of the pieces of the stream.
+    longest: the maximum number of bytes of a record, else `sizes.RECORD`, independent of the pieces of the stream
+    Raises FormatError if one is longer.
     """
-    size, longest = sizes.BLOCK, sizes.RECORD
+    size, longest = sizes.BLOCK, longest or sizes.RECORD
     ready = _readiness(stream)
     begun: list[bytes] = []  # the beginning of a record
     pieces: list[bytes] = []  # what follows it

@@ -31,8 +31,7 @@ from collections import Counter
 from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.documents.chunks import lines
-from frametool.documents.document import format_error, parse_documents
+from frametool.documents.document import format_error, lines, parse_documents
 from frametool.errors import FormatError, ValueInvalid, did_you_mean, listing, shown
 from frametool.formats.table import FORMATS, Poses
 from frametool.frames.stamps import BILLION, parse_stamp, whole_stamp
