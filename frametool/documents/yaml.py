@@ -10,8 +10,7 @@ one line that tells a person what to do.
 
 Long lists of such maps, as in big trees, differ from JSON only in the quotes.  If a strict pattern finds nothing else,
 a few replacements make them JSON, which reads 100 000 of them in a quarter of the time that the parser needs for its
-events (0.5 s against 2.1); anything unusual, also an error, is left to the parser.  In other texts plain values in
-brackets after their key, `f1: {xyz: [0.9, 0, 2.0]}`, are extracted in the same way.
+events (0.5 s against 2.1); anything unusual, also an error, is left to the parser.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ from frametool.documents.source import (
     repeated_key,
     too_much,
 )
-from frametool.errors import FormatError, shown
+from frametool.errors import FormatError
 from frametool.text.numbers import odd_characters
 
 TYPE_CHECKING = False
@@ -69,9 +68,6 @@ _QUOTES = (
     ("{", '{"'), ("}", '"}'), (": ", '": "'), (", ", '", "'), ('"[', '["'), (']"', '"]'),
 )  # fmt: skip
 STANDIN = "0"
-_BRACKETED = rf"(?am)^( *+(?:- )?{_WORD}: )(\{{{_PAIR}(?:, {_PAIR})*+\}}|{_LIST})$"
-_NOT_PLAIN = r"""["'|>#&*!%@`?\t\r]"""  # quotes, comments, multi-line texts, anchors: brackets may be text there
-BRACKETS = "\ue000"  # replaces a value in brackets
 
 
 def split_run(text: str) -> tuple[str, list[Any]] | None:
@@ -79,18 +75,21 @@ def split_run(text: str) -> tuple[str, list[Any]] | None:
 
     Returns the text with STANDIN as the list's only item, and the items; None if the text has no such end.
     """
+    from json import JSONDecoder
+
     begin = re.search(r"(?m)^ *- (\{?)", text) if len(text) >= sizes.ASIDE else None
     run = begin and re.compile(_FLOWS if begin[1] else _BLOCKS).match(text, begin.start())
-    if not begin or not run:
+    if not begin or not run or run[0].count(":") > MOST_CONTAINERS:
         return None
-    items = _items(run[0] if begin[1] else _as_flows(run[0], run["indent"]), run["indent"])
-    return None if items is None else (f"{text[: run.start()]}{run['indent']}- {STANDIN}\n", items)
-
-
-def _as_flows(run: str, indent: str) -> str:
-    """Convert block maps to flow maps, one per line."""
-    lines = run[:-1].replace(f"\n{indent}  ", ", ").replace(f"\n{indent}- ", f"}}\n{indent}- {{")
-    return f"{indent}- {{{lines[len(indent) + 2 :]}}}\n"
+    indent = run["indent"]
+    lines = run[0][len(indent) + 2 : -1]
+    if not begin[1]:  # block maps become flow maps, one per line
+        lines = lines.replace(f"\n{indent}  ", ", ").replace(f"\n{indent}- ", f"}}\n{indent}- {{")
+        lines = f"{{{lines}}}"
+    for plain, quoted in (*_QUOTES, (f"\n{indent}- ", ",\n")):
+        lines = lines.replace(plain, quoted)
+    items: list[Any] = JSONDecoder(object_pairs_hook=_distinct).decode(f"[{lines}]")
+    return None if None in items else (f"{text[: run.start()]}{indent}- {STANDIN}\n", items)
 
 
 def put_back(values: list[Any], items: list[Any]) -> bool:
@@ -104,38 +103,6 @@ def put_back(values: list[Any], items: list[Any]) -> bool:
     return True
 
 
-def split_brackets(text: str) -> tuple[str, list[Any]] | None:
-    """Extract the plain values in brackets that end a line of a text.
-
-    Returns the text with BRACKETS in their places, and the values in order; None if a text is short or not plain.
-    """
-    if len(text) < sizes.ASIDE or BRACKETS in text or re.search(_NOT_PLAIN, text):
-        return None
-    found: list[str] = []
-
-    def stand_in(match: re.Match[str]) -> str:
-        found.append(f"- {match[2]}\n")
-        return f"{match[1]}{BRACKETS}"
-
-    rest = re.sub(_BRACKETED, stand_in, text)
-    items = _items("".join(found), "") if found else None
-    return None if items is None else (rest, items)
-
-
-def _items(run: str, indent: str) -> list[Any] | None:
-    """Read one value in brackets per line as JSON; None if a key appears twice or there are too many."""
-    from json import JSONDecoder
-
-    if run.count("{") + run.count("[") > MOST_CONTAINERS:
-        return None
-    for plain, quoted in _QUOTES:
-        run = run.replace(plain, quoted)
-    run = run.replace("- [", '- ["').replace("]\n", '"]\n')
-    run = run.replace(f"\n{indent}- ", ",\n")
-    made: list[Any] = JSONDecoder(object_pairs_hook=_distinct).decode(f"[{run[len(indent) + 2 :]}]")
-    return None if None in made else made
-
-
 def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any] | None:
     made = dict(pairs)
     return made if len(made) == len(pairs) else None
@@ -143,13 +110,10 @@ def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any] | None:
 
 # compiled when an error needs them, not at start-up
 _UNREADABLE = "[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]"
-_ABOUT_TABS = "cannot start any token|tab character"
-_ABOUT_BEGINNINGS = "cannot start any token|scanning a directive"
-_NEVER_FIRST = ("@", "`", "%")
-_LONGEST_SHOWN = 40
 _HINTS = {
     "mapping values are not allowed in this context": "; check the indentation, or quote a text that holds ': '",
     "found unexpected ':'": "; write a blank after the colon",
+    "found character that cannot start any token": "; quote the text",
     "could not find expected ':'": "; a key needs ': ' after it",
     "did not find expected key": "; check the indentation and the brackets above",
     "did not find expected '-' indicator": "; check the indentation",
@@ -160,9 +124,7 @@ def translated(source: Source, error: Exception) -> FormatError:
     """Convert an error of the parser: lower case, with its place, and a hint if one is known."""
     if isinstance(error, MarkedYAMLError) and (mark := error.problem_mark or error.context_mark):
         line = mark.line + 1
-        begin = error.context_mark.index if error.context_mark else mark.index
-        above = source.text[begin : mark.index].rstrip().count("\n")
-        message = _message(error, line_of(source.text, line), mark.column + 1, above)
+        message = _message(error, line_of(source.text, line), mark.column + 1)
         return error_at(source, mark.index, message + _suspicion(source, line))
     if strange := re.search(_UNREADABLE, source.text):
         code = f"U+{ord(strange[0]):04X}"
@@ -187,23 +149,15 @@ def _one_line(text: str) -> str:
     return " ".join(text.split()).lower()
 
 
-def _message(error: MarkedYAMLError, line: str, column: int, above: int) -> str:
-    """Return what is wrong at a column of a line, from the parser's problem and its context, lines above."""
+def _message(error: MarkedYAMLError, line: str, column: int) -> str:
+    """Return what is wrong at a column of a line, from the parser's problem and its context."""
     problem, context = _one_line(error.problem or ""), _one_line(error.context or "")
     if "maximum nesting depth" in problem:  # of libyaml, which reads ahead
         return too_much(DEEPEST)
-    word = line[column - 1 :].split(maxsplit=1)[0] if line[column - 1 :].strip() else ""
-    if "\t" in (line[column - 1 : column], *line[: column - 1].split(" ")) and re.search(_ABOUT_TABS, problem):
+    has_tab = "\t" in (line[column - 1 : column], *line[: column - 1].split(" "))
+    if has_tab and re.search("cannot start any token|tab character", problem):
         return "a tab cannot indent YAML; use blanks"
-    if "scanning a directive" in context:
-        word = line.split(maxsplit=1)[0] if line.strip() else ""
-    if word.startswith(_NEVER_FIRST) and re.search(_ABOUT_BEGINNINGS, problem + context):
-        name = word.rstrip(":,]}")[:_LONGEST_SHOWN]
-        return f'nothing can begin with {shown(word[0])} here; quote the name: "{name}"'
-    if word == ":" and problem == "did not find expected key":
-        return "an empty key; write a name before the colon"
-    begun = f" begun {above} line{'s' * (above > 1)} above" if above else ""  # a record has no line number
-    return problem + (_HINTS.get(problem) or (f", {context}{begun}" if context else ""))
+    return problem + (_HINTS.get(problem) or (f", {context}" if context else ""))
 
 
 TAG = "!"  # the key for the tag of a mapping: no plain key of YAML looks like it
@@ -235,7 +189,7 @@ def parse_yaml(source: Source, tags: Collection[str] = ()) -> list[Value]:
     if source.text.count("\n%TAG") > _MOST_DIRECTIVES:
         raise error_at(source, source.text.index("\n%TAG") + 1, f"more than {_MOST_DIRECTIVES} %TAG directives")
     with paused_collector():
-        return _read_by_lines(source, tags) or _read_without_brackets(source) or _Builder(source, tags).build()
+        return _read_by_lines(source, tags) or _Builder(source, tags).build()
 
 
 def _read_by_lines(source: Source, tags: Collection[str]) -> list[Value] | None:
@@ -248,20 +202,6 @@ def _read_by_lines(source: Source, tags: Collection[str]) -> list[Value] | None:
     except FormatError:
         return None
     return values if put_back(values, split[1]) else None
-
-
-def _read_without_brackets(source: Source) -> list[Value] | None:
-    """Read a plain text whose values in brackets are extracted; None for others and for errors."""
-    split = split_brackets(source.text)
-    if split is None:
-        return None
-    builder = _Builder(Source(source.name, split[0]), ())
-    builder.aside = iter(split[1])
-    try:
-        values = builder.build()
-    except FormatError:
-        return None
-    return values if next(builder.aside, None) is None else None
 
 
 def yaml_events(text: str) -> Iterator[Event]:
@@ -287,7 +227,7 @@ def yaml_events(text: str) -> Iterator[Event]:
 class _Builder:
     """Builds the values of one text; stores the state for rare events."""
 
-    __slots__ = ("aliases", "anchors", "aside", "copies", "documents", "open", "source", "tags")
+    __slots__ = ("aliases", "anchors", "copies", "documents", "open", "source", "tags")
 
     def __init__(self, source: Source, tags: Collection[str]) -> None:
         """Start with an empty list of documents, the accepted tags, and the budget for aliases."""
@@ -296,7 +236,6 @@ class _Builder:
         self.anchors: dict[str, Value] = {}
         self.aliases = MOST_ALIASES
         self.copies = SPARE_COPIES + len(source.text)
-        self.aside: Iterator[Value] | None = None  # the values of the BRACKETS placeholders, if any
         self.documents: list[Value] = []
         self.open: list[tuple[dict[str, Value] | list[Value], object]] = []
 
@@ -316,7 +255,7 @@ class _Builder:
         `current` is the dict or list being filled and `key` the key waiting for its value: None if a key is next, _ITEM
         in a list.  A single function, because two million events pass through it for 100 000 frames.
         """
-        stack, nulls, refused_keys, item, brackets = self.open, _NULLS, _ODD_KEYS, _ITEM, self.aside and BRACKETS
+        stack, nulls, refused_keys, item = self.open, _NULLS, _ODD_KEYS, _ITEM
         current: Any = self.documents
         key: Any = item
         room = MOST_CONTAINERS
@@ -335,8 +274,6 @@ class _Builder:
                     continue
                 if value in nulls and not event.style:
                     value = None
-                elif value == brackets:
-                    value = self._from_aside(event)
             elif kind is MappingStartEvent or kind is SequenceStartEvent:
                 value = {} if kind is MappingStartEvent else []
                 if key is None:
@@ -366,12 +303,6 @@ class _Builder:
                 stack.append((current, key))
                 current = value
                 key = None if kind is MappingStartEvent else item
-
-    def _from_aside(self, event: ScalarEvent) -> Value:
-        """Return the next extracted value: a list or a map of lists."""
-        if len(self.open) + 2 > DEEPEST:
-            raise self._error(event, too_much(DEEPEST))
-        return next(self.aside or iter(()), None)
 
     def _note(self, event: NodeEvent, value: Value) -> None:
         """Store the tag of a mapping if it is accepted, refuse others; remember the value of an anchor."""
