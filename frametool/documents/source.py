@@ -17,14 +17,14 @@ from bisect import bisect_right
 from contextlib import contextmanager
 from functools import cached_property
 from io import BufferedReader, BytesIO, FileIO
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from frametool.errors import LONGEST_NAME, FileProblem, FormatError, cells, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
     from os import PathLike
-    from typing import BinaryIO, TypeAlias, TypeVar
+    from typing import BinaryIO, TypeVar
 
     Value = TypeVar("Value")
     Path: TypeAlias = tuple[str | int, ...]
@@ -60,7 +60,6 @@ def too_much(depth: int) -> str:
 
 HEAD = 1 << 16  # bytes of a file that are inspected before it is read
 UTF16 = (b"\xff\xfe", b"\xfe\xff")
-UTF32 = (b"\xff\xfe\x00\x00", b"\x00\x00\xfe\xff")
 LOOKED_AT = 4096
 MAGIC = {
     b"\x7fELF": "a program (ELF)",
@@ -106,48 +105,20 @@ class Verbatim(str):
     __slots__ = ()
 
 
-class FileState(NamedTuple):
-    """The attributes of a file that differ after a change; for a folder, of one of its files.
-
-    others: device, inode, mode, and the time of the last change
-    """
-
-    name: str
-    size: int
-    ctime_ns: int
-    others: tuple[int, ...]
-
-    @classmethod
-    def of(cls, found: os.stat_result, name: str = "") -> FileState:
-        """Create from the result of stat."""
-        return cls(
-            name, found.st_size, found.st_ctime_ns, (found.st_dev, found.st_ino, found.st_mode, found.st_mtime_ns)
-        )
+State: TypeAlias = tuple[str, int, int, int, int]  # name, time of change, size, device, inode
 
 
-def states_of(path: str) -> list[FileState]:
-    """Return the state of a file, or of each file in a folder; raises OSError."""
-    if os.path.isdir(path):
-        return sorted(FileState.of(entry.stat(), entry.name) for entry in os.scandir(path))
-    return [FileState.of(os.stat(path))]
+def states_of(path: str) -> list[State]:
+    """Return what differs after a change of a file; for a folder, of each file in it.  Raises OSError."""
+    found = [(each.name, each.stat()) for each in os.scandir(path)] if os.path.isdir(path) else [("", os.stat(path))]
+    return sorted((name, at.st_ctime_ns, at.st_size, at.st_dev, at.st_ino) for name, at in found)
 
 
 class Pasted(Source):
     """A text converted from a pasted one, without places in it."""
 
 
-_noted: list[dict[str, list[FileState]]] = []
-
-
-@contextmanager
-def noting_files() -> Iterator[dict[str, list[FileState]]]:
-    """Yield a dict that receives the state of each file opened by `opened` in the block, at that time."""
-    found: dict[str, list[FileState]] = {}
-    _noted.append(found)
-    try:
-        yield found
-    finally:
-        _noted.pop()
+_noted: list[dict[str, list[State]]] = []  # each receives the state of every file when `opened` opens it
 
 
 class ReadCache:
@@ -158,7 +129,7 @@ class ReadCache:
 
     def __init__(self) -> None:
         """Create an empty cache."""
-        self._values: dict[Hashable, tuple[Any, dict[str, list[FileState]], int]] = {}
+        self._values: dict[Hashable, tuple[Any, dict[str, list[State]], int]] = {}
 
     def read(self, key: Hashable, files: Iterable[str], size: int, read: Callable[[], Value]) -> Value:
         """Return the result of `read` for files, and others that it opens; cached unless one of them has changed.
@@ -168,38 +139,29 @@ class ReadCache:
         """
         found = self._values.pop(key, None)
         if found is None or not _are_current(found[1]):
-            with noting_files() as noted:
-                noted |= {path: states_of(path) for path in files}
+            noted = {path: states_of(path) for path in files}
+            _noted.append(noted)
+            try:
                 value = read()
+            finally:
+                _noted.pop()
             states = [state for each in noted.values() for state in each]
             plain = all(os.path.isfile(path) or os.path.isdir(path) for path in noted)  # which can be read again
-            if not plain or max((each.ctime_ns for each in states), default=0) >= time.time_ns() - SETTLED_NS:
+            if not plain or max((changed for _, changed, *_ in states), default=0) >= time.time_ns() - SETTLED_NS:
                 return value
-            found = value, noted, size + sum(each.size for each in states)
+            found = value, noted, size + sum(state[2] for state in states)
         self._values[key] = found  # as the youngest
         while len(self._values) > MOST_KEPT or sum(size for *_, size in self._values.values()) > MOST_KEPT_BYTES:
             del self._values[next(iter(self._values))]
         return found[0]
 
 
-def _are_current(files: dict[str, list[FileState]]) -> bool:
+def _are_current(files: dict[str, list[State]]) -> bool:
     """Return True if all files are unchanged."""
     try:
         return all(states_of(path) == states for path, states in files.items())
     except OSError:
         return False
-
-
-def _instead_of_a_file(name: str) -> str:
-    """Return what a text that was taken for a file name may be instead, if it looks like a pose."""
-    for pattern, remedy in (
-        (r"\s*(?:inv\(|~\s*[\[{])", "the inverse of a pose is inv(POSE), in quotes, with all its brackets"),
-        (r"\s*[pP]\[", "a pose of Universal Robots is p[x, y, z, rx, ry, rz], with its bracket"),
-        (r".*(?:^|\s)[-+]?[\d.]+[\s,]+[-+]?[\d.]+[\s,]", "numbers say what they are by --from REP"),
-    ):
-        if re.match(pattern, name):
-            return f"; taken for a file's name: {remedy}"
-    return ""
 
 
 def opened(path: str | PathLike[str]) -> BufferedReader:
@@ -219,7 +181,9 @@ def opened(path: str | PathLike[str]) -> BufferedReader:
         return BufferedReader(FileIO(path), HEAD)
     except OSError as error:
         called = name if 0 < len(name) <= LONGEST_NAME else shown(name)
-        raise FileProblem(f"{called}: {(error.strerror or str(error)).lower()}{_instead_of_a_file(name)}") from None
+        is_numbers = re.match(r".*(?:^|\s)[-+]?[\d.]+[\s,]+[-+]?[\d.]+[\s,]", name)
+        hint = "; taken for a file's name: numbers say what they are by --from REP" if is_numbers else ""
+        raise FileProblem(f"{called}: {(error.strerror or str(error)).lower()}{hint}") from None
     except ValueError as error:
         raise FileProblem(f"{shown(name)} is no file name: {error}") from None
 
@@ -305,14 +269,8 @@ def not_text(data: bytes) -> str:
     for magic, what in MAGIC.items():
         if head.startswith(magic):
             return f"not text but {what}"
-    if head.startswith(UTF32):
-        return "UTF-32, which is not read; convert it: iconv -f UTF-32 -t UTF-8"
     if head.startswith(UTF16):
         return "UTF-16, which is not read here; convert it: iconv -f UTF-16 -t UTF-8"
-    even, odds = head[::2].count(0), head[1::2].count(0)
-    for zeros, others, encoding in ((odds, even, "UTF-16LE"), (even, odds, "UTF-16BE")):
-        if zeros > len(head) // 5 and others <= zeros // 20:
-            return f"{encoding} without a byte order mark; convert it: iconv -f {encoding} -t UTF-8"
     controls = len(head) - len(head.translate(None, _CONTROLS))
     try:
         most = len(head) // 10 if head[:-3].decode() else 0
@@ -357,13 +315,9 @@ def error_at(source: Source, offset: int, message: str, error: type[FormatError]
 
 
 def line_of(text: str, line: int) -> str:
-    """Return a line of the text without its end; "" after the last."""
-    begin = 0
-    for number, end in enumerate(re.finditer(_LINE_END, text), 1):
-        if number == line:
-            return text[begin : end.start()]
-        begin = end.end()
-    return text[begin:]
+    """Return a line of the text without its end; of later ones the last."""
+    lines = re.split(_LINE_END, text, maxsplit=line)
+    return lines[min(line, len(lines)) - 1]
 
 
 def pointer(line: str, column: int) -> str:
@@ -447,12 +401,11 @@ def find_marks(events: Iterable[Event], paths: Sequence[Path]) -> dict[Path, tup
     """
     wanted = {path[:length] for path in paths for length in range(1, len(path) + 1)}
     found: dict[Path, tuple[int, int]] = {}
-    walk = iter(events)
     outer: list[tuple[Path, str | int | None]] = []
     path: Path = ()
     step: str | int | None = 0  # the next index or key; None when a key is expected
     key_start = 0
-    for kind, text, start, *_ in walk:
+    for kind, text, start, *_ in events:
         if kind == END:
             path, step = outer.pop()
             continue
@@ -466,22 +419,9 @@ def find_marks(events: Iterable[Event], paths: Sequence[Path]) -> dict[Path, tup
                 break
         step = step + 1 if isinstance(step, int) else None
         if kind != LEAF:
-            if here in wanted:
-                outer.append((path, step))
-                path, step = here, 0 if kind == LIST else None
-            else:
-                _skip(walk)
+            outer.append((path, step))
+            path, step = here, 0 if kind == LIST else None
     return found
-
-
-def _skip(walk: Iterator[Event]) -> None:
-    """Skip the rest of a list or map that has just begun."""
-    depth = 1
-    for kind, *_ in walk:
-        if kind != LEAF:
-            depth += -1 if kind == END else 1
-            if not depth:
-                return
 
 
 def mark_of(path: Path, found: dict[Path, tuple[int, int]], *, key: bool) -> int:
