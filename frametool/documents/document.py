@@ -238,9 +238,10 @@ def lines(stream: BinaryIO, name: str, whole: Callable[[bytes], int] = whole_lin
     Raises FormatError if it is not UTF-8, and for a line or document that is too long.
     """
     line = 1
-    is_wide = stream.peek(2).startswith(UTF16)  # type: ignore[attr-defined]
-    found = read_blocks(cast("ByteStream", stream), whole=whole, longest=MOST_CHARACTERS)
-    for block in (stream.read(),) if is_wide else found:
+    blocks = read_blocks(cast("ByteStream", stream), whole=whole, longest=MOST_CHARACTERS)
+    for block in blocks:
+        if block.startswith(UTF16):  # which has other line ends
+            block += b"".join(blocks)  # noqa: PLW2901
         with counted_from(line):
             text = decode(block, name)
         yield Piece(text.replace("\r\n", "\n") if "\r" in text else text, line)

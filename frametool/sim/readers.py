@@ -16,9 +16,8 @@ from itertools import chain
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.chunks import Piece, counted_from
-from frametool.documents.chunks import lines as pieces_of_lines
-from frametool.documents.document import format_error, parse_documents
+from frametool.documents.document import Piece, counted_from, format_error, parse_documents
+from frametool.documents.document import lines as pieces_of_lines
 from frametool.documents.source import Source, error_at
 from frametool.errors import FormatError, ValueInvalid, alternatives, shown
 from frametool.formats.detect import detect
