@@ -28,7 +28,6 @@ from frametool.documents.source import (
     places_of,
 )
 from frametool.errors import FormatError
-from frametool.text.lines import read_blocks, whole_lines
 from frametool.text.numbers import odd_characters
 
 if TYPE_CHECKING:
@@ -231,14 +230,16 @@ class Piece(NamedTuple):
     line: int
 
 
-def lines(stream: BinaryIO, name: str, whole: Callable[[bytes], int] = whole_lines) -> Iterator[Piece]:
+def lines(stream: BinaryIO, name: str, whole: Callable[[bytes], int] | None = None) -> Iterator[Piece]:
     """Split a stream after line ends; a piece has as many lines as arrived in one block.
 
     whole: as in `read_blocks`.  Line ends become those of Unix, which does not change line numbers.
     Raises FormatError if it is not UTF-8, and for a line or document that is too long.
     """
+    from frametool.text.lines import read_blocks, whole_lines
+
     line = 1
-    blocks = read_blocks(cast("ByteStream", stream), whole=whole, longest=MOST_CHARACTERS)
+    blocks = read_blocks(cast("ByteStream", stream), whole=whole or whole_lines, longest=MOST_CHARACTERS)
     for block in blocks:
         if block.startswith(UTF16):  # which has other line ends
             block += b"".join(blocks)  # noqa: PLW2901
@@ -259,7 +260,7 @@ def _whole_documents(text: bytes) -> int:
     `ros2 topic echo` appends the three dashes to its note about a lost message.
     """
     ends = (text.rfind(end) + len(end) for end in (b"---\n", b"---\r\n") if end in text)
-    return max(ends, default=-whole_lines(text))
+    return max(ends, default=-1 - text.rfind(b"\n"))
 
 
 @contextmanager

@@ -12,8 +12,7 @@ import numpy as np
 
 from frametool.documents.source import InputFile
 from frametool.errors import FormatError, Misused, ValueInvalid, warn
-from frametool.formats.rows.pose_lists import StampFile, blocks, describe, form_of
-from frametool.formats.rows.pose_rows import IMAGE, NUMBER, rows_of
+from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, describe, rows_of
 from frametool.formats.table import FORMATS, is_recording, is_trajectory
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Diagnostics, Options, Topics, stop
@@ -216,7 +215,7 @@ class FormatConverter:
             report = lambda error: faults.append(Fault(max(error.line, 1) - 1, "", error.message))  # noqa: E731
         options = Options(self.tally, Topics(), report, normalize=self.request.normalize, answers=self.answers)
         file.format = self.fmt
-        fmt = form_of(file, options)
+        fmt: Poses = self.module.form_of(file, options)
         request = self.request
         if request.frames:
             raise ValueInvalid("poses do not say their frame; name SOURCE")
@@ -226,7 +225,7 @@ class FormatConverter:
         plan = _plan(request)
         state = State()
         rename = rename_of(request) or (lambda parent, name: (parent, name))
-        for each in blocks(file, options, named=False):
+        for each in self.module.blocks(file, options, named=False):
             block = _block(each._replace(stamps_ns=each.stamps_ns + request.offset_ns))
             done = Run(plan, block, state)
             good = done.rows.tolist()

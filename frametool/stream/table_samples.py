@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, cast
 
 from frametool.documents.source import not_text
 from frametool.errors import FormatError
-from frametool.formats.rows.pose_lists import StampFile, describe
+from frametool.formats.rows.pose_rows import StampFile, describe
 from frametool.formats.table import FORMATS
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge, Samples

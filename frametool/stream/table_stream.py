@@ -39,7 +39,7 @@ from frametool.text.lines import read_blocks, whole_lines
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence
 
-    from frametool.formats.rows.pose_lists import StampFile
+    from frametool.formats.rows.pose_rows import StampFile
     from frametool.formats.table import Poses
     from frametool.stream.request import Request
     from frametool.stream.rows import Block

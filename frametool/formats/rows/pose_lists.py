@@ -33,8 +33,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import format_error, lines, parse_documents
 from frametool.errors import FormatError, ValueInvalid, did_you_mean, listing, shown
+from frametool.formats.rows.pose_rows import StampFile, describe
 from frametool.formats.table import FORMATS, Poses
-from frametool.frames.stamps import BILLION, parse_stamp, whole_stamp
+from frametool.frames.stamps import BILLION
 from frametool.geometry import euler, floats
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Samples
@@ -117,17 +118,6 @@ def blocks(file: InputFile, options: Options, *, named: bool = True) -> Iterator
     describe(options, spec, count, named=named)
 
 
-def describe(options: Options, spec: Poses, count: int, *, named: bool = True) -> None:
-    """Record the assumptions about a trajectory, to be reported with the name of its file."""
-    parent, child = options.answers.names(*spec.frames)
-    said = []
-    if named and not options.answers.frames:
-        said.append(f"{count} {'pose' if count == 1 else 'poses'} of {child} in {parent} (--frames)")
-    if spec.counted and not options.answers.stamps:
-        said.append(f"seconds are {spec.counted} (--stamps)")
-    options.tally.assumed = ", ".join(said)
-
-
 def _checked(some: Sequence[Written], spec: Poses, file: InputFile, options: Options) -> tuple[list[int], Components]:
     """Return the valid rows, and the poses of the body in the world."""
     import numpy as np
@@ -161,36 +151,6 @@ def error_at(file: InputFile, row: Written, message: str) -> FormatError:
     if row.path:
         return format_error(file.source, row.path, message)
     return FormatError(message, source=file.name, line=row.line)
-
-
-class StampFile:
-    """Timestamps of poses, one per line: decimal seconds, or nanoseconds with `ns`, to the nanosecond."""
-
-    def __init__(self, path: str) -> None:
-        """Read the file; raises FileProblem, FormatError."""
-        from frametool.documents.source import read_text
-
-        self.path = path
-        self.stamps: list[int] = []
-        for number, line in enumerate(read_text(path).splitlines(), 1):
-            bare = line.strip()
-            if bare and not bare.startswith("#"):
-                try:
-                    self.stamps.append(whole_stamp(parse_stamp(bare)))
-                except ValueInvalid as error:
-                    raise FormatError(str(error), source=path, line=number) from None
-
-    def at(self, index: int) -> int:
-        """Return the time of a pose, counted from 0."""
-        if index >= len(self.stamps):
-            message = f"{len(self.stamps)} times are too few for the poses; one a line is wanted"
-            raise FormatError(message, source=self.path)
-        return self.stamps[index]
-
-    def finish(self, count: int, name: str) -> None:
-        """Check that there was one time per pose."""
-        if count != len(self.stamps):
-            raise FormatError(f"{len(self.stamps)} times for the {count} poses of {name}", source=self.path)
 
 
 def text_lines(file: InputFile) -> Iterator[tuple[int, str]]:

@@ -10,15 +10,17 @@ from importlib import import_module
 from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import ValueInvalid, listing, warn
+from frametool.errors import FormatError, ValueInvalid, listing, warn
 from frametool.formats.table import FORMATS
-from frametool.frames.stamps import format_stamp
+from frametool.frames.stamps import format_stamp, parse_stamp, whole_stamp
 from frametool.geometry import quaternion, rigid
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
+    from frametool.formats.table import Poses
     from frametool.geometry.types import Components
+    from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
 
 
@@ -159,3 +161,47 @@ def rows_of(spec: str) -> RowForm | None:
     """Return how all poses are written in a format; None if each result has a text of its own."""
     found = getattr(import_module(FORMATS[spec].writer), "ROWS", None)
     return found[spec] if isinstance(found, dict) else found
+
+
+# --- what is common to files of poses of one body ---
+
+
+def describe(options: Options, spec: Poses, count: int, *, named: bool = True) -> None:
+    """Record the assumptions about a trajectory, to be reported with the name of its file."""
+    parent, child = options.answers.names(*spec.frames)
+    said = []
+    if named and not options.answers.frames:
+        said.append(f"{count} {'pose' if count == 1 else 'poses'} of {child} in {parent} (--frames)")
+    if spec.counted and not options.answers.stamps:
+        said.append(f"seconds are {spec.counted} (--stamps)")
+    options.tally.assumed = ", ".join(said)
+
+
+class StampFile:
+    """Timestamps of poses, one per line: decimal seconds, or nanoseconds with `ns`, to the nanosecond."""
+
+    def __init__(self, path: str) -> None:
+        """Read the file; raises FileProblem, FormatError."""
+        from frametool.documents.source import read_text
+
+        self.path = path
+        self.stamps: list[int] = []
+        for number, line in enumerate(read_text(path).splitlines(), 1):
+            bare = line.strip()
+            if bare and not bare.startswith("#"):
+                try:
+                    self.stamps.append(whole_stamp(parse_stamp(bare)))
+                except ValueInvalid as error:
+                    raise FormatError(str(error), source=path, line=number) from None
+
+    def at(self, index: int) -> int:
+        """Return the time of a pose, counted from 0."""
+        if index >= len(self.stamps):
+            message = f"{len(self.stamps)} times are too few for the poses; one a line is wanted"
+            raise FormatError(message, source=self.path)
+        return self.stamps[index]
+
+    def finish(self, count: int, name: str) -> None:
+        """Check that there was one time per pose."""
+        if count != len(self.stamps):
+            raise FormatError(f"{len(self.stamps)} times for the {count} poses of {name}", source=self.path)
