@@ -241,7 +241,7 @@ FORMATS = {
     ),
     "ros1": _ECHO._replace(summary="messages as `rostopic echo` prints them"),
     "ros2": _ECHO._replace(summary="messages as `ros2 topic echo` prints them"),
-    "foxglove": Format("FrameTransform as JSON, one a line", writes=("poses", "tree"), writer="frametool.ros.foxglove"),
+    "foxglove": _ECHO._replace(summary="FrameTransform as JSON, one a line", writes=("poses", "tree")),
     "static1": _CALLS._replace(summary="static_transform_publisher of ROS 1"),
     "static2": _CALLS._replace(summary="static_transform_publisher of ROS 2"),
     "tf2": _drawing(

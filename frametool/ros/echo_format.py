@@ -3,6 +3,11 @@
     header:                     header:·             rostopic writes a blank after a key that opens a block,
       frame_id: map               frame_id: "map"    quotes names, and aligns nanoseconds to nine columns
 
+Foxglove's FrameTransform and FrameTransforms are JSON, one message per line:
+
+    {"timestamp": {"sec": 1, "nsec": 0}, "parent_frame_id": "world", "child_frame_id": "turtle1",
+     "translation": {"x": 0, ..}, "rotation": {"x": 0, "y": 0, "z": 0, "w": 1}}
+
 A message is a mapping in the order of its fields; its stamps are mappings too. This module does not know message
 types, except that a transform, a point and a pose have a header.
 """
@@ -28,7 +33,7 @@ if TYPE_CHECKING:
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return TransformStamped messages; frames without a name are "", an unknown stamp is 0."""
+    """Return a message for each pose; frames without a name are "", an unknown stamp is 0."""
     return write_messages((transform_stamped(result, style) for result in results), style)
 
 
@@ -38,7 +43,7 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
 
 
 def write_tree(tree: FrameTree, style: Style) -> str:
-    """Return one TFMessage with every edge, as in a latched /tf_static."""
+    """Return one message with every edge, as in a latched /tf_static."""
     return write_messages([{"transforms": [transform_stamped(edge, style) for edge in edge_results(tree)]}], style)
 
 
@@ -49,6 +54,8 @@ def write_messages(messages: Iterable[dict[str, Any]], style: Style) -> str:
 
 def message_text(message: dict[str, Any], style: Style) -> str:
     """Return one message and the line that ends it."""
+    if style.format == "foxglove":
+        return f"{json_dump(message, style.number)}\n"
     message = _respelled(message, style.format)
     lines = _ros1_lines(message, style, "") if style.format == "ros1" else _ros2_lines(message, style, "")
     return "".join(f"{line}\n" for line in lines) + "---\n"
@@ -71,17 +78,18 @@ def _respelled(value: Any, fmt: str) -> Any:
 
 
 def transform_stamped(result: Result, style: Style) -> dict[str, Any]:
-    """Return a TransformStamped in the order of its fields."""
-    pose = result.pose
+    """Return a TransformStamped, or a FrameTransform, in the order of its fields."""
+    pose, stamp_ns = result.pose, result.extras.get("stamp_ns")
     rotation = rotation_numbers(pose, notation("quaternion"), style)
-    return {
-        "header": header(pose.parent, result.extras.get("stamp_ns"), style),
-        "child_frame_id": pose.name or "",
-        "transform": {
-            "translation": dict(zip("xyz", pose.components, strict=False)),
-            "rotation": dict(zip("xyzw", rotation, strict=True)),
-        },
+    moved = {
+        "translation": dict(zip("xyz", pose.components, strict=False)),
+        "rotation": dict(zip("xyzw", rotation, strict=True)),
     }
+    if style.format == "foxglove":
+        timestamp = dict(zip(("sec", "nsec"), divmod(stamp_ns or 0, BILLION), strict=True))
+        names = {"parent_frame_id": pose.parent or "", "child_frame_id": pose.name or ""}
+        return {"timestamp": timestamp, **names, **moved}
+    return {"header": header(pose.parent, stamp_ns, style), "child_frame_id": pose.name or "", "transform": moved}
 
 
 def header(frame: str | None, stamp_ns: int | None, style: Style) -> dict[str, Any]:
