@@ -13,7 +13,7 @@ from operator import itemgetter
 from pathlib import Path
 from shutil import rmtree
 from tempfile import gettempdir, mkdtemp
-from typing import IO, TYPE_CHECKING, Any, Self, TypeAlias
+from typing import IO, TYPE_CHECKING, Any, TypeAlias
 from weakref import finalize
 
 import numpy as np
@@ -43,13 +43,7 @@ BY_NUMBERS = re.compile(r"\bhistory: *\d")  # in a quality of service
 class FirstPiece(bytes):
     """The first bytes of a file in a folder, with its name."""
 
-    name: str
-
-    def __new__(cls, piece: bytes, name: str) -> Self:
-        """Store a piece and a name."""
-        made = super().__new__(cls, piece)
-        made.name = name
-        return made
+    name = ""
 
 
 class RecordingFile:
@@ -100,26 +94,21 @@ class RecordingFile:
     def begin(self, channels: Iterable[Channel]) -> None:
         """Begin some channels."""
         for each in channels:
-            self.counts.setdefault(each, 0)
-            if each.key not in self._numbers:
-                self._numbers[each.key] = self._connection(each) if self.format == BAG1 else self._channel(each)
-            self._numbers[each] = self._numbers[each.key]
+            if each not in self.counts:
+                self.counts[each], self._numbers[each] = 0, self._number(each)
 
-    def _connection(self, channel: Channel) -> Any:
-        said = channel.said
-        latching = int(said["latching"]) if said.get("latching") else None
-        _, _, definition = channel.schema or ("", "", b"")
-        return self._writer.add_connection(
-            channel.topic, channel.type, msgdef=definition.decode(), md5sum=channel.digest or "*",
-            callerid=said.get("callerid"), latching=latching,
-        )  # fmt: skip
-
-    def _channel(self, channel: Channel) -> int:
-        schema = channel.schema
-        if schema is not None and schema not in self._numbers:
+    def _number(self, channel: Channel) -> Any:
+        """Return what the writer knows a channel by."""
+        said, schema = channel.said, channel.schema
+        if self.format == BAG1:
+            return self._writer.add_connection(
+                channel.topic, channel.type, msgdef=schema[2].decode() if schema else "", md5sum=channel.digest or "*",
+                callerid=said.get("callerid"), latching=int(said["latching"]) if said.get("latching") else None,
+            )  # fmt: skip
+        if schema and schema not in self._numbers:
             self._numbers[schema] = self._writer.register_schema(*schema)
         number = self._numbers[schema] if schema else 0
-        return int(self._writer.register_channel(channel.topic, channel.encoding, number, channel.said))
+        return self._writer.register_channel(channel.topic, channel.encoding, number, said)
 
     def write(self, channel: Channel, stamp_ns: int, data: bytes | memoryview) -> None:
         """Write one message; a late one is logged with the previous one."""
@@ -164,8 +153,11 @@ class RecordingFile:
                 self._writer.finish()
                 self._stream.close()
         if self.format == BAG2:
-            yield FirstPiece(dump({INFORMATION: metadata}).encode(), METADATA)
-            yield FirstPiece(self._file.read(PIECE), f"{NAME}.mcap")
+            pieces = {METADATA: dump({INFORMATION: metadata}).encode(), f"{NAME}.mcap": self._file.read(PIECE)}
+            for name, piece in pieces.items():
+                first = FirstPiece(piece)
+                first.name = name
+                yield first
         while piece := self._file.read(PIECE):
             yield piece
         self._discard()

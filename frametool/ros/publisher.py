@@ -78,12 +78,9 @@ def _line(pose: Pose, style: Style) -> str:
             raise ValueInvalid(f"frame {name!r} cannot be written in {style.format}: it could not be read back")
     angles = bool(style.notations) and style.notations[0].representation.name == "rpy"
     numbers = rotation_numbers(pose, notation("rpy_rad" if angles else "quaternion"), style)
-    position = [style.number(value) for value in pose.components[:3]]
-    rotation = [style.number(value) for value in numbers]
+    cells = [*map(style.number, (*pose.components[:3], *numbers)), quote(pose.parent), quote(pose.name)]
     if style.format == "static1":
-        cells = [*position, *(reversed(rotation) if angles else rotation), quote(pose.parent), quote(pose.name)]
-        return " ".join(cells)
-    cells = [*position, *rotation, quote(pose.parent), quote(pose.name)]
+        return " ".join([*cells[:3], *(cells[5:2:-1] if angles else cells[3:7]), *cells[-2:]])
     names = (*XYZ, *(RPY if angles else QUATERNION), *FRAMES)
     return " ".join(f"--{name} {cell}" for name, cell in zip(names, cells, strict=True))
 
