@@ -86,12 +86,13 @@ def _read_tree(summary: str, module: str, **fields: Any) -> Format:
     return Format(summary, reads=("tree",), reader=module, **fields)
 
 
-def _drawing(summary: str, module: str, **fields: Any) -> Format:
+_DRAWINGS = "frametool.formats.trees.drawings"
+
+
+def _drawing(summary: str, **fields: Any) -> Format:
     """Return the row of a format with edges but without poses."""
-    conventions = "parent -> child, no poses"
-    return Format(
-        summary, reads=("drawing",), reader=module, writes=("tree",), writer=module, conventions=conventions, **fields
-    )
+    about = {"reads": ("drawing",), "writes": ("tree",), "conventions": "parent -> child, no poses", **fields}
+    return Format(summary, reader=_DRAWINGS, writer=_DRAWINGS, **about)
 
 
 def _arrays(
@@ -244,14 +245,12 @@ FORMATS = {
     "foxglove": _ECHO._replace(summary="FrameTransform as JSON, one a line", writes=("poses", "tree")),
     "static1": _CALLS._replace(summary="static_transform_publisher of ROS 1"),
     "static2": _CALLS._replace(summary="static_transform_publisher of ROS 2"),
-    "tf2": _drawing(
-        "the listing of tf2's all_frames_as_yaml", "frametool.ros.tf2_listing", magic=(("yaml inner", "broadcaster"),)
-    ),
+    "tf2": _drawing("the listing of tf2's all_frames_as_yaml", magic=(("yaml inner", "broadcaster"),)),
     "dot": _drawing(
-        "graphviz", "frametool.formats.trees.drawings", suffixes=(".dot", ".gv"),
+        "graphviz", suffixes=(".dot", ".gv"),
         magic=(("text", r"\A\ufeff?(?:\s|//[^\n]*\n)*(?:strict\s+)?digraph\b"),),
     ),
-    "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.trees.drawings"),
+    "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer=_DRAWINGS),
     "euroc": _trajectory(
         "EuRoC ground truth", _TABLE,
         magic=(

@@ -1,1 +1,1 @@
-"""ROS messages, echo text, bags, publisher arguments, Foxglove; tf2's listing."""
+"""ROS messages, echo text, bags, publisher arguments, Foxglove."""

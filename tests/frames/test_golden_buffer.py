@@ -13,8 +13,8 @@ import pytest
 
 from frametool import Transform, TransformBuffer
 from frametool.errors import LookupFailed, NoDataAt, NotConnected, UnknownFrame
+from frametool.formats.trees.drawings import write_tree
 from frametool.grammar.result import Style
-from frametool.ros.tf2_listing import write_tree
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 KINDS = {

@@ -4,7 +4,13 @@ r"""Drawings of trees for graphviz and mermaid: one node per frame, an arrow fro
     n0["base"] -->|"xyz 0.1 0.0 1.2<br>rpy 0.0 15.0 0.0 deg"| n1["camera"]             mermaid
 
 Metres and degrees.  In graphviz, moving frames are drawn as ROS's view_frames does: parents, rates and time spans.
-Graphviz can also be read: an arrow goes from parent to child; there are no poses.
+Graphviz can also be read: an arrow goes from parent to child; there are no poses.  Nor are there in the listing of
+tf2's `all_frames_as_yaml`; names are not quoted, a blank follows each, stamps have three decimals:
+
+    laser:
+      parent: 'base_link'
+      broadcaster: 'default_authority'
+      rate: 10000.000
 """
 
 from __future__ import annotations
@@ -28,11 +34,15 @@ if TYPE_CHECKING:
 _WORD = r"""("(?:[^"\\]|\\.)*+"|[A-Za-z_\d./]++)"""
 _ARROW = rf"""{_WORD}\s*->\s*(?={_WORD}\s*(\[(?:[^\]"]|"(?:[^"\\]|\\.)*+")*+\])?)"""
 _SETTING = ("graph", "node", "edge")  # words of graphviz that are not names
+_LISTED_FACTS = ("rate", "buffer_length", "most_recent_transform")
 _FACTS = (r"Average rate:\s*([\d.]+)", r"Buffer length:\s*([\d.]+)", r"Most recent transform:\s*([\d.]+)")
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the frames and edges of a digraph; their labels are recorded in the tally, there are no poses."""
+    """Yield the frames and edges of a digraph or a listing; their labels are recorded in the tally."""
+    if file.format == "tf2":
+        yield from _read_listing(file, options)
+        return
     text = re.sub(r"(?m)^[^\S\n]*//.*$", "", file.text)
     if not text.rstrip().endswith("}"):
         raise FormatError("the drawing ends before its last }; is the file whole?", source=file.name)
@@ -43,6 +53,17 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         parent, child = (options.tally.names.bare(_unquoted(word)) for word in arrow.groups()[:2])
         options.tally.drawn[child] = _about(arrow[3] or "")
         yield Edge(parent, child, IDENTITY, line=line)
+
+
+def _read_listing(file: InputFile, options: Options) -> Iterator[Edge]:
+    for entry, line in _with_lines(r"(?m)^(\S.*?):[ \t]*\r?\n((?:[ \t]+\S.*(?:\n|\Z))+)", file.text):
+        facts = dict(re.findall(r"(?m)^\s*(\w+):[ \t]*(.*?)\s*$", entry[2]))
+        child, parent = (options.tally.names.bare(each.strip("'\"")) for each in (entry[1], facts.get("parent", "")))
+        if parent:
+            numbers = (facts.get(name, "") for name in _LISTED_FACTS)
+            numbers = (float(each) if re.fullmatch(r"\d+(?:\.\d*)?", each) else 0.0 for each in numbers)
+            options.tally.drawn[child] = listed_motion(*numbers)
+            yield Edge(parent, child, IDENTITY, line=line)
 
 
 def _with_lines(pattern: str, text: str) -> Iterator[tuple[re.Match[str], int]]:
@@ -68,7 +89,9 @@ def _about(attributes: str) -> str:
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Return a flowchart of mermaid, or a digraph of graphviz."""
+    """Return a flowchart of mermaid, a digraph of graphviz, or tf2's listing, `{}` for no frames."""
+    if style.format == "tf2":
+        return "".join(map(_listed, cache_entries(tree))) or "{}\n"
     if style.format == "mermaid":
         return _flowchart(tree, style)
     if tree.moves:
@@ -120,3 +143,15 @@ def _edge(each: CacheEntry) -> str:
     }
     label = "\\n".join(f"{name}: {value}" for name, value in facts.items())
     return f'"{graphviz(each.parent)}" -> "{graphviz(each.child)}"[label=" {label}\\n"];'
+
+
+def _listed(each: CacheEntry) -> str:
+    return (
+        f"{each.child}: \n"
+        f"  parent: '{each.parent}'\n"
+        "  broadcaster: 'default_authority'\n"
+        f"  rate: {each.rate:.3f}\n"
+        f"  most_recent_transform: {each.newest:.3f}\n"
+        f"  oldest_transform: {each.oldest:.3f}\n"
+        f"  buffer_length: {each.length:.3f}\n"
+    )
