@@ -46,8 +46,6 @@ _RIGID = ["child_frame_id", *_axes("transform.translation"), *_axes("transform.r
 _HEADER2 = ["header.stamp.sec", "header.stamp.nanosec", "header.frame_id"]
 TRANSFORM1 = ["header.seq", "header.stamp", "header.frame_id", *_RIGID]
 TRANSFORM2 = [*_HEADER2, *_RIGID]
-_TWIST = [*_axes("linear"), *_axes("angular")]
-_POINT = [*_HEADER2, *_axes("point")]
 _POSE = [*_HEADER2, *_axes("pose.position"), *_axes("pose.orientation", "xyzw")]
 _MANY = re.compile(r"field\.(\w*?)0\.header\.seq")
 
@@ -67,14 +65,9 @@ def message1(cells: Sequence[str], header: Sequence[str]) -> dict[str, Any]:
 def message2(cells: Sequence[str]) -> dict[str, Any]:
     """Return the message of one row of `ros2 topic echo --csv`.
 
-    Raises Misfit for a row that matches none of the known messages.
+    Raises Misfit for a row that is neither a pose nor transforms.
     """
-    if len(cells) == 6:
-        is_number = not cells[2].strip("-+.0123456789eE")
-        return _nested(_TWIST if is_number else _POINT, cells)
-    if len(cells) == 10:
-        return _nested(_POSE, cells)
-    return {"transforms": _entries(cells, TRANSFORM2)}
+    return _nested(_POSE, cells) if len(cells) == len(_POSE) else {"transforms": _entries(cells, TRANSFORM2)}
 
 
 def _entries(cells: Sequence[str], names: Sequence[str]) -> list[dict[str, Any]]:
