@@ -135,13 +135,10 @@ class TextMessage(NamedTuple):
         return error
 
 
-def read_messages(stream: BinaryIO, name: str, fmt: str, tally: Diagnostics) -> Iterator[TextMessage | FormatError]:
-    """Yield the messages of a recording; an unreadable one is replaced by its error."""
-    if fmt in {"echo", "jsonl"}:
-        for piece in (documents if fmt == "echo" else lines)(stream, name):
-            yield from piece_messages(piece, name, fmt, tally)
-    else:
-        yield from _csv(stream, name, fmt, tally)
+def read_messages(stream: BinaryIO, name: str, tally: Diagnostics) -> Iterator[TextMessage | FormatError]:
+    """Yield the messages printed by the echo tools; an unreadable one is replaced by its error."""
+    for piece in documents(stream, name):
+        yield from piece_messages(piece, name, "echo", tally)
 
 
 def piece_messages(piece: Piece, name: str, fmt: str, tally: Diagnostics) -> Iterator[TextMessage | FormatError]:
@@ -229,7 +226,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
             for stretch in _cut(piece, end, sizes.STRETCH):
                 yield from _plain(stretch, end, file, options)
     else:
-        for message in read_messages(file.stream, file.name, file.format, options.tally):
+        for message in _csv(file.stream, file.name, file.format, options.tally):
             yield from _message_edges(message, options)
 
 

@@ -6,8 +6,6 @@
     {timestamp: {sec: 1, nsec: 0}, parent_frame_id: map, child_frame_id: base, translation: {..}, ..}   Foxglove
 
     {header: {stamp: .., frame_id: ''}, name: [elbow, wrist], position: [0.5, -0.2], velocity: [], ..}  JointState
-    %time,field.header.seq,field.header.stamp,field.header.frame_id,field.name0,field.position0,..      rostopic echo -p
-    1683377979,902062451,,elbow,wrist,0.5,-0.2,0.1,0.0                                            ros2 topic echo --csv
 
 Quaternions x, y, z, w; metres; header.frame_id is the parent: parent_from_child. Stamps become integer nanoseconds.
 Joint positions are radians or metres; a message may contain only some joints.
@@ -24,7 +22,7 @@ from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, wi
 from frametool.grammar.rotation_spelling import read_rotation
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from frametool.grammar.edges import Answers
     from frametool.grammar.readers import Path, Quaternion, Reading, Vector
@@ -257,8 +255,6 @@ def read_rigid(mapping: dict[str, Any], keys: tuple[str, str], reading: Reading)
 
 
 STATE_LISTS = ("name", "position", "velocity", "effort")
-_NUMBERED = re.compile(r"(name|position)(\d+)")
-_NUMBER = re.compile(r"[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?|[-+]?(?:nan|inf)")
 
 
 def is_joint_state(value: dict[str, Any]) -> bool:
@@ -296,41 +292,3 @@ def position_of(joint: str, value: Any) -> Path | None:
     index = value["name"].index(joint)
     listed = value.get("position")
     return ("position", index) if type(listed) is list and index < len(listed) else None
-
-
-def of_numbered(message: dict[str, Any]) -> dict[str, Any]:
-    """Return the JointState of a row of `rostopic echo -p`, which numbers the items of lists."""
-    lists: dict[str, list[Any]] = {"name": [], "position": []}
-    for key, value in message.items():
-        if (match := _NUMBERED.fullmatch(key)) and int(match[2]) == len(lists[match[1]]):
-            lists[match[1]].append(value)
-    return {"header": message.get("header"), **lists}
-
-
-def of_row(cells: Sequence[str]) -> dict[str, Any]:
-    """Return the JointState of a row of `ros2 topic echo --csv`: names, then as many positions, velocities, efforts.
-
-    Raises Misfit.
-    """
-    numbers = next((at for at in range(3, len(cells)) if _NUMBER.fullmatch(cells[at])), len(cells))
-    names, rest = cells[3:numbers], cells[numbers:]
-    if not names or len(rest) not in (len(names), 2 * len(names), 3 * len(names)):
-        found = f"found {len(names)} names and {len(rest)} numbers"
-        raise Misfit(f"expected sec,nanosec,frame_id, names of joints and a position for each; {found}")
-    stamp = {"sec": cells[0], "nanosec": cells[1]}
-    return {"header": {"stamp": stamp}, "name": [*names], "position": [*rest[: len(names)]]}
-
-
-def looks_like_row(line: str) -> bool:
-    """Return True for a row of `ros2 topic echo --csv`, False for a header of CSV."""
-    return re.match(r"-?\d+,\d+,[^,]*,[^,]*[A-Za-z_]", line) is not None
-
-
-def unquoted(line: str) -> list[str]:
-    """Split a row without quotes.
-
-    Raises Misfit for one with quotes.
-    """
-    if '"' in line:
-        raise Misfit(f"the echo tools quote nothing, found {shown(line)}")
-    return [cell.strip() for cell in line.split(",")]

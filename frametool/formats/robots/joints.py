@@ -368,7 +368,7 @@ def read_joint_file(path: str, joints: Mapping[str, Joint]) -> Iterator[JointSam
         elif "rows" in FORMATS[fmt].reads:
             yield from _of_table(file, fmt, joints, tally)
         else:
-            for message in read_messages(file.stream, file.name, "echo", tally):
+            for message in read_messages(file.stream, file.name, tally):
                 if isinstance(message, FormatError):
                     raise message
                 try:
