@@ -100,14 +100,13 @@ def _position(
     kind: str, spots: dict[str, NamedColumn], groups: dict[str, dict[str, NamedColumn]], earth: Earth
 ) -> Columns | None:
     """Return the columns of a position of one kind, if they are there."""
-    if kind == ECEF:
-        axes = [(axis, spots[name]) for axis, name in zip("xyz", ECEF_COLUMNS, strict=True) if name in spots]
-        return _columns(kind, axes, spots, earth) if len(axes) == 3 else None
-    if kind in LOCAL:
-        return _local(kind, spots, earth)
-    if kind in FLAT:
-        there = [(name, spots[name]) for name in FLAT[kind] if name in spots]
-        return _columns(kind, there, spots, earth) if len(there) == len(FLAT[kind]) else None
+    if kind in LOCAL and earth.origin is None:
+        return None  # east and north are other data
+    if kind == ECEF or kind in LOCAL or kind in FLAT:
+        names = ECEF_COLUMNS if kind == ECEF else POSITIONS[kind].names
+        axes = zip("xyz" if kind == ECEF else names, names, strict=True)
+        there = [(axis, spots[name]) for axis, name in axes if name in spots]
+        return _columns(kind, there, spots, earth) if len(there) == len(names) else None
     fields: list[tuple[str, NamedColumn]] = [(name, spots[name]) for name in ("lat", "lon") if name in spots]
     if kind == UTM:
         zone = spots.get(ZONE) or groups.get("utm_", {}).get(ZONE) or groups.get("", {}).get(ZONE)
@@ -122,15 +121,6 @@ def _position(
         fields = [(f"{name}_rad" if _in_radians(spot) else name, spot) for name, spot in fields]
         size = 2
     return None if len(fields) < size else _columns(kind, [*fields, *_height(spots)], spots, earth)
-
-
-def _local(kind: str, spots: dict[str, NamedColumn], earth: Earth) -> Columns | None:
-    """Return the columns of local axes, where an origin says of which; without one they are other data."""
-    wanted = POSITIONS[kind].names
-    if earth.origin is None or wanted[2] not in spots:
-        return None
-    there = [(name, spots[name]) for name in wanted if name in spots]
-    return _columns(kind, there, spots, earth) if len(there) == len(wanted) else None
 
 
 def _height(spots: dict[str, NamedColumn]) -> list[tuple[str, NamedColumn]]:

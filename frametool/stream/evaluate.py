@@ -511,29 +511,25 @@ class Run:
         if end is not None:
             self._keep(self.block.places[self.rows] < end)
             unchanged = [(place, text) for place, text in unchanged if place < end]
-        groups = [*self._written(), *self._null_rows()]
+        groups = [] if self.request.gathered or not len(self.rows) else [self._written()]
+        if self.request.on_error == NULL and self.reasons:
+            rows = np.array(sorted(self.reasons), np.int64)
+            pieces = [_without_result(piece, self.plan.null) for piece in self.plan.pieces]
+            groups.append((self.block.places[rows], assemble(pieces, self._parts(rows), None, np.zeros_like(rows))))
         return [*groups, texts_as_rows(unchanged)] if unchanged else groups
 
-    def _written(self) -> list[tuple[Ints, list[Spans]]]:
-        plan, rows = self.plan, self.rows
-        if not len(rows) or self.request.gathered:
-            return []
-        values = None
+    def _parts(self, rows: Ints) -> Sequence[Spans]:
+        return self.block.parts if len(rows) == self.count else [chosen(part, rows) for part in self.block.parts]
+
+    def _written(self) -> tuple[Ints, list[Spans]]:
+        """Return the places and the text of the results."""
+        plan, values = self.plan, None
         if self.results.shape[1]:
             write = partial(numbers_or_null, plan.pieces, plan.null) if self.operation.shown else number_spans
             after = separators(plan.pieces, self.results.shape[1])
             values = write(self.results, self.request.precision, after, yaml=plan.yaml)
-        parts = self.block.parts if len(rows) == self.count else [chosen(part, rows) for part in self.block.parts]
-        return [(self.block.places[rows], assemble(plan.pieces, parts, values, self.locked, self.results))]
-
-    def _null_rows(self) -> list[tuple[Ints, list[Spans]]]:
-        plan = self.plan
-        if self.request.on_error != NULL or not self.reasons:
-            return []
-        rows = np.array(sorted(self.reasons), np.int64)
-        pieces = [_without_result(piece, plan.null) for piece in plan.pieces]
-        parts = [chosen(part, rows) for part in self.block.parts]
-        return [(self.block.places[rows], assemble(pieces, parts, None, np.zeros(len(rows), np.int64)))]
+        text = assemble(plan.pieces, self._parts(self.rows), values, self.locked, self.results)
+        return self.block.places[self.rows], text
 
     def faults(self) -> list[Fault]:
         """Return what is wrong, line by line."""

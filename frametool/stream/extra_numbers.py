@@ -203,18 +203,6 @@ def _refuse_extra(table: Table, axes: str, others: str, source: str) -> None:
         raise FormatError(message, source=source, line=1)
 
 
-def with_entries_at(extra: Sequence[int], columns: Sequence[Column], count: int) -> list[Column]:
-    """Put the entries of a result's covariance, the last numbers there are, where that of the row stood."""
-    entries = sorted([each for each in columns if isinstance(each, New)], key=lambda each: each.number)[-count:]
-    found: list[Column] = []
-    for column in columns:
-        if isinstance(column, Kept) and column.place in extra:
-            found += entries if column.place == min(extra) else []
-        elif column not in entries:
-            found.append(column)
-    return found
-
-
 def with_rates(
     table: Table, request: Request, shapes: Sequence[Shape], targets: Sequence[Target], places: Sequence[int],
     columns: Sequence[Column], source: str,

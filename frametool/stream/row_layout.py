@@ -282,16 +282,14 @@ class Target(NamedTuple):
 
     def angle_columns(self) -> list[tuple[int, float]]:
         """Return which of the numbers are angles, each with the size of a full turn."""
-        found, first = [], count_of(self.unit)
+        periods = [0.0] * count_of(self.unit)
         for notation, degrees in self.notations:
-            found += [(first + index, 360.0 if degrees else TURN) for index in notation.representation.angles]
-            first += len(notation.representation.columns)
-        start = count_of(self.unit)
-        return [
-            (place - sum(each < place for each in self.absent), TURN if place - start in self.radians_at else period)
-            for place, period in found
-            if place not in self.absent
-        ]
+            row = notation.representation
+            periods += [(360.0 if degrees else TURN) * (at in row.angles) for at in range(len(row.columns))]
+        for index in self.radians_at:
+            periods[count_of(self.unit) + index] = TURN
+        there = [period for place, period in enumerate(periods) if place not in self.absent]
+        return [(place, period) for place, period in enumerate(there) if period]
 
     def locked(self, parts: Components) -> Any:
         """Return where Euler angles among the notations are not unique; None if there are none."""

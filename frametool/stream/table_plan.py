@@ -83,11 +83,10 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     words, marked = readers_of(shapes[0]) if on_earth else ({}, dict.fromkeys(asked_at, number_or_none))
     named = ({frames[0]: PARENT} if frames and request.poses else {}) | ({} if name is None else {name: NAME})
     poses = [_written(pose) for pose in poses] if on_earth else poses
-    written = (_several if several else _columns)(table, poses, shapes, targets, request, named)
-    if extra and not request.keep:
-        from frametool.stream.extra_numbers import with_entries_at
-
-        written = with_entries_at(extra, written, len(request.operation.carried(shapes[0])))
+    if several:
+        written = _several(table, poses, shapes, targets, request, named)
+    else:
+        written = _columns(table, poses, shapes, targets[0], request, named, extra)
     if request.operation.turns and table.names and poses and poses[0].rotation:
         from frametool.stream.extra_numbers import with_rates
 
@@ -305,15 +304,10 @@ def _names_or_numbers(table: Table) -> Sequence[str]:
 
 
 def _columns(
-    table: Table,
-    poses: Sequence[PoseColumns],
-    shapes: Sequence[Shape],
-    targets: Sequence[Target],
-    request: Request,
-    named: Mapping[int, int],
-) -> list[Column]:
+    table: Table, poses: Sequence[PoseColumns], shapes: Sequence[Shape], target: Target, request: Request,
+    named: Mapping[int, int], covariance: Sequence[int],
+) -> list[Column]:  # fmt: skip
     """Put the results where they belong; `named` are the columns of names and their roles."""
-    (target,) = targets
     position, rotation, extras = _new_columns(poses, target, request, shapes[0] if shapes else Shape(POSE))
     ours = [columns for pose in poses for columns in pose if columns is not None]
     columns: list[Column] = [Kept(place) for place in range(table.width)]
@@ -326,6 +320,9 @@ def _columns(
         for place, role in named.items():
             columns[place] = Named(place, role)
     at: dict[int, list[Column]] = {place: [] for each in ours for place in each.places}
+    if covariance:  # its entries are the last numbers of the result
+        last = len(extras) - len(request.operation.carried(shapes[0]))
+        extras, entries = extras[:last], extras[last:]
     pose = poses[0]
     if _in_place(pose, shapes[0], target, request):
         new = (*position, *rotation)
@@ -339,6 +336,8 @@ def _columns(
         at[min(pose.rotation.places)] += [*rotation, *extras]
     else:
         at[min(at)] += [*position, *rotation, *extras]
+    if covariance:
+        at |= {place: entries if place == min(covariance) else [] for place in covariance}
     return [column for place, old in enumerate(columns) for column in at.get(place, [old])]
 
 
@@ -350,13 +349,9 @@ def _extra(table: Table, columns: Sequence[Column], extras: Sequence[Column], sh
 
 
 def _several(
-    table: Table,
-    poses: Sequence[PoseColumns],
-    shapes: Sequence[Shape],
-    targets: Sequence[Target],
-    request: Request,
+    table: Table, poses: Sequence[PoseColumns], shapes: Sequence[Shape], targets: Sequence[Target], request: Request,
     named: Mapping[int, int],
-) -> list[Column]:
+) -> list[Column]:  # fmt: skip
     """Put each of several results where it comes from; raises Misused where it has other numbers."""
     columns: list[Column] = [Kept(place) for place in range(table.width)]
     for place, role in named.items() if rename_of(request) is not None else ():

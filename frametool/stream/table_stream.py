@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
     from frametool.formats.rows.pose_rows import StampFile
     from frametool.formats.table import Poses
+    from frametool.stream.layout import Layout
     from frametool.stream.request import Request
     from frametool.stream.rows import Block
     from frametool.stream.stamp_source import Timed
@@ -155,13 +156,18 @@ class PlannedRows:
             request.gathered.stamped |= stamp_places(table.names)[0] is not None
         self.state = State()
         self.mended, self.off = 0, 0.0
-        if request.all_numbers and self.layout.time is None and stamped:
-            time, below = stamp_places(table.names)
-            if not table.names and not request.columns and min(self.layout.places, default=0) == 1:
-                time = 0  # what is before the numbers that --from speaks of
-            if time not in self.layout.frames:
-                self.layout = self.layout._replace(time=time, below=below)
+        if request.all_numbers:  # no text is put together
+            self.layout = self.layout._replace(stretches=(), pieces=())
+            if self.layout.time is None and stamped:
+                self.layout = self._with_stamps(self.layout)
         self.stamp_at = self.layout.time
+
+    def _with_stamps(self, layout: Layout) -> Layout:
+        """Find the column of stamps that no option names."""
+        time, below = stamp_places(self.table.names)
+        if not (self.table.names or self.request.columns) and min(layout.places, default=0) == 1:
+            time = 0  # what is before the numbers that --from speaks of
+        return layout if time in layout.frames else layout._replace(time=time, below=below)
 
     @property
     def columns(self) -> str:
