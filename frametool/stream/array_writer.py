@@ -21,7 +21,7 @@ from frametool.formats.table import FORMATS
 from frametool.geometry import arrays
 from frametool.stream.row_layout import POSE, SIX, TWIST, WRENCH, six_names
 from frametool.stream.row_poses import NO_STAMP, is_typed, objects, plain_cells, text_of, texts_of
-from frametool.stream.writers import target_in
+from frametool.stream.writers import columns_of, settle, target_in
 from frametool.text.parse import parse_floats
 from frametool.text.spans import Spans
 
@@ -235,12 +235,8 @@ class ArrayWriter(ColumnsWriter):
 
     def of_block(self, block: RowPoses) -> bytes:
         """Return what is written of a block; numbers are metres and x y z w, nan in rows without a result."""
-        if (place := self.style.place) is not None and len(block.numbers):
-            from frametool.grammar.place import check_in_ecef
-
-            for parent in dict.fromkeys(block.parents):
-                check_in_ecef(parent, place)
-            place.settle(*(np.ascontiguousarray(column) for column in block.numbers.T[:3]))
+        if self.style.place is not None and len(block.numbers):
+            settle(self.style.place, block)
         if not len(block.numbers):
             block = block._replace(numbers=np.empty((0, self.own - 3 * (not self.placed) + len(self.extras))))
         return self.of_columns(len(block.numbers), self._made(block))
@@ -283,10 +279,8 @@ class ArrayWriter(ColumnsWriter):
 
     def _numbers(self, block: RowPoses) -> list[Any]:
         """Return the numbers of the results in the notations that are written."""
-        columns = [np.ascontiguousarray(column) for column in block.numbers.T]
-        if not self.placed:
-            columns = [columns[0] * 0.0] * 3 + columns
+        columns = columns_of(block, placed=self.placed)
         nothing = columns[0] * 0.0  # nan in rows without a result; the last row of a matrix is four plain numbers
         with np.errstate(invalid="ignore"):
-            numbers = self.target.written(block.unmoved(tuple(columns[: self.own])), arrays)
+            numbers = self.target.written(block.unmoved(columns[: self.own]), arrays)
         return [*(each + nothing if isinstance(each, float) else each for each in numbers), *columns[self.own :]]

@@ -174,19 +174,6 @@ def _heading(spots: dict[str, NamedColumn], position: Columns) -> Columns | None
     return Columns((spot.place,), (spot.name,), notation=notation, degrees=(not radians,))
 
 
-def chosen(places: Sequence[int], names: Sequence[str], kind: str, earth: Earth) -> Columns:
-    """Take columns that --columns and --from say are a position on the Earth, in the order of its numbers.
-
-    Raises ValueInvalid for a count that it does not have.
-    """
-    fields = POSITIONS[kind].names[-_count(kind, earth) :]
-    least = kernels(kind).least or len(fields)
-    if not least - (kind == UTM and earth.zone is not None) <= len(places) <= len(fields):
-        raise ValueInvalid(f"{kind} has {len(fields)} numbers ({' '.join(fields)}); found {len(places)}")
-    spots = [NamedColumn(place, names[at], "") for at, place in enumerate(places)]
-    return _columns(kind, [*zip(fields, spots, strict=False)], {}, earth)
-
-
 def unsaid_heading(names: Iterable[str]) -> str:
     """Return the name of a heading whose unit nobody says, so that it stays data; "" without one."""
     matches = ((name, PATTERN.fullmatch(name)) for name in names if name)
@@ -264,9 +251,15 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
     Raises Misused for names that are not there, or a count that the place does not have.
     """
     called, places = places_named(spec, names, width)
-    most = _count(request.given_place, request.earth or Earth())
+    kind, earth = request.given_place, request.earth or Earth()
+    most = _count(kind, earth)
+    fields = POSITIONS[kind].names[-most:]
+    own = places[:most]
+    if len(own) < (kernels(kind).least or len(fields)) - (kind == UTM and earth.zone is not None):
+        raise Misused(f"--columns: {kind} has {most} numbers ({' '.join(fields)}); found {len(own)}")
+    spots = [NamedColumn(place, called[place], "") for place in own]
     try:
-        position = chosen(places[:most], called, request.given_place, request.earth or Earth())
+        position = _columns(kind, [*zip(fields, spots, strict=False)], {}, earth)
     except ValueInvalid as error:
         raise Misused(f"--columns: {error}") from None
     behind = places[most:]

@@ -355,16 +355,14 @@ def _other_names(header: Header) -> str:
         return ""
     folded = {name.lower(): name for name in reversed(header.names)}
     stems = [name[:-1] for name in folded if name[-1:] == "w" and len(name) > 1] + ["q", "q_"]
-    for stem in stems:
-        for letters in ("xyzw", "0123", "1234"):
-            if letters == "xyzw" and stem in ("", "q"):
-                continue
-            if all(stem + letter in folded for letter in letters):
-                shown = [folded[stem + letter] for letter in letters]
-                return (
-                    f"no qx, qy, qz, qw: {' '.join(shown)} look like a quaternion under other names; name them so, or "
-                    f"add --columns x,y,z,{','.join(shown)} --from xyzw (or wxyz)"
-                )
+    pairs = [(stem, letters) for stem in stems for letters in ("xyzw", "0123", "1234")]
+    for stem, letters in pairs:
+        if (stem, letters) != ("q", "xyzw") and all(stem + letter in folded for letter in letters):
+            shown = [folded[stem + letter] for letter in letters]
+            return (
+                f"no qx, qy, qz, qw: {' '.join(shown)} look like a quaternion under other names; name them so, or "
+                f"add --columns x,y,z,{','.join(shown)} --from xyzw (or wxyz)"
+            )
     return ""
 
 

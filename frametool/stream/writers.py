@@ -81,6 +81,21 @@ def target_in(style: Style, kind: str, *, placed: bool) -> Target:
     return Target(None if whole or not placed else place or 1.0, notations, style.keep_sign, whole)
 
 
+def settle(place: Place, block: RowPoses) -> None:
+    """Refuse positions of another frame than the Earth's; the first of all may be the origin."""
+    from frametool.grammar.place import check_in_ecef
+
+    for parent in dict.fromkeys(block.parents):
+        check_in_ecef(parent, place)
+    place.settle(*columns_of(block)[:3])
+
+
+def columns_of(block: RowPoses, *, placed: bool = True) -> Components:
+    """Return the numbers of a block as columns; poses that are not placed are at 0."""
+    columns = tuple(map(np.ascontiguousarray, block.numbers.T))
+    return columns if placed else (*[columns[0] * 0.0] * 3, *columns)
+
+
 class TextWriter:
     """Write blocks of poses, points or vectors as text; `end` says what comes behind the last."""
 
@@ -102,7 +117,7 @@ class TextWriter:
         self.write: Callable[[Sequence[Any], Style], str] = getattr(module, name, _no_text)
         self.dropped_fields = None if self.fixed is None else DroppedFields(self.fixed, style)
         self.extras = tuple(extras)
-        self.placed = placed
+        self.placed = placed or kind != POSE
         self.target = target_in(style, kind, placed=placed)
         far = 1.0 if self.target.place is None else 1e6  # nothing near the Earth's centre has a latitude
         self.probe = (*(far * part for part in PROBE[:3]), *PROBE[3:])
@@ -119,8 +134,11 @@ class TextWriter:
         if not len(block.numbers):
             self.empty = block
             return b""
-        if self.style.place is not None:
-            self._settle(self.style.place, block)
+        if (place := self.style.place) is not None:
+            if self.fixed is not None:
+                names = ", ".join(each.name for each in (place, *place.more))
+                raise ValueInvalid(f"{self.style.format} holds x, y, z; leave --to {names} out, or write csv or json")
+            settle(place, block)
         if self.style.format not in LEARNED:
             self.dropped |= dict.fromkeys((*self.extras, *block.extras))
             refuse_scale_in(self.style.format, self.dropped)
@@ -132,17 +150,6 @@ class TextWriter:
             text += self._fixed(self.fixed, run) if self.fixed else self._free(run, is_null=bool(absent[start]))
             self.count += end - start
         return text
-
-    def _settle(self, place: Place, block: RowPoses) -> None:
-        """Refuse positions of another frame than the Earth's; the first of all may be the origin."""
-        from frametool.grammar.place import check_in_ecef
-
-        for parent in dict.fromkeys(block.parents):
-            check_in_ecef(parent, place)
-        if self.fixed is not None:
-            names = ", ".join(each.name for each in (place, *place.more))
-            raise ValueInvalid(f"{self.style.format} holds x, y, z; leave --to {names} out, or write csv or json")
-        place.settle(*self._own(tuple(block.numbers.T))[:3])
 
     def end(self) -> Iterator[bytes]:
         """Yield what comes behind the last pose, and warn of what was left out."""
@@ -171,7 +178,7 @@ class TextWriter:
             dropped.counted |= "stamps" in fmt.holds and block.stamps_ns is None
             dropped.by_stamp |= IMAGE in fmt.row and images is None
             dropped.turned = is_turned(self.style)
-        tx, ty, tz, x, y, z, w = self._own(tuple(block.numbers.T))[:7]  # as the format has them: axes, direction, sign
+        tx, ty, tz, x, y, z, w = columns_of(block, placed=self.placed)[:7]  # as the format has them: axes, direction
         pose = turned(self.style, (tx, ty, tz, *quaternion.unit(x, y, z, w, arrays)))
         tx, ty, tz, x, y, z, w = rigid.inverse(*pose) if FORMATS[self.style.format].poses.inverse else pose
         turn = (x, y, z, w) if self.style.keep_sign else quaternion.from_quaternion(x, y, z, w, arrays)
@@ -245,20 +252,14 @@ class TextWriter:
             self._learn(block)
             if self.rows is not None and self._filled(self.rows, first_of(block)) != self._one_by_one(first_of(block)):
                 self.rows = None
-        columns = self._own(tuple(block.numbers.T))
-        locked = self.target.locked(columns[:7])
+        locked = self.target.locked(columns_of(block, placed=self.placed)[:7])
         if self.rows is None or (locked is not None and bool(np.any(locked))):
             return self._one_by_one(block)
         return self._filled(self.rows, block)
 
-    def _own(self, columns: Components) -> Components:
-        """Return seven components and what comes with them; a pose without a position is at 0."""
-        own = tuple(np.ascontiguousarray(part) if isinstance(part, np.ndarray) else part for part in columns)
-        return own if self.placed or self.kind != POSE else (*[own[0] * 0.0] * 3, *own)
-
     def _filled(self, rows: RowForm, block: RowPoses) -> bytes:
         """Fill the numbers of a block into the rows that were learned."""
-        written = self.target.written(block.unmoved(self._own(tuple(block.numbers.T))), arrays)
+        written = self.target.written(block.unmoved(columns_of(block, placed=self.placed)), arrays)
         values = np.empty((len(block.numbers), len(self.order)))
         for at, place in enumerate(self.order):
             values[:, at] = written[place]
@@ -278,7 +279,7 @@ class TextWriter:
         row = twice[len(alone) :]
         head, between = (alone[: -len(row)], "") if alone.endswith(row) else ("", row[: -len(alone)])
         row = row[len(between) :]
-        own = self.probe[: self._size] if self.placed or self.kind != POSE else self.probe
+        own = self.probe[: self._size]
         extra = (0.7310585786300049 + at for at in range(len(self.extras)))
         written = [*self.target.written(own, floats), *extra]
         marks = {repr(value): at for at, value in enumerate(written) if type(value) is float}
