@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components, Rigid
     from frametool.grammar.readers import Path
     from frametool.stream.record import Record
-    from frametool.stream.request import Memory, Operation, Request
+    from frametool.stream.request import Operation, Request
     from frametool.stream.row_layout import Target
 
 SIX_BY_SIX = 36  # entries of the covariance of a pose
@@ -58,14 +58,10 @@ class Entry(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What became of a record: the components of its result; whether its rotation had to be normalised.
-
-    has_gaps: numbers of it may be nan
-    """
+    """What became of a record: the components of its result; has_gaps: numbers of it may be nan."""
 
     entry: Entry
     parts: Components
-    mended: bool
     has_gaps: bool = False
 
 
@@ -133,17 +129,15 @@ def _extra(find: Callable[..., Path], document: Document, record: Record, *name:
     return (document.index, *within((document.index,), find, document.value, record.path[1:], *name))
 
 
-def answer(
-    entry: Entry, values: Sequence[float], stamp: Sequence[str], request: Request, memory: Memory | None = None
-) -> Answer | None:
-    """Return what becomes of a record; None for the first of all where a velocity needs the one before.
+def answer(entry: Entry, values: Sequence[float], stamp: Sequence[str], request: Request) -> Answer:
+    """Return what becomes of a record.
 
-    values: its numbers; stamp: the texts of its own time; memory: of the records before
+    values: its numbers; stamp: the texts of its own time
     Raises ValueInvalid for what is no rotation, FrametoolError where there is no pose at its time.
     """
     operation, shape, timed = request.operation, entry.record.shape, request.timed
     edge, at_ns = entry.edge, None
-    if stamp and (timed is not None or operation.velocity or request.window):
+    if stamp and (timed is not None or request.window):
         try:
             at_ns = _stamp_ns(entry, stamp)
             if timed is not None and (operation.formula is None or operation.shown):
@@ -153,23 +147,12 @@ def answer(
             raise
     if request.window and at_ns is not None and not request.window[0] <= at_ns <= request.window[1]:
         raise Outside("beyond --start or --stop")
-    seconds = memory.step(at_ns) if operation.velocity and memory and at_ns is not None else None
-    warned: list[tuple[str, str]] = []
-
-    def rotation(own: Components) -> Components:
-        quaternion, warnings = checked_rotation(shape, own, normalize=request.normalize)
-        warned.extend(warnings)
-        return quaternion
-
-    def compared(pose: Rigid) -> list[Rigid]:
-        return memory.pair(operation.of, pose) if memory and operation.looks_back else [pose]
-
     parts = operation.result(
-        shape, tuple(values), edge, floats, rotation=rotation, compared=compared, seconds=lambda: seconds or 1.0,
-        times_ns=at_ns,
+        shape, tuple(values), edge, floats,
+        rotation=lambda own: checked_rotation(shape, own, normalize=request.normalize)[0],
+        compared=lambda pose: [pose], seconds=float, times_ns=at_ns,
     )  # fmt: skip
-    has_gaps = operation.shown is not None
-    return None if operation.velocity and seconds is None else Answer(entry, parts, bool(warned), has_gaps)
+    return Answer(entry, parts, has_gaps=operation.shown is not None)
 
 
 def wide_turn(made: Answer, operation: Operation) -> Finding | None:

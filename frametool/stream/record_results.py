@@ -18,7 +18,6 @@ from frametool.grammar.result import NoResult
 from frametool.stream.faults import NULL, STOP, Fault, tell_of_rounding
 from frametool.stream.record_text import RecordText, attempt, fault_at, nulled
 from frametool.stream.record_values import ROUNDED, Teller, plain, values_of_text
-from frametool.stream.request import Memory
 from frametool.stream.splitter import ARRAY, NO_END, Splitter
 from frametool.text.lines import read_blocks
 
@@ -63,10 +62,10 @@ def stream_rows(stream: ByteStream, fmt: str, request: Request, style: Style, ba
     """Yield the results of a stream of records, block by block; bad ones are reported as rows are."""
     splitter = Splitter(fmt)
     operation, request = request.operation, request._replace(canonical=True)
-    singly = operation.shown is not None or request.place is not None
+    singly = operation.shown is not None or (request.place is not None and not operation.looks_back)
     alike: RecordRows | None = None
     line, rows = 1, 0
-    memory, teller = Memory(), Teller(most=1)
+    teller = Teller(most=1)
     for block in read_blocks(stream, whole=splitter.whole):
         at = 0
         batches: Sequence[RecordBatch] = ()
@@ -88,7 +87,7 @@ def stream_rows(stream: ByteStream, fmt: str, request: Request, style: Style, ba
             fault = known if isinstance(known, Fault) else reason and Fault.of(line - 1, *reason)
             if isinstance(known, RecordText) and not fault:
                 try:
-                    found = values_of_text(known, style, memory, teller, parts)
+                    found = values_of_text(known, style, teller, parts)
                     values += zip(count(part.start), found, strict=False)
                 except FormatError as error:
                     fault = fault_at(known.source, error)

@@ -259,7 +259,7 @@ def marked(template: Template, at: int, request: Request, style: Style, target: 
     parent, name = entry.parent and PARENT, entry.name and NAME
     stamp = None if record.stamp_ns is None else STAMP_NS
     shown = entry._replace(parent=parent, name=name, record=record._replace(stamp_ns=stamp))
-    probe = Answer(shown, parts, mended=False)
+    probe = Answer(shown, parts)
     own_style = style if style.format in SPELLED else style.with_format("csv")
     try:
         root = Node(0, len(text), parse_nodes(text))

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from frametool.stream.answers import Answer, Entry
     from frametool.stream.layout import Piece
     from frametool.stream.record import Record
-    from frametool.stream.request import Memory, Request
+    from frametool.stream.request import Request
     from frametool.stream.splice import Edit
     from frametool.stream.splitter import Part
 
@@ -82,10 +82,10 @@ class RecordText:
         paths = (path for entry in self.entries for path in entry.record.numbers if path is not None)
         return self.text.count("\n", 0, min((self.root.at(path).start for path in paths), default=0))
 
-    def answer(self, entry: Entry, memory: Memory | None = None) -> Answer | None:
-        """Return what becomes of a record; None for the first of all where a velocity needs the one before."""
+    def answer(self, entry: Entry) -> Answer:
+        """Return what becomes of a record."""
         texts = [str(value_at(self.values, path)) for path in entry.stamp]
-        return answer(entry, entry.record.values, texts, self.request, memory)
+        return answer(entry, entry.record.values, texts, self.request)
 
     def edits_for(self, entries: Sequence[Entry], request: Request) -> list[Edit]:
         """Return what changes in the text; a name that several records share changes once."""
@@ -119,7 +119,7 @@ class RecordText:
         line, column: where the text begins; lines count from 0
         """
         try:
-            answers = [each for entry in self.entries if (each := self.answer(entry)) is not None]
+            answers = [*map(self.answer, self.entries)]
             numbers = [number for each in answers for number in written(each)]
         except FrametoolError as error:
             return Fault.of(line + self.line, getattr(error, "column_name", ""), error)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.document import NOTHING, Aliased, Node, refuse_alias
 from frametool.documents.json import JSON_NUMBER
 from frametool.documents.source import Source, Verbatim
-from frametool.errors import Finding, FormatError, ValueInvalid, shown, warn
+from frametool.errors import Finding, FormatError, Misused, ValueInvalid, shown, warn
 from frametool.formats.table import is_recording
 from frametool.geometry import floats
 from frametool.grammar.names import in_nanoseconds, stamp_column
@@ -24,7 +24,7 @@ from frametool.grammar.result import Result, with_entries
 from frametool.stream.answers import Answer, Outside, wide_turn, written
 from frametool.stream.record import STALE, placed, value_at
 from frametool.stream.record_text import RecordText
-from frametool.stream.request import Memory, Request
+from frametool.stream.request import Request
 from frametool.stream.row_layout import AS_READ, PARTS, POSE, ROTATION, VECTOR, checked_rotation
 from frametool.stream.splice import refuse_member
 from frametool.stream.stamp_source import read_stamp
@@ -147,21 +147,23 @@ def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
     Raises FormatError with the place of a record that cannot be read or has no result.
     """
     own = Teller()
+    if request.operation.looks_back:
+        raise Misused("rows are compared with those before them in streams; pipe them in as JSON lines, YAML or CSV")
     known = RecordText(source, request._replace(canonical=True), json=False, note=partial(own.tell, source))
-    yield from values_of_text(known, style, Memory(), own)
+    yield from values_of_text(known, style, own)
     own.end(source.name)
 
 
 def values_of_text(
-    known: RecordText, style: Style, memory: Memory, own: Teller, parts: Sequence[Components] | None = None
+    known: RecordText, style: Style, own: Teller, parts: Sequence[Components] | None = None
 ) -> Iterator[Value]:
     """Yield the results of the records of a text.
 
-    memory: of the records before; own: reports what is invalid; parts: the components of each result, if known
+    own: reports what is invalid; parts: the components of each result, if known
     Raises FormatError for a record without a result.
     """
     found = parts or repeat(None, len(known.entries))
-    answers = (_answer(known, *each, memory, own) for each in zip(known.entries, found, strict=True))
+    answers = (_answer(known, *each, own) for each in zip(known.entries, found, strict=True))
     made = [each for each in answers if each is not None]
     units: dict[Path, list[Answer]] = {}
     for each in made:
@@ -183,16 +185,14 @@ def unit_of(record: Record, document: Any) -> Path:
     return record.path[: 1 + (type(document) is list and len(record.path) > 1)]
 
 
-def _answer(
-    known: RecordText, entry: Entry, parts: Components | None, memory: Memory, own: Teller
-) -> Answer | None:
-    """Apply the operation to one record; the first of all has no velocity and so no result."""
+def _answer(known: RecordText, entry: Entry, parts: Components | None, own: Teller) -> Answer | None:
+    """Apply the operation to one record; None for one whose time is not wanted."""
     record, source = entry.record, known.source
     own.counts[LOST] += bool(entry.lost)
     if entry.lost and own.counts[LOST] == 1:
         warn(f"{source.name}: frame {shown(entry.lost)} is left out: the frames of the result are not known")
     try:
-        found = Answer(entry, parts, mended=False) if parts else known.answer(entry, memory)
+        found = Answer(entry, parts) if parts else known.answer(entry)
     except Outside:
         return None
     except Misfit as misfit:
@@ -200,7 +200,7 @@ def _answer(
     except ValueInvalid as error:
         bad = NotARotation(str(error), record.path)  # what was read well has no result
         raise placed(bad, source) from bad
-    if found and (warning := wide_turn(found, known.request.operation)) and not own.counts[warning.rule]:
+    if (warning := wide_turn(found, known.request.operation)) and not own.counts[warning.rule]:
         own.tell(source, [warning])
     return found
 

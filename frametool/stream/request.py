@@ -1,6 +1,6 @@
 """What is asked of a stream, whatever its format: the operation, how rows are read, how results are written.
 
-One `Operation` serves floats and arrays alike; `Memory` is what one record leaves for the next.
+One `Operation` serves floats and arrays alike.
 """
 
 from __future__ import annotations
@@ -525,33 +525,6 @@ class Request(NamedTuple):
     def in_degrees(self, notation: Notation) -> bool:
         """Return True if a notation's angles are degrees: its own word wins."""
         return self.degrees if notation.degrees is None else notation.degrees
-
-
-class Memory:
-    """The pose before, or the first of all, and its stamp."""
-
-    __slots__ = ("pose", "stamp_ns")
-
-    def __init__(self) -> None:
-        """Begin before the first row."""
-        self.pose: Rigid | None = None
-        self.stamp_ns: int | None = None
-
-    def pair(self, of: str, pose: Rigid) -> list[Rigid]:
-        """Return what a pose is compared with, and the pose; the very first one's is itself."""
-        before = self.pose or pose
-        if of == PREVIOUS or self.pose is None:
-            self.pose = pose
-        return [before, pose]
-
-    def step(self, stamp_ns: int) -> float | None:
-        """Return the seconds since the row before, None for the first; raises ValueInvalid if time does not advance."""
-        before, self.stamp_ns = self.stamp_ns, stamp_ns
-        if before is None:
-            return None
-        if stamp_ns <= before:
-            raise ValueInvalid(no_step(before, stamp_ns))
-        return (stamp_ns - before) / 1_000_000_000
 
 
 def no_step(before: int, stamp_ns: int) -> str:
