@@ -19,11 +19,11 @@ from frametool.geometry import floats
 from frametool.geometry.representations import notation
 from frametool.grammar.names import in_nanoseconds
 from frametool.grammar.result import Result
-from frametool.stream.answers import Answer
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import DEGREES
 from frametool.stream.record_cuts import Cut, RecordCutter, block_of, names_of, plan_of
 from frametool.stream.record_cuts import in_order as in_cut_order
+from frametool.stream.record_text import Answer
 from frametool.stream.record_values import (
     ROUNDED,
     SPELLED,

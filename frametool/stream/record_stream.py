@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING
 from frametool import sizes
 from frametool.errors import FormatError, FrametoolError
 from frametool.stream import stamp_source
-from frametool.stream.answers import Outside
 from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote
-from frametool.stream.record_text import RecordText, attempt, column_in, null_of
+from frametool.stream.record_text import Outside, RecordText, attempt, column_in, null_of
 from frametool.stream.splitter import ARRAY, NO_END, Part, Splitter
 from frametool.text.lines import Pieces, read_blocks
 

@@ -21,9 +21,8 @@ from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import SCALE, Pose, inverted
 from frametool.grammar.readers import Misfit, NotARotation, Reading, tell
 from frametool.grammar.result import Result, with_entries
-from frametool.stream.answers import Answer, Outside, wide_turn, written
 from frametool.stream.record import STALE, placed, value_at
-from frametool.stream.record_text import RecordText
+from frametool.stream.record_text import Answer, Outside, RecordText, wide_turn, written
 from frametool.stream.request import Request
 from frametool.stream.row_layout import AS_READ, PARTS, POSE, ROTATION, VECTOR, checked_rotation
 from frametool.stream.splice import refuse_member
@@ -35,8 +34,8 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components
     from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
-    from frametool.stream.answers import Entry
     from frametool.stream.record import Record
+    from frametool.stream.record_text import Entry
 
     Value = Result | dict[str, Any]
 

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.documents.document import Node
-    from frametool.stream.answers import Entry
     from frametool.stream.layout import Piece
     from frametool.stream.record import Name, Record
+    from frametool.stream.record_text import Entry
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Target
 
@@ -289,12 +289,9 @@ class Splicer:
             return
         if not self.request.poses and {"name", "parent"} & self.node.value.keys() - {*record.members}:
             return  # in a row that was no pose they say something else
-        parent, name = self.entry.parent, self.entry.name
-        if self._has_swapped(name, parent):
-            return
-        self._name(record.name, name, "name")
+        self._name(record.name, self.entry.name, "name")
         if record.parent.paths or not record.parent.text:
-            self._name(record.parent, parent, self._parent_key())
+            self._name(record.parent, self.entry.parent, self._parent_key())
 
     def _parent_key(self) -> str:
         """Return the key that names the frame in which a result is given."""
@@ -319,19 +316,6 @@ class Splicer:
                 node = self.root.at(path)
                 text = quoted_name(node, new or "", json=self.json).encode()
                 self.edits.append(Edit(node.start, node.end, (Renamed(node.start, text),)))
-
-    def _has_swapped(self, name: str | None, parent: str | None) -> bool:
-        """Call the one frame there is by the other key, where that is all that changes."""
-        before, own = self.record.name, self.record.parent
-        if (name, parent) != (own.text, before.text) or (name is None) == (parent is None):
-            return False
-        old, key = (before, "parent") if own.text is None else (own, "name")
-        only = not (before.paths and own.paths)
-        if not only or len(old.paths) != 1 or old.paths[0][-1] not in ("name", "parent"):
-            return False
-        node = self.node.value[old.paths[0][-1]][0]
-        self.edits.append(Edit(node.start, node.end, (Const(self._text(key).encode()),)))
-        return True
 
     def _text(self, value: Any) -> str:
         """Write a value in the record's syntax, each number a mark."""

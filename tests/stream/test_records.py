@@ -36,7 +36,7 @@ def test_json_points_keep_their_spelling_and_all_other_keys(record: str, wanted:
 @pytest.mark.parametrize(
     ("record", "wanted"),
     [
-        ("# c\nname: a  # b\nxyz: [1, 2, 3]\nrpy_deg: [0, 0, 90]\n", "# c\nparent: a  # b\nxyz: [-2.0, 1.0, -3.0]\nrpy_deg: [0.0, 0.0, -90.0]\n"),
+        ("# c\nname: a  # b\nxyz: [1, 2, 3]\nrpy_deg: [0, 0, 90]\n", "# c\nparent: a\nxyz: [-2.0, 1.0, -3.0]\nrpy_deg: [0.0, 0.0, -90.0]\n"),
         ("{xyz: {x: 1}, quaternion: {x: 0, y: 0, z: 0, w: 1}}\n", "{xyz: [-1.0, 0.0, 0.0], quaternion: {x: 0.0, y: 0.0, z: 0.0, w: 1.0}}\n"),
         ("rpy: [0, 0, 90deg]\n", "rpy_deg: {roll: 0.0, pitch: 0.0, yaw: -90.0}\n"),
         ("xyz: [1e-5, 0, 0]\n", "xyz: [-1.0e-05, 0.0, 0.0]\n"),

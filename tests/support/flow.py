@@ -19,10 +19,10 @@ from frametool.formats.table import readers
 from frametool.geometry.representations import notation
 from frametool.grammar.readers import Reading
 from frametool.grammar.result import Style
-from frametool.stream.answers import Entry, answer
 from frametool.stream.faults import MOST, BadRows, run
 from frametool.stream.record import find_records
 from frametool.stream.record_stream import run_records
+from frametool.stream.record_text import Entry, answer
 from frametool.stream.record_values import read_poses, results
 from frametool.stream.request import Operation, Request
 from frametool.stream.splice import target_of
