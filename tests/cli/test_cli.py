@@ -133,7 +133,7 @@ def test_vectors_rotate_and_points_also_shift(run: Run) -> None:
     result = run("apply", "arm.yaml", "world", *records, "--format", "json", files={"arm.yaml": ARM})
     vector, point = map(json.loads, result.out.splitlines())
     assert vector == {"frame": "world", "vector": [0.0, 0.0, -1.0]}
-    assert point == {"frame": "world", "point": {"x": 0.0, "y": 0.0, "z": 0.25}}
+    assert point == {"frame": "world", "point": [0.0, 0.0, 0.25]}
 
 
 def test_trees_are_merged_and_found_through_the_environment(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
