@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import os
 import re
-from array import array
-from bisect import bisect_left
 from functools import partial
 from importlib import import_module
 from io import BytesIO
@@ -33,7 +31,7 @@ from frametool.errors import (
     warn,
 )
 from frametool.formats.detect import Beginning, detect, of_folder
-from frametool.formats.table import BAG, CHOICES, FORMATS, readers
+from frametool.formats.table import CHOICES, FORMATS, readers
 from frametool.frames import topology
 from frametool.frames.lookups import FrameTree
 from frametool.geometry.representations import EARTH_FRAMES
@@ -88,7 +86,7 @@ class FrameFile(InputFile):
         """
         folder = found if (found := of_folder(str(path))) and fmt in (None, "", found) else None
         if not (fmt or folder) and os.path.isdir(path):
-            raise FileProblem(f"{path}: {_about_folder(str(path))}")
+            raise FileProblem(f"{path}: is a directory; name a file in it, or the folder of a bag, with metadata.yaml")
         super().__init__(path, stream, folder=folder is not None)
         try:
             self.format, self.known_by = fmt or folder or "", "what it holds" if folder else ""
@@ -215,13 +213,6 @@ def refuse_unknown_joints(files: Sequence[FrameFile]) -> None:
             raise error
 
 
-def _about_folder(path: str) -> str:
-    """Return why a folder is not read, and which of its files could be."""
-    bags = tuple(suffix for row in FORMATS.values() if row.reader == BAG for suffix in row.suffixes)
-    files = sorted(name for name in os.listdir(path) if name.endswith(bags))[:5]
-    return f"a folder without metadata.yaml; name a file in it: {', '.join(files)}" if files else "is a directory"
-
-
 class Rules(NamedTuple):
     """How moving frames are read, and rotations that are not exact.
 
@@ -237,20 +228,8 @@ class Rules(NamedTuple):
     earth: str = ""
 
 
-class Replaced(NamedTuple):
-    """A sample that replaced another one at the same stamp."""
-
-    parent: str
-    child: str
-    stamp_ns: int
-    earlier: EdgePlace
-    later: EdgePlace
-
-
 class TreeBuilder:
     """The edges read so far, and the place where each frame was first defined."""
-
-    has_cameras = False  # whether files need to be searched for them
 
     def __init__(self, name: str, rules: Rules | None = None) -> None:
         """Create an empty builder; `name` is that of the source, for messages."""
@@ -260,12 +239,10 @@ class TreeBuilder:
         self.tree = FrameTree(name)
         self.buffer: TransformBuffer | None = None
         self._first: dict[str, tuple[str, Rigid, EdgePlace]] = {}  # child -> its first definition
-        self._places: dict[str, dict[int, EdgePlace]] = {}  # child -> stamp -> the place of that sample
-        self._replaced: list[Replaced] = []
+        self._replaced: list[tuple[str, str, EdgePlace]] = []  # samples that replaced another one at the same stamp
         self._stamps: dict[str, int] = {}  # child -> its only stamp, while it has no other
         self._moves: set[str] = set()
         self._late: set[str] = set()  # children with a warning that their samples go back in time
-        self._whole: dict[str, list[SamplesOfFile]] = {}  # child -> samples that were read in one piece
         self.axes: dict[str, str] = {}  # frame -> the axes of its camera
         self.covariances: dict[str, Components] = {}  # child -> the covariance of its edge
         self.drawn: dict[str, str] = {}  # child -> the label of its edge in a drawing
@@ -348,8 +325,6 @@ class TreeBuilder:
             self._first.setdefault(child, (parent, components[0], placed.place(0)))
             self._stamps.setdefault(child, stamps_ns[0])
             self._moves.add(child)
-            known = Samples(parent, child, array("q", stamps_ns), (), array("q", placed.samples.lines))
-            self._whole.setdefault(child, []).append(SamplesOfFile(placed.file, known))
             return
         if child not in self._late and any(map(gt, stamps_ns, islice(stamps_ns, 1, None))):
             self._late.add(child)
@@ -389,14 +364,6 @@ class TreeBuilder:
             goes_on = self._goes_on(samples.parent, samples.child)
             follows = goes_on and track.last_ns < samples.stamps_ns[0]  # type: ignore[union-attr]
         return follows and all(map(lt, samples.stamps_ns, islice(samples.stamps_ns, 1, None)))
-
-    def _place_before(self, child: str, stamp_ns: int) -> EdgePlace | None:
-        """Return the place of the sample at a stamp among those read in one piece."""
-        for placed in self._whole.get(child, ()):
-            at = bisect_left(placed.samples.stamps_ns, stamp_ns)
-            if at < len(placed.samples.stamps_ns) and placed.samples.stamps_ns[at] == stamp_ns:
-                return placed.place(at)
-        return None
 
     def finish(self) -> FrameTree | TransformBuffer:
         """Return the tree, or the buffer if anything moves."""
@@ -439,28 +406,21 @@ class TreeBuilder:
         self._first.setdefault(child, (parent, components, place))
         if stamp_ns is not None and self._stamps.setdefault(child, stamp_ns) != stamp_ns:
             self._moves.add(child)
-        replaced = buffer.insert_components(parent, child, components, stamp_ns)
-        if stamp_ns is not None:
-            places = self._places.setdefault(child, {})
-            if replaced:
-                earlier = places.get(stamp_ns) or self._place_before(child, stamp_ns) or place
-                self._replaced.append(Replaced(parent, child, stamp_ns, earlier, place))
-            places[stamp_ns] = place
+        if buffer.insert_components(parent, child, components, stamp_ns) and stamp_ns is not None:
+            self._replaced.append((parent, child, place))
 
-    def _warn_replaced(self, static: set[str], most: int = 10) -> None:
+    def _warn_replaced(self, static: set[str]) -> None:
         """Refuse static frames with two values; warn about moving ones with two poses at one stamp."""
         from frametool.frames.stamps import format_stamp
 
-        for each in self._replaced:
-            if each.child in static:
-                raise self._placed(topology.two_poses(each.child, each.parent), each.parent, each.child, each.later)
-        most += len(self._replaced) == most + 1
-        for each in self._replaced[:most]:
-            places = f"{each.earlier.seen_from(each.later)} and {each.later.seen_from(each.later)}"
-            what = f"frame {shown(each.child)} has two poses at {format_stamp(each.stamp_ns)}: {places}"
-            warn(f"{self.name}: {what}; the last one holds")
-        if len(self._replaced) > most:
-            warn(f"{self.name}: {len(self._replaced) - most} more stamps with two poses of one frame")
+        for parent, child, place in self._replaced:
+            if child in static:
+                raise self._placed(topology.two_poses(child, parent), parent, child, place)
+        if self._replaced:
+            _, child, place = self._replaced[0]
+            ((name, line),) = lines_of([place])
+            what = f"frame {shown(child)} has two poses at {format_stamp(place.edge.stamp_ns or 0)}; the last one holds"
+            warn(f"{name}:{line}: {what}{more_like_it(len(self._replaced))}")
 
     def _static_tree(self, buffer: TransformBuffer) -> FrameTree:
         """Return all static edges as a tree, which checks its rules."""
@@ -570,20 +530,15 @@ def load_sources(
             for file in files:
                 _add(builder, file)
             refuse_unknown_joints(files)
-            tree = _with_cameras(builder.finish(), files) if builder.has_cameras else builder.finish()
+            tree = builder.finish()
+            tree.robots = [file.tally.robot for file in files if file.tally.robot is not None]
+            tree.cameras = {name: camera for file in files for name, camera in file.cameras.items()}
+            if others := [file for file in files if FORMATS[file.format].cameras]:
+                tree.read_cameras = partial(_read_cameras, tree, others)
     finally:
         close_all(sources)
     if places is not None:
         places |= builder.places
-    return tree
-
-
-def _with_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile]) -> FrameTree | TransformBuffer:
-    """Add to a tree the robots of its files, and cameras: those of frametool trees now, others on demand."""
-    others = [file for file in files if FORMATS[file.format].cameras]
-    tree.robots = [file.tally.robot for file in files if file.tally.robot is not None]
-    tree.cameras = {name: camera for file in files for name, camera in file.cameras.items()}
-    tree.read_cameras = partial(_read_cameras, tree, others)
     return tree
 
 
@@ -618,4 +573,3 @@ def _add(builder: TreeBuilder, file: FrameFile) -> None:
         raise FormatError("no frames in it", source=file.name)
     builder.axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}
     builder.drawn |= file.tally.drawn
-    builder.has_cameras |= file.format not in OWN or bool(file.cameras)

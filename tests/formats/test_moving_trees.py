@@ -96,16 +96,16 @@ def test_an_edge_said_once_with_and_once_without_a_stamp_stands_still(turn: int,
     assert isinstance(loaded(tmp_path, *texts), FrameTree)
 
 
-def test_two_poses_at_one_stamp_take_the_last_and_name_both_lines(tmp_path: Path) -> None:
+def test_two_poses_at_one_stamp_take_the_last_and_name_its_line(tmp_path: Path) -> None:
     text = message(1, EPOCH) + message(2, EPOCH + 1) + message(5, EPOCH + 1)
-    with pytest.warns(FrametoolWarning, match=r"frame 'base' has two poses at 1700000000\.123456790: line 7 and line 12"):
+    with pytest.warns(FrametoolWarning, match=r"0\.yaml:12: frame 'base' has two poses at 1700000000\.123456790; the last one holds"):
         buffer = loaded(tmp_path, text)
     assert x_of(buffer, "map", "base", EPOCH + 1) == 5.0
 
 
-def test_two_files_that_disagree_are_both_named(tmp_path: Path) -> None:
+def test_of_two_files_that_disagree_the_later_is_named(tmp_path: Path) -> None:
     first = message(1, EPOCH) + message(2, EPOCH + 1)
-    with pytest.warns(FrametoolWarning, match=r"0\.yaml:7 and line 2"):
+    with pytest.warns(FrametoolWarning, match=r"1\.yaml:2: frame 'base' has two poses"):
         loaded(tmp_path, first, message(5, EPOCH + 1))
 
 

@@ -300,10 +300,8 @@ def test_a_comment_that_begins_as_a_bag_does_makes_no_bag(tmp_path: Path) -> Non
     assert len(list(FrameFile(tmp_path / "t.yaml").edges())) == 2
 
 
-def test_a_folder_of_bags_without_metadata_names_the_files_in_it(tmp_path: Path) -> None:
-    assert refusal(tmp_path) == "is a directory"
-    (tmp_path / "run_0.mcap").write_bytes(b"")
-    assert refusal(tmp_path) == "a folder without metadata.yaml; name a file in it: run_0.mcap"
+def test_a_folder_without_metadata_is_no_bag(tmp_path: Path) -> None:
+    assert refusal(tmp_path) == "is a directory; name a file in it, or the folder of a bag, with metadata.yaml"
 
 
 # --- stamps --------------------------------------------------------------------------------------------------------

@@ -487,12 +487,12 @@ def test_a_table_that_is_no_trajectory_says_what_is_missing(text: str, said: str
     assert (done.status, said in done.err) == (1, True)
 
 
-def test_of_two_poses_at_one_stamp_the_last_holds_and_both_lines_are_told(run: Run) -> None:
+def test_of_two_poses_at_one_stamp_the_last_holds_and_its_line_is_told(run: Run) -> None:
     rows = [f"{at} {at} 0 0 0 0 0 1\n" for at in range(9000)]
     rows.append("17 5 0 0 0 0 0 1\n")
     done = run("lookup", "a.tum", "world", "body", "--at", "17", "-f", "json", files={"a.tum": "".join(rows)})
     assert json.loads(done.out)["xyz"] == [5.0, 0.0, 0.0]
-    assert "frame 'body' has two poses at 17.000000000: line 18 and line 9001; the last one holds" in done.err
+    assert "a.tum:9001: frame 'body' has two poses at 17.000000000; the last one holds" in done.err
 
 
 def test_samples_taken_in_bulk_are_those_taken_one_by_one(tmp_path: Path) -> None:
