@@ -250,9 +250,9 @@ class Stream:
         """Find the format of the stream by what it begins with, and by its name."""
         from frametool.formats.detect import detect
 
-        fmt, known_by = detect(begin, *options.STREAMED, name=self.path or "", otherwise="columns" if is_table else "")
-        if known_by and not quiet:
-            options.say_if_verbose(f"{self.name}: read as {fmt} ({FORMATS[fmt].summary}), known by {known_by}")
+        fmt = detect(begin, *options.STREAMED, name=self.path or "", otherwise="columns" if is_table else "")
+        if not quiet:
+            options.say_if_verbose(f"{self.name}: read as {fmt} ({FORMATS[fmt].summary})")
         return fmt
 
     def _way(self, fmt: str, request: Request, output: Output) -> Callable[..., tuple[Generator[Outcome], About]]:
@@ -422,7 +422,7 @@ def _format_of(path: str) -> str:
 
     try:
         with open(path, "rb") as file:
-            return detect(file.read(HEAD), *options.STREAMED, name=path)[0]
+            return detect(file.read(HEAD), *options.STREAMED, name=path)
     except (OSError, ValueError):
         return ""
 

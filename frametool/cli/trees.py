@@ -146,7 +146,7 @@ def state(files: Sequence[FrameFile], *, whole: bool = True) -> None:
         refuse_idle(files)
     for file in files:
         if inputs().verbose:
-            say(file.known)
+            say(f"{file.name}: {FORMATS[file.format].summary}")
         if file.stated and not inputs().quiet:
             say(file.stated)
 

@@ -28,7 +28,6 @@ from __future__ import annotations
 
 import os
 import re
-from contextlib import suppress
 from functools import cached_property
 
 from frametool.documents.source import HEAD, LOOKED_AT, UTF16, not_text
@@ -82,25 +81,17 @@ class Beginning:
     @cached_property
     def json_paths(self) -> set[tuple[str, ...]]:
         """Return the paths of the keys of JSON; lists on the path do not count."""
-        from frametool.documents.json import json_events, looks_like_json
-        from frametool.documents.source import END, LEAF, MAP
+        from frametool.documents.json import looks_like_json
 
-        text = self.text[:LOOKED_AT].lstrip()
-        paths: set[tuple[str, ...]] = set()
-        path: tuple[str, ...] = ()
-        outer: list[tuple[str, ...]] = []
-        if looks_like_json(text):
-            with suppress(ValueError, IndexError):  # JSON up to a word with a backslash that JSON does not know
-                for kind, word, _, end, *_ in json_events(text):
-                    if kind == END:
-                        path = outer.pop()
-                    elif kind != LEAF:
-                        outer.append(path)
-                        path = (*path, "") if kind == MAP else path
-                    elif text[end:].lstrip().startswith(":"):
-                        path = (*path[:-1], word)
-                        paths.add(path)
-        return paths
+        found: set[tuple[str, ...]] = set()
+        inner: list[tuple[tuple[str, ...], Any]] = [((), self.value)] if looks_like_json(self.text[:LOOKED_AT]) else []
+        for path, value in inner:  # grows during the loop
+            if isinstance(value, list):
+                inner += [(path, each) for each in value]
+            elif isinstance(value, dict):
+                found |= {(*path, key) for key in value}
+                inner += [((*path, key), each) for key, each in value.items()]
+        return found
 
     @cached_property
     def yaml_keys(self) -> set[str]:
@@ -132,6 +123,11 @@ class Beginning:
     @cached_property
     def document(self) -> dict[str, Any]:
         """Return the first YAML or JSON map as plain values, as far as the text is read; {} if there is no map."""
+        return self.value if isinstance(self.value, dict) else {}
+
+    @cached_property
+    def value(self) -> Any:
+        """Return the first value of YAML or JSON as plain values, as far as the text is read; None if there is none."""
         from frametool.documents.source import END, LEAF, MAP
         from frametool.documents.yaml import yaml_events
 
@@ -153,7 +149,7 @@ class Beginning:
                 inside.append(value)
             if kind != LEAF:
                 ways.append((value, None))
-        return top[0] if top and isinstance(top[0], dict) else {}
+        return top[0] if top else None
 
     @cached_property
     def xml(self) -> str:
@@ -246,37 +242,26 @@ def _signs(fmt: str) -> tuple[tuple[str, str | bytes], ...]:
     return (UNSUPPORTED[fmt] if fmt in UNSUPPORTED else FORMATS[fmt]).magic
 
 
-# kind -> the description of the sign; all other kinds are keys
-_KNOWN_BY = {
-    "magic": "its first bytes",
-    "xml text": "its elements",
-    "xml": "its root element",
-    "text": "its first lines",
-    "line": "its first line",
-}
-
-
 def by_sign(head: bytes, *reads: str, name: str = "") -> str | None:
     """Return the format, among those from which `reads` is read, that matches the first bytes; None if none does.
 
-    Raises FormatError if two formats fit, or an unsupported one.
+    Supported formats have priority.  Raises FormatError if two formats fit, or an unsupported one.
     """
-    return _by_sign(Beginning(head), *reads, name=name)[0]
+    return _by_sign(Beginning(head), *reads, name=name)
 
 
-def _by_sign(begin: Beginning, *reads: str, name: str) -> tuple[str | None, str]:
-    """Return the matching format and the description of its sign; supported formats have priority."""
+def _by_sign(begin: Beginning, *reads: str, name: str) -> str | None:
     fitting, kind = _fitting(begin, _STRONG, (*readers(*reads), *UNSUPPORTED, *readers("drawing")))
     if fitting and kind != "magic" and not begin.head.startswith(UTF16) and not_text(begin.head):
-        return None, ""  # bytes that resemble a line of some format by chance
+        return None  # bytes that resemble a line of some format by chance
     found = [fmt for fmt in fitting if not _is_unread(fmt, reads)] or fitting
     if not found:
-        return None, ""
+        return None
     if _is_unread(found[0], reads):
         raise not_read(found[0], name)
     if len(found) > 1:
         raise FormatError(f"fits {' and '.join(found)}; give --in {'|'.join(found)}", source=name or "stdin")
-    return found[0], _KNOWN_BY.get(kind, "its keys")
+    return found[0]
 
 
 def _is_unread(fmt: str, reads: tuple[str, ...]) -> bool:
@@ -301,17 +286,16 @@ def of_folder(path: str) -> str | None:
     return None
 
 
-def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty: str = "") -> tuple[str, str]:
-    """Return the format of a file and the description of its sign, among the formats from which `reads` is read.
+def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty: str = "") -> str:
+    """Return the format of a file, among the formats from which `reads` is read.
 
     head: its first bytes; name: of the file, "" for standard input; otherwise: the default format; empty: the format of
     a file with nothing but comments.
     Raises FormatError if nothing matches and there is no default, or two formats fit.
     """
     begin = Beginning(head)
-    fmt, known_by = _by_sign(begin, *reads, name=name)
-    if fmt:
-        return fmt, known_by
+    if fmt := _by_sign(begin, *reads, name=name):
+        return fmt
     if "tree" not in reads and (what := not_text(head)):
         raise _no_text(what, name)
     if "tree" in reads and begin.xml and (begin.elements or not by_suffix(name, readers(*reads))):
@@ -322,23 +306,23 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
     if fmt := by_suffix(name, readers(*reads)):
         if (what := not_text(head)).startswith("not text but") and FORMATS[fmt].reader != BAG:
             raise _no_text(what, name)
-        return fmt, f"the suffix {name[name.rfind('.') :].lower()}"
+        return fmt
     if fmt := unsupported_by_suffix(name):
         raise not_read(fmt, name)
     if (what := not_text(head)) and not head.startswith(UTF16):
         raise _no_text(what, name)
     found, _ = _fitting(begin, _WEAK, readers(*reads))
     if found and (otherwise or begin.has_data):
-        return found[0], "its first line"
+        return found[0]
     if otherwise:
-        return otherwise, "nothing else"
+        return otherwise
     if not begin.data_line and empty:
-        return empty, "nothing else"
+        return empty
     if not begin.text.strip():
         raise FormatError("nothing in it", source=name or "stdin")
     if "records" in reads or not begin.has_data or not re.search(r"(?m):(?:\s|$)|^[^\S\n]*+[-?&!{[]", begin.text):
         raise _unknown(begin, *reads, name=name)
-    return "yaml", "nothing else"
+    return "yaml"
 
 
 def _no_text(what: str, name: str) -> FormatError:
@@ -416,7 +400,7 @@ def with_hint(error: FormatError, text: bytes, name: str, *, chosen: bool = Fals
 def _points_to_lookup(text: bytes, name: str) -> FormatError | None:
     begin = Beginning(text[:HEAD])
     try:
-        fmt, _ = _by_sign(begin, "tree", name=name)
+        fmt = _by_sign(begin, "tree", name=name)
     except FormatError as error:
         return error
     if fmt in (None, "yaml", "json"):

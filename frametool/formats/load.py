@@ -89,9 +89,7 @@ class FrameFile(InputFile):
             raise FileProblem(f"{path}: is a directory; name a file in it, or the folder of a bag, with metadata.yaml")
         super().__init__(path, stream, folder=folder is not None)
         try:
-            self.format, self.known_by = fmt or folder or "", "what it holds" if folder else ""
-            if not self.format:
-                self.format, self.known_by = detect(self.head(), *reads, name=self.path, empty="yaml")
+            self.format = fmt or folder or detect(self.head(), *reads, name=self.path, empty="yaml")
         except BaseException:
             self.close()
             raise
@@ -119,11 +117,6 @@ class FrameFile(InputFile):
             words = {word.strip('"# \r') for word in Beginning(self.head()).first_line.split(row.delimiter)}
             return row.required_options[0 if words.isdisjoint(PARENT_COLUMNS) or words.isdisjoint(NAME_KEYS) else 1 :]
         return (*row.required_options, *["frames"] * bool(self.topics.chosen))
-
-    @property
-    def known(self) -> str:
-        """Return the detected format and its sign, unless the format was set."""
-        return f"{self.name}: {FORMATS[self.format].summary}{f', known by {self.known_by}' if self.known_by else ''}"
 
     @property
     def stated(self) -> str:
@@ -246,6 +239,9 @@ class TreeBuilder:
         self.axes: dict[str, str] = {}  # frame -> the axes of its camera
         self.covariances: dict[str, Components] = {}  # child -> the covariance of its edge
         self.drawn: dict[str, str] = {}  # child -> the label of its edge in a drawing
+        self.cameras: dict[str, Camera] = {}  # of frametool trees, by their frames
+        self.with_cameras: list[FrameFile] = []  # files of other formats that may hold cameras, read on demand
+        self.robots: list[Any] = []  # as in `Diagnostics`
 
     @property
     def places(self) -> dict[str, EdgePlace]:
@@ -380,6 +376,9 @@ class TreeBuilder:
         made.camera_axes |= self.axes
         made.covariances |= self.covariances
         made.drawn |= self.drawn
+        made.cameras, made.robots = self.cameras, self.robots
+        if self.with_cameras:
+            made.read_cameras = partial(_read_cameras, made, self.with_cameras)
         return made
 
     def _moving(self) -> TransformBuffer:
@@ -531,10 +530,6 @@ def load_sources(
                 _add(builder, file)
             refuse_unknown_joints(files)
             tree = builder.finish()
-            tree.robots = [file.tally.robot for file in files if file.tally.robot is not None]
-            tree.cameras = {name: camera for file in files for name, camera in file.cameras.items()}
-            if others := [file for file in files if FORMATS[file.format].cameras]:
-                tree.read_cameras = partial(_read_cameras, tree, others)
     finally:
         close_all(sources)
     if places is not None:
@@ -573,3 +568,8 @@ def _add(builder: TreeBuilder, file: FrameFile) -> None:
         raise FormatError("no frames in it", source=file.name)
     builder.axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}
     builder.drawn |= file.tally.drawn
+    builder.cameras |= file.cameras
+    if file.tally.robot is not None:
+        builder.robots.append(file.tally.robot)
+    if FORMATS[file.format].cameras:
+        builder.with_cameras.append(file)

@@ -219,7 +219,7 @@ def _pieces(lines: Iterable[str]) -> Iterator[tuple[Piece, bool]]:
     numbered = enumerate((_without_noise(line.rstrip("\r\n")) for line in lines), 1)
     for number, text in numbered:
         if _says_something(text):
-            is_table = detect(text.encode(), "rows", "records", otherwise="yaml")[0] == "csv"
+            is_table = detect(text.encode(), "rows", "records", otherwise="yaml") == "csv"
             pieces = (_rows if is_table else _documents)(chain(((number, text),), numbered))
             yield from ((piece, is_table) for piece in pieces)
 

@@ -78,7 +78,7 @@ def read_samples(
     """
     file = InputFile(argument)
     try:
-        fmt = fmt or detect(file.head(), "rows", "records", name=file.path, otherwise="json")[0]
+        fmt = fmt or detect(file.head(), "rows", "records", name=file.path, otherwise="json")
         if columns or FORMATS[fmt].is_table:
             return _of_table(file, fmt, columns, normalize=normalize)
         source = file.source
@@ -220,7 +220,7 @@ def read_points(argument: str, *, fmt: str, answers: Answers, policy: Callable[[
 
     file = InputFile(argument)
     try:
-        fmt = fmt or detect(file.head(), "rows", "arrays", "records", name=file.path)[0]
+        fmt = fmt or detect(file.head(), "rows", "arrays", "records", name=file.path)
         if "records" in FORMATS[fmt].reads and not re.search(TREE, file.head()):
             return _of_documents(file)
         return _of_rows(file, fmt, answers, policy(file.name))

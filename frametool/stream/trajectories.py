@@ -102,7 +102,7 @@ def read_trajectory(
         return _of_tree(name, fmt, topics, answers, inside, normalize=normalize)
     file = InputFile(name)
     try:
-        fmt = fmt or detect(file.head(), "rows", "arrays", "tree", "records", name=file.path)[0]
+        fmt = fmt or detect(file.head(), "rows", "arrays", "tree", "records", name=file.path)
         is_record = "records" in FORMATS[fmt].reads and not re.search(TREE, file.head())
         if not is_record and {"rows", "arrays"}.isdisjoint(FORMATS[fmt].reads):
             return _of_tree(name, fmt, topics, answers, inside, file, normalize=normalize)
@@ -141,7 +141,7 @@ def read_stamps(path: str, report: Report) -> list[int]:
         head = file.head()
         words = next((line.split() for line in head.splitlines() if line.strip() and line.lstrip()[:1] != b"#"), [])
         is_list = len(words) < 2 and not re.search(rb"[,;:{\[<\0]", b"".join(words)) and by_sign(head, "tree") is None
-        fmt = "tum" if is_list else detect(head, "rows", "arrays", "tree", "records", name=file.path)[0]
+        fmt = "tum" if is_list else detect(head, "rows", "arrays", "tree", "records", name=file.path)
         known = FORMATS[fmt]
         if not known.is_table or fmt == "kitti":
             return _stamps_of_poses(path, fmt, is_tree=not known.is_table and bool(re.search(TREE, head)))

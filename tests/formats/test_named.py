@@ -231,7 +231,7 @@ def test_what_is_wrong_in_an_entry_names_its_place(run: Run, entry: str, message
     ],
 )
 def test_what_has_a_form_of_its_own_keeps_it(text: str, form: str) -> None:
-    assert detect(text.encode(), "tree", name="a.yaml")[0] == form
+    assert detect(text.encode(), "tree", name="a.yaml") == form
 
 
 def test_positions_alone_are_no_autoware(run: Run) -> None:

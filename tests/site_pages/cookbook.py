@@ -119,7 +119,7 @@ def example_files() -> list[str]:
 def form_of(name: str) -> str:
     """Return the form of an example file; "" of one that has none, as a list of commands."""
     try:
-        return detect((EXAMPLES / name).read_bytes(), "tree", "records", "rows", "arrays", name=name)[0]
+        return detect((EXAMPLES / name).read_bytes(), "tree", "records", "rows", "arrays", name=name)
     except FormatError:
         return ""
 

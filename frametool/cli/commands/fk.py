@@ -57,7 +57,7 @@ def _added(stream: Stream, output: Output, rows: JointRows, file: FrameFile) -> 
     """Write the rows of a stream with their poses; the file is that of the robot."""
     inputs, name = stream.inputs, stream.path or "stdin"
     begin = stream.opened().peek()
-    fmt = stream.chosen_format() or detect(begin, *STREAMED, name=stream.path or "")[0]
+    fmt = stream.chosen_format() or detect(begin, *STREAMED, name=stream.path or "")
     refuse(holds_arrays(fmt), f"rows of joints are a table of text, records or messages, not {fmt}")
     names = names_in(begin, fmt, name, header=inputs.header)
     rows.bind(names, name, fixed=frozenset(file.answers.joints))

@@ -113,7 +113,7 @@ def _names(task: CameraTask, records: Sequence[Source]) -> Sequence[str]:
     stream = task.stream
     stream.read_clouds_as_rows()
     begin = stream.opened().peek()
-    fmt = stream.within or stream.chosen_format() or detect(begin, *STREAMED, name=stream.name, otherwise="columns")[0]
+    fmt = stream.within or stream.chosen_format() or detect(begin, *STREAMED, name=stream.name, otherwise="columns")
     if "records" in FORMATS[fmt].reads:
         return keys_in(begin, fmt, stream.name, WANTED)
     from frametool.stream.table import open_table

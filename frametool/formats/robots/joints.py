@@ -357,7 +357,7 @@ def read_joint_file(path: str, joints: Mapping[str, Joint]) -> Iterator[JointSam
     file, tally = InputFile(path), Diagnostics()
     try:
         head = file.head()
-        fmt = detect(head, "joints", "records", "rows", name=path, otherwise="yaml")[0]
+        fmt = detect(head, "joints", "records", "rows", name=path, otherwise="yaml")
         if "joints" in FORMATS[fmt].reads:
             yield from import_module(FORMATS[fmt].reader).read_joints(file, state)
         elif state:
