@@ -229,9 +229,9 @@ def _read(argument: str | Source, request: Request, read: Callable[[Source], Ite
         except FormatError as error:
             if source.name == INLINE:
                 raise
-            from frametool.formats.detect import with_hint
+            from frametool.formats.detect import points_to_lookup
 
-            raise with_hint(error, source.text.encode(), source.name) from None
+            raise points_to_lookup(source.text.encode(), source.name) or error from None
 
 
 @contextmanager
