@@ -171,7 +171,7 @@ class SeveralClouds:
             for path, named, frame in zip(self.paths, self.formats, frames or [""] * count, strict=True):
                 file = InputFile(path)
                 opened.callback(file.close)
-                file.format = fmt = named or detect(file.head(), "records", "rows", "arrays", name=path)[0]
+                file.format = fmt = named or detect(file.head(), "records", "rows", "arrays", name=path)
                 if "arrays" not in FORMATS[fmt].reads:
                     hint = f"make one of it: frametool convert -i {path} -o NEW.pcd"
                     raise FormatError(f"{FORMATS[fmt].summary}, no cloud; {hint}", source=path)

@@ -72,7 +72,7 @@ def named_file(path: str, scope: Scope) -> Term:
     from frametool.formats.detect import detect
 
     with opened(path) as file:  # what is neither a table nor a document may be a tree
-        fmt = detect(file.read(HEAD), "tree", "rows", "records", name=path, otherwise="yaml")[0]
+        fmt = detect(file.read(HEAD), "tree", "rows", "records", name=path, otherwise="yaml")
     if "rows" in FORMATS[fmt].reads:
         return poses_of_table(path, fmt, normalize=scope.normalize, degrees=scope.degrees)
     found = values_of_document(source_of(path), scope) if "records" in FORMATS[fmt].reads else None
