@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from frametool.fit.comparison import Delta
     from frametool.frames.trajectory import Trajectory
-    from frametool.geometry.types import Array
+    from frametool.geometry.types import Array, Indices
 
 
 ALIGNMENTS = ("none", "origin", "yaw", "se3", "sim3")
@@ -236,15 +236,20 @@ def nearest(ref: Trajectory, est: Trajectory, max_diff_ns: float) -> Pairs:
     walks_est = est.size <= ref.size
     walked, other = (est, ref) if walks_est else (ref, est)
     other = other.at(np.argsort(other.stamps_ns, kind="stable"))
-    after = np.searchsorted(other.stamps_ns, walked.stamps_ns).clip(1 if other.size > 1 else 0, other.size - 1)
-    before = (after - 1).clip(0)
-    from_before = walked.stamps_ns - other.stamps_ns[before]
-    index = np.where(from_before <= other.stamps_ns[after] - walked.stamps_ns, before, after)
-    close = np.abs(other.stamps_ns[index] - walked.stamps_ns) <= max_diff_ns
+    index, off = _nearest(other.stamps_ns, walked.stamps_ns)
+    close = off <= max_diff_ns
     index = index[close]
     sides = (other.at(index), walked.at(close)) if walks_est else (walked.at(close), other.at(index))
     possible = est.size if walks_est else _inside(ref.stamps_ns, est.stamps_ns)
     return Pairs(*sides, possible, len(index) - len(np.unique(index)))
+
+
+def _nearest(own: Array, stamps_ns: Array) -> tuple[Indices, Array]:
+    """Return the index of the nearest of some sorted stamps, the earlier one of a tie, and how far off it is."""
+    after = np.searchsorted(own, stamps_ns).clip(0, len(own) - 1)
+    before = (after - 1).clip(0)
+    index = np.where(stamps_ns - own[before] <= np.abs(own[after] - stamps_ns), before, after)
+    return index, np.abs(own[index] - stamps_ns)
 
 
 def interval(stamps_ns: Array) -> float:
@@ -277,12 +282,10 @@ def paired_samples(
         return HandEyeSamples(gripper.poses, target.poses, places, tuple(names), files)
     gap_ns, dense = NEAR_NS if max_gap_ns is None else max_gap_ns, gripper.in_order()
     made, is_between = between(dense, target.stamps_ns, gap_ns)
-    index = np.searchsorted(dense.stamps_ns, target.stamps_ns).clip(1, max(dense.size - 1, 1))
-    off = np.abs(dense.stamps_ns[[index - 1, index.clip(0, dense.size - 1)]] - target.stamps_ns)
-    nearest, near = np.where(off[0] <= off[1], index - 1, index.clip(0, dense.size - 1)), off.min(0) <= gap_ns
-    chosen = dense.at(nearest)
+    index, off = _nearest(dense.stamps_ns, target.stamps_ns)
+    chosen = dense.at(index)
     chosen.xyz[is_between], chosen.xyzw[is_between] = made.xyz, made.xyzw
-    kept = np.flatnonzero(is_between | near)
+    kept = np.flatnonzero(np.logical_or(is_between, off <= gap_ns))
     gap = f"{gap_ns / 1e6:g} ms"
     if not len(kept):
         apart = f"their stamps are {float(off.min()) / 1e9:.3f} s apart at least; one clock? --max-gap"

@@ -42,9 +42,12 @@ def solve_normal(matrix: Array, right: Array) -> Array:
 
     Raises NotSettled if there is no solution.
     """
-    scaled, units = _scaled(matrix)
+    diagonal = np.diagonal(matrix)[:, None]
+    if not (diagonal > 0.0).all():
+        raise NotSettled
+    units = np.sqrt(diagonal)
     try:
-        found: Array = np.linalg.solve(scaled, right / units) / units
+        found: Array = np.linalg.solve(matrix / units / units.T, right / units) / units
     except np.linalg.LinAlgError:
         raise NotSettled from None
     if not np.isfinite(found).all():
@@ -52,23 +55,11 @@ def solve_normal(matrix: Array, right: Array) -> Array:
     return found
 
 
-def _scaled(matrix: Array) -> tuple[Array, Array]:
-    """Return the matrix scaled to a diagonal of 1, and the units of its rows, (n, 1); NotSettled without one."""
-    diagonal = np.diagonal(matrix)[:, None]
-    if not (diagonal > 0.0).all():
-        raise NotSettled
-    units = np.sqrt(diagonal)
-    return matrix / units / units.T, units
-
-
 def inverse(matrix: Array) -> Array:
     """Return the inverse of a symmetric positive definite matrix, symmetric; raises NotSettled if there is none."""
-    scaled, units = _scaled(matrix)
-    try:
-        np.linalg.cholesky(scaled)
-        found = np.linalg.inv(scaled) / units / units.T
-    except np.linalg.LinAlgError:
-        raise NotSettled from None
+    found = solve_normal(matrix, np.eye(len(matrix)))
+    if not (np.diagonal(found) > 0.0).all():
+        raise NotSettled
     return (found + found.T) / 2.0
 
 

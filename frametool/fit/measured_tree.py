@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -172,19 +172,6 @@ def _sigmas(errors: Array, information: Array) -> Array:
 ONE_LINE = 200  # characters
 
 
-class Verdicts(NamedTuple):
-    """The explanations of rows, and open questions.
-
-    noise: rows without a mistake that the uncertainty of the fit explains; swaps: rows to exchange, (rejected, rival)
-    undecided: the first row whose loop does not identify the outlier, with its rivals
-    """
-
-    fits: list[str | None]
-    noise: list[int]
-    swaps: list[tuple[int, int]]
-    undecided: tuple[int, list[int]] | None
-
-
 def judged(problem: TreeProblem, measurements: Sequence[Measurement], found: Fitted) -> tuple[Fitted, list[str | None]]:
     """Explain the rejected rows; if a rival has a mistake instead, reject the rival.
 
@@ -230,10 +217,14 @@ class _Case:
         self.least_information = problem.information(noise, noise.factor)
         self.uncertainty = Uncertainty(problem, found)
 
-    def verdicts(self) -> Verdicts:
-        """Try the mistakes on each rejected row, and on its rivals: used rows that only it checks."""
+    def verdicts(self) -> tuple[list[str | None], list[int], list[tuple[int, int]], tuple[int, list[int]] | None]:
+        """Try the mistakes on each rejected row, and on its rivals: used rows that only it checks.
+
+        Returns the mistake of each row; rows without one that the uncertainty of the fit explains; rows to exchange,
+        (rejected, rival); and the first row whose loop does not identify the outlier, with its rivals.
+        """
         fits: list[str | None] = [None] * self.problem.size
-        noise, swaps, undecided = [], [], None
+        noise, swaps, undecided = list[int](), list[tuple[int, int]](), None
         for row in np.flatnonzero(~self.found.kept).tolist():
             rivals = sorted(self.alone.intersection(self.tree.way(*self.problem.pairs[row])))
             words = {row: best_blunder(self.measurements[row], self.poses[row], self.information[row])}
@@ -253,7 +244,7 @@ class _Case:
                 swaps.append((row, blamed[0]))
             else:
                 undecided = undecided or (row, rivals)
-        return Verdicts(fits, noise, swaps, undecided)
+        return fits, noise, swaps, undecided
 
     def _with_doubt(self, row: int, information: Array) -> Array:
         """Return the information of a row relative to the fit, whose own uncertainty between the frames is included."""

@@ -32,26 +32,14 @@ CHORD = 0.1  # metres of path before and after a pose that define its direction
 ROUNDING = 1e-9  # of a delta
 
 
-class Statistics(NamedTuple):
-    """Statistics of many numbers: std is the population's (n), p95 the linear percentile."""
-
-    rmse: float
-    mean: float
-    median: float
-    std: float
-    min: float
-    max: float
-    sse: float
-    p95: float
-
-
-def statistics(values: Array) -> Statistics:
-    """Compute the statistics of numbers."""
-    count, sse, mean = len(values), float((values**2).sum()), float(values.mean())
-    return Statistics(
-        sqrt(sse / count), mean, float(np.median(values)), float(values.std()),
-        float(values.min()), float(values.max()), sse, float(np.percentile(values, 95)),
-    )  # fmt: skip
+def statistics(values: Array) -> dict[str, float]:
+    """Compute the statistics of numbers: std is the population's (n), p95 the linear percentile."""
+    sse = float((values**2).sum())
+    return {
+        "rmse": sqrt(sse / len(values)), "mean": float(values.mean()), "median": float(np.median(values)),
+        "std": float(values.std()), "min": float(values.min()), "max": float(values.max()), "sse": sse,
+        "p95": float(np.percentile(values, 95)),
+    }  # fmt: skip
 
 
 class AbsoluteErrors(NamedTuple):
@@ -260,7 +248,7 @@ def _limit(limit: tuple[bool, int] | None) -> str | None:
 
 
 def _summed(values: Array | None) -> dict[str, float] | None:
-    return None if values is None else statistics(values)._asdict()
+    return None if values is None else statistics(values)
 
 
 def _errors(m: Array | None, rad: Array | None, *, evo: bool) -> dict[str, Any]:
@@ -290,8 +278,8 @@ def _kitti(found: Comparison) -> dict[str, Any] | None:
     def mean(chosen: Any) -> dict[str, Any]:
         return {
             "segments": int(np.count_nonzero(chosen)),
-            "percent": 100 * statistics(segments.share[chosen]).mean,
-            "deg_per_m": degrees(statistics(segments.rad_per_m[chosen]).mean),
+            "percent": 100 * float(segments.share[chosen].mean()),
+            "deg_per_m": degrees(float(segments.rad_per_m[chosen].mean())),
         }
 
     lengths = [
@@ -366,22 +354,17 @@ class Limit(NamedTuple):
 
         Raises ValueInvalid if there is no such number.
         """
-        value = self._value(found)
-        return value if SIGNS[self.sign](value, self.bound) else None
-
-    def _value(self, found: dict[str, Any]) -> float:
         kind, _, delta = self.name.partition(":")
         if kind == "rpe" and delta:
             row = next((row for row in found["rpe"] if row["delta"] == delta), None)
-            path = "percent" if self.unit == "%" else "deg.rmse" if self.unit in ("deg", "rad") else "m.rmse"
-            value = None if row is None else _at(row, path)
+            value = _at(row, "percent" if self.unit == "%" else "deg.rmse" if self.unit in ("deg", "rad") else "m.rmse")
         else:
             value = _at(found, SHORT.get(self.name, self.name))
             if self.name == "paired" and self.unit == "%" and value is not None:
                 value = 100.0 * value / max(found["poses"]["possible"], 1)
         if not isinstance(value, int | float):
             raise ValueInvalid(f"{self.text}: {found['est']} has no such number; -f json shows those there are")
-        return float(value)
+        return float(value) if SIGNS[self.sign](value, self.bound) else None
 
 
 def parse_limits(text: str) -> list[Limit]:
