@@ -5,7 +5,6 @@ Connectivity, spanning trees, and rows that are in no loop.  Bodies are numbered
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, alternatives, listing, shown
@@ -15,11 +14,10 @@ from frametool.geometry.transform import Transform
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from frametool.geometry.types import Components, Rigid
+    from frametool.frames.lookups import Frames
     from frametool.stream.measurements import Measurement
 
     Pairs = Sequence[tuple[int, int]]
-    Fixed = Sequence[tuple[str, str, Rigid, Components | None]]  # parent, child, pose, covariance
 
 class SpanningTree(NamedTuple):
     """Rows that connect every body to the root by one path.
@@ -86,7 +84,6 @@ def bridges(tree: SpanningTree, pairs: Pairs, rows: Iterable[int]) -> set[int]:
 
 
 MOST = 1000  # frames
-APART = 1e-6  # metres, radians: the largest difference between two exact paths to one frame
 LISTED = 150  # characters of names in the message about unconnected frames
 
 
@@ -95,14 +92,12 @@ class Bodies(NamedTuple):
 
     frames: in order of first mention; number: the body of each, 0 for the root's
     pose: of each frame in its body; in the root's body, in the root
-    parent: of each frame that keeps its entry, the frame it is fixed in
     """
 
     root: str
     frames: tuple[str, ...]
     number: dict[str, int]
     pose: dict[str, Transform]
-    parent: dict[str, str]
 
     @property
     def size(self) -> int:
@@ -110,9 +105,9 @@ class Bodies(NamedTuple):
         return 1 + max(self.number.values())
 
 
-def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Fixed) -> Bodies:
-    """Group frames into bodies; raises ValueInvalid for an unknown root and contradictory edges."""
-    edges = [*((m.parent, m.child) for m in measurements), *(each[:2] for each in fixed)]
+def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Frames) -> Bodies:
+    """Group frames into bodies; raises ValueInvalid for an unknown root."""
+    edges = [*((m.parent, m.child) for m in measurements), *((each.parent, each.child) for each in fixed.tracks())]
     frames = tuple(dict.fromkeys(name for edge in edges for name in edge))
     if len(frames) > MOST:
         raise ValueInvalid(f"{len(frames)} frames; solve takes at most {MOST}")
@@ -121,36 +116,20 @@ def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Fixe
         root = next((name for name in frames if name not in children), frames[0])
     elif root not in frames:
         raise ValueInvalid(f"unknown root {shown(root)}{alternatives(root, frames, 'frames')}")
-    near: dict[str, list[tuple[str, Transform]]] = {name: [] for name in frames}
-    for parent, child, components, _ in fixed:
-        near[parent].append((child, Transform.of(*components)))
-        near[child].append((parent, Transform.of(*components).inverse()))
-    number: dict[str, int] = {}
-    pose: dict[str, Transform] = {}
-    for start in (root, *frames):
-        if start not in number:
-            number[start], pose[start] = len(set(number.values())), Transform.identity()
-            reached = [start]
-            for name in reached:  # grows during the loop
-                for other, edge in near[name]:
-                    if other not in number:
-                        number[other], pose[other] = number[start], pose[name] @ edge
-                        reached.append(other)
-                    metres, radians = (pose[name] @ edge).distance(pose[other])
-                    if metres > APART or radians > APART:
-                        off = f"{1e3 * metres:.1f} mm {math.degrees(radians):.1f} deg apart"
-                        twice = f"{shown(other)} is fixed in {shown(name)} in two ways"
-                        raise ValueInvalid(f"{twice}, {off}; fix one of them")
-    return Bodies(root, frames, number, pose, _entries(fixed))
+    first: dict[str, str] = {}  # of each body, by the top of its tree
+    for name in (root, *frames):
+        first.setdefault(top_of(fixed, name), name)
+    number = {top: at for at, top in enumerate(first)}
+    anchors = {name: first[top_of(fixed, name)] for name in frames}
+    pose = {name: Transform.identity() if name == at else fixed.lookup(at, name) for name, at in anchors.items()}
+    return Bodies(root, frames, {name: number[top_of(fixed, name)] for name in frames}, pose)
 
 
-def _entries(fixed: Fixed) -> dict[str, str]:
-    """Return the parent of each frame that keeps one: all fixed edges except those that would close a loop."""
-    groups, parents = Groups[str](), dict[str, str]()
-    for parent, child, *_ in fixed:
-        if child not in parents and groups.join(child, parent):
-            parents[child] = parent
-    return parents
+def top_of(fixed: Frames, name: str) -> str:
+    """Return the root of the tree of fixed frames that holds a frame."""
+    while name in fixed.frames and (above := fixed.parent(name)) is not None:
+        name = above
+    return name
 
 
 def require_connected(bodies: Bodies, pairs: Iterable[tuple[int, int]]) -> None:

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.errors import Finding, NotConnected, ValueInvalid, alternatives, first_of, printable, shown, warn
-from frametool.fit.graph import bodies_of, bridges, require_connected
+from frametool.fit.graph import bodies_of, bridges, require_connected, top_of
 from frametool.fit.least_squares import KEPT, NotSettled, applied, errors, inverse, length, stacked
 from frametool.fit.tree_solver import Fitted, Noise, TreeProblem, TreeRows, jacobians, of_body
-from frametool.frames.lookups import FrameTree
+from frametool.frames.lookups import Frames, FrameTree
 from frametool.frames.topology import Groups
 from frametool.geometry.conventions import axes_change
 from frametool.geometry.rotation import Rotation
@@ -28,7 +28,7 @@ from frametool.stream.measurements import Measurement, parted
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.fit.graph import Bodies, Fixed
+    from frametool.fit.graph import Bodies
     from frametool.geometry.types import Array
 
 
@@ -285,13 +285,13 @@ SINGULAR = 1e-12  # of the correlations: the least eigenvalue of a valid covaria
 
 
 def solve_tree(
-    measurements: Sequence[Measurement], *, root: str | None = None, fixed: Fixed = (), robust: bool = True,
-    progress: Callable[[float], None] | None = None,
+    measurements: Sequence[Measurement], *, root: str | None = None, fixed: Frames | None = None,
+    robust: bool = True, progress: Callable[[float], None] | None = None,
 ) -> TreeSolution:  # fmt: skip
     """Find the tree that fits measurements best.
 
     root: the frame in which the others are expressed; default the first that is never a child
-    fixed: (parent, child, components, covariance) of exact edges, whose frames move as one body
+    fixed: a tree of exact edges, whose frames move as one body
     robust: reject outliers; progress: called with the finished share
     Raises ValueInvalid: frames are not connected, an unknown root, undecided.
     """
@@ -301,6 +301,7 @@ def solve_tree(
         if each.parent == each.child:
             raise ValueInvalid(f"{place_of(measurements, row)}: {shown(each.child)} is measured from itself")
     report = progress or (lambda _: None)
+    fixed = fixed or FrameTree()
     bodies = bodies_of(measurements, root, fixed)
     require_connected(bodies, [(bodies.number[each.parent], bodies.number[each.child]) for each in measurements])
     try:
@@ -364,11 +365,12 @@ class TreeSolution:
 
     def __init__(
         self, measurements: Sequence[Measurement], bodies: Bodies, problem: TreeProblem, found: Fitted,
-        fits: list[str | None], fixed: Fixed,
+        fits: list[str | None], fixed: Frames,
     ) -> None:  # fmt: skip
         """Compute the results of a fit."""
         self.measurements, self.fits = tuple(measurements), fits
-        self.root, self.frames, self.fixed = bodies.root, bodies.frames, frozenset(bodies.parent)
+        self.root, self.frames = bodies.root, bodies.frames
+        self.fixed = frozenset(track.child for track in fixed.tracks())
         self._of, self._uncertainty = bodies, Uncertainty(problem, found)
         self.residuals: Array = problem.errors(found.bodies)
         self.used = found.kept
@@ -392,17 +394,20 @@ class TreeSolution:
         self.frame_checked = {name: sure[bodies.number[name]] for name in self.frames}
         ends = Counter(name for row in rows for name in measurements[row][:2])
         self.rows = {name: ends[name] for name in self.frames}
-        self.parents = self._entries()
+        top = top_of(fixed, self.root)
+        above = {name: track.parent if (track := fixed.track(name)) else self.root for name in self.frames}
+        self.parents = {name: parent for name, parent in above.items() if name != top}
         number = np.array([bodies.number[name] for name in self.frames])
         self._poses = found.bodies[number] @ stacked(bodies.pose[name] for name in self.frames)
         self.poses = dict(zip(self.frames, self._poses.canonical(), strict=True))
         self.tree = FrameTree("the result")
-        kept = {each[:2]: (Transform.of(*each[2]), each[3]) for each in fixed}
         for name in self.frames:
-            if (parent := self.parents.get(name)) is None:
-                self.tree.add_root(name)
+            if (track := fixed.track(name)) is not None:
+                self.tree.add(track.parent, name, Transform.of(*track.components), fixed.covariances.get(name))
+            elif name in self.parents:
+                self.tree.add(self.root, name, self.pose(name), self.marginal(name))
             else:
-                self.tree.add(parent, name, *(kept.get((parent, name)) or (self.pose(name), self.marginal(name))))
+                self.tree.add_root(name)
 
     @property
     def count(self) -> int:
@@ -432,11 +437,3 @@ class TreeSolution:
 
     def _at(self, frame: str) -> tuple[int, Transform]:
         return self._of.number[self._known(frame)], self._poses[self.frames.index(frame)]
-
-    def _entries(self) -> dict[str, str]:
-        """Return the parent of every frame but one: the root, or the parent of the root if that is fixed."""
-        fixed = self._of.parent
-        top = self.root
-        while top in fixed:
-            top = fixed[top]
-        return {name: fixed.get(name, self.root) for name in self.frames if name != top}

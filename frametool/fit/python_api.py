@@ -118,10 +118,11 @@ def solve(
     trees = [each if isinstance(each, FrameTree) else load(each) for each in fix]
     if moving := next((each for each in trees if each.moves), None):
         raise ValueInvalid(f"{moving.name} moves; fixed frames must be static")
-    fixed = [
-        (track.parent, track.child, track.components, tree.covariances.get(track.child))
-        for tree in trees for track in tree.tracks()
-    ]  # fmt: skip
+    fixed = FrameTree("the fixed frames")
+    for tree in trees:
+        for track in tree.tracks():
+            own = Transform.of(*track.components), tree.covariances.get(track.child)
+            fixed.add(track.parent, track.child, *own)
     return solve_tree(_measurements(measurements), root=root, fixed=fixed, robust=robust)
 
 

@@ -23,6 +23,7 @@ from frametool.view.fit_text import Solution, SolvedFrame, SolvedRow
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
 
+    from frametool.frames.lookups import Frames
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Array, Components
     from frametool.stream.measurements import Measurement
@@ -40,7 +41,7 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
     from frametool.view.progress import ProgressBar
 
     measurements = _measurements(inputs, files)
-    fixed = _fixed_edges(inputs, {name for each in measurements for name in each[:2]}) if inputs.fix else []
+    fixed = _fixed_tree(inputs, {name for each in measurements for name in each[:2]}) if inputs.fix else None
     with ProgressBar(SHARES, quiet=inputs.quiet, counted="") as bar:
         found = solve_tree(
             measurements, root=inputs.root, fixed=fixed, robust=robust,
@@ -71,7 +72,7 @@ def _report_taken(inputs: Inputs, *texts: str | None) -> None:
         say(text)
 
 
-def _fixed_edges(inputs: Inputs, measured: Collection[str]) -> list[tuple[str, str, Any, Components | None]]:
+def _fixed_tree(inputs: Inputs, measured: Collection[str]) -> Frames:
     """Return the edges of --fix trees."""
     from frametool.formats.load import Rules
 
@@ -81,7 +82,7 @@ def _fixed_edges(inputs: Inputs, measured: Collection[str]) -> list[tuple[str, s
     if not {*tree.frames} & {*measured}:
         known = alternatives(one := tree.frames[0], measured, "frames")
         raise ValueInvalid(f"{tree.name}: no frame of it is measured: {shown(one)}{known}")
-    return [(each.parent, each.child, each.components, tree.covariances.get(each.child)) for each in tree.tracks()]
+    return tree
 
 
 def _measurements(inputs: Inputs, files: Sequence[str]) -> list[Measurement]:
