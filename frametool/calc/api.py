@@ -250,21 +250,16 @@ def machine_text(term: Term, style: Style) -> str:
 def machine_table(terms: Sequence[Term], style: Style) -> str:
     """Write values as a table."""
     from frametool.calc.rows import NAMES, RESULT
+    from frametool.formats.rows.csv import write_poses
 
-    module = import_module(FORMATS["csv"].writer)
-    results = [plain_result(term, style) for term in terms]
-    if results and all(isinstance(each, Result) for each in results):
-        return str(module.write_poses(results, style))
-    rows: list[dict[str, Any]] = []
-    for term, result in zip(terms, results, strict=True):
-        if isinstance(result, Result):
-            raise ValueInvalid("a table holds poses or other values; write json or yaml")
+    def cells(term: Term) -> Any:
+        result = plain_result(term, style)
+        if isinstance(result, Result) or (style.place is not None and term.type.kind == POINT):
+            return result
         if isinstance(result, float):
-            rows.append({RESULT: result})
-        elif style.place is not None and term.type.kind == POINT:
-            rows.append(result)
-        else:
-            *frame, (key, numbers) = result.items()
-            names = [name + "_deg" * (key == "rpy_deg") for name in NAMES[term.type.kind]]
-            rows.append(dict(frame) | dict(zip(names, numbers, strict=True)))
-    return str(module.write_points(rows, style))
+            return {RESULT: result}
+        *frame, (key, numbers) = result.items()
+        names = [name + "_deg" * (key == "rpy_deg") for name in NAMES[term.type.kind]]
+        return dict(frame) | dict(zip(names, numbers, strict=True))
+
+    return write_poses(map(cells, terms), style)

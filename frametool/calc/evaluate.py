@@ -212,14 +212,12 @@ class _Walk:
             raise CalcError("there is no last value yet")
         if name in UNITS:
             raise CalcError(f"unknown name {shown(name)}; write a unit directly after its number: 1{name}")
-        known = [*(each for each in scope.names if each != "ans"), *FUNCTIONS, *RESERVED]
-        hint = did_you_mean(name, known)
-        frames = [frame for _, tree in scope.trees for frame in tree.frames]
-        if name in frames:
-            hint = "; a frame is asked for as TARGET<-SOURCE"
-        elif name in FUNCTIONS:
+        if name in FUNCTIONS:
             raise CalcError(f"{name} is a function: {name}({FUNCTIONS[name].takes})")
-        raise CalcError(f"unknown name {shown(name)}{hint}")
+        if any(name in tree.frames for _, tree in scope.trees):
+            raise CalcError(f"unknown name {shown(name)}; a frame is asked for as TARGET<-SOURCE")
+        known = [*(each for each in scope.names if each != "ans"), *FUNCTIONS, *RESERVED]
+        raise CalcError(f"unknown name {shown(name)}{did_you_mean(name, known)}")
 
     def _row(self, what: str) -> Type:
         """Return the type of a row."""
