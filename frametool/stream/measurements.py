@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import Verbatim
-from frametool.errors import FormatError, ValueInvalid, did_you_mean, shown, warn
+from frametool.errors import FormatError, ValueInvalid, alternatives, did_you_mean, shown, warn
 from frametool.formats.load import EdgePlace, close_all, lines_of
 from frametool.formats.trees.tree_reader import read_edges, shown_keys
 from frametool.geometry.rotation import Rotation
@@ -135,14 +135,9 @@ def without(measurements: Sequence[Measurement], places: Sequence[str]) -> list[
 
     Raises ValueInvalid for a place where none is, or several.
     """
-    there = {each.place: parted(each.place) for each in measurements}
-    for place in (each for each in places if each not in there):
-        file, line, _ = parted(place)
-        own = [(abs(at[1] - line), each) for each, at in there.items() if line and at[0] == file]
-        files = ", ".join(dict.fromkeys(name for name, *_ in there.values()))
-        known = f"the nearest stand at {', '.join(each for _, each in sorted(own)[:3])}" if own else ""
-        raise ValueInvalid(f"no measurement stands at {shown(place)}; {known or f'give FILE:LINE of {files}'}")
     many = Counter(each.place for each in measurements)
+    if unknown := next((place for place in places if place not in many), ""):
+        raise ValueInvalid(f"no measurement stands at {shown(unknown)}{alternatives(unknown, many, 'measurements')}")
     if several := next((place for place in places if many[place] > 1), ""):
         raise ValueInvalid(f"{several} holds {many[several]} measurements; write each on a line of its own")
     return [each for each in measurements if each.place not in places]
@@ -217,21 +212,18 @@ def _of_table(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
             pose, cells = result.pose, result.extras
             try:
                 child = _one_child(pose.name, cells.get("name"))
-                inverse = _read_flag(cells.get("inverse"))
             except ValueInvalid as error:
                 raise FormatError(str(error), source=file.name, line=line + at) from None
+            if (flag := cells.get("inverse")) not in (None, "true", "false"):
+                message = f"inverse must be true or false, found {shown(str(flag))}"
+                raise FormatError(message, source=file.name, line=line + at)
+            inverse = flag == "true"
             pose = pose._replace(covariance=cells.get("covariance"))
             made = _made(inverted(pose) if inverse else pose, bare(pose.parent or ""), bare(child), cells.get("id"))
             written = None if inverse else _written(rows.shape, inputs)
             yield MeasuredRow(made._replace(written=written), line + at, cells.get("stamp_ns"))
     file.tally.rough += [1] * rows.mended
     file.tell()
-
-
-def _read_flag(cell: str | None) -> bool:
-    if cell not in (None, "true", "false"):
-        raise ValueInvalid(f"inverse must be true or false, found {shown(str(cell))}")
-    return cell == "true"
 
 
 def _of_documents(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:

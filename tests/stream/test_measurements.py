@@ -236,18 +236,15 @@ def test_rows_are_dropped_by_their_places(read: Read) -> None:
     rows = read("".join(f"- {{parent: a, child: f{at}, xyz: [1, 2, 3]}}\n" for at in range(5)))
     assert [each.child for each in without(rows, ["m.yaml:2", "m.yaml:5"])] == ["f0", "f2", "f3"]
     assert without(rows, []) == rows
-    for place, message in {
-        "m.yaml:9": "no measurement stands at 'm.yaml:9'; the nearest stand at m.yaml:5, m.yaml:4, m.yaml:3",
-        "x.yaml:1": "no measurement stands at 'x.yaml:1'; give FILE:LINE of m.yaml",
-        "m.yaml": "no measurement stands at 'm.yaml'; give FILE:LINE of m.yaml",
-    }.items():
+    known = "measurements: m.yaml:1, m.yaml:2, m.yaml:3, m.yaml:4, m.yaml:5"
+    for place, near in {"m.yaml:9": "m.yaml:5", "x.yaml:1": "m.yaml:1", "m.yaml": "m.yaml:5"}.items():
         with pytest.raises(ValueInvalid) as caught:
             without(rows, [place])
-        assert str(caught.value) == message
+        assert str(caught.value) == f"no measurement stands at '{place}'; did you mean '{near}'? {known}"
     twice = read("[{parent: a, child: b, xyz: [1, 2, 3]}, {parent: a, child: c, xyz: [1, 2, 3]}]")
     assert [each.place for each in twice] == ["m.yaml:1:2", "m.yaml:1:41"]
     assert [each.child for each in without(twice, ["m.yaml:1:2"])] == ["c"]
-    with pytest.raises(ValueInvalid, match=r"at 'm\.yaml:1'; the nearest stand at m\.yaml:1:2, m\.yaml:1:41"):
+    with pytest.raises(ValueInvalid, match=r"at 'm\.yaml:1'; did you mean 'm\.yaml:1:2'\? measurements: m\.yaml:1:2, m\.yaml:1:41"):
         without(twice, ["m.yaml:1"])
     robot = ROBOT.replace("\n", "").replace("</robot>", '<link name="c"/><joint name="k" type="fixed"><parent link="a"/><child link="c"/></joint></robot>')
     with pytest.raises(ValueInvalid, match=r"r\.urdf:1 holds 2 measurements; write each on a line of its own"):
