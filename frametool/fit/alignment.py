@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, warn
 from frametool.fit.least_squares import align_vectors, length, solve_normal
 from frametool.frames.trajectory import BODY, WORLD
 from frametool.geometry.rotation import Rotation
@@ -290,11 +290,10 @@ def paired_samples(
     if not len(kept):
         apart = f"their stamps are {float(off.min()) / 1e9:.3f} s apart at least; one clock? --max-gap"
         raise ValueInvalid(f"no pose of {files[0]} is within {gap} of one of {files[1]}: {apart}")
-    messages = []
     if alone := target.size - len(kept):
-        messages = [f"{files[1]}: {alone} of {target.size} poses have none of {files[0]} within {gap}: unpaired"]
+        warn(f"{files[1]}: {alone} of {target.size} poses have none of {files[0]} within {gap}: unpaired")
     sides = chosen.at(kept).poses, target.at(kept).poses
-    return HandEyeSamples(*sides, _places(files[1], target.at(kept), kept.tolist()), tuple(names), files, "", messages)
+    return HandEyeSamples(*sides, _places(files[1], target.at(kept), kept.tolist()), tuple(names), files)
 
 
 def _places(file: str, each: Trajectory, rows: Sequence[int]) -> list[str]:

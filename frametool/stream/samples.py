@@ -15,7 +15,7 @@ import numpy as np
 
 from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import InputFile
-from frametool.errors import FormatError, ValueInvalid, bare, first_of, shown
+from frametool.errors import FormatError, ValueInvalid, bare, first_of, shown, warn
 from frametool.formats.detect import detect
 from frametool.formats.table import FORMATS
 from frametool.formats.trees.tree_reader import shown_keys
@@ -53,7 +53,7 @@ class HandEyeSamples(NamedTuple):
     """Pairs of poses: base_from_gripper and camera_from_target, (n,) each.
 
     places: where each is; names: of base, gripper, camera and target, None where nothing says one
-    files: what they are called; taken: how a format's own words were taken; warnings: sentences on what has no partner
+    files: what they are called; taken: how a format's own words were taken
     placed: whether they have positions; else these are 0
     """
 
@@ -63,7 +63,6 @@ class HandEyeSamples(NamedTuple):
     names: tuple[str | None, ...]
     files: tuple[str, ...]
     taken: str = ""
-    warnings: Sequence[str] = ()
     placed: bool = True
 
 
@@ -315,7 +314,7 @@ def _weight(text: Any, place: str) -> float:
 class Matched(NamedTuple):
     """Points of two files that belong together, (n, 3) each.
 
-    places, ids: of each in the first file; warnings: sentences on what has no partner
+    places, ids: of each in the first file
     """
 
     target: Array
@@ -323,15 +322,13 @@ class Matched(NamedTuple):
     weights: list[float] | None
     places: list[str]
     ids: list[str] | None
-    warnings: list[str]
 
 
 def matched(a: Points, b: Points) -> Matched:
-    """Match points by their ids, or row by row where one file has none.
+    """Match points by their ids, or row by row where one file has none; warn of what has no partner.
 
     Raises ValueInvalid where nothing matches.
     """
-    warnings = []
     if a.ids is not None and b.ids is not None:
         of_b = {name: at for at, name in enumerate(b.ids)}
         rows = [at for at, name in enumerate(a.ids) if name in of_b]
@@ -339,27 +336,20 @@ def matched(a: Points, b: Points) -> Matched:
         if not rows:
             named = " | ".join(first_of(ids, MOST_NAMED, quote=bare) for ids in (a.ids, b.ids))
             raise ValueInvalid(f"{a.file} and {b.file} have no id in common: {named}")
-        for one, other in ((a, b), (b, a)):
-            known = {*(other.ids or ())}
+        for one, two in ((a, b), (b, a)):
+            known = {*(two.ids or ())}
             if alone := [name for name in one.ids or () if name not in known]:
-                count = f"{len(alone)} of {len(one.xyz)} points have no partner in {other.file}"
-                warnings.append(f"{one.file}: {count}: {first_of(alone, MOST_NAMED, quote=bare)}")
+                count = f"{len(alone)} of {len(one.xyz)} points have no partner in {two.file}"
+                warn(f"{one.file}: {count}: {first_of(alone, MOST_NAMED, quote=bare)}")
     elif len(a.xyz) != len(b.xyz):
         raise ValueInvalid(f"{a.file} has {len(a.xyz)} points, {b.file} {len(b.xyz)}, and no ids to match them")
     else:
         rows = others = [*range(len(a.xyz))]
         if a.ids is not None or b.ids is not None:
-            warnings.append(f"{(a if a.ids is None else b).file} has no ids: points are matched row by row")
-    weights = _weights(a, b, rows, others)
-    ids = a.ids or b.ids
-    return Matched(
-        a.xyz[rows], b.xyz[others], weights, [a.places[at] for at in rows], ids and [ids[at] for at in rows], warnings
-    )
-
-
-def _weights(a: Points, b: Points, rows: Sequence[int], others: Sequence[int]) -> list[float] | None:
-    of_a = None if a.weights is None else [a.weights[at] for at in rows]
-    of_b = None if b.weights is None else [b.weights[at] for at in others]
-    if of_a and of_b and of_a != of_b:
+            warn(f"{(a if a.ids is None else b).file} has no ids: points are matched row by row")
+    own, other = (each.weights and [each.weights[at] for at in some] for each, some in ((a, rows), (b, others)))
+    if own and other and own != other:
         raise ValueInvalid(f"{a.file} and {b.file} have different weights; keep one column {WEIGHT}")
-    return of_a or of_b
+    ids = a.ids or b.ids
+    places = [a.places[at] for at in rows]
+    return Matched(a.xyz[rows], b.xyz[others], own or other, places, ids and [ids[at] for at in rows])

@@ -146,8 +146,6 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
     second, number = f"; {samples.files[1]}:" if len(files) > 1 else ",", len(samples.places)
     taken = f"{samples.files[0]}: {base}<-{gripper}{second} {camera}<-{target}; {number} sample{'s' * (number != 1)}"
     _report_taken(inputs, taken, samples.taken, f"solving for {holder}<-{camera} and {other}<-{target}")
-    for each in samples.warnings:
-        say(each)
     from frametool.fit.hand_eye import solve_hand_eye
 
     found = solve_hand_eye(samples.gripper, samples.target, eye_to_hand=eye_to_hand, robust=robust, names=called)
@@ -192,8 +190,6 @@ def solved_points(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solu
     how, ids = "by row" if pairs.ids is None or a.ids is None or b.ids is None else "by id", pairs.ids
     matched_as = f"{len(pairs.places)} matched {how}"
     _report_taken(inputs, f"{a.file}: points in {target}; {b.file}: points in {source}; {matched_as}")
-    for each in pairs.warnings:
-        say(each)
     weights, scale = pairs.weights, inputs.scale
     found = solve_points(pairs.target, pairs.source, weights=weights, scale=scale, robust=robust, names=names)
     frames = _side(target, source, found.transform, found.covariance, int(found.used.sum()))
