@@ -17,11 +17,12 @@ from frametool.errors import ValueInvalid, shown
 from frametool.frames.stamps import BILLION, format_stamp
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from frametool.recordings.read import Channel
     from frametool.text.spans import Floats, Ints
 
+    Sample = tuple[int, tuple[str, str], Sequence[float]]  # its stamp, parent and child, and numbers
 
 BAG1 = "bag1"
 SECONDS = {BAG1: (0, (1 << 32) - 1)}  # of a stamp; int32 in ROS 2
@@ -77,7 +78,7 @@ class MessageTemplate:
     def __init__(self, kind: Kind, fmt: str, parent: str, child: str = "") -> None:
         """Serialise a message with unique numbers to find their positions; ValueInvalid for names that are not text."""
         numbers = [_PROBE * (at + 1) for at in range(kind.numbers)]
-        self.bytes = serialised(kind, fmt, [(parent, child)], [_PROBE_NS], [numbers])
+        self.bytes = serialised(kind, fmt, [(_PROBE_NS, (parent, child), numbers)])
         self.stamp_at = self.bytes.index(struct.pack("<II", *divmod(_PROBE_NS, BILLION)))
         self.numbers_at = self.bytes.index(struct.pack(f"<{kind.numbers}d", *numbers))
 
@@ -97,15 +98,10 @@ _PROBE = 1.2345678912345e-67
 _PROBE_NS = 1532698752_187654321
 
 
-def serialised(
-    kind: Kind, fmt: str, frames: Sequence[tuple[str, str]], stamps_ns: Sequence[int],
-    numbers: Sequence[Sequence[float]],
-) -> bytes:  # fmt: skip
-    """Return one message; frames: (parent, child) of each of its transforms or poses.
-
-    Raises ValueInvalid for names that are not text.
-    """
+def serialised(kind: Kind, fmt: str, samples: Iterable[Sample]) -> bytes:
+    """Return one message of some transforms or poses; raises ValueInvalid for names that are not text."""
     store = typestore(ros1=fmt == BAG1)
+    stamps_ns, frames, numbers = zip(*samples, strict=True)
     stamps = [divmod(stamp, BILLION) for stamp in stamps_ns]
     stamps = [((second + (1 << 31)) % (1 << 32) - (1 << 31), part) for second, part in stamps]  # of ROS 1, as int32
     message = _message(store.types, kind, frames, stamps, numbers)

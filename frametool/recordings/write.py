@@ -8,12 +8,12 @@ from __future__ import annotations
 import re
 from contextlib import contextmanager, suppress
 from heapq import merge
-from itertools import chain, groupby
+from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
 from shutil import rmtree
 from tempfile import gettempdir, mkdtemp
-from typing import IO, TYPE_CHECKING, Any, TypeAlias
+from typing import IO, TYPE_CHECKING, Any
 from weakref import finalize
 
 import numpy as np
@@ -25,13 +25,12 @@ from frametool.recordings.made import KINDS, check_stamps, serialised, typestore
 from frametool.recordings.read import BAG1, BAG2, CDR, INFORMATION, ITSELF, METADATA, QOS, SERIALIZED, Channel, Recorded
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator
 
     from frametool.frames.lookups import Frames
     from frametool.frames.track import Track
-    from frametool.geometry.types import Components
     from frametool.grammar.result import Style
-    from frametool.recordings.made import Kind
+    from frametool.recordings.made import Kind, Sample
 
 NAME = "recording"  # of the file in a bag2 folder, whatever the folder's name: two runs write the same bytes
 PIECE = 1 << 20  # bytes
@@ -193,40 +192,31 @@ class RecordingFile:
 def tree_pieces(tree: Frames, style: Style) -> Iterator[bytes]:
     """Yield the bytes of a recording of a tree: static edges in one message, moving ones in one per stamp."""
     fmt, asked = style.format, style.recording
-    topics = {"tf_static": any(track.is_static for track in tree.tracks()), "tf": tree.moves}
-    if asked.topic and all(topics.values()):
+    still = [track for track in tree.tracks() if track.is_static]
+    moving = [track for track in tree.tracks() if not track.is_static]
+    if asked.topic and still and moving:
         raise ValueInvalid(f"the tree has static and moving frames, on two topics; {asked.topic} names one")
-    if not any(topics.values()):
+    if not still and not moving:
         raise ValueInvalid(f"{fmt} holds transforms, and there is none in the tree")
     file = RecordingFile(fmt, asked.folder)
-    moving = merge(*(_samples(track, style) for track in tree.tracks() if not track.is_static), key=itemgetter(0))
-    messages = ((stamp, [*rows]) for stamp, rows in groupby(moving, itemgetter(0)))
-    first = next(messages, None)
-    if topics["tf_static"]:
-        still = [row for track in tree.tracks() if track.is_static for row in _samples(track, style)]
-        data = serialised(KINDS["tf_static"], fmt, *_columns(still))
-        file.write(file.channel(KINDS["tf_static"], asked.topic), 0 if first is None else first[0], data)
-    if first is not None:
+    if still:
+        data = serialised(KINDS["tf_static"], fmt, [row for track in still for row in _samples(track, style)])
+        first = min((track.span[0] for track in moving), default=0)
+        file.write(file.channel(KINDS["tf_static"], asked.topic), first, data)
+    if moving:
         channel = file.channel(KINDS["tf"], asked.topic)
-        for stamp, rows in chain([first], messages):
+        samples = merge(*(_samples(track, style) for track in moving), key=itemgetter(0))
+        for stamp, rows in groupby(samples, itemgetter(0)):
             check_stamps(np.array([stamp]), fmt)
-            file.write(channel, stamp, serialised(KINDS["tf"], fmt, *_columns(rows)))
+            file.write(channel, stamp, serialised(KINDS["tf"], fmt, rows))
     yield from file.pieces()
 
 
-Sample: TypeAlias = "tuple[int, tuple[str, str], Components]"
-
-
 def _samples(track: Track, style: Style) -> Iterator[Sample]:
-    """Yield the samples of a frame as stamp, (parent, child) and pose; static ones with the stamp 0."""
+    """Yield the samples of a frame; static ones with the stamp 0."""
     for stamp_ns, parent, (tx, ty, tz, x, y, z, w) in track.walk():
         turn = (x, y, z, w) if style.keep_sign else quaternion.from_quaternion(x, y, z, w, floats)
         yield stamp_ns or 0, (parent, track.child), tuple(part + 0.0 for part in (tx, ty, tz, *turn))
-
-
-def _columns(samples: Sequence[Sample]) -> Iterator[Any]:
-    """Return frames, stamps and poses of samples."""
-    return zip(*((frames, stamp, pose) for stamp, frames, pose in samples), strict=True)
 
 
 def _discarded(stream: IO[bytes], file: IO[bytes], folder: Path) -> None:

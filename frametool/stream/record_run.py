@@ -250,8 +250,7 @@ class RecordRun:
         for topic, edges in self.added.items():
             channel = self._latched(topic)
             file.begin([channel])
-            frames = [(edge.parent, edge.child) for edge in edges]
-            data = serialised(TF_STATIC, fmt, frames, [stamp_ns] * len(edges), [edge.numbers for edge in edges])
+            data = serialised(TF_STATIC, fmt, [(stamp_ns, (edge.parent, edge.child), edge.numbers) for edge in edges])
             file.add(Recorded(channel, first_ns, data, first_ns))
         file.begin(self.reader.all)
         for message in self._messages(advance):

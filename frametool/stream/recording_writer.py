@@ -179,7 +179,6 @@ class RecordingWriter:
         parents = {parent for parent, _, _ in self.path}
         if len(parents) > 1:
             raise ValueInvalid(f"a path is seen from one frame, the poses from {listing(parents)}")
-        stamps = [stamp for _, each, _ in self.path for stamp in each.tolist()]
-        poses = [pose for _, _, each in self.path for pose in each.tolist()]
-        message = serialised(KINDS["path"], self.style.format, [(parents.pop(), "")] * len(poses), stamps, poses)
-        self.file.write(self.channel("path"), stamps[-1], message)
+        rows = (zip(stamps.tolist(), poses.tolist(), strict=True) for _, stamps, poses in self.path)
+        samples = [(stamp, (min(parents), ""), pose) for each in rows for stamp, pose in each]
+        self.file.write(self.channel("path"), samples[-1][0], serialised(KINDS["path"], self.style.format, samples))

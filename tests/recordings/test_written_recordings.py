@@ -102,7 +102,7 @@ def test_bytes_that_are_filled_in_are_those_of_the_library(form: str, name: str,
     kind = KINDS[name]
     numbers, stamps = random.normal(size=(5, kind.numbers)), np.array([0, 1, 10**9 - 1, 2**31 * 10**9 - 1, 5 * 10**9])
     filled = MessageTemplate(kind, form, parent, "child").filled(stamps, numbers)
-    wanted = [serialised(kind, form, [(parent, "child")], [int(stamp)], [row]) for stamp, row in zip(stamps, numbers.tolist(), strict=True)]
+    wanted = [serialised(kind, form, [(int(stamp), (parent, "child"), row)]) for stamp, row in zip(stamps, numbers.tolist(), strict=True)]
     assert filled == wanted
 
 
