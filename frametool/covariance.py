@@ -90,14 +90,14 @@ def _entries(value: Covariance, size: int) -> Components:
     if value is None:
         return ()
     side = round(size**0.5)
-    if not _are_many(value, side):
-        return uncertainty.taken(value, size)
     import numpy as np
 
     try:
         rows = np.asarray(value, np.float64)
     except (TypeError, ValueError):
-        raise ValueInvalid(f"covariances: expected numbers of shape (..., {side}, {side})") from None
+        return uncertainty.taken(value, size)  # raises: it says what is wrong
+    if rows.ndim < 3:
+        return uncertainty.taken(value, size)
     if rows.shape[-2:] != (side, side):
         raise ValueInvalid(f"covariances: expected shape (..., {side}, {side}), got {rows.shape}")
     flat = rows.reshape(-1, size)
@@ -107,12 +107,3 @@ def _entries(value: Covariance, size: int) -> Components:
         except ValueInvalid as error:
             raise ValueInvalid(f"row {row}: {error}") from None
     return tuple(rows[..., i, j] for i in range(side) for j in range(side))
-
-
-def _are_many(value: Any, side: int) -> bool:
-    """Return True for an array or list of covariances, False for the numbers or rows of one."""
-    if hasattr(value, "shape"):
-        return len(value.shape) > 1 and value.shape != (side, side)
-    first = value[0] if isinstance(value, (list, tuple)) and value else None
-    inner = first[0] if isinstance(first, (list, tuple)) and first else None
-    return len(getattr(first, "shape", ())) > 1 or hasattr(inner, "__len__")

@@ -24,7 +24,7 @@ from frametool.calc.values import (
     arithmetic,
     made,
 )
-from frametool.geometry import euler, floats, quaternion, rigid
+from frametool.geometry import euler, floats, quaternion, rigid, validation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -163,11 +163,11 @@ def _mean_pose(*parts: Number) -> Components:
     poses = [numbers[at : at + 7] for at in range(0, len(numbers), 7)]
     count = len(poses)
     shift = [sum((pose[at] for pose in poses[1:]), poses[0][at]) / count for at in range(3)]
-    moment = [
-        [sum((p[3 + i] * p[3 + j] for p in poses[1:]), poses[0][3 + i] * poses[0][3 + j]) for j in range(4)]
-        for i in range(4)
-    ]
-    return (*shift, *xp.canonical_sign(*quaternion.largest_eigenvector(moment, xp)))
+    import numpy as np
+
+    rotations = zip(*(pose[3:] for pose in poses), strict=True)
+    parts = tuple(np.stack(np.broadcast_arrays(*column)) for column in rotations)
+    return (*shift, *xp.canonical_sign(*validation.mean_quaternion(parts, np.ones(count))))
 
 
 def _dist(name: str, terms: Sequence[Term]) -> Term:

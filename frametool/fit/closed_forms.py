@@ -56,16 +56,15 @@ def mean_and_spread(poses: Transform, weights: Numbers | None = None) -> tuple[T
     Raises ValueInvalid for invalid weights, and if the rotations are so different that they have no mean.
     """
     mass = validation.masses(weights, poses.shape)
-    moment = validation.second_moment(poses.components[3:], mass)
-    _refuse_no_mean(moment)
+    _refuse_no_mean(validation.second_moment(poses.components[3:], mass))
     mean = poses.mean(weights)
     metres, radians = mean.distance(poses)
     counts = mass > 0.0
-    whole = validation.total(mass.copy())
+    whole = mass.sum()
     return mean, Spread(
-        (validation.total(mass * metres * metres) / whole) ** 0.5,
+        float((mass * metres * metres).sum() / whole) ** 0.5,
         float(metres[counts].max()),
-        (validation.total(mass * radians * radians) / whole) ** 0.5,
+        float((mass * radians * radians).sum() / whole) ** 0.5,
         float(radians[counts].max()),
     )
 

@@ -8,13 +8,13 @@ REP 103: a body at rest that faces east has its axes along ENU.
 from __future__ import annotations
 
 from math import sqrt
+from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, nearest, shown
 from frametool.geometry import euler, floats, matrix, quaternion
 from frametool.geometry.representations import WORLDS
 from frametool.geometry.rotation import Rotation
 
-TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -63,25 +63,20 @@ def named_rotation(text: str) -> Rotation:
     return change.rotation.canonical()
 
 
-class AxesChange:
+class AxesChange(NamedTuple):
     """A change of axes that may include a reflection: first y is negated if so, then the rotation is applied."""
 
-    __slots__ = ("mirrors", "rotation")
-
-    def __init__(self, rotation: Rotation, *, mirrors: bool = False) -> None:
-        """Store both."""
-        self.rotation = rotation
-        self.mirrors = mirrors
+    rotation: Rotation
+    mirrors: bool = False
 
     def inverse(self) -> AxesChange:
         """Return the inverse change."""
-        back = self.rotation.inverse()
-        return AxesChange(_in_mirror(back) if self.mirrors else back, mirrors=self.mirrors)
+        return AxesChange(AxesChange(self.rotation.inverse(), self.mirrors).behind(), self.mirrors)
 
     def after(self, other: AxesChange) -> AxesChange:
         """Return the change by another, followed by this one."""
         second = _in_mirror(other.rotation) if self.mirrors else other.rotation
-        return AxesChange(self.rotation @ second, mirrors=self.mirrors != other.mirrors)
+        return AxesChange(self.rotation @ second, self.mirrors != other.mirrors)
 
     def behind(self) -> Rotation:
         """Return the rotation that follows the reflection if this change is on the right side of a pose."""
@@ -113,7 +108,7 @@ def named_change(text: str, *, of_world: bool = False) -> AxesChange:
 
 def _flu_from(name: str) -> AxesChange:
     """Return flu_from_NAME."""
-    return AxesChange({**AXES, **MIRRORED}[name][0], mirrors=name in MIRRORED)
+    return AxesChange({**AXES, **MIRRORED}[name][0], name in MIRRORED)
 
 
 def _own_axes(text: str) -> AxesChange:
@@ -122,7 +117,7 @@ def _own_axes(text: str) -> AxesChange:
     mirrors = matrix.determinant(*matrix.nine(entry for row in rows for entry in row)) < 0.0
     sign = -1.0 if mirrors else 1.0
     entries = matrix.nine(entry for x, y, z in rows for entry in (x, sign * y, z))
-    return AxesChange(Rotation.of(*matrix.to_quaternion(*entries, floats)), mirrors=mirrors)
+    return AxesChange(Rotation.of(*matrix.to_quaternion(*entries, floats)), mirrors)
 
 
 def _letters(text: str) -> list[str]:

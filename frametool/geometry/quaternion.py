@@ -433,21 +433,3 @@ def as_mrp(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Three[N]:
     """Return modified Rodrigues parameters of length 0 to 1: those of the shorter rotation."""
     divisor = xp.copysign(1.0 + abs(w), xp.first_nonzero(w, x, y, z))
     return x / divisor, y / divisor, z / divisor
-
-
-def largest_eigenvector(moment: Sequence[Sequence[N]], xp: Functions[N]) -> Four[N]:
-    """Return a unit eigenvector of the largest eigenvalue of a positive semidefinite symmetric 4 by 4 matrix.
-
-    Repeated squaring converges to the projection on that eigenvector, whose longest column is the result.
-    Sixty squarings separate eigenvalues that differ by one eps.
-    """
-    for _ in range(60):
-        trace = moment[0][0] + moment[1][1] + moment[2][2] + moment[3][3]
-        moment = [[part / trace for part in row] for row in moment]
-        moment = [[a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] for b in moment] for a in moment]
-    longest = moment[0]
-    for row in moment[1:]:
-        longer = largest_of([abs(part) for part in row], xp) > largest_of([abs(part) for part in longest], xp)
-        longest = [xp.where(longer, new, old) for new, old in zip(row, longest, strict=True)]
-    x, y, z, w = longest
-    return normalized(x, y, z, w, xp)

@@ -284,14 +284,12 @@ class Rotation(Batched):
         return self.of(*validation.run(quaternion.slerp, 4, parts))
 
     def mean(self, weights: Numbers | None = None) -> Rotation:
-        """Return the chordal mean of all elements: the rotation with the least sum of squared matrix differences.
-
-        Source: Markley et al. 2007, the eigenvector of the largest eigenvalue of sum(w q q^T).
-        """
+        """Return the chordal mean of all elements: the rotation with the least sum of squared matrix differences."""
         if not self.shape:
             return self
-        moment = validation.second_moment(self._components, validation.masses(weights, self.shape))
-        return Rotation.of(*quaternion.largest_eigenvector(moment, floats)).canonical()
+        mass = validation.masses(weights, self.shape).reshape(-1)
+        found = validation.mean_quaternion(tuple(part.reshape(-1) for part in self._components), mass)
+        return Rotation.of(*found).canonical()
 
     def _repr_html_(self) -> str | None:
         """Show it in a notebook as a terminal does."""

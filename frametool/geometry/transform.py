@@ -200,9 +200,8 @@ class Transform(Batched):
         if not self.shape:
             return self
         mass = validation.masses(weights, self.shape)
-        x, y, z = (validation.total(part * mass) for part in self._components[:3])
-        whole = validation.total(mass.copy())
-        return Transform.of(x / whole, y / whole, z / whole, *self.rotation.mean(weights).components)
+        shift = (float((part * mass).sum() / mass.sum()) for part in self._components[:3])
+        return Transform.of(*shift, *self.rotation.mean(weights).components)
 
     def _repr_html_(self) -> str | None:
         """Show it in a notebook as a terminal does."""

@@ -252,26 +252,24 @@ def chosen(components: Components, index: Any) -> Components:
     return tuple(part[index] if getattr(part[index], "shape", ()) else float(part[index]) for part in components)
 
 
-def second_moment(components: Components, mass: Array) -> list[list[float]]:
-    """Return sum(w q q^T), 4 by 4."""
-    from frametool.geometry import arrays
+def second_moment(components: Components, mass: Array) -> Array:
+    """Return sum(w q q^T) over the first axis of the components and the weights: (..., 4, 4)."""
+    import numpy as np
 
-    upper = {(i, j): 0.0 for i in range(4) for j in range(i, 4)}
-    for _, (weight, *parts) in arrays.cut((mass, *components)):
-        heavy = [weight * part for part in parts]
-        for i, j in upper:
-            upper[i, j] += total(heavy[i] * parts[j])
-    return [[upper[min(i, j), max(i, j)] for j in range(4)] for i in range(4)]
+    q = np.stack(components, axis=-1)
+    moment: Array = np.einsum("n,n...i,n...j->...ij", mass, q, q)
+    return moment
 
 
-def total(values: Array) -> float:
-    """Return a sum by adding halves onto each other in place: numpy's own order depends on the machine."""
-    sums = values.reshape(-1)
-    while sums.size > 1:
-        half = sums.size // 2
-        sums[:half] += sums[-half:]
-        sums = sums[: sums.size - half]
-    return float(sums[0])
+def mean_quaternion(components: Components, mass: Array) -> Components:
+    """Return the rotation with the least weighted sum of squared matrix differences, over the first axis.
+
+    Source: Markley et al. 2007: the eigenvector of the largest eigenvalue of the second moment.
+    """
+    import numpy as np
+
+    found = np.linalg.eigh(second_moment(components, mass))[1][..., -1]
+    return tuple(found.tolist() if found.ndim == 1 else np.moveaxis(found, -1, 0))
 
 
 def masses(value: Numbers | None, shape: tuple[int, ...]) -> Array:

@@ -123,11 +123,6 @@ class Names(dict[str, str]):
 class Diagnostics:
     """Diagnostics about a file: collected while it is read, emitted at the end."""
 
-    __slots__ = (
-        "assumed", "axes", "drawn", "names", "noise", "notes", "others", "projected", "robot", "rough",
-        "unknown_joints",
-    )  # fmt: skip
-
     def __init__(self) -> None:
         """Create empty diagnostics; `rough` and `noise` hold line numbers, `others` counts by topic.
 
