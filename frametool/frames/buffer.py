@@ -119,8 +119,11 @@ class TransformBuffer(Frames):
 
     def _move(self, track: MovingTrack, parent: str, components: Rigid, stamp_ns: int) -> bool:
         """Add a further sample of a moving frame; return True if it replaced another one."""
-        if self.keep_ns is not None:
-            _check_age(track, stamp_ns, self.keep_ns)
+        if self.keep_ns is not None and track.last_ns - self.keep_ns > stamp_ns:
+            raise ValueInvalid(
+                f"a sample of {shown(track.child)} at {format_stamp(stamp_ns)} is older than the buffer keeps: "
+                f"{format_stamp(self.keep_ns)} s before its newest at {format_stamp(track.last_ns)}",
+            )
         if track.has(stamp_ns):
             known = track.sample_at(stamp_ns)
             if known == (parent, components):
@@ -160,16 +163,6 @@ class TransformBuffer(Frames):
         """Return how many frames and samples there are."""
         samples = sum(track.count for track in self._tracks.values())
         return f"TransformBuffer({len(self._frames)} frames, {samples} samples)"
-
-
-def _check_age(track: MovingTrack, stamp_ns: int, keep_ns: int) -> None:
-    """Refuse a sample older than what a buffer keeps."""
-    newest = track.last_ns
-    if newest - keep_ns > stamp_ns:
-        raise ValueInvalid(
-            f"a sample of {shown(track.child)} at {format_stamp(stamp_ns)} is older than the buffer keeps: "
-            f"{format_stamp(keep_ns)} s before its newest at {format_stamp(newest)}",
-        )
 
 
 def _holds(track: Track, at_ns: int | None) -> bool:

@@ -41,7 +41,7 @@ def lookup_many(frames: Frames, target: str, source: str, at_ns: Any, *, missing
     out = np.empty((7, flat.size))
     _fill_sorted(out, frames, target, source, flat if order is None else flat[order])
     if order is not None:
-        out = _put_back(out, order)
+        out[:, order] = out.copy()
     if missing == "raise" and np.isnan(out[6]).any():
         frames.lookup(target, source, int(flat[np.isnan(out[6]).argmax()]))  # raises, with the reason
     if not times.shape:
@@ -58,14 +58,6 @@ def as_stamps(at_ns: Any) -> Stamps:
         return times.astype(np.int64, copy=False)
     except OverflowError:
         raise ValueInvalid("a time is beyond 64 bits of nanoseconds") from None
-
-
-def _put_back(out: Floats, order: NDArray[np.intp]) -> Floats:
-    """Return columns in the order before sorting."""
-    back = np.empty_like(out)
-    for target_column, in_order in zip(back, out, strict=True):
-        target_column[order] = in_order
-    return back
 
 
 def _fill_sorted(out: Floats, frames: Frames, target: str, source: str, times: Stamps) -> None:

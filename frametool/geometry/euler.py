@@ -122,14 +122,8 @@ def locked(x: N, y: N, z: N, w: N, axes: str) -> Condition:
 
 
 def _pairs(
-    vector: Three[N],
-    w: N,
-    i: int,
-    j: int,
-    k: int,
-    parity: float,
-    symmetric: bool,  # noqa: FBT001
-) -> Four[N]:
+    vector: Three[N], w: N, i: int, j: int, k: int, parity: float, symmetric: bool,  # noqa: FBT001
+) -> Four[N]:  # fmt: skip
     """Return a, b, c, d: (a, b) points along half the sum of the outer angles, (c, d) along half their difference."""
     vi, vj, vk = vector[i], vector[j], vector[k]
     if symmetric:

@@ -458,7 +458,8 @@ def checked_axes(axes: str) -> str:
     """Return the name of an Euler convention; raise ValueInvalid, naming the nearest, if it is not one."""
     if axes in euler.AXES:
         return axes
-    near = _both_readings(axes.lower()) or _near_axes(axes.lower()) or ";"
+    alike = [each for each in euler.AXES if each[0] == axes[:1].lower()]  # static axes are never suggested for rotating
+    near = _both_readings(axes.lower()) or did_you_mean(axes.lower(), alike) or ";"
     raise ValueInvalid(
         f"unknown Euler axes {shown(axes)}{near} s (static axes) or r (rotating axes) and three letters, such as rzyx"
     )
@@ -474,11 +475,6 @@ def checked_world(axes: str | None) -> str:
 
 
 CHECKED = {NAMED_AXES: checked_axes, OF_WORLD: checked_world}
-
-
-def _near_axes(axes: str) -> str:
-    """Return the nearest convention with the same first letter: static axes are never suggested for rotating ones."""
-    return did_you_mean(axes, [each for each in euler.AXES if each[0] == axes[:1]])
 
 
 def _both_readings(letters: str) -> str:

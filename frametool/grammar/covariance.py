@@ -9,11 +9,12 @@ Over (x, y, z, rotation about X, Y, Z), metres and radians, along the fixed axes
 from __future__ import annotations
 
 import re
+from math import radians
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.geometry import uncertainty
-from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_number, within
+from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, places_in, read_number, read_texts, within
 from frametool.text.numbers import ANGLES as UNITS_OF_ANGLE
 from frametool.text.numbers import BRACKETS, NotFinite, read_number_or_angle
 from frametool.text.numbers import LENGTHS as UNITS_OF_LENGTH
@@ -152,21 +153,13 @@ def read_sigmas(value: Any, reading: Reading) -> list[float]:
 
 def _three(key: str, value: Any, axes: Sequence[str], reading: Reading) -> list[float]:
     """Read the three numbers of a part of sigma in metres or radians; a single number applies to all three."""
-    from math import radians
-
-    if type(value) is dict:
-        if unknown := [each for each in value if each not in axes]:
-            raise Misfit(f"unknown key {shown(unknown[0])}; expected {', '.join(axes)}", (key, unknown[0]), key=True)
-        texts: list[tuple[Path, Any]] = [((key, axis), value.get(axis, "0")) for axis in axes]
-    elif type(value) is list:
-        if len(value) != len(axes):
-            raise Misfit(f"expected 3 numbers ({' '.join(axes)}) or one for all, found {len(value)}", (key,))
-        texts = [((key, at), text) for at, text in enumerate(value)]
-    else:
-        texts = [((key,), value)] * 3
+    texts, places = [value] * 3, [(key,)] * 3
+    if type(value) in (dict, list):
+        texts = within((key,), read_texts, value, axes, partial=True)
+        places = [(key, *step) for step in (places_in(value) if type(value) is list else zip(axes))]
     degrees = reading.degrees if ANGLES.get(key) is None else ANGLES[key]
     found = []
-    for path, text in texts:
+    for path, text in zip(places, texts, strict=True):
         number = within(path, _sigma, text, degrees if key in ANGLES else None)
         found.append(number / LENGTHS[key] if key in LENGTHS else radians(number) if degrees else number)
     return found

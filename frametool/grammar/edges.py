@@ -56,13 +56,10 @@ class Samples(NamedTuple):
     components: Sequence[Rigid]
     lines: Sequence[int]
 
-    def edge(self, at: int) -> Edge:
-        """Return one of the poses as an edge."""
-        return Edge(self.parent, self.child, self.components[at], self.stamps_ns[at], self.lines[at])
-
     def edges(self) -> Iterator[Edge]:
         """Yield the poses as edges."""
-        return map(self.edge, range(len(self.stamps_ns)))
+        rows = zip(self.components, self.stamps_ns, self.lines, strict=True)
+        return (Edge(self.parent, self.child, *row) for row in rows)
 
 
 class EdgeColumns(NamedTuple):

@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, did_you_mean, shown
+from frametool.geometry import placed
 from frametool.geometry.representations import REPRESENTATIONS, ROTATIONS, notation
 from frametool.grammar.readers import (
     INDICES,
@@ -110,9 +111,7 @@ class Pose(NamedTuple):
         Raises ValueInvalid if it has both.
         """
         if self.covariance is not None and self.scale != 1.0:
-            from frametool.geometry.placed import NOT_BOTH
-
-            raise ValueInvalid(NOT_BOTH)
+            raise ValueInvalid(placed.NOT_BOTH)
         return (*self.components, *(self.covariance or ()), *([self.scale] * (self.scale != 1.0)))
 
     @property
@@ -177,8 +176,6 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
 
 def inverted(pose: Pose) -> Pose:
     """Return the inverse numbers under the same names: the meaning of `inverse: true`."""
-    from frametool.geometry import placed
-
     back = Pose.of(placed.inverse(pose.placed))
     return pose._replace(
         position=None if pose.position is None else back.position,
@@ -240,9 +237,7 @@ def refuse_scale(value: Any) -> None:
     except (ValueInvalid, TypeError):
         is_one = False
     if not is_one:
-        from frametool.geometry.placed import SIMILARITY
-
-        raise NotARotation(SIMILARITY, (SCALE,))
+        raise NotARotation(placed.SIMILARITY, (SCALE,))
 
 
 def read_position(value: Any, unit: float, *, bare: bool = False) -> Vector:

@@ -13,7 +13,7 @@ from math import isfinite
 
 from frametool.errors import LookupFailed, ValueInvalid, shown, warn
 from frametool.frames.stamps import format_stamp
-from frametool.geometry import floats, quaternion, rigid
+from frametool.geometry import floats, placed, quaternion, rigid
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, uncertain
 
@@ -35,16 +35,8 @@ def product(left: Pose, right: Pose) -> Pose:
 
     Raises ValueInvalid if both name the inner frame and the names differ.
     """
-    is_exact = left.is_exact and right.is_exact
-    compose = (lambda a, b: rigid.compose(*a, *b)) if is_exact else _placed().compose
-    return Pose.of(compose(left.placed, right.placed), *composed_names(left, right)[::-1])
-
-
-def _placed() -> Any:
-    """Return the functions for poses with a covariance or a scale; they are rare, so start-up does not import them."""
-    from frametool.geometry import placed
-
-    return placed
+    parent, name = composed_names(left, right)
+    return Pose.of(placed.compose(left.placed, right.placed), name, parent)
 
 
 def composed_names(left: Pose, right: Pose) -> tuple[str | None, str | None]:
@@ -67,7 +59,7 @@ def shared_stamp(poses: Iterable[Pose]) -> dict[str, Any]:
 
 def inverse(pose: Pose) -> Pose:
     """Return b_from_a of a_from_b; missing parts remain missing."""
-    back = Pose.of(rigid.inverse(*pose.components) if pose.is_exact else _placed().inverse(pose.placed))
+    back = Pose.of(placed.inverse(pose.placed))
     return back._replace(
         position=None if pose.position is None else back.position,
         rotation=None if pose.rotation is None else back.rotation,

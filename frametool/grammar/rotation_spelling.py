@@ -191,10 +191,7 @@ def _checked(notation: Notation, numbers: Sequence[float], reading: Reading, *, 
 
 
 def read_components(
-    notation: Notation,
-    texts: Sequence[Any],
-    places: Sequence[Path],
-    reading: Reading,
+    notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading
 ) -> tuple[list[float], bool]:
     """Read the components of a rotation; return them with the unit of the angles (True: degrees)."""
     degrees = reading.degrees if notation.degrees is None else notation.degrees
