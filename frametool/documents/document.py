@@ -175,48 +175,24 @@ def refuse_alias(node: Node) -> None:
 NOTHING = Node(0, 0, {})  # a mapping without keys
 
 
-class _Opened:
-    """A list or map that is not complete yet."""
-
-    __slots__ = ("column", "end", "flow", "key", "start", "value")
-
-    def __init__(self, kind: int, start: int, column: int, *, flow: bool) -> None:
-        self.value: Any = {} if kind == MAP else []
-        self.start = start
-        self.end = start
-        self.column = column
-        self.flow = flow
-        self.key: Node | None = None
-
-    def take(self, node: Node) -> None:
-        """Add an item, a key, or the value of the key before it."""
-        self.end = node.end
-        if type(self.value) is list:
-            self.value.append(node)
-        elif self.key is None:
-            self.key = node
-        else:
-            self.value[self.key.value] = self.key, node
-            self.key = None
-
-    def node(self, end: int) -> Node:
-        """Return the complete node; without brackets it ends with its last value."""
-        return Node(self.start, end if self.flow else self.end, self.value, self.flow, column=self.column)
-
-
 def parse_nodes(text: str) -> list[Node]:
     """Return the trees of all documents of a text that `parse_documents` has read, without checks."""
     roots: list[Node] = []
-    opened: list[_Opened] = []
-    for kind, word, start, end, style, column in events_of(text):
+    opened: list[tuple[Event, list[Node]]] = []  # lists and maps that are not complete yet, with their nodes
+    for event in events_of(text):
+        kind, word, start, end, style, column = event
         if kind not in (LEAF, END):
-            opened.append(_Opened(kind, start, column, flow=bool(style)))
+            opened.append((event, []))
             continue
-        node = opened.pop().node(end) if kind == END else Node(start, end, word, quote=style, column=column)
-        if opened:
-            opened[-1].take(node)
-        else:
-            roots.append(node)
+        node = Node(start, end, word, quote=style, column=column)
+        if kind == END:
+            (kind, _, start, _, style, column), inner = opened.pop()
+            pairs = zip(inner[::2], inner[1::2], strict=False)
+            value: Any = {key.value: (key, each) for key, each in pairs} if kind == MAP else inner
+            if not style:  # without brackets it ends with its last value
+                end = inner[-1].end if inner else start
+            node = Node(start, end, value, bool(style), column=column)
+        (opened[-1][1] if opened else roots).append(node)
     return roots
 
 

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.frames.stamps import BILLION
-from frametool.text.decimals import shortest_decimals
 from frametool.text.digits import (
     LEAST_POWER,
     TENS,
@@ -31,6 +30,7 @@ from frametool.text.digits import (
 )
 from frametool.text.numbers import half_unit
 from frametool.text.spans import Spans, windows
+from frametool.text.write import shortest_decimals
 
 if TYPE_CHECKING:
     from frametool.text.spans import Bytes, Flags, Floats, Ints, Words

@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numbers_at_hand import HOSTILE, random_bits
 
-from frametool.text.decimals import shortest_decimals
 from frametool.text.spans import join
-from frametool.text.write import shortest_spans
+from frametool.text.write import shortest_decimals, shortest_spans
 
 
 def lines(values: list[float]) -> list[str]:
