@@ -92,16 +92,13 @@ def strict_json(source: Source) -> list[Any]:
 
 
 def _deeply_decoded(source: Source) -> list[Any]:
-    """Decode a text; deep nesting within the limit gets the stack that json needs."""
-    try:
-        return _decoded(source.text)
-    except RecursionError:
-        if any(depth > DEEPEST for depth, _ in _depths(source.text)):
-            raise _too_deep(source) from None
+    """Decode a text, with the stack that json needs for deep nesting within the limit."""
     limit = sys.getrecursionlimit()
     sys.setrecursionlimit(limit + 4 * DEEPEST)
     try:
         return _decoded(source.text)
+    except RecursionError:
+        raise _too_deep(source) from None
     finally:
         sys.setrecursionlimit(limit)
 

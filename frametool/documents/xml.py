@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from functools import partial
-from math import inf, isfinite
 from typing import TYPE_CHECKING, NamedTuple
 from xml.parsers import expat
 
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
 DEEPEST_ELEMENT = 100_000
 _BLOCK = 1 << 16
 _OTHER_ENTITY = re.compile(rb"&(?!(?:amp|lt|gt|quot|apos|#[0-9]+|#x[0-9a-fA-F]+);)[^\s;&]++;")
-_DECIMALS = "0123456789.-+eE \t\r\n"
 
 
 class Element(NamedTuple):
@@ -170,13 +168,6 @@ class XmlFile:
     def numbers_in(self, text: str, element: Element, attribute: str, count: int) -> tuple[float, ...]:
         """Read a text of an element as this many finite numbers; the attribute, if any, is its place."""
         words = text.split()
-        if len(words) == count and not text.strip(_DECIMALS):  # plain decimals, nearly always
-            try:
-                numbers = tuple(map(float, words))
-            except ValueError:
-                numbers = (inf,)
-            if all(map(isfinite, numbers)):
-                return numbers
         if len(words) != count:
             found = f"found {len(words)} in {shown(text)}"
             expected = f"{count} number{'s' * (count != 1)}"

@@ -92,17 +92,6 @@ def split_run(text: str) -> tuple[str, list[Any]] | None:
     return None if None in items else (f"{text[: run.start()]}{indent}- {STANDIN}\n", items)
 
 
-def put_back(values: list[Any], items: list[Any]) -> bool:
-    """Replace the placeholder by the items: in the last list of the last document."""
-    holder = values[-1]
-    while isinstance(holder, dict) and holder:
-        holder = next(reversed(holder.values()))
-    if holder != [STANDIN]:
-        return False
-    holder[:] = items
-    return True
-
-
 def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any] | None:
     made = dict(pairs)
     return made if len(made) == len(pairs) else None
@@ -201,7 +190,13 @@ def _read_by_lines(source: Source, tags: Collection[str]) -> list[Value] | None:
         values = _Builder(Source(source.name, split[0]), tags).build()
     except FormatError:
         return None
-    return values if put_back(values, split[1]) else None
+    holder = values[-1]
+    while isinstance(holder, dict) and holder:
+        holder = next(reversed(holder.values()))
+    if holder != [STANDIN]:  # the last list of the last document
+        return None
+    holder[:] = split[1]
+    return values
 
 
 def yaml_events(text: str) -> Iterator[Event]:

@@ -116,7 +116,7 @@ BAG = "frametool.recordings.messages"
 _RECORDING: dict[str, Any] = {
     "writes": ("poses", "points", "tree", "recording"), "writer": "frametool.recordings.write", "cameras": True,
 }  # fmt: skip
-_NUMBER = r"[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?"
+NUMBER = r"[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?"
 _ONE_COLUMN = r"\ufeff?\"?[A-Za-z]\w*(?: ?[\[(][a-z]+[\])])?\"?[ \t]*\r?\n[-+.\d]"  # a name above numbers
 _MESSAGE_KEYS = (
     "transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force"
@@ -199,7 +199,7 @@ FORMATS = {
     ),
     "tum": _trajectory(
         "trajectory: t x y z qx qy qz qw", _TABLE, suffixes=(".tum",),
-        magic=(("line", rf"(?:{_NUMBER}[ \t]+){{7}}{_NUMBER}\s*$"),),
+        magic=(("line", rf"(?:{NUMBER}[ \t]+){{7}}{NUMBER}\s*$"),),
         conventions="world<-body, seconds, metres, quaternion x y z w", required_options=("frames",), delimiter="",
         columns=("t", "x", "y", "z", "qx", "qy", "qz", "qw"), poses=Poses("xyzw", counted=""),
     ),
@@ -218,7 +218,7 @@ FORMATS = {
     ),
     "csv2": _read_tree(
         "CSV of `ros2 topic echo --csv`", _MESSAGES, required_options=("frames",),
-        magic=(("line", rf"-?\d{{1,12}},\d{{1,10}},(?!{_NUMBER},)[^,]*,[^,]+,|[-+0-9.e]+(?:,[-+0-9.e]+){{5}}$"),),
+        magic=(("line", rf"-?\d{{1,12}},\d{{1,10}},(?!{NUMBER},)[^,]*,[^,]+,|[-+0-9.e]+(?:,[-+0-9.e]+){{5}}$"),),
     ),
     "calls": _read_tree(
         "static_transform_publisher calls", "frametool.ros.publisher",
@@ -255,7 +255,7 @@ FORMATS = {
         "EuRoC ground truth", _TABLE,
         magic=(
             ("text", r"\A\ufeff?#\s*timestamp[^\n]*q_RS_w"),
-            ("line", rf"\d{{19}}(?:\s*,\s*{_NUMBER}){{7}}(?:(?:\s*,\s*{_NUMBER}){{9}})?\s*$"),
+            ("line", rf"\d{{19}}(?:\s*,\s*{NUMBER}){{7}}(?:(?:\s*,\s*{NUMBER}){{9}})?\s*$"),
         ),
         conventions="world<-body (R<-S), nanoseconds, metres, quaternion w x y z", required_options=("frames",),
         delimiter=",", columns=_EUROC, widths=(8, 17), poses=Poses("wxyz", counted=""),
@@ -265,7 +265,7 @@ FORMATS = {
         poses=Poses("wxyz", inverse=True, axes="optical", frames=_CAMERA, counted="image ids"),
         magic=(
             ("text", r"\A\ufeff?(?:\s*#[^\n]*\n)*?# *(?:Image|Frame) list with"),
-            ("line", rf"\d+(?:[ \t]+{_NUMBER}){{7}}[ \t]+\d+[ \t]+\S*[^\s\d.]"),
+            ("line", rf"\d+(?:[ \t]+{NUMBER}){{7}}[ \t]+\d+[ \t]+\S*[^\s\d.]"),
         ),
         conventions="the file holds camera<-world, quaternion w x y z",
     ),
@@ -276,7 +276,7 @@ FORMATS = {
     ),
     "kitti": _trajectory(
         "KITTI poses", _TABLE,
-        magic=(("line", rf"(?:{_NUMBER}[ \t]+){{11}}{_NUMBER}\s*$"),), conventions="world<-cam0, metres", delimiter="",
+        magic=(("line", rf"(?:{NUMBER}[ \t]+){{11}}{NUMBER}\s*$"),), conventions="world<-cam0, metres", delimiter="",
         columns=("r11", "r12", "r13", "tx", "r21", "r22", "r23", "ty", "r31", "r32", "r33", "tz"), widths=(12,),
         poses=Poses("matrix", axes="optical", frames=("world", "cam0"), counted="numbers of pictures"),
     ),

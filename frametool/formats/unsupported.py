@@ -9,6 +9,7 @@ import os
 from typing import NamedTuple
 
 from frametool.errors import ValueInvalid
+from frametool.formats.table import NUMBER
 
 
 class Unsupported(NamedTuple):
@@ -31,11 +32,10 @@ class Unsupported(NamedTuple):
 
 
 _COLMAP_MODELS = "(?:SIMPLE_|FULL_)?(?:PINHOLE|RADIAL|OPENCV|FOV)(?:_FISHEYE)?|(?:RAD_TAN_)?THIN_PRISM_FISHEYE"
-_NUMBER = r"[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?"
 _NO_INDICES = r"(?!\s*0\s+1\s+2\s+0\s[^\n]*\n\s*1\s[^\n]*\n\s*2\s)"  # of a data frame
 _OPEN3D = (
     rf"\A\ufeff?{_NO_INDICES}\s*\d+[ \t]+\d+[ \t]+\d+[^\S\n]*+\n"
-    rf"(?:\s*+(?:{_NUMBER}[ \t]+){{3}}{_NUMBER}[^\S\n]*+\n){{2}}"
+    rf"(?:\s*+(?:{NUMBER}[ \t]+){{3}}{NUMBER}[^\S\n]*+\n){{2}}"
 )
 _SRDF = (
     "group|group_state|gripper|end_effector|virtual_joint|passive_joint|joint_property|link_sphere_approximation|"
@@ -77,10 +77,6 @@ UNSUPPORTED = {
         "COLMAP images.bin",
         "write it as text: colmap model_converter --input_path . --output_path . --output_type TXT",
         (("magic", rb".{4}\0{4}.{4}.{56}.{4}[\x20-\x7e]{1,200}\0"),),
-    ),
-    "feather1": Unsupported(
-        "Feather of the first version",
-        "write it anew: pyarrow.feather.write_feather(pyarrow.feather.read_table(FILE), NEW)", (("magic", rb"FEA1"),),
     ),
     "xacro": Unsupported(
         "xacro, from which URDF is made", "expand it: xacro FILE > robot.urdf (pip install xacro)",
@@ -126,15 +122,6 @@ UNSUPPORTED = {
     "gltf": Unsupported(
         "a glTF scene", "glTF has y up and z forward; export URDF, or the poses as JSON",
         (("magic", rb"glTF"), ("json path", "asset/version")), (".gltf", ".glb"),
-    ),
-    "unity": Unsupported(
-        "a Unity scene", "Unity is left-handed with y up; export poses as JSON and convert them",
-        (("magic", rb"%YAML 1\.1\r?\n%TAG !u! tag:unity3d"),), (".unity", ".prefab"),
-    ),
-    "itk": Unsupported(
-        "an ITK or ANTs transform",
-        "it maps points about a centre in LPS axes, in mm; convert it to a 4x4 matrix first",
-        (("magic", rb"#Insight Transform File"),), (".tfm",),
     ),
 }
 

@@ -35,11 +35,7 @@ _TOKEN = re.compile(
     """
 )
 _IN_QUOTES = re.compile(rf"(?s)\\(?P<quoted>.)|(?P<dollar>{_DOLLAR})|(?P<special>`)")
-_LINES, _NAMES = "write one command a line", "keep a result by NAME = COMMAND and give $NAME"
-_INSTEAD = {
-    "|": _NAMES, "`": _NAMES, "$(": _NAMES, "<": "name the file as an argument, or with -i",
-    ">": "write files with -o FILE", ";": _LINES, "&": _LINES,
-}  # fmt: skip
+_INSTEAD = "write one command a line, keep a result by NAME = COMMAND, name files with -i and -o"
 
 
 def _tokens(line: str) -> Iterator[tuple[re.Match[str], bool]]:
@@ -89,7 +85,7 @@ def _text(kind: str, text: str, value_of: Callable[[str], str], *, begins: bool 
     if kind == "dollar":
         return _dollar(text, value_of)
     if kind == "special":
-        raise Misused(f"{text} is for a shell: {_INSTEAD[text]}; in quotes it is text")
+        raise Misused(f"{text} is for a shell: {_INSTEAD}; in quotes it is text")
     if kind == "quoted":  # a backslash in double quotes is literal before other characters
         return text if text in '$`"\\' else f"\\{text}"
     return os.path.expanduser(text) if kind == "plain" and begins and text.startswith("~/") else text
@@ -97,12 +93,9 @@ def _text(kind: str, text: str, value_of: Callable[[str], str], *, begins: bool 
 
 def _dollar(text: str, value_of: Callable[[str], str]) -> str:
     """Return the text for a dollar sign and what follows it."""
-    behind = text[1:]
-    bare = behind[1:-1] if behind.startswith("{") else behind
+    bare = text[1:].removeprefix("{").removesuffix("}")
     if re.fullmatch(NAME, bare):
         return value_of(bare)
-    if behind == "(":
-        raise Misused(f"$( is for a shell: {_INSTEAD['$(']}; in single quotes it is text")
-    if behind not in ("", "$"):
+    if text not in ("$", "$$"):
         raise Misused(f"{text} names nothing: names are letters, digits and _; $$ is a dollar sign")
     return "$"

@@ -151,9 +151,9 @@ def test_a_kept_pose_has_all_its_bits(run: Run) -> None:
     [
         ("convert '1", "the ' in column 9 is not closed"),
         ('convert a "1', 'the " in column 11 is not closed'),
-        ("lookup a b c | compose -", "| is for a shell: keep a result by NAME = COMMAND"),
-        ("convert 1 > x.json", "> is for a shell: write files with -o FILE"),
-        ("convert $(pwd)", "$( is for a shell"),
+        ("lookup a b c | compose -", "| is for a shell: write one command a line, keep a result by NAME = COMMAND"),
+        ("convert 1 > x.json", "> is for a shell: write one command a line"),
+        ("convert $(pwd)", "$( names nothing"),
         ("convert $bsae", "unknown name $bsae; did you mean 'base'? names: base; a dollar sign is $$"),
         ("convert $HOME", "unknown name $HOME; names: base; a dollar sign is $$"),
         ("convert $1", "$1 names nothing"),

@@ -56,7 +56,7 @@ def test_standard_input_files_and_results_are_bytes(tmp_path: Path, monkeypatch:
 @pytest.mark.parametrize(("line", "status", "message"), [
     ("convert 'open", 2, "the ' in column 9 is not closed"),
     ("convert $pose", 2, "$pose has no value here"),
-    ("convert > file", 2, "> is for a shell: write files with -o FILE"),
+    ("convert > file", 2, "> is for a shell: write one command a line"),
     ("lookup robot.yaml map bse", 4, "did you mean 'base'?"),
     ("lookup nowhere.yaml map base", 5, "nowhere.yaml: no such file"),
     (["lookup", "a\0b", "map", "base"], 5, "embedded null byte"),

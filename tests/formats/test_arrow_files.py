@@ -494,10 +494,6 @@ def test_without_pyarrow_the_extra_is_named(use: Use, monkeypatch: pytest.Monkey
     assert (written.status, written.err.count("pip install 'frametool[arrow]'"), written.data) == (5, 1, b"")
 
 
-def test_a_file_of_the_first_feather_says_what_to_do(use: Use) -> None:
-    assert "write it anew" in use("apply", "--transform", POSE, data=b"FEA1" + b"\0" * 100).err
-
-
 def test_rows_of_joints_are_refused_by_their_form(use: Use) -> None:
     done = use("fk", str(EXAMPLES / "arm.urdf"), "arm_base", "tool", data=encoded(cloud()))
     assert (done.status, done.err.count("\n")) == (2, 1)
