@@ -20,7 +20,7 @@ from frametool.text.numbers import odd_characters
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
 LONGEST = 1 << 16  # characters of an expression
 DEEPEST = 100  # levels of nested brackets, signs and exponents
@@ -33,6 +33,7 @@ UNITS: dict[str, tuple[float, float, str]] = {
     "s": (1.0, 1.0, SECOND), "ms": (1.0, 1e3, SECOND), "us": (1.0, 1e6, SECOND), "ns": (1.0, 1e9, SECOND),
 }  # fmt: skip
 LOOKUP = "a look-up is written TARGET<-SOURCE"
+JOINING = (("+", "-"), ("*", "/"))  # operators, loosest first
 HINTS = {
     "}": "a { before it is missing", '"': 'a quote is not closed: "name"', "<": LOOKUP, ">": LOOKUP,
     ".": "a number has a digit behind its point, a column is row.NAME",
@@ -253,20 +254,15 @@ class _Parser:
         if self.depth > DEEPEST:
             raise CalcError(f"nested deeper than {DEEPEST} levels", at)
 
-    def sum(self) -> Branch:
-        """Parse products joined by + and -."""
-        return self._chain(("+", "-"), self.product)
-
-    def product(self) -> Branch:
-        """Parse factors joined by * and /."""
-        return self._chain(("*", "/"), self.factor)
-
-    def _chain(self, operators: tuple[str, str], part: Callable[[], Branch]) -> Branch:
-        parts, joined = [part()], []
-        while self.has(*operators):
+    def sum(self, level: int = 0) -> Branch:
+        """Parse products joined by + and -; at the next level, factors joined by * and /."""
+        if level == len(JOINING):
+            return self.factor()
+        parts, joined = [self.sum(level + 1)], []
+        while self.has(*JOINING[level]):
             token = self.take()
             joined.append((token.text, token.start))
-            parts.append(part())
+            parts.append(self.sum(level + 1))
         if not joined:
             return parts[0]
         return Branch("chain", joined[0][1], parts[0].start, parts[-1].end, tuple(joined), tuple(parts))
