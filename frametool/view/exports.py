@@ -25,6 +25,7 @@ from frametool import __version__
 from frametool.formats.robots.model import JointValue
 from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import BILLION, format_stamp
+from frametool.geometry.rigid import IDENTITY
 from frametool.sim.turtle import single
 from frametool.view.pictures import SIZE, page_file, write_html
 from frametool.view.scene import EYES, FrameScene, Projection, can_be_drawn
@@ -151,7 +152,6 @@ def _keys(track: MovingTrack, first_ns: int) -> tuple[list[float], list[Sequence
 SCRIPTS = ("begin", "kernels", "frames", "state", "camera", "picture", "labels", "panel", "hands")
 EXTRAS = ("joints", "solids")  # where the page has some
 PACKED = 48_000  # bytes of numbers, from where on they are compressed
-NO_POSE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def write_page(
@@ -196,7 +196,7 @@ def _data(scene: FrameScene) -> tuple[dict[str, Any], bytes]:
     """Return names and parents, and the static poses, followed by the stamps and poses of each track, as bytes."""
     index = {name: number for number, name in enumerate(scene.names)}
     static = [None if name in scene.tracks else scene.tree.track(name) for name in scene.names]
-    blob = bytearray(_packed("d", chain.from_iterable(track.components if track else NO_POSE for track in static)))
+    blob = bytearray(_packed("d", chain.from_iterable(track.components if track else IDENTITY for track in static)))
     tracks: list[dict[str, Any]] = []
     for name, track in scene.tracks.items():
         stamps, above, poses = zip(*track.walk(), strict=True)
@@ -247,7 +247,7 @@ MESH_PART = 0.35  # of the usual distance between frames is the least edge of a 
 def _drawn_solids(scene: FrameScene, solids: Sequence[Solid]) -> dict[str, Any]:
     """Return the solids of known frames; a mesh becomes a box around the child frames of its frame."""
     index = {name: number for number, name in enumerate(scene.names)}
-    ends = {name: [NO_POSE[:3]] for name in scene.names}  # of the links that begin at a frame
+    ends = {name: [IDENTITY[:3]] for name in scene.names}  # of the links that begin at a frame
     for track in scene.tree.tracks():
         ends[track.parent].append(track.components[:3])
     lengths = sorted(filter(None, (math.hypot(*end) for held in ends.values() for end in held)))
@@ -260,7 +260,7 @@ def _drawn_solids(scene: FrameScene, solids: Sequence[Solid]) -> dict[str, Any]:
                 low, high = ([of(column) for column in zip(*ends[each.frame], strict=True)] for of in (min, max))
                 x, y, z = ((a + b) / 2.0 for a, b in zip(low, high, strict=True))
                 size = tuple(max(b - a, least) for a, b in zip(low, high, strict=True))
-                drawn = each._replace(kind="box", size=size, pose=(x, y, z, *NO_POSE[3:]))
+                drawn = each._replace(kind="box", size=size, pose=(x, y, z, *IDENTITY[3:]))
             found.append(drawn._asdict() | {"frame": index[each.frame]})
     return {"solids": found, "meshes": sum(each.kind == "mesh" for each in solids)}
 

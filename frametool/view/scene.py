@@ -20,7 +20,6 @@ from frametool.geometry import earth as wgs84
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.place import ECEF as EARTH
 from frametool.geometry.place import ENU
-from frametool.geometry.rigid import IDENTITY
 from frametool.text.numbers import parse_angle
 
 if TYPE_CHECKING:
@@ -80,7 +79,6 @@ def _on(tree: Frames, ground: Ground) -> Frames:
         for stamp_ns, parent, pose in track.walk():
             above, seen = (ground.name, rigid.relative(*ground.pose, *pose)) if parent == earth else (parent, pose)
             found.insert_components(above, track.child, seen, stamp_ns)
-    found.camera_axes, found.covariances = tree.camera_axes, tree.covariances
     return found
 
 
@@ -156,19 +154,13 @@ class FrameScene:
 
     def poses(self) -> dict[str, Rigid]:
         """Return the pose in `fixed` of every chosen frame that is connected to it at the time, parents first."""
-        now = Snapshot(self.tree, self.at_ns)
-        root = now.roots[self.fixed]
-        if root in now.without_data:
-            return {self.fixed: IDENTITY} if self._is_chosen(self.fixed) else {}
-        names, in_root = self.names, now.seen_from(root)
+        now, names = Snapshot(self.tree, self.at_ns), self.names
+        seen = now.seen_from(self.fixed)
+        if now.roots[self.fixed] in now.without_data:
+            seen = {self.fixed: seen[self.fixed]}
         if any(track.varies for track in self.tracks.values()):  # only changing parents can upset the order
             names, _ = _in_order(self.tree, {name: self.parent(name) for name in names})
-        back = rigid.inverse(*in_root[self.fixed].components)
-        return {
-            name: IDENTITY if name == self.fixed else rigid.compose(*back, *in_root[name].components)
-            for name in names
-            if name in in_root and self._is_chosen(name)
-        }
+        return {name: seen[name].components for name in names if name in seen and self._is_chosen(name)}
 
     def _is_chosen(self, name: str) -> bool:
         return self.chosen is None or name in self.chosen
