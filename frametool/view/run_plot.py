@@ -34,15 +34,6 @@ class Stroke(NamedTuple):
     points: list[Point]
 
 
-class Curves(NamedTuple):
-    """The curves of a follower, one value per control step: seconds, metres, m/s, rad/s."""
-
-    times: list[float]
-    distance: list[float]
-    linear: list[float]
-    angular: list[float]
-
-
 def colours_of(turtles: Iterable[str]) -> dict[str, str]:
     """Return a colour for each turtle, in the order of their names."""
     return dict(zip(sorted(turtles), cycle(COLOURS), strict=False))
@@ -55,7 +46,8 @@ class Drawing:
         """Create an empty drawing."""
         self.strokes: list[Stroke] = []
         self.turtles: dict[str, TurtleState] = {}
-        self.curves: dict[str, Curves] = {name: Curves([], [], [], []) for name in scene.followers}
+        # of each follower, for each control step: seconds, metres, m/s, rad/s
+        self.curves: dict[str, list[tuple[float, ...]]] = {name: [] for name in scene.followers}
         self._current: dict[str, Stroke] = {}
         self._clears = 0
 
@@ -71,9 +63,7 @@ class Drawing:
                 self._draw(name, step)
         for command in step.commands:
             ahead, turning, _ = command.twist
-            numbers = (step.t_ns / BILLION, command.distance or 0.0, ahead, turning)
-            for curve, number in zip(self.curves[command.turtle], numbers, strict=True):
-                curve.append(number)
+            self.curves[command.turtle].append((step.t_ns / BILLION, command.distance or 0.0, ahead, turning))
 
     def colours(self) -> dict[str, str]:
         """Return the colour of every turtle: `#rrggbb`."""
@@ -106,19 +96,21 @@ WHITE = "#ffffff"
 DARKENED = dict(
     zip(COLOURS, ("#c79a00", "#d4691b", "#1593ad", "#2a9d8f", "#d6458b", "#5a9a16", "#7d5fc7", "#666666"), strict=True)
 )
-PANELS = ("distance (m)", "linear.x (m/s)", "angular.z (rad/s)")  # as the numbers of Curves behind the times
+PANELS = ("distance (m)", "linear.x (m/s)", "angular.z (rad/s)")  # as the numbers of curves after the times
 FEET = [(x, y, 4.0) for x in (-9.0, 9.0) for y in (-11.0, 11.0)]
 
 
 def run_picture(drawing: Drawing) -> Picture:
     """Draw the run; without followers there are no charts."""
-    followed = {name: curve for name, curve in drawing.curves.items() if curve.times}
+    followed = {name: rows for name, rows in drawing.curves.items() if rows}
     shapes = list(_window(drawing))
     colours = drawing.colours()
     height = (WINDOW - 2.0 * PANEL_GAP) / 3.0
     for index, title in enumerate(PANELS if followed else ()):
-        curves = [ChartLine(name, DARKENED[colours[name]], [*zip(each.times, each[index + 1], strict=True)])
-                  for name, each in followed.items()]  # fmt: skip
+        curves = [
+            ChartLine(name, DARKENED[colours[name]], [(row[0], row[index + 1]) for row in rows])
+            for name, rows in followed.items()
+        ]
         area = Area(LEFT, MARGIN + index * (height + PANEL_GAP), PANEL_WIDTH, height)
         names = ("time (s)" * (title == PANELS[-1]), title)
         shapes += Chart(area, names, curves).drawn()

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from rich.console import Console
     from rich.panel import Panel
-    from rich.text import Text
 
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import IssuedCommand, SimulationStep
@@ -187,14 +186,11 @@ def print_terminal(scene: FrameScene, eye: tuple[float, float] = SLANTED, color:
     """Print a picture of the terminal's size, in colour where it has any, or as `color` says: always or never."""
     from shutil import get_terminal_size
 
-    columns, lines = get_terminal_size()
-    coloured_console(color).print(_rich_text(TerminalPicture(scene, columns, lines - 1, eye)))
-
-
-def _rich_text(picture: TerminalPicture) -> Text:
     from rich.text import Text
 
-    return Text("\n").join(Text.assemble(*line) for line in picture.lines())
+    columns, lines = get_terminal_size()
+    picture = TerminalPicture(scene, columns, lines - 1, eye)
+    coloured_console(color).print(Text("\n").join(Text.assemble(*line) for line in picture.lines()))
 
 
 def _letters(words: str) -> Iterator[str]:
