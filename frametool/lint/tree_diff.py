@@ -227,15 +227,9 @@ class _Pair:
         parts: dict[tuple[str, str], set[str]] = {}
         for frame in self.common:
             parts.setdefault((self.a.roots[frame], self.b.roots[frame]), set()).add(frame)
-        for (root, other), frames in parts.items():
+        for (root, _), frames in parts.items():
             if len(frames) > 1:
-                start = next(frame for frame in self.a.below(root) if frame in frames)
-                if start != root:
-                    where = f"of B hangs from {shown(other)}" if root in self.b.tree.frames else "is not in B"
-                    self.notes.append(f"seen from {shown(start)}, because the root of A, {shown(root)}, {where}")
-                self._see_from(start)
-        if len(parts) > 1 and not (self.a.without_data or self.b.without_data):
-            self.notes.append(f"{len(parts)} parts that hang together in A and in B, each seen from a frame of its own")
+                self._see_from(next(frame for frame in self.a.below(root) if frame in frames))
 
     def _see_from(self, start: str) -> None:
         in_a, in_b = self.a.seen_from(start), self.b.seen_from(start)

@@ -116,7 +116,7 @@ def test_an_edge_turned_round_is_no_move() -> None:
 def test_a_root_that_only_one_has_makes_place_for_what_is_below_it() -> None:
     arm = ("base", "arm", turned(10, "z", (1, 0, 0)))
     comparison = diff(tree_of(("map", "base", turned(90)), arm), tree_of(arm))
-    assert comparison.notes == ["seen from 'base', because the root of A, 'map', is not in B"]
+    assert comparison.notes == []
     assert [(each.kind, each.frame) for each in comparison.differences] == [("only-in-a", "map"), ("parent", "base")]
     assert next(each for each in comparison.unmoved if each.frame == "arm").seen_from == "base"
 
@@ -125,7 +125,6 @@ def test_parts_that_are_not_connected_are_each_seen_from_their_own_root() -> Non
     edges = [("a", "b", turned(1)), ("c", "d", turned(2)), ("d", "e", turned(3))]
     told = diff(tree_of(*edges), tree_of(*edges))
     assert {each.frame: each.seen_from for each in told.unmoved} == {"a": None, "b": "a", "c": None, "d": "c", "e": "c"}
-    assert told.notes == ["2 parts that hang together in A and in B, each seen from a frame of its own"]
     assert {each.note for each in diff(tree_of(*edges), tree_of(*edges), seen_from="a").unmoved} == {
         "", "not connected to 'a' in both",
     }  # fmt: skip
