@@ -147,8 +147,8 @@ def state(files: Sequence[FrameFile], *, whole: bool = True) -> None:
     for file in files:
         if inputs().verbose:
             say(f"{file.name}: {FORMATS[file.format].summary}")
-        if file.stated and not inputs().quiet:
-            say(file.stated)
+        if file.tally.assumed and not inputs().quiet:
+            say(f"{file.name}: {file.tally.assumed}")
 
 
 def opened(

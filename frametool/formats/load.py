@@ -118,11 +118,6 @@ class FrameFile(InputFile):
             return row.required_options[0 if words.isdisjoint(PARENT_COLUMNS) or words.isdisjoint(NAME_KEYS) else 1 :]
         return (*row.required_options, *["frames"] * bool(self.topics.chosen))
 
-    @property
-    def stated(self) -> str:
-        """Return what was assumed about a file that was read, or omitted; "" if it is complete."""
-        return f"{self.name}: {self.tally.assumed}" if self.tally.assumed else ""
-
     def edges(self, report: Report = stop, *, tell: bool = True, normalize: bool = False) -> Iterator[Edge]:
         """Yield the edges in the order of the file, then emit warnings; otherwise as `pieces`."""
         for piece in self.pieces(report, tell=tell, normalize=normalize):

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import Verbatim
-from frametool.errors import FormatError, ValueInvalid, alternatives, did_you_mean, shown, warn
+from frametool.errors import FormatError, ValueInvalid, alternatives, did_you_mean, first_of, shown, warn
 from frametool.formats.load import EdgePlace, close_all, lines_of
-from frametool.formats.trees.tree_reader import read_edges, shown_keys
+from frametool.formats.trees.tree_reader import MOST_KEYS, read_edges
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 from frametool.grammar.covariance import AXES, columns, is_sigma
@@ -279,7 +279,8 @@ def _of_row(row: Any, path: Path, request: Request, reading: Reading) -> Iterato
     if type(row) is not dict:
         raise Misfit(f"expected a measurement, found {kind(row)}; {LIKE}", path)
     if OURS.isdisjoint(row):
-        raise Misfit(f"expected measurements:, frames: or a row, found the keys {shown_keys(row)}; {LIKE}", path)
+        found = first_of([*row], MOST_KEYS, quote=shown)
+        raise Misfit(f"expected measurements:, frames: or a row, found the keys {found}; {LIKE}", path)
     if "samples" in row:
         raise Misfit("a frame that moves is not solved for; measure what stands still", (*path, "samples"), key=True)
     if set(row) == {"name"}:

@@ -18,7 +18,7 @@ from frametool.documents.source import InputFile
 from frametool.errors import FormatError, ValueInvalid, bare, first_of, shown, warn
 from frametool.formats.detect import detect
 from frametool.formats.table import FORMATS
-from frametool.formats.trees.tree_reader import shown_keys
+from frametool.formats.trees.tree_reader import MOST_KEYS
 from frametool.geometry.transform import Transform
 from frametool.grammar.edges import Answers
 from frametool.grammar.pose import inverted, read_pose
@@ -144,7 +144,7 @@ def _listed(value: Any) -> Iterator[tuple[Path, Any]]:
         yield (), value
         return
     if type(value) is not list:
-        found = f"the keys {shown_keys(value)}" if type(value) is dict else kind(value)
+        found = f"the keys {first_of([*value], MOST_KEYS, quote=shown)}" if type(value) is dict else kind(value)
         raise Misfit(f"expected samples {LIKE}, found {found}; two files of poses are GRIPPER TARGET", path)
     yield from (((*path, at), each) for at, each in enumerate(value))
 
@@ -154,7 +154,7 @@ def _sample(value: Any, reading: Reading, *, eye_to_hand: bool) -> tuple[Pose, P
     sample = as_mapping(value, f"a sample {LIKE}")
     first = next((key for key in PARTNERS if key in sample), None)
     if first is None:
-        raise Misfit(f"no sample; expected {LIKE}, found the keys {shown_keys(sample)}")
+        raise Misfit(f"no sample; expected {LIKE}, found the keys {first_of([*sample], MOST_KEYS, quote=shown)}")
     second = next((key for key in PARTNERS[first] if key in sample), None)
     if second is None:
         raise Misfit(f"missing {PARTNERS[first][0]} beside {first}")

@@ -74,10 +74,12 @@ class MjcfModel:
     def __init__(self, root: XmlNode, options: Options) -> None:
         """Read a model; raises FormatError."""
         self.options = options
-        self._refuse(root)
+        nodes = [root]
+        for node in nodes:  # grows during the loop
+            nodes += node.children
+            if node.tag in REFUSED:
+                raise node.error(f"<{node.tag}> is not expanded here; {WHOLE}")
         self.poses = PoseReader(root)
-        for section in root.all("default"):
-            self._refuse(section)
         self.classes = Classes(root)
         self.links: dict[str, Link] = {}
         self.joints: dict[str, Joint] = {}
@@ -85,19 +87,12 @@ class MjcfModel:
         for section in root.all("worldbody"):
             self._walk(section)
 
-    def _refuse(self, node: XmlNode) -> None:
-        """Refuse elements that MuJoCo would have to expand first."""
-        for child in node.all(*REFUSED):
-            raise child.error(f"<{child.tag}> is not expanded here; {WHOLE}")
-
     def _walk(self, section: XmlNode) -> None:
         """Read the contents of a world in the order of the file; with a stack, because bodies may be deep."""
-        self._refuse(section)
         pending = [(child, _Inside(WORLD, "", IDENTITY)) for child in reversed(section.children)]
         while pending:
             node, around = pending.pop()
             if (inside := self._take(node, around)) is not None:
-                self._refuse(node)
                 pending += [(child, inside) for child in reversed(node.children)]
 
     def _take(self, node: XmlNode, inside: _Inside) -> _Inside | None:
@@ -226,16 +221,14 @@ def _key(root: XmlNode, state: str) -> XmlNode:
     """Return the key of a name or number."""
     keys = [key for frames in root.all("keyframe") for key in frames.all("key")]
     file = root.xml.name
-    names = {key.attribute("name") or str(index): key for index, key in enumerate(keys)}
-    numbered = {str(index): key for index, key in enumerate(keys)}
     if not keys:
         raise FormatError("no <key> in it, which would have joint values", source=file)
-    if not state:
-        message = f"name one of its keys: {file}:{next(iter(names))}"
-        raise FormatError(f"{message}{alternatives('', names, 'keys')}", source=file)
-    if state not in names | numbered:
-        raise FormatError(f"no key {shown(state)}{alternatives(state, names, 'keys')}", source=file)
-    return names.get(state) or numbered[state]
+    names = {key.attribute("name") or str(index): key for index, key in enumerate(keys)}
+    states = {str(index): key for index, key in enumerate(keys)} | names
+    if state not in states:
+        message = f"no key {shown(state)}" if state else f"name one of its keys: {file}:{next(iter(names))}"
+        raise FormatError(f"{message}{alternatives(state, names, 'keys')}", source=file)
+    return states[state]
 
 
 def _value(joint: Joint, numbers: list[float], refuse: Callable[[str, Path], FormatError]) -> Any:

@@ -273,34 +273,51 @@ class SdfJoint(NamedTuple):
     """The connection of two bodies, links or the world.
 
     motions: what moves, outermost first; empty for a fixed joint
-    hanging: the child, whose parent is `outer`; the world is always the parent
-
     """
 
     frame: SdfFrame
     parent: SdfFrame
     child: SdfFrame
     motions: tuple[Joint, ...]
-    hanging: SdfFrame
-    outer: SdfFrame
+
+    @property
+    def ends(self) -> tuple[SdfFrame, SdfFrame]:
+        """Return the child, and its parent in the tree: the world is always the parent."""
+        return (self.parent, self.child) if self.child.kind == WORLD else (self.child, self.parent)
 
 
-class SdfJoints:
-    """All joints of a file, in its order.
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield the edges of a world or model, with joint values from options, default as in the file."""
+    yield from _SdfTree(SdfFrames(read_nodes(XmlFile(file), HELD), options)).edges()
 
-    names: the names for their values, without scopes if these are unique
+
+class _SdfTree:
+    """Builds the tree of the frames of a file.
+
+    names: the names of joints for their values, without scopes if these are unique
     """
 
     def __init__(self, frames: SdfFrames) -> None:
-        """Read them; raises FormatError."""
         self.frames = frames
+        self.options = frames.options
         of_joints = [frame for frame in frames.all.values() if frame.kind == "joint"]
         counts = Counter(frame.holder.attribute("name") for frame in of_joints)
         self.names = {
             frame.name: local if counts[local := frame.holder.attribute("name")] == 1 else frame.name
             for frame in of_joints
         }
-        self.all = [self._read(frame) for frame in of_joints]
+        self.joints = [self._read(frame) for frame in of_joints]
+        self.hung: dict[str, SdfJoint] = {}  # link -> the joint above it
+        self._groups = Groups[str]()  # of connected links
+        for joint in self.joints:
+            self._hang(joint)
+        ends = [end for joint in self.joints for end in (joint.parent, joint.child)]
+        self.in_world = frames.top.holder.tag == "world" or frames.top in ends
+        self.carried: dict[str, SdfFrame] = {}  # model -> the link above its frame, if it is not the other way round
+        for model in frames.all.values():
+            link = self.body(model) if model.kind == "model" else None
+            if link is not None and link.name in self.hung:
+                self.carried[model.name] = link
 
     def body(self, frame: SdfFrame) -> SdfFrame | None:
         """Return the link, or the world, that a frame moves with; None for a model without links.
@@ -336,8 +353,7 @@ class SdfJoints:
         if kind in STILL:
             named = f"joint {shown(frame.local)} is a {kind}"
             self.frames.note(holder, f"{named}: it is fixed as in the file and takes no value")
-        hanging, outer = (parent, child) if child.kind == WORLD else (child, parent)
-        return SdfJoint(frame, parent, child, self._motions(frame, kind), hanging, outer)
+        return SdfJoint(frame, parent, child, self._motions(frame, kind))
 
     def _motions(self, frame: SdfFrame, kind: str) -> tuple[Joint, ...]:
         name, line = self.names[frame.name], frame.holder.line
@@ -398,38 +414,13 @@ class SdfJoints:
         held = holder.first(tag)
         return default if held is None else held.numbers(1)[0]
 
-
-def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the edges of a world or model, with joint values from options, default as in the file."""
-    yield from _SdfTree(SdfFrames(read_nodes(XmlFile(file), HELD), options)).edges()
-
-
-class _SdfTree:
-    """Builds the tree of the frames of a file."""
-
-    def __init__(self, frames: SdfFrames) -> None:
-        self.frames = frames
-        self.joints = joints = SdfJoints(frames)
-        self.options = frames.options
-        self.hung: dict[str, SdfJoint] = {}  # link -> the joint above it
-        self._groups = Groups[str]()  # of connected links
-        for joint in joints.all:
-            self._hang(joint)
-        ends = [end for joint in joints.all for end in (joint.parent, joint.child)]
-        self.in_world = frames.top.holder.tag == "world" or frames.top in ends
-        self.carried: dict[str, SdfFrame] = {}  # model -> the link above its frame, if it is not the other way round
-        for model in frames.all.values():
-            link = joints.body(model) if model.kind == "model" else None
-            if link is not None and link.name in self.hung:
-                self.carried[model.name] = link
-
     def _hang(self, joint: SdfJoint) -> None:
         """Make a joint the parent of a link; one that would close a loop is omitted, with a note."""
-        link = joint.hanging.name
+        link, outer = (end.name for end in joint.ends)
         if link in self.hung:
             where = f"{shown(link)} hangs on joint {shown(self.hung[link].frame.local)} already"
-        elif not self._groups.join(link, joint.outer.name):
-            where = f"{shown(joint.outer.name)} hangs on {shown(link)} already"
+        elif not self._groups.join(link, outer):
+            where = f"{shown(outer)} hangs on {shown(link)} already"
         else:
             self.hung[link] = joint
             return
@@ -452,8 +443,9 @@ class _SdfTree:
         if joint := self.hung.get(frame.name):
             line = joint.frame.holder.line
             origin, after = relative(joint.parent, joint.frame), relative(joint.frame, joint.child)
-            rest, inverted = relative(joint.outer, frame), frame is joint.parent
-            return Link(joint.outer.name, frame.name, origin, joint.motions, line, after, rest, inverted)
+            outer = joint.ends[1]
+            rest, inverted = relative(outer, frame), frame is joint.parent
+            return Link(outer.name, frame.name, origin, joint.motions, line, after, rest, inverted)
         outer = self._outer(frame)
         model = frame.below(self.frames.top)[-1]
         stays = outer is self.frames.top and model.kind == "model" and relative(outer, model) == IDENTITY
@@ -474,9 +466,9 @@ class _SdfTree:
 
     def _posture(self) -> JointState:
         """Return the joint values; their names are those of the joints here: `tip` for `arm::tip`."""
-        moving = [motion for joint in self.joints.all for motion in joint.motions]
-        fixed = [self.joints.names[joint.frame.name] for joint in self.joints.all if not joint.motions]
+        moving = [motion for joint in self.joints for motion in joint.motions]
+        fixed = [self.names[joint.frame.name] for joint in self.joints if not joint.motions]
         answers = self.options.answers
-        values = {self.joints.names.get(name, name): value for name, value in answers.joints.items()}
+        values = {self.names.get(name, name): value for name, value in answers.joints.items()}
         options = self.options._replace(answers=answers._replace(joints=values))
         return JointState(moving, options, self.frames.top.holder.xml.name, fixed=fixed)

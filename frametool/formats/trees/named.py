@@ -46,10 +46,9 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield one edge per name."""
     frames = options.answers.frames
     base = options.answers.names("base")[0]
-    count, in_base, said, left = 0, False, True, dict[str, None]()
+    in_base, said, left = list[bool](), list[bool](), dict[str, None]()  # of each pose; remarks
 
     def take(value: Any, reading: Reading) -> Iterator[Edge]:
-        nonlocal count, in_base, said
         reading.bare_numbers = False
         top: dict[Any, Any] = as_mapping(value, "poses by the names of frames")
         path: Path = ()
@@ -63,21 +62,20 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
             reading.here = here
             try:
                 pose, ends = _entry(name, entry, reading, options, left)
-                in_base |= ends is None
-                said &= type(entry) is dict and not {*PARENTS}.isdisjoint(entry)
+                in_base.append(ends is None)
+                said.append(type(entry) is dict and not {*PARENTS}.isdisjoint(entry))
                 target, source, child = ends or (base, str(name), str(name))
                 if child != source:
                     pose = rigid.inverse(*pose)
                 yield Edge(source if child == target else target, child, pose, path=here)
-                count += 1
             except Misfit as misfit:
                 reading.refuse(misfit.below(*here))
 
     yield from document_edges(file, options, take)
-    if frames and said:
+    if frames and all(said):
         options.tally.note(f"--frames {','.join(frames)} has no effect: each pose names its parent", 1)
-    count_of = f"{count} {'pose' if count == 1 else 'poses'}"
-    assumed = f"{count_of} in {bare(base)} (--frames says another)" if in_base and not frames else ""
+    count = f"{len(said)} {'pose' if len(said) == 1 else 'poses'}"
+    assumed = f"{count} in {bare(base)} (--frames says another)" if any(in_base) and not frames else ""
     others = f"{', '.join(map(bare, left))} left out" if left else ""
     options.tally.assumed = "; ".join(filter(None, (assumed, others)))
 

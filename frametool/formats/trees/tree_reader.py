@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import InputFile, Source, pointer
-from frametool.errors import Finding, FormatError, Unanswered, ValueInvalid, alternatives, bare, shown
+from frametool.errors import Finding, FormatError, Unanswered, ValueInvalid, alternatives, bare, first_of, shown
 from frametool.frames.stamps import parse_stamp
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Diagnostics, Edge, Options
@@ -40,6 +40,7 @@ TREE_KEYS = frozenset(("frames", "angles"))
 STAMP_KEYS = frozenset(("stamp", "stamp_ns"))
 TIMED = frozenset(("samples", "camera", *STAMP_KEYS))
 XYZ = ("x", "y", "z")
+MOST_KEYS = 5  # of a mapping in a message
 NO_NAME = "is in place of a frame's name: a root has no pose, its keys are its children"
 CAMERA_KEYS = ("model", "K", "D", "size", "skew", "xi", "alpha", "beta", "w", "axes", "R", "P")
 LOOSE = frozenset(("x", "roll", "yaw", "theta", "qw", "yaw_deg", "x_mm"))  # single numbers
@@ -89,21 +90,8 @@ def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
     else:
         raise Misfit(
             f"no frame tree: expected frames:, transforms: or an entry with name: and parent:; "
-            f"found the keys {shown_keys(value)} (frametool help frames)",
+            f"found the keys {first_of([*value], MOST_KEYS, quote=shown)} (frametool help frames)",
         )
-
-
-def shown_keys(value: dict[str, Any]) -> str:
-    """Return the first keys of a mapping in quotes, within about sixty characters."""
-    named = ""
-    for key in value:
-        if len(more := f"{named}{', ' * bool(named)}{shown(key)}") > MOST_SHOWN and named:
-            return f"{named} .."
-        named = more
-    return named
-
-
-MOST_SHOWN = 70  # characters of the keys that were found
 
 
 def _tree(document: dict[str, Any], reading: Reading) -> Iterator[Edge]:
