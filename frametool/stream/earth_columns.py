@@ -263,7 +263,7 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
     except ValueInvalid as error:
         raise Misused(f"--columns: {error}") from None
     behind = places[most:]
-    turned = find_rotations([name if at in behind else "" for at, name in enumerate(called)], None) if behind else []
+    turned = find_rotations(Header([name if at in behind else "" for at, name in enumerate(called)]), None)
     if behind and len(turned) != 1:
         others = ", ".join(called[at] for at in behind)
         raise Misused(f"--columns: {others} are no rotation behind {request.given_place}")

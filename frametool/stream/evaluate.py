@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Target
     from frametool.stream.rows import Block
-    from frametool.stream.stamp_source import Timed
     from frametool.text.spans import Flags, Floats, Ints
 
 
@@ -221,32 +220,23 @@ class Run:
     def _movers(self) -> list[Rigid | None]:
         """Return the pose that moves each point or pose of the rows: of its own frame, at its own time, or none."""
         plan, block, shapes = self.plan, self.block, max(len(self.plan.shapes), 1)
-        if self.operation.formula is not None and not self.operation.shown:
+        if not self.count or (self.operation.formula is not None and not self.operation.shown):
             return [None] * shapes
-        sources = [[plan.source]] if plan.source else block.sources
-        edges = list(map(self._edge, sources)) or [None] * shapes
-        if self.request.timed is not None and self.count:
-            frames = sources or [block.names.frames or [None]]
-            movers = [  # the rows of a table have one stamp for all their points
-                self._by_time(self.request.timed, at, names) if len(block.stamps[at]) else edges[at]
-                for at, names in enumerate(frames)
-            ]
-            return movers * (shapes // len(movers))
-        if plan.edge_of is not None and self.count and not sources:
-            return [by_frame(plan.edge_of, block.names.frames, self._blame, plan.frame_column)] * shapes
-        return edges
+        frames = [[plan.source]] if plan.source else block.sources or [block.names.frames or [None]]
+        movers = [self._mover(at, each) for at, each in enumerate(frames)]
+        return movers * (shapes // len(movers))  # the rows of a table have one stamp and one frame for all their points
 
-    def _edge(self, frames: Sequence[str | None]) -> Rigid | None:
-        """Return the pose that moves one of the shapes of the rows, by the frames that it is expressed in."""
-        edge_of = self.plan.edge_of
-        if edge_of is None or not self.count:
+    def _mover(self, at: int, frames: Sequence[str | None]) -> Rigid | None:
+        """Return the pose that moves one of the points or poses of the rows, by the frames that it is expressed in."""
+        plan, timed = self.plan, self.request.timed
+        if timed is not None and len(self.block.stamps[at]):
+            times = self._times(at)
+            rows = np.delete(np.arange(self.count), [*self.reasons])
+            return by_time(timed, times, rows, frames, self._blame, plan.frame_column)
+        if plan.edge_of is None:
             return None
-        return edge_of(frames[0]) if len(frames) == 1 else by_frame(edge_of, frames, self._blame)
-
-    def _by_time(self, timed: Timed, at: int, frames: Sequence[str | None]) -> Rigid:
-        times = self._times(at)
-        rows = np.delete(np.arange(self.count), [*self.reasons])
-        return by_time(timed, times, rows, frames, self._blame, self.plan.frame_column)
+        is_one = len(frames) == 1 and (plan.source or self.block.sources)
+        return plan.edge_of(frames[0]) if is_one else by_frame(plan.edge_of, frames, self._blame, plan.frame_column)
 
     def _compute(self, columns: list[Floats], movers: Sequence[Rigid | None], state: State) -> list[Components]:
         """Apply the operation to each point or pose of the rows."""
@@ -302,21 +292,6 @@ class Run:
         for row in np.flatnonzero(weights < 0.0).tolist():
             self._blame(row, name, f"weight {weights[row]:g} is negative")
         return weights
-
-    def _why_no_value(self, row: int) -> str | FrametoolError:
-        """Evaluate an expression for one row alone, which says why it has no value there."""
-        operation = self.operation
-        for at, (shape, columns, _) in enumerate(self._things(self.columns)):
-            own = tuple(float(column[row]) for column in columns)
-            times = int(self._times(at)[row]) if operation.formula and operation.formula.needs_time else None
-            try:
-                operation.result(
-                    shape, own, None, floats, times_ns=times, compared=lambda pose: [pose], seconds=float,
-                    rotation=partial(_checked, shape),
-                )  # fmt: skip
-            except FrametoolError as error:
-                return error
-        return "the result is not finite: the numbers are too large"
 
     def _good(self) -> list[int]:
         return [row for row in range(self.count) if row not in self.reasons and row not in self.outside]
@@ -461,19 +436,24 @@ class Run:
 
     def _why_not_finite(self, row: int, moved: Sequence[Components]) -> tuple[str, str | FrametoolError]:
         """Return the column and the reason why a row has no finite result."""
-        if self.operation.formula:
-            return "", self._why_no_value(row)
-        first = 0
-        for shape, columns, _ in self._things(self.columns):
+        operation, first = self.operation, 0
+        for at, (shape, columns, _) in enumerate(self._things(self.columns)):
+            own = tuple(float(column[row]) for column in columns)
+            times = int(self._times(at)[row]) if operation.formula and operation.formula.needs_time else None
             try:
-                if shape.place is not None:
-                    shape.place.check([float(column[row]) for column in columns[: shape.place.size]])
-            except ValueInvalid as error:
-                return self.plan.names[first], error
+                if operation.formula:  # for one row alone, it says so itself
+                    operation.result(
+                        shape, own, None, floats, times_ns=times, compared=lambda pose: [pose], seconds=float,
+                        rotation=partial(_checked, shape),
+                    )  # fmt: skip
+                elif shape.place is not None:
+                    shape.place.check(own[: shape.place.size])
+            except FrametoolError as error:
+                return "" if operation.formula else self.plan.names[first], error
             first += shape.size
         for target, parts in zip(self.plan.targets, moved, strict=True):
             try:
-                if target.place is not None:
+                if target.place is not None and not operation.formula:
                     target.place.check_result(*(float(np.broadcast_to(part, self.count)[row]) for part in parts[:3]))
             except ValueInvalid as error:
                 return "", error

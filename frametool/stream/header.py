@@ -194,9 +194,8 @@ def _position(columns: Columns) -> Columns:
     return columns._replace(unit=x if x == y == z else (x, y, z))
 
 
-def find_rotations(names: Sequence[str] | Header, expected: Notation | None) -> list[Columns]:
+def find_rotations(header: Header, expected: Notation | None) -> list[Columns]:
     """Return every set of columns that can be a rotation, of the expected notation if there is one."""
-    header = names if isinstance(names, Header) else Header(names)
     rows = SEARCHED if expected is None else _searched(expected)
     found: dict[frozenset[int], Columns] = {}  # qvec_w .. are found by either of two names
     for row in rows:

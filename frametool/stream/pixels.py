@@ -149,14 +149,13 @@ class PointsOfPixels(Seen):
 
     def shown(self, target: str) -> Shown:
         """Return how the numbers are written; target: the frame that they are in, if it has a name."""
-        framed: dict[str, Any] = {"frame": target} if target else {}
         if self.into is not None:
             listed = self.columns[0].startswith("pixel")
             members: dict[str, Any] = {"pixel": (0, 1)} if listed else {self.columns[at]: (at,) for at in range(2)}
             return Shown({}, members, replaces=True)
-        if self.height is None and not self.far:
-            return Shown({}, {**framed, "origin": (0, 1, 2), "ray": (3, 4, 5)})
-        return Shown({}, {**framed, "point": (0, 1, 2)})
+        rays = {"origin": (0, 1, 2), "ray": (3, 4, 5)}
+        framed: dict[str, Any] = {"frame": target} if target else {}
+        return Shown({}, framed | (rays if self.extras("") == RAY else {"point": (0, 1, 2)}))
 
     def extras(self, row: str) -> tuple[str, ...]:  # noqa: ARG002
         """Name the numbers."""
