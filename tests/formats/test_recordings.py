@@ -103,7 +103,7 @@ def read(tmp_path: Path, text: str | bytes) -> list[Edge]:
 def test_every_form_gives_the_same_samples_however_the_bytes_are_cut(
     form: str, block: int, tmp_path: Path, sizes: Sizes
 ) -> None:
-    sizes(piece=block)
+    sizes(block=block)
     assert [each[:4] for each in read(tmp_path, FORMS[form])] == EXPECTED
 
 
