@@ -1,6 +1,6 @@
 """Records into other forms, whole processes: `python tests/benchmarks/bench_records.py [N]`.
 
-N poses as JSON lines become a table, a trajectory and a recording, and messages of a recording become a table again,
+N poses as JSON lines become a table, a trajectory, a recording and documents of YAML, and messages of a recording become a table again,
 each beside the same from CSV.  Least processor seconds of several runs, records a second, peak memory of all so far.
 """
 
@@ -20,12 +20,12 @@ RUNS = 3
 TOOL = [sys.executable, "-c", "from frametool.cli import main; main()"]
 
 
-def timed(folder: str, source: str, into: str) -> tuple[float, float]:
-    """Return the least processor seconds of converting a file into another, and the megabytes of memory so far."""
+def timed(folder: str, source: str, into: str, *command: str) -> tuple[float, float]:
+    """Return the least processor seconds of making a file of another, and the megabytes of memory so far."""
     best = float("inf")
     for _ in range(RUNS):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        subprocess.run([*TOOL, "convert", "-i", source, "-o", into, "--force", "--quiet"], stderr=subprocess.DEVNULL, check=True, cwd=folder)
+        subprocess.run([*TOOL, *(command or ("convert",)), "-i", source, "-o", into, "--force", "--quiet"], stderr=subprocess.DEVNULL, check=True, cwd=folder)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         best = min(best, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
     return best, after.ru_maxrss / 1024
@@ -41,7 +41,7 @@ def main(count: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         with Path(folder, "walk.csv").open("w", encoding="utf-8") as table, Path(folder, "walk.jsonl").open("w", encoding="utf-8") as lines:
             table.write("stamp_ns,x,y,z,qx,qy,qz,qw\n")
-            for at, row in enumerate(rows):
+            for at, row in enumerate(rows, 1):
                 table.write(f"{at}0000000,{','.join(map(repr, row))}\n")
                 lines.write(f'{{"stamp_ns": {at}0000000, "xyz": {row[:3]}, "xyzw": {row[3:]}}}\n')
         print(f"{'records':<14} {'seconds':>8} {'a second':>9} {'MB':>5}  times those of CSV")
@@ -49,6 +49,11 @@ def main(count: int) -> None:
             seconds, memory = timed(folder, source, into)
             theirs, _ = timed(folder, "walk.csv", into.replace("csv", "tum"))
             print(f"{source.rpartition('.')[2]:<5} -> {into.rpartition('.')[2]:<5} {seconds:8.2f} {count / seconds:9.0f} {memory:5.0f}  {seconds / theirs:.2f}")
+        table, _ = timed(folder, "walk.jsonl", "new.csv")
+        print("the same as documents of YAML, and what depends on the rows before, as rows of CSV; times JSON lines to CSV")
+        for command, into in (((), "new.yaml"), (("relative", "--consecutive"), "new.csv"), (("relative", "--consecutive", "--velocity"), "new.csv")):
+            seconds, memory = timed(folder, "walk.jsonl", into, *command)
+            print(f"{' '.join((*command, into)):<44} {seconds:8.2f} {count / seconds:9.0f} {memory:5.0f}  {seconds / table:.2f}")
 
 
 if __name__ == "__main__":
