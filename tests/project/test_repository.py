@@ -145,3 +145,11 @@ def test_who_cites_it_says_this_version() -> None:
 @pytest.mark.parametrize("path", re.findall(r"`([\w./]+\.(?:py|toml|md)|frametool/[\w/]+/)`", (ROOT / ".github" / "CONTRIBUTING.md").read_text()))
 def test_what_contributors_are_sent_to_is_there(path: str) -> None:
     assert (ROOT / path).exists()
+
+
+def test_what_contributors_are_told_to_look_at_is_defined() -> None:
+    steps = re.findall(r"(?m)^\d+\. .*", (ROOT / ".github" / "CONTRIBUTING.md").read_text())
+    named = {name.rpartition(".")[2] for step in steps for name in re.findall(r"`([A-Za-z_]+(?:\.[a-z_]+)?)`", step)}
+    sources = "\n".join(path.read_text() for path in (ROOT / "frametool").rglob("*.py"))
+    assert len(named) > 15
+    assert [name for name in sorted(named) if not re.search(rf"\b(?:def|class) {name}\b", sources)] == []
