@@ -402,11 +402,19 @@ def test_files_of_a_folder_are_counted_each_by_itself(chosen: tuple[str, ...], r
 # --- what is not whole ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("compression", ["", "lz4", "zstd"])
-def test_a_chunk_that_promises_more_than_a_file_holds_is_not_unpacked(compression: str, run: Run, tmp_path: Path) -> None:
+FRAME = b"\x28\xb5\x2f\xfd\xe0" + struct.pack("<Q", 600 << 20)  # of zstd, which says how large it will be
+
+
+@pytest.mark.parametrize(
+    ("compression", "stated", "data"),
+    [("", 600 << 20, b"no chunk."), ("lz4", 600 << 20, b"no chunk."), ("zstd", 600 << 20, b"no chunk."), ("zstd", 9, FRAME)],
+)
+def test_a_chunk_that_promises_more_than_a_file_holds_is_not_unpacked(
+    compression: str, stated: int, data: bytes, run: Run, tmp_path: Path
+) -> None:
     size = 600 << 20
-    head = struct.pack("<QQQI", 0, 0, size, 0) + by_hand.text(compression) + struct.pack("<Q", 9)
-    (tmp_path / "run.mcap").write_bytes(by_hand.whole(by_hand.header(), by_hand.record(6, head + b"no chunk.")))
+    head = struct.pack("<QQQI", 0, 0, stated, 0) + by_hand.text(compression) + struct.pack("<Q", len(data))
+    (tmp_path / "run.mcap").write_bytes(by_hand.whole(by_hand.header(), by_hand.record(6, head + data)))
     done = run("record", "run.mcap", "-o", "new.mcap")
     assert (done.status, done.err.count("frametool: run.mcap: ")) == (1, 1)
     assert f"a chunk of {size} bytes; {1 << 28} are read" in done.err
