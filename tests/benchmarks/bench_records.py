@@ -49,11 +49,11 @@ def main(count: int) -> None:
             seconds, memory = timed(folder, source, into)
             theirs, _ = timed(folder, "walk.csv", into.replace("csv", "tum"))
             print(f"{source.rpartition('.')[2]:<5} -> {into.rpartition('.')[2]:<5} {seconds:8.2f} {count / seconds:9.0f} {memory:5.0f}  {seconds / theirs:.2f}")
-        table, _ = timed(folder, "walk.jsonl", "new.csv")
+        of_table, _ = timed(folder, "walk.jsonl", "new.csv")
         print("the same as documents of YAML, and what depends on the rows before, as rows of CSV; times JSON lines to CSV")
         for command, into in (((), "new.yaml"), (("relative", "--consecutive"), "new.csv"), (("relative", "--consecutive", "--velocity"), "new.csv")):
             seconds, memory = timed(folder, "walk.jsonl", into, *command)
-            print(f"{' '.join((*command, into)):<44} {seconds:8.2f} {count / seconds:9.0f} {memory:5.0f}  {seconds / table:.2f}")
+            print(f"{' '.join((*command, into)):<44} {seconds:8.2f} {count / seconds:9.0f} {memory:5.0f}  {seconds / of_table:.2f}")
 
 
 if __name__ == "__main__":
