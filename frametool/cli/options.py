@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import Inputs, Text, inputs, misuse, option, refuse, say_if_typed, together
-from frametool.cli.stderr import say, say_error
+from frametool.cli.stderr import say_error
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, heard_by, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
 from frametool.geometry.euler import AXES
@@ -208,12 +208,6 @@ def for_each(formats: Sequence[str], files: int) -> list[str]:
     """Return the format of each of several files as --in names them, the last for the rest; "" where it names none."""
     refuse(len(formats) > files, f"--in names {len(formats)} formats for {files} file{'s' * (files != 1)}")
     return [*formats, *([*formats[-1:]] or [""]) * (files - len(formats))]
-
-
-def say_if_verbose(text: str) -> None:
-    """Write a line on stderr if the command was called with -v."""
-    if inputs().verbose:
-        say(text)
 
 
 # --- results -------------------------------------------------------------------------------------------------------

@@ -159,12 +159,7 @@ def source_of(argument: str | Source) -> Source:
     if isinstance(argument, Source):
         return argument
     if is_inline(argument):
-        bare, is_inverse = without_inverse(argument)
-        if not is_inverse:
-            return Source(INLINE, bare)
-        from frametool.stream.request import Request
-
-        return _inverses(Source(INLINE, bare), Request())
+        return Source(INLINE, argument)
     if argument != "-":
         try:
             return Source(argument, read_text(argument))

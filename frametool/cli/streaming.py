@@ -251,8 +251,8 @@ class Stream:
         from frametool.formats.detect import detect
 
         fmt = detect(begin, *options.STREAMED, name=self.path or "", otherwise="columns" if is_table else "")
-        if not quiet:
-            options.say_if_verbose(f"{self.name}: read as {fmt} ({FORMATS[fmt].summary})")
+        if self.inputs.verbose and not quiet:
+            say(f"{self.name}: read as {fmt} ({FORMATS[fmt].summary})")
         return fmt
 
     def _way(self, fmt: str, request: Request, output: Output) -> Callable[..., tuple[Generator[Outcome], About]]:

@@ -190,7 +190,7 @@ def test_examples_replace_nothing_without_being_told(run: Callable[..., Any], tm
 @pytest.mark.parametrize(
     ("words", "status", "message"),
     [
-        (("robto.yaml",), 2, "no example 'robto.yaml'; did you mean 'robot.svg' or 'robot.yaml'?"),
+        (("robto.yaml",), 2, "no example 'robto.yaml'; did you mean 'robot.yaml'?"),
         (("xyzzy",), 2, "no example 'xyzzy'; `frametool examples` lists all"),
         (("-o", "-"), 2, "--output - prints one example; name it, or a folder for all"),
         (("--force",), 2, "--force needs --output"),

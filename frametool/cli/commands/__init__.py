@@ -124,22 +124,17 @@ def _show_version(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:
         ctx.exit()
 
 
-EXTRAS = {"rosbags": "bag", "pyarrow": "arrow", "laspy": "las", "matplotlib": "plot"}  # package -> extra with it
+PACKAGES = ("numpy", "click", "rich", "pyyaml", "rosbags", "pyarrow", "laspy", "matplotlib")
 
 
 def _surroundings() -> str:
     """Return the versions of Python and of the packages there are, one a line, for a report of a fault."""
     import platform
-    from importlib.metadata import PackageNotFoundError, version
+    from importlib.metadata import distributions
 
-    lines = [f"Python {platform.python_version()} on {platform.system()} {platform.machine()}"]
-    for package in ("numpy", "click", "rich", "pyyaml", *EXTRAS):
-        try:
-            found = version(package)
-        except PackageNotFoundError:
-            found = "not installed"
-        lines.append(f"{package} {found}{f' (extra {EXTRAS[package]})' if package in EXTRAS else ''}")
-    return "".join(f"{line}\n" for line in lines)
+    there = {str(each.name).lower(): each.version for each in distributions()}
+    python = f"Python {platform.python_version()} on {platform.system()} {platform.machine()}\n"
+    return python + "".join(f"{package} {there.get(package, 'not installed')}\n" for package in PACKAGES)
 
 
 @click.command(cls=Group, help=HELP)
@@ -156,12 +151,44 @@ def called(arguments: list[str]) -> object:
     Not by click's own `main`, which writes to stderr at Ctrl-C and turns a closed pipe into status 1.
     """
     if instruction := os.environ.get(COMPLETION):
-        from frametool.cli.completion import answer
-
-        return answer(group, COMPLETION, instruction, " ".join(arguments))
+        return _completed(instruction, " ".join(arguments))
     width = 100 if sys.stdout.isatty() else 80
     with group.make_context("frametool", arguments, obj=(*arguments,), max_content_width=width) as ctx:
         return group.invoke(ctx)
+
+
+SCRIPTS = os.path.join(os.path.dirname(os.path.dirname(__file__)), "completions")  # of shells; the wheel installs them
+
+
+def _completed(wanted: str, line: str) -> int:
+    """Print what a shell asks for; return 0.
+
+    wanted: `words`, those that may end the line, each between its type and its meaning; or `bash_source` and the like
+    The scripts are our own: those of click differ with its versions, and part words at a colon or a comma.
+    """
+    shells = sorted(os.listdir(SCRIPTS))
+    if wanted == "words":
+        text = "".join("\t".join(row) + "\n" for row in _offers(line) if "".join(row).isprintable())
+    elif (shell := wanted.removesuffix("_source")) in shells:
+        with open(os.path.join(SCRIPTS, shell), encoding="utf-8") as script:
+            text = script.read()
+    else:
+        known = ", ".join(f"{each}_source" for each in shells)
+        raise click.UsageError(f"{COMPLETION} is {wanted!r}; it prints the completions of a shell as {known}")
+    with writing(None) as write:
+        write(text)
+    return 0
+
+
+def _offers(line: str) -> list[tuple[str, str, str]]:
+    """Return type, word and meaning of what may end a line; all of the word, also what comes before a `=`."""
+    from click.shell_completion import ShellComplete, split_arg_string
+
+    *words, begun = split_arg_string(f"{line}.")  # the point: behind a blank a word begins
+    option = begun[: begun.find("=") + 1] if begun.startswith("--") else ""
+    known = list(map(os.path.expanduser, words[1:]))
+    found = ShellComplete(group, {}, "frametool", COMPLETION).get_completions(known, begun[:-1])
+    return [(each.type, option + each.value, each.help or "") for each in found]
 
 
 def called_in(

@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 
 
 LIKE_A_FILE = r"(?!row\.)[^\s(){}\[\]*<>\"']*\.[A-Za-z]\w*"
-LONGEST_PATH = 4096
 
 
 def file_named_in(text: str, scope: Scope) -> Term | None:
@@ -49,7 +48,7 @@ def file_named_in(text: str, scope: Scope) -> Term | None:
     """
     head, equals, tail = text.partition("=")
     name, path = head.strip(), tail.strip()
-    if not equals or not name.isidentifier() or not 0 < len(path) < LONGEST_PATH:
+    if not equals or not name.isidentifier() or not path:
         return None
     if path != "-" and not os.path.exists(path) and not re.fullmatch(LIKE_A_FILE, path):
         return None

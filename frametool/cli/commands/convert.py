@@ -202,7 +202,6 @@ def _say_other_side(axes: str | None, world: str | None) -> None:
     """Report what changes the axes of the other frame of a pose where such conventions come in pairs."""
     from frametool.geometry.conventions import other_side
 
-    if axes and world is None and (other := other_side(axes, of_world=False)):
-        say(f"note: only the body axes changed; the world axes are as before (--world-axes {other})")
-    if world and axes is None and (other := other_side(world, of_world=True)):
-        say(f"note: only the world axes changed; the body axes are as before (--axes {other})")
+    changed, stays, option = ("world", "body", "--axes") if world else ("body", "world", "--world-axes")
+    if not (axes and world) and (other := other_side(world or axes or "", of_world=bool(world))):
+        say(f"note: only the {changed} axes changed; the {stays} axes are as before ({option} {other})")

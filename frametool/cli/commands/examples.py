@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-from os.path import splitext
 from typing import TYPE_CHECKING
 
 from frametool.cli.command import FILE, Inputs, Text, argument, command_named, option, refuse
 from frametool.cli.sink import refuse_existing, writing
-from frametool.errors import FileProblem, ValueInvalid, nearest, printable, shown
+from frametool.errors import FileProblem, ValueInvalid, any_near, printable, shown
 
 if TYPE_CHECKING:
     import click
@@ -44,11 +43,7 @@ class Example(Text):
         """Refuse an unknown one with the nearest."""
         name = text.removeprefix("examples/")
         if name not in names():
-            stems = {each: splitext(each)[0] for each in names()}
-            near = nearest(splitext(name)[0], set(stems.values()))
-            likely = " or ".join(shown(each) for each, stem in stems.items() if stem in near)
-            hint = f"did you mean {likely}?" if near else "`frametool examples` lists all"
-            raise ValueInvalid(f"no example {shown(name)}; {hint}")
+            raise ValueInvalid(f"no example {shown(name)}{any_near(name, names(), '`frametool examples` lists all')}")
         return name
 
     def offers(self, ctx: click.Context, incomplete: str) -> dict[str, str]:  # noqa: ARG002

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-import click
-
 from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.options import pose_options, reading_options, verbose_option
 from frametool.cli.output import copied_as, folder_of, opened_place
@@ -19,10 +15,6 @@ from frametool.grammar.edges import Diagnostics
 from frametool.grammar.readers import is_slashed
 from frametool.stream.faults import ON_ERROR, STOP, BadRows
 from frametool.view.progress import ProgressBar
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
 
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 messages skipped, 4 lookup, 5 file."
 TRANSFORMS = ("tf", "tf_static")  # how topics of transforms are called, in any namespace
@@ -74,8 +66,9 @@ def command(inputs: Inputs) -> int:
     from frametool.recordings.read import opened_recording
     from frametool.stream.record_run import RecordRequest, RecordRun
 
-    more, into, topics, normalize = inputs.more, inputs.into, inputs.moved_topics, inputs.peek("normalize")
-    _refuse_idle(more, into, topics)
+    more, into, normalize = inputs.more, inputs.into, inputs.peek("normalize")
+    are_transforms = all(topic.rpartition("/")[2] in TRANSFORMS for topic in inputs.peek("moved_topics"))
+    topics = inputs.moved_topics if into or (more and are_transforms) else ()
     path = tree_file(inputs.tree)
     if path == "-":
         raise FileProblem("stdin: a recording cannot be read from a pipe; name its file")
@@ -105,13 +98,6 @@ def command(inputs: Inputs) -> int:
     for sentence in () if quiet else run.summary():
         say(f"{path}: {sentence}")
     return bad.finish(sum(run.moved.values()))
-
-
-def _refuse_idle(more: Sequence[str], into: str | None, topics: Sequence[str]) -> None:
-    """Refuse options that would not be used."""
-    of_poses = [topic for topic in topics if topic.rpartition("/")[2] not in TRANSFORMS]
-    if topics and not into and (of_poses or not more):
-        raise click.UsageError(f"--topic {(of_poses or topics)[0]} is for --into FRAME, which moves its messages")
 
 
 def _bare(frame: str) -> str:

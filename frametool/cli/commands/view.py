@@ -105,7 +105,7 @@ def command(inputs: Inputs) -> None:
     sliders = chosen == "html" and not overlay and not inputs.no_sliders
     inputs.refuse_idle()
     content = _content(scene, chosen, tree, eye, before, str(target), sliders=sliders)
-    path = _page_file(tree) if inputs.opens and output is None else output
+    path = _page_file() if inputs.opens and output is None else output
     with writing(path, force=inputs.force or output is None) as write:
         write(content)
     if inputs.opens and path:
@@ -172,11 +172,10 @@ def _solids(tree: str) -> list[Solid]:
     return solids
 
 
-def _page_file(tree: str) -> str:
+def _page_file() -> str:
     """Name a file of one's own for a page that is only looked at."""
     from tempfile import mkstemp
 
-    begin = "".join(letter for letter in os.path.basename(tree)[:40] if letter.isalnum())
-    handle, path = mkstemp(prefix=f"frametool_{begin}_", suffix=".html")
+    handle, path = mkstemp(prefix="frametool_", suffix=".html")
     os.close(handle)
     return path
