@@ -105,9 +105,8 @@ def _check_together(context: click.Context, passed: Sequence[Option]) -> None:
     called = {each.name: each.opts[-1] for each in passed}
     for each in passed:
         name = each.opts[-1]
-        if others := called.keys() & {*each.excludes}:
-            first = min(others, key=each.excludes.index)
-            raise click.UsageError(f"{name} and {called[first]} exclude each other", context)
+        if others := [called[other] for other in each.excludes if other in called]:
+            raise click.UsageError(f"{name} and {others[0]} exclude each other", context)
         if each.requires and called.keys().isdisjoint(each.requires):
             known = {each.name: each.opts[-1] for each in context.command.params}
             choices = " or ".join(known[needed] for needed in each.requires if needed in known)
@@ -379,7 +378,7 @@ class Command(WithHelp):
             passed = ctx.meta[PASSED] = [each for each in found[2] if isinstance(each, Option)]
             for each in passed:
                 if passed.count(each) > 1 and not (each.multiple or each.is_flag or ctx.resilient_parsing):
-                    raise click.UsageError(f"{each.opts[-1]} is given twice; only one can be used", ctx)
+                    raise click.UsageError(f"{each.opts[-1]} appears twice; only one can be used", ctx)
             return found
 
         parser.parse_args = parse_noting

@@ -206,7 +206,7 @@ def input_formats(*, streams: bool = False) -> tuple[list[str], str]:
 
 def for_each(formats: Sequence[str], files: int) -> list[str]:
     """Return the format of each of several files as --in names them, the last for the rest; "" where it names none."""
-    refuse(len(formats) > files, f"--in names {len(formats)} formats for {files} file{'s' * (files != 1)}")
+    refuse(len(formats) > files, f"--in appears {len(formats)} times for {files} file{'s' * (files != 1)}")
     return [*formats, *([*formats[-1:]] or [""]) * (files - len(formats))]
 
 

@@ -302,8 +302,7 @@ class Stream:
         from frametool.stream.as_poses import FormatConverter
 
         target = output.chosen or _kept(fmt, output)
-        if target not in FORMATS:
-            raise click.UsageError(f"--format {target} is for single results and records, not for a stream of {fmt}")
+        refuse(target not in FORMATS, f"--format {target} is for single results and records, not for a stream of {fmt}")
         request = request._replace(by_default=not output.notations)
         converted = FormatConverter(fmt, request, output.style.with_format(target), self.name, answers())
         outcomes = converted.outcomes(stream, header=self.inputs.header)

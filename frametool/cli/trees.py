@@ -173,9 +173,8 @@ def opened(
         raise click.UsageError(f"--in {other[0]}: no frames are read from that; `frametool formats` lists what is")
     files = of or len(arguments)
     for option, values in (("--in", formats), ("--frames", named)):
-        if not streams and len(values) > files:
-            times = f"{len(values)} times for {files} file{'s' * (files != 1)}"
-            raise click.UsageError(f"{option} is given {times}")
+        more = f"{option} appears {len(values)} times for {files} file{'s' * (files != 1)}"
+        refuse(not streams and len(values) > files, more)
     format_of_next, general = iter(formats[behind:] or formats), answers()
     found = opened_together(
         FrameFile.inline(source_of(each))
@@ -192,7 +191,7 @@ def opened(
     lacking = [file for file in found if "frames" in file.required_options]
     if len(named) not in (0, 1, len(lacking), files):
         close_all(found)
-        raise click.UsageError(f"--frames is given {len(named)} times, {len(lacking)} of the files need names")
+        raise click.UsageError(f"--frames appears {len(named)} times, {len(lacking)} of the files need names")
     if len(named) == 1:  # for poses that have no names at all, rather than for names that others go without saying
         lacking = [file for file in lacking if "rows" in FORMATS[file.format].reads] or lacking
     for file, names in zip(found if len(named) == files else lacking, named[behind:] or named, strict=False):
@@ -228,8 +227,7 @@ def _joints(texts: Sequence[str]) -> dict[str, str]:
     for text in texts:
         name, _, value = text.partition("=")
         refuse(not (name and value), f"--joint takes NAME=VALUE, found {shown(text)}")
-        if name in values:
-            raise click.UsageError(f"--joint {shown(name)} is given twice, {values[name]} and {value}; leave one out")
+        refuse(name in values, f"--joint {shown(name)} has two values, {values.get(name)} and {value}; leave one out")
         values[name] = value
     return values
 
@@ -268,7 +266,7 @@ FRAME = Frame()
 
 
 def frame_name(name: str, tree: Frames | Robot) -> str:
-    """Return what a tree calls a frame: without the leading `/` that tf2 has given up; the Earth's by either name."""
+    """Return what a tree calls a frame: without the leading `/` of old versions of tf2; the Earth's by either name."""
     if name in EARTH_FRAMES and name not in tree.frames:
         return next((other for other in EARTH_FRAMES if other in tree.frames), name)
     if name.startswith("/") and name not in tree.frames:

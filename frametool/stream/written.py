@@ -81,7 +81,7 @@ def _target_and_source(way: ByTree | WrittenPose, own: str | None) -> tuple[str,
         if own and own.startswith("/") and own not in way.frames.frames:
             own = own[1:]
     if own and source is not None and own != source:
-        raise ValueInvalid(f"a record is given in {shown(own)}, not in {shown(source)}")
+        raise ValueInvalid(f"a record is expressed in {shown(own)}, not in {shown(source)}")
     if not own and source is None and isinstance(way, ByTree):
         raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
     return target, own or source or "b"

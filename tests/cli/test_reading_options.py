@@ -78,7 +78,7 @@ def test_an_option_that_is_given_more_often_than_there_are_files_is_refused(run:
     count = 3 if name == "diff" else 2
     found = run(name, *COMMANDS[name], *(option * count), files=dict(FILES))
     assert found.status == 2
-    assert f"{option[0]} is given {count} times for {count - 1} file" in found.err
+    assert f"{option[0]} appears {count} times for {count - 1} file" in found.err
 
 
 # --- --in beside a stream ---
@@ -119,7 +119,7 @@ def test_without_a_stream_the_form_is_that_of_the_tree(run: Run) -> None:
         (("tree", "t.yaml", "--in", "xacro"), "is not supported: expand it: xacro FILE"),
         (("tree", "t.yaml", "--frames", "a,"), "--frames takes names with commas between them, found 'a,'"),
         (("tree", "t.yaml", "-j", "lift"), "--joint takes NAME=VALUE, found 'lift'"),
-        (("tree", "t.yaml", "-j", "lift=1", "-j", "a=2", "-j", "lift=3"), "--joint 'lift' is given twice, 1 and 3; leave one out"),
+        (("tree", "t.yaml", "-j", "lift=1", "-j", "a=2", "-j", "lift=3"), "--joint 'lift' has two values, 1 and 3; leave one out"),
         (("tree", "t.yaml", "--direction", "up"), "'up' is not one of 'parent-from-child', 'child-from-parent'"),
     ],
 )
@@ -231,4 +231,4 @@ def test_names_of_frames_for_some_of_the_files_are_those_that_need_them(run: Run
     texts = {**FILES, "a.tum": TUM}
     done = run("tree", "r.urdf", "--with", "a.tum", "--with", "t.yaml", "--frames", "a,b", "--frames", "c,d", files=texts)
     assert done.status == 2
-    assert "--frames is given 2 times, 1 of the files need names" in done.err
+    assert "--frames appears 2 times, 1 of the files need names" in done.err

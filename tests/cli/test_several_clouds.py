@@ -111,4 +111,4 @@ def test_what_is_not_said_or_cannot_be_is_refused_and_nothing_is_written(
 @pytest.mark.parametrize("command", ["convert", "invert"])
 def test_no_other_command_replaces_a_second_input_in_silence(run: Run, command: str) -> None:
     done = run(command, *BOTH, "-o", "x.ply", files=FILES)
-    assert (done.status, "--input is given twice; only one can be used" in done.err) == (2, True)
+    assert (done.status, "--input appears twice; only one can be used" in done.err) == (2, True)

@@ -165,7 +165,7 @@ def test_rows_without_a_result_keep_the_name_of_their_frame(tmp_path: Path) -> N
 def test_rows_must_be_given_in_the_source(tmp_path: Path) -> None:
     status, out, told = in_tree(tmp_path, "cam", "--on-error", "null")
     assert (status, out) == (3, b"frame_id,x,y,z\nmap,1.0,0.0,0.0\n/lid,,,\nnope,,,\nmop,,,\n")
-    assert "stdin:4:frame_id: a record is given in 'nope', not in 'cam'" in told[2]
+    assert "stdin:4:frame_id: a record is expressed in 'nope', not in 'cam'" in told[2]
 
 
 def test_poses_are_not_cut_down_to_points(tmp_path: Path) -> None:

@@ -284,7 +284,7 @@ def _kind(inputs: Inputs) -> str | None:
     """Return what all records are; None where --as does not say, or says it for each --columns."""
     kinds, count = inputs.kinds, len(inputs.peek("columns"))
     if len(kinds) > 1 and len(kinds) != count:
-        raise click.UsageError(f"--as is given {len(kinds)} times, --columns {count} times; each --columns has its own")
+        raise click.UsageError(f"--as appears {len(kinds)} times, --columns {count} times; each --columns has its own")
     return kinds[0] if len(kinds) == 1 else None
 
 
@@ -409,7 +409,7 @@ def _settled(own: str | None, source: str | None) -> str | None:
     """Decide which frame a record is expressed in: where both it and the command say, they must agree."""
     if own and source is not None and own != source and not {own, source} <= {*EARTH_FRAMES}:
         remedy = "leave SOURCE out to use each record's own frame"
-        raise ValueInvalid(f"a record is given in {shown(own)}, not in {shown(source)}; {remedy}")
+        raise ValueInvalid(f"a record is expressed in {shown(own)}, not in {shown(source)}; {remedy}")
     return source or own
 
 

@@ -158,7 +158,7 @@ LONGEST_HISTORY = 1000  # lines
 
 def talk(scope: Scope, output: Output) -> int:
     """Answer lines until Ctrl-D; errors go on, Ctrl-C forgets the line."""
-    refuse(output.path is not None, "-o FILE is for expressions that are given or piped, not for the prompt")
+    refuse(output.path is not None, "-o FILE is for expressions on the command line or in a pipe, not for the prompt")
     prompt = "> " if sys.stdout.isatty() else ""
     with _readline(scope):
         while True:
@@ -325,7 +325,7 @@ def _over_rows(lines: Sequence[Line], flags: Sequence[bool], scope: Scope, outpu
     results = marked or [lines[-1]]
     names = [line.name for line in results]
     refuse(len(names) > 1 and not all(names), "rows get one result, or several with names: -e NAME=EXPR -e NAME=EXPR")
-    refuse(twice := next((name for name in names if name and names.count(name) > 1), ""), f"-e {twice}= is given twice")
+    refuse(twice := next((name for name in names if name and names.count(name) > 1), ""), f"-e {twice}= appears twice")
     bindings = [line for line in lines if line not in results]
     return RowExpressions(results, bindings, scope, output.style)
 

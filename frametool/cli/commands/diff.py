@@ -48,7 +48,7 @@ def command(inputs: Inputs) -> int:
     Moving frames are compared at their latest time and sample by sample, or with --at at one time.
 
     A and B are files, - for standard input, or . for the file that FRAMETOOL_TREE names. --in and --frames are taken in
-    the order of the files: A, those of --with-a, B, those of --with-b; given only for A they apply to both.
+    the order of the files: A, those of --with-a, B, those of --with-b; one alone applies to both.
     """
     output = Output(inputs, "report", otherwise="text")
     sides = (inputs.a, *inputs.with_a), (inputs.b, *inputs.with_b)

@@ -68,8 +68,7 @@ def command(inputs: Inputs) -> int:
     columns = inputs.target_column, inputs.source_column
     output, target, source = task.output, inputs.target, inputs.source
     by_row = {*columns, inputs.time_column} != {None}
-    if not by_row and source is None:
-        raise click.UsageError(f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
+    refuse(not by_row and source is None, f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
     if target is not None and columns[0] is None:
         output.check_target(target)
     covariance = not task.derives and inputs.covariance

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 NAMES = ("base", "gripper", "camera", "target")
 SHARES = 1000  # of the way, as progress counts it
-UNSURE = 1.2  # times: given sigmas that are smaller than that are reported
+UNSURE = 1.2  # times: sigmas of the input that are smaller than that are reported
 
 
 def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
@@ -48,7 +48,7 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
             progress=lambda share: bar.advance(0, round(SHARES * share) - bar.size),
         )  # fmt: skip
     if found.sigma_factor > UNSURE:
-        warn(f"the given sigmas are {found.sigma_factor:.2g} times too small for what the used rows are off")
+        warn(f"the sigmas of the input are {found.sigma_factor:.2g} times too small for what the used rows are off")
     frames = []
     for name in sorted(found.frames, key=lambda name: name != found.root):
         track = found.tree.track(name)  # in the root, or as --fix has it

@@ -51,7 +51,7 @@ def _eye(text: str) -> Eye:
 @option("-f --format", "format of the picture  [default: by the suffix of --output, else text]", FORMS, name="fmt")
 @option("-o --output FILE", "write to this file instead of stdout, atomically")
 @option("--force", "let --output overwrite a file", requires=("output",), under="Result")
-@option("--overlay", "compare TREE with a second tree, given as TARGET: what has moved?")
+@option("--overlay", "compare TREE with a second tree, TARGET: what has moved?")
 @option("--no-sliders", "leave out the sliders for the joints of a robot", name="no_sliders")
 @option("--open", "show the page in the browser", name="opens")
 @color_option
