@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import FormatError
+from frametool.errors import FormatError, Misused, shown
 from frametool.formats.load import refuse_unknown_joints
 from frametool.frames.edge_log import EdgeLog, chain
 from frametool.frames.path import frames_on
@@ -44,7 +44,8 @@ def monitor(
     if not ends:
         return list(map(edge_entry, logs.values()))
     target, source = ends
-    between = [logs[child] for child in chain(logs, target, source)]
+    if not (between := [logs[child] for child in chain(logs, target, source)]):
+        raise Misused(f"no edge is between {shown(target)} and itself; name two frames")
     return [*map(edge_entry, between), chain_entry(target, source, between)]
 
 

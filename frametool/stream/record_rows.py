@@ -20,7 +20,7 @@ from frametool.geometry.representations import notation
 from frametool.grammar.names import in_nanoseconds
 from frametool.grammar.result import Result
 from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import DEGREES
+from frametool.stream.faults import DEGREES, Fault
 from frametool.stream.record_cuts import Cut, RecordCutter, block_of, names_of, plan_of
 from frametool.stream.record_cuts import in_order as in_cut_order
 from frametool.stream.record_text import Answer
@@ -137,7 +137,9 @@ class RecordRows:
                 hit = known
                 if hit is None and (self.left or in_order) and not part.problem:
                     self.left -= not in_order
-                    hit = self.cutter.learned(self.cutter.read(text, part), text, part)
+                    made = self.cutter.read(text, part)
+                    if in_order or isinstance(made, Fault) or len(made.entries) <= MOST_ENTRIES:
+                        hit = self.cutter.learned(made, text, part)
                 if hit is None:
                     alone.append(Alone(part))
                 else:

@@ -326,8 +326,8 @@ class RecordText:
         notes = zip(self.notes, places, strict=True)
         found = [RowNote(at, note.rule, note.message, str(there)) for note, (at, there) in notes]
         known = {note.about for note in found}
-        others = [each._replace(line=line + self.line) for each in self.row_notes() if each.about not in known]
-        return sorted(found + others)
+        first = line + self.line
+        return sorted(found + [each._replace(line=first) for each in self.row_notes() if each.about not in known])
 
 
 def cut(

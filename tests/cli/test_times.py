@@ -270,6 +270,11 @@ def test_check_does_work_in_proportion_to_the_file(run: Run, form: str) -> None:
     assert work[2] - work[1] <= 2.5 * (work[1] - work[0])
 
 
+def test_between_a_frame_and_itself_nothing_is_monitored(run: Run) -> None:
+    done = run("monitor", "tree.yaml", "a", "a", files={"tree.yaml": "[{name: a, parent: b, xyz: [1, 2, 3]}]"})
+    assert (done.status, done.err) == (2, "frametool: no edge is between 'a' and itself; name two frames\n")
+
+
 def test_random_options_never_end_in_a_traceback(run: Run) -> None:
     draw = random.Random(7)  # noqa: S311 - not for secrets
     values = [*HUGE, *FAR, "0", "1", "latest", "0:2:0.5", "bad.txt", "-1", "500000000ns", "1.5"]
