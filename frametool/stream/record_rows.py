@@ -137,9 +137,9 @@ class RecordRows:
                 hit = known
                 if hit is None and (self.left or in_order) and not part.problem:
                     self.left -= not in_order
-                    made = self.cutter.read(text, part)
-                    if in_order or isinstance(made, Fault) or len(made.entries) <= MOST_ENTRIES:
-                        hit = self.cutter.learned(made, text, part)
+                    first = self.cutter.read(text, part)
+                    if in_order or isinstance(first, Fault) or len(first.entries) <= MOST_ENTRIES:
+                        hit = self.cutter.learned(first, text, part)
                 if hit is None:
                     alone.append(Alone(part))
                 else:
