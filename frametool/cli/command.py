@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import reduce
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ import click
 
 from frametool.cli.sink import checked_by, show
 from frametool.cli.stderr import say
-from frametool.errors import FormatError, ValueInvalid
+from frametool.errors import FormatError, FrametoolError, ValueInvalid, heard_by
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -264,10 +264,12 @@ class Text(click.types.StringParamType):
         return {}
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
-        """Offer what begins as the incomplete word does."""
+        """Offer what begins as the incomplete word does; nothing where a file cannot be read: this must not print."""
         from click.shell_completion import CompletionItem
 
-        offered = self.offers(ctx, incomplete)
+        offered: Mapping[str, str] | None = {}
+        with heard_by(lambda *_: None), suppress(FrametoolError, click.UsageError, OSError):
+            offered = self.offers(ctx, incomplete)
         if offered is None:
             return [CompletionItem(incomplete, type="file")]
         return [CompletionItem(word, help=about) for word, about in offered.items() if word.startswith(incomplete)]

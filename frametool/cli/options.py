@@ -14,7 +14,7 @@ import click
 
 from frametool.cli.command import Inputs, Text, inputs, misuse, option, refuse, say_if_typed, together
 from frametool.cli.stderr import say_error
-from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, heard_by, shown
+from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
 from frametool.geometry.euler import AXES
 from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, WORLDS, notations
@@ -125,6 +125,27 @@ class AxesName(Text):
         return {f"{begun}{joint}{name}" if joint else name: about for name, about in known.items() if name != begun}
 
 
+class ColumnNames(Text):
+    """Columns of the input, or keys of its records, with commas between them."""
+
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:
+        """Offer those of the file that -i names."""
+        from frametool.documents.source import HEAD
+        from frametool.formats.detect import Beginning, detect
+        from frametool.stream.table import open_table
+
+        path = ctx.params.get("input_path") or ""
+        path = path if isinstance(path, str) else path[0]
+        with open(path, "rb") as file:
+            head = file.read(HEAD)
+        fmt = detect(head, "rows", "records", name=path)
+        names = sorted(map(".".join, Beginning(head).json_paths))
+        if FORMATS[fmt].is_table:
+            names = list(open_table(head, fmt, header=True, source=path)[0].names or ())
+        done, comma, _ = incomplete.rpartition(",")
+        return dict.fromkeys((done + comma + name for name in names), "")
+
+
 def tree_on_the_line(ctx: click.Context) -> str | None:
     """Return the first file of frames; behind an option click has not come to the arguments."""
     named = ctx.params.get("files") or ctx.params.get("arguments") or ctx.args
@@ -134,17 +155,17 @@ def tree_on_the_line(ctx: click.Context) -> str | None:
 class JointSetting(Text):
     """A joint of a robot and its value."""
 
-    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
-        """Offer the joints of the robot on the line with their limits."""
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:
+        """Offer the joints of the robot on the line with their limits; behind the = the limits."""
         from frametool.formats.load import load
 
-        try:
-            with heard_by(lambda *_: None):
-                robots = load(tree_on_the_line(ctx) or "").robots
-        except FrametoolError:
-            return {}  # a completion must not print
+        robots = load(tree_on_the_line(ctx) or "").robots
         joints = [joint for _, links, _ in robots for link in links for joint in link.joints]
-        return {f"{each.name}=": f"{each.lower} .. {each.upper}" for each in joints}
+        ends = {each.name: [str(end) for end in (each.lower, each.upper) if end is not None] for each in joints}
+        name, equals, _ = incomplete.partition("=")
+        if equals:
+            return {f"{name}={end}": "a limit" for end in ends.get(name, ())}
+        return {f"{each}=": " .. ".join(both) for each, both in ends.items()}
 
 
 # --- inputs --------------------------------------------------------------------------------------------------------

@@ -48,7 +48,7 @@ _of_rows = partial(option, under="Rows")
 _ROWS = (
     option("--from REP", "representation of bare numbers", options.Notations(), name="from_rep", under="Rotations"),
     _of_rows("--columns NAME,..", "pose columns by name or number, once per pose; or one key of records, a.b",
-             multiple=True),
+             options.ColumnNames(), multiple=True),
     _of_rows("--keep", "append result columns, keep the input's"),
     _of_rows("--prefix TEXT", "prefix of the result's column names", options.utf8, default=""),
     _of_rows("--on-error", "bad rows", ON_ERROR, default=STOP),

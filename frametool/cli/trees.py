@@ -16,7 +16,7 @@ from frametool.cli.options import input_formats, tree_on_the_line
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say
 from frametool.documents.source import ReadCache
-from frametool.errors import FrametoolError, bare, listing, shown, warn
+from frametool.errors import bare, listing, shown, warn
 from frametool.formats.table import FORMATS, ORDERS
 from frametool.grammar.edges import Answers
 from frametool.grammar.names import EARTH_FRAMES
@@ -256,10 +256,7 @@ class Frame(Text):
         named = tree_on_the_line(ctx)
         if named is None and "arguments" in ctx.params:
             return None
-        try:
-            return dict.fromkeys(load_tree(named or ".", ctx.params.get("more") or ()).frames, "")
-        except (FrametoolError, click.UsageError):
-            return {}  # a completion must not print
+        return dict.fromkeys(load_tree(named or ".", ctx.params.get("more") or ()).frames, "")
 
 
 FRAME = Frame()

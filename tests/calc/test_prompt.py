@@ -159,6 +159,13 @@ def test_words_are_completed_where_they_fit() -> None:
     assert completer.completions("a", "x") == ["angle(", "asin(", "acos(", "atan(", "ans", "as ", "arm_base_link<-"]
 
 
+def test_the_shell_completes_frames_of_the_trees_that_were_named(run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    for words, expected in [("frametool calc --tree robot.yaml inv(map<-cam", "inv(map<-camera_optical"), ("frametool calc d=drive.yaml d[map<-gri", "d[map<-gripper")]:
+        monkeypatch.setenv("_FRAMETOOL_COMPLETE", "words")
+        done = run(words, files={name: (EXAMPLES / name).read_text() for name in ("robot.yaml", "drive.yaml")})
+        assert f"plain\t{expected}\t" in done.out.splitlines()
+
+
 def test_a_pipe_is_one_expression_a_line(run: Callable[..., Any]) -> None:
     done = run("calc", "-f", "json", stdin="# twice\nx = 2mm\n\nx * 3\nans + 1mm\n")
     assert done.out == "0.006\n0.007\n"

@@ -68,6 +68,11 @@ def answered(run: Callable[..., Any], folder: Path, monkeypatch: pytest.MonkeyPa
         ("convert --world-axes enu_from_n", ["enu_from_ned"]),
         ("convert --to euler:rzy", ["euler:rzyx", "euler:rzyz"]),
         ("convert --to=rpy,euler:rzy", ["--to=rpy,euler:rzyx", "--to=rpy,euler:rzyz"]),
+        ("convert -i a.csv --columns x,y,", ["x,y,id", "x,y,x", "x,y,y", "x,y,z"]),
+        ("convert -i a.tum --columns q", ["qx", "qy", "qz", "qw"]),
+        ("apply -i a.jsonl --time-column p", ["point", "point.x"]),
+        ("calc -i a.csv --time-column i", ["id"]),
+        ("mean -i a.csv --weights z", ["z"]),
         ("lookup tree.yaml ", ["base", "my frame", "arm:left", "arm:right", "tool=x", "$c*"]),
         ("lookup tree.yaml base arm:l", ["arm:left"]),
         ("lookup ~/tree.yaml 'my f", ["my frame"]),
@@ -76,8 +81,13 @@ def answered(run: Callable[..., Any], folder: Path, monkeypatch: pytest.MonkeyPa
         ("lookup arm.urdf a b -j ", ["shoulder=", "slide=", "wrist="]),
         ("lookup arm.urdf -j s", ["shoulder=", "slide="]),
         ("fk arm.urdf a b --joint=sl", ["--joint=slide="]),
+        ("lookup arm.urdf a b -j slide=", ["slide=0.0", "slide=0.25"]),
+        ("lookup arm.urdf a b -j wrist=", []),
         ("lookup tree.yaml a b -j ", []),
         ("lookup a b -j ", []),
+        ("convert -i none.csv --columns x", []),
+        ("convert -i a.bin --columns x", []),
+        ("convert --columns x", []),
         ("lookup none.yaml ", []),
     ],
 )
@@ -121,6 +131,7 @@ TYPED = {
     "frametool convert --to=euler:sxyz,qua": ["convert", "--to=euler:sxyz,quaternion"],
     "frametool convert -i a.t": ["convert", "-i", "a.tum"],
     "frametool lookup arm.urdf a b -j wri": ["lookup", "arm.urdf", "a", "b", "-j", "wrist="],
+    "frametool lookup arm.urdf a b -j slide=0.2": ["lookup", "arm.urdf", "a", "b", "-j", "slide=0.25"],
     "frametool convert -i tree.yaml --output=a.t": ["convert", "-i", "tree.yaml", "--output=a.tum"],
 }
 

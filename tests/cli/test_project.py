@@ -330,3 +330,9 @@ def test_what_a_record_says_beside_its_point_stays(run: Run) -> None:
     assert run("project", "--camera", PINHOLE, stdin=sure).out.startswith(sure[:-2])
     for form in ("text", "yaml"):
         assert run("project", "--camera", PINHOLE, "0", "0", "1", "-f", form).out.splitlines()[1] == "pixel: [31.5, 23.5]"
+
+
+def test_the_shell_is_offered_the_cameras_of_a_file(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("_FRAMETOOL_COMPLETE", "words")
+    offered = run(f"frametool project --camera {EXAMPLES}/camchain.yaml:").out.splitlines()
+    assert [row.split("\t")[1].rpartition(":")[2] for row in offered] == ["cam0", "cam1"]

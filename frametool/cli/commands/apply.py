@@ -217,8 +217,8 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @option("--covariance", "include that of the tree's edges, or of --transform", excludes=("explain",))
 @options.scale_option
 @EXPLAIN
-@option("--frame-column NAME", "column with the frame of each row, without SOURCE")
-@option("--time-column NAME", "column or key with the time of each row", excludes=("at",))
+@option("--frame-column NAME", "column with the frame of each row, without SOURCE", options.ColumnNames())
+@option("--time-column NAME", "column or key with the time of each row", options.ColumnNames(), excludes=("at",))
 @option("--at TIME", "one time for all  [default: latest]", options.read_time)
 @options.rules_options
 @options.offset_option

@@ -16,9 +16,9 @@ from frametool.calc.functions import BETWEEN_WORDS, FUNCTIONS, Completer
 from frametool.calc.parser import Line, mentions_row, walk
 from frametool.calc.rules import wanted
 from frametool.calc.values import LIST, POINT, POSE, TREE, VECTOR, Term, Type
-from frametool.cli.command import Command, Inputs, argument, command_named, option, refuse
+from frametool.cli.command import Command, Inputs, Text, argument, command_named, option, refuse
 from frametool.cli.commands.help import topic
-from frametool.cli.options import reading_options, result_options, whole_pose_options
+from frametool.cli.options import ColumnNames, reading_options, result_options, whole_pose_options
 from frametool.cli.output import Output
 from frametool.cli.poses import source_of
 from frametool.cli.sink import writing
@@ -32,7 +32,7 @@ from frametool.grammar.result import Result, Style
 from frametool.stream.faults import STOP, Fault
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from frametool.calc.rows import RowExpressions
     from frametool.stream.request import Request
@@ -76,6 +76,20 @@ def named_file(path: str, scope: Scope) -> Term:
         return poses_of_table(path, fmt, normalize=scope.normalize, degrees=scope.degrees)
     found = values_of_document(source_of(path), scope) if "records" in FORMATS[fmt].reads else None
     return found or Term(Type(TREE), (), tree=load_tree(path, streams=True))
+
+
+class Expression(Text):
+    """An expression, completed from --tree and from the files that were named before it."""
+
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:
+        """Offer what its last word may become."""
+        scope, trees = Scope(), ctx.params.get("trees")
+        scope.tree = load_tree(trees[0], trees[1:]) if trees else None
+        for each in ctx.params.get("arguments") or ():
+            file_named_in(each, scope)
+        cut = max(incomplete.rfind(mark) for mark in BETWEEN_WORDS) + 1
+        before, word = incomplete[:cut], incomplete[cut:]
+        return dict.fromkeys((before + each for each in Completer(scope, None).completions(word, before)), "")
 
 
 def value_texts(terms: Iterable[Term], style: Style) -> Iterator[str]:
@@ -239,12 +253,12 @@ def _begins_with_minus(argument: str) -> bool:
 
 
 @command_named("calc", own=("input_path",), cls=CalcCommand)
-@argument("arguments", nargs=-1, metavar="[NAME=FILE ..] [EXPR ..]")
+@argument("arguments", Expression(), nargs=-1, metavar="[NAME=FILE ..] [EXPR ..]")
 @option("--tree FILE", "the tree of look-ups; may be repeated  [default: FRAMETOOL_TREE]", name="trees", multiple=True)
 @option("-e NAME=EXPR", "a result in its own columns: NAME, NAME_x ..; may be repeated; also EXPR, @FILE",
-    name="expressions", multiple=True)
+    Expression(), name="expressions", multiple=True)
 @option("--as", "what the rows are  [default: as they look]", KINDS, name="kind")
-@option("--time-column NAME", "of the time of @ row  [default: the one that looks so]", under="Time")
+@option("--time-column NAME", "of the time of @ row  [default: the one that looks so]", ColumnNames(), under="Time")
 @stream_options
 @whole_pose_options
 @result_options("points")

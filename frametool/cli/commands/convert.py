@@ -52,7 +52,7 @@ class ConvertCommand(Command):
 @options.frames_out_option
 @EXPLAIN
 @option("--unwrap", "continue angles beyond half a turn")
-@option("--time-column NAME", "column or key of the timestamps, for the next three",
+@option("--time-column NAME", "column or key of the timestamps, for the next three", options.ColumnNames(),
     requires=("time_offset", "start", "stop"), under="Time")  # fmt: skip
 @options.limit_options
 def command(inputs: Inputs) -> int:

@@ -31,7 +31,7 @@ MANY = ("times", "start", "stop")
 def _column_option(end: str, *excludes: str) -> Adds:
     about, under = f"column with the {end} of each row of -i or stdin", "Time" if end == "time" else "Rows"
     excluded = (*excludes, "times", "source_at", "fixed", "explain")  # a table has many look-ups
-    return option(f"--{end.lower()}-column NAME", about, excludes=excluded, under=under)
+    return option(f"--{end.lower()}-column NAME", about, options.ColumnNames(), excludes=excluded, under=under)
 
 
 @command_named("lookup", own=("times", "notations"))

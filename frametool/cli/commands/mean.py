@@ -6,7 +6,7 @@ import click
 
 from frametool.cli.command import Inputs, argument, command_named, option, refuse
 from frametool.cli.explaining import PoseTask, pose_stream_options
-from frametool.cli.options import pose_result_options
+from frametool.cli.options import ColumnNames, pose_result_options
 from frametool.cli.poses import is_inline, is_pasted, poses_from, without_inverse
 from frametool.errors import ValueInvalid, warn
 from frametool.stream.faults import MOST
@@ -15,8 +15,8 @@ from frametool.text.numbers import parse_number
 
 @command_named("mean")
 @argument("poses", nargs=-1, metavar="[POSE.. | FILE]")
-@option("--weights NAME | W,W,..", "column or key with weights, or the weights of the POSEs")
-@option("--by NAME", "one mean per value of this column or key", excludes=("weights",))
+@option("--weights NAME | W,W,..", "column or key with weights, or the weights of the POSEs", ColumnNames())
+@option("--by NAME", "one mean per value of this column or key", ColumnNames(), excludes=("weights",))
 @option("--robust", "reject outliers, and list them")
 @pose_stream_options
 @pose_result_options("poses")

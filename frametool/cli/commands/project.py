@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from frametool.cli import options
-from frametool.cli.command import Inputs, argument, command_named, option, together
+from frametool.cli.command import Inputs, Text, argument, command_named, option, together
 from frametool.cli.commands.apply import Way, begins_number, is_record, sources_of, way_by_tree
 from frametool.cli.output import Output
 from frametool.cli.poses import is_inline, values_of
@@ -20,7 +20,7 @@ from frametool.errors import ValueInvalid, shown
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from contextlib import AbstractContextManager
 
     from frametool.cli.sink import Write
@@ -34,6 +34,20 @@ if TYPE_CHECKING:
 AXES = ("optical", "opengl", "flu")
 
 
+class CameraFile(Text):
+    """A file, and behind a colon which of its cameras is meant; or a camera written inline."""
+
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:  # noqa: ARG002
+        """Offer the names of the cameras in a file that is there."""
+        path, colon, _ = incomplete.rpartition(":")
+        if not colon:
+            return None
+        from frametool.documents.source import InputFile
+        from frametool.formats.cameras import cameras_of
+
+        return {f"{path}:{name}": "" for name in cameras_of(InputFile(path)) if name}
+
+
 def parse_size(text: str) -> tuple[int, int]:
     """Read W,H; raises ValueInvalid."""
     width, _, height = (each.strip() for each in text.partition(","))
@@ -44,7 +58,7 @@ def parse_size(text: str) -> tuple[int, int]:
 
 _AXES = option("--camera-axes AXES", "of CAMERA: optical, opengl or flu  [default: as TREE says]", AXES)
 camera_options = together(
-    option("--camera FILE[:NAME]", "intrinsics from this file, or inline, not from TREE"),
+    option("--camera FILE[:NAME]", "intrinsics from this file, or inline, not from TREE", CameraFile()),
     option("--model NAME", "distortion model of --camera", requires=("camera",)),
     option("--size W,H", "image size, to which K is scaled", parse_size),
     option("--rectified", "use the rectified image: R, then P, no distortion"),
@@ -54,7 +68,7 @@ camera_options = together(
     stream_options,
     options.pose_options,
     options.result_options("points"),
-    option("--time-column NAME", "column or key with the time of each row", excludes=("at",),
+    option("--time-column NAME", "column or key with the time of each row", options.ColumnNames(), excludes=("at",),
            under="Time"),
     option("--at TIME", "one time for all  [default: latest]", options.read_time, under="Time"),
     options.rules_options,
@@ -67,7 +81,7 @@ camera_options = together(
 @argument("arguments", FRAME, nargs=-1, metavar="[TREE CAMERA [SOURCE]] [X Y Z | RECORD]..")
 @option("--range", "add range, the distance from the camera", name="ranged")
 @option("--image FILE", "draw over this image: -o FILE.svg, .html, .png", requires=("output",))
-@option("--frame-column NAME", "column with the frame of each row, without SOURCE")
+@option("--frame-column NAME", "column with the frame of each row, without SOURCE", options.ColumnNames())
 @camera_options
 def command(inputs: Inputs) -> int:
     """Add to points the pixels at which a camera sees them.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from frametool.cli.command import Inputs, argument, command_named, option, refuse
 from frametool.cli.explaining import EXPLAIN, PoseTask, one_argument, pose_stream_options
-from frametool.cli.options import limit_options, pose_result_options, window_of
+from frametool.cli.options import ColumnNames, limit_options, pose_result_options, window_of
 from frametool.cli.poses import rows_among, without_inverse
 from frametool.cli.stderr import say
 from frametool.grammar.pose import Pose
@@ -19,7 +19,7 @@ from frametool.grammar.pose_algebra import relative_names
 @option("--consecutive", "of a stream, each row relative to the row before it", excludes=("first", "explain"))
 @option("--first", "of a stream, each row relative to the first", excludes=("explain",))
 @option("--velocity", "with --consecutive, also the twist between rows, m/s and rad/s", requires=("consecutive",))
-@option("--time-column NAME", "with --velocity, the column or key of the stamps  [default: stamp, t ..]",
+@option("--time-column NAME", "with --velocity, the column or key of the stamps  [default: stamp, t ..]", ColumnNames(),
     requires=("velocity", "time_offset", "start", "stop"))
 @EXPLAIN
 @limit_options

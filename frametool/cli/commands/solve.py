@@ -10,7 +10,15 @@ import click
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, refuse_two_readers
 from frametool.cli.comparing import read_span, trajectory
-from frametool.cli.options import file_with, for_each, reading_options, result_options, suffix_of, whole_pose_options
+from frametool.cli.options import (
+    ColumnNames,
+    file_with,
+    for_each,
+    reading_options,
+    result_options,
+    suffix_of,
+    whole_pose_options,
+)
 from frametool.cli.output import Output
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say, say_error, tell
@@ -221,7 +229,7 @@ def _read_names(text: str) -> list[str]:
 @option("--eye-to-hand", "the camera is static, the target moves", requires=("hand_eye",))
 @option("--max-gap TIME", "longest time between paired stamps  [default: 50ms]", read_span,
     name="max_gap_ns", requires=("hand_eye",))  # fmt: skip
-@option("--columns NAME,..", "columns of GRIPPER, then of TARGET, in one table",
+@option("--columns NAME,..", "columns of GRIPPER, then of TARGET, in one table", ColumnNames(),
     multiple=True, requires=("hand_eye",), under="Rows")  # fmt: skip
 @option("--points", "A<-B from matched points")
 @option("--scale", "estimate the scale from A to B too", requires=("points",))
