@@ -263,13 +263,17 @@ class Text(click.types.StringParamType):
         """Return what the shell may complete, and what it means; None for names of files, which the shell knows."""
         return {}
 
+    def offered(self, ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:
+        """Return what it offers, without a word; nothing where a file cannot be read."""
+        with heard_by(lambda *_: None), suppress(FrametoolError, click.UsageError, OSError):
+            return self.offers(ctx, incomplete)
+        return {}
+
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
-        """Offer what begins as the incomplete word does; nothing where a file cannot be read: this must not print."""
+        """Offer what begins as the incomplete word does."""
         from click.shell_completion import CompletionItem
 
-        offered: Mapping[str, str] | None = {}
-        with heard_by(lambda *_: None), suppress(FrametoolError, click.UsageError, OSError):
-            offered = self.offers(ctx, incomplete)
+        offered = self.offered(ctx, incomplete)
         if offered is None:
             return [CompletionItem(incomplete, type="file")]
         return [CompletionItem(word, help=about) for word, about in offered.items() if word.startswith(incomplete)]

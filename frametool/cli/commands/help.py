@@ -177,7 +177,7 @@ def _exit_codes(text: str) -> dict[str, str]:
 
 def _option(option: click.Option, group: str, ctx: click.Context) -> dict[str, Any]:
     kind, is_flag = option.type, option.is_flag or option.count
-    choices = kind.offers(ctx, "") if isinstance(kind, Text) else getattr(kind, "choices", ())
+    choices = kind.offered(ctx, "") if isinstance(kind, Text) else getattr(kind, "choices", ())
     metavar = option.metavar or (option.opts[-1].strip("-") if choices else kind.name).upper()
     default = re.search(r"\[default: (.*?)\]", shared.option_row(option)[1])
     return {
