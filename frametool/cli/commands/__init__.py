@@ -16,7 +16,7 @@ import click
 from frametool import __version__
 from frametool.cli.command import WithHelp, show_help
 from frametool.cli.sink import writing
-from frametool.errors import SHOWN, Misused, any_near, did_you_mean, shown
+from frametool.errors import SHOWN, FileProblem, Misused, any_near, did_you_mean, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -214,16 +214,25 @@ def answered(call: Callable[[], object], arguments: Sequence[str]) -> int:
         return end.exit_code
     except click.ClickException as error:
         raise Misused(_usage(error, arguments)) from None
+    except FileProblem as error:
+        from frametool.cli.replaced import replacement
+
+        if gone := replacement(arguments):  # its value was taken for a file
+            raise Misused(gone) from error
+        raise
     return result if isinstance(result, int) else 0
 
 
 def _usage(error: click.ClickException, arguments: Sequence[str]) -> str:
     """Put a usage error on one line that ends in where help is; what it quotes of the arguments is cut."""
+    from frametool.cli.replaced import replacement
+
     ctx = getattr(error, "ctx", None)
     message = error.format_message().replace("\n", " ").rstrip(".")
     if isinstance(error, click.NoSuchOption):  # each version of click has its own words
         name, near = error.option_name, error.possibilities or ()
         message = f"no such option {shown(name)}{did_you_mean(name, near)}"
+    message = replacement(arguments) or message
     for text in (part for each in arguments for part in (each, *each.split("=", 1)) if len(repr(part)) > SHOWN):
         message = message.replace(repr(text), shown(text)).replace(text, shown(text)[1:-1])
     if message[1:2].islower():
