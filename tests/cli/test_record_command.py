@@ -72,6 +72,11 @@ REFUSED = {
     ("nope.mcap", "-o", "new.mcap"): (5, "nope.mcap: no such file or directory"),
     ("-", "-o", "new.mcap"): (5, "stdin: a recording cannot be read from a pipe; name its file"),
     ("run.mcap", "-o", "nope/new.mcap"): (5, "nope/new.mcap: no such file or directory"),
+    ("sqlite", "-o", "sqlite/new.mcap"): (5, "sqlite/new.mcap: would change sqlite, which is read; give another name"),
+    ("sqlite", "-f", "bag2", "-o", "sqlite", "--force"): (5, "sqlite: would change sqlite, which is read; give another name"),
+    ("sqlite/sqlite.db3", "-f", "bag2", "-o", "sqlite", "--force"): (5, "sqlite: would change sqlite/sqlite.db3, which is read; give another name"),
+    ("run.mcap", "-o", "./run.mcap", "--force"): (5, "./run.mcap: would change run.mcap, which is read; give another name"),
+    ("run.mcap", "--with", "tree.yaml", "-o", "tree.yaml", "-f", "mcap", "--force"): (5, "tree.yaml: would change tree.yaml, which is read; give another name"),
     ("run.mcap", "-o", "run.bag", "-f", "mcap"): (2, f"record: -o run.bag is the name of bag1, -f says mcap; give -o NEW.mcap{USAGE}"),
 }  # fmt: skip
 
@@ -85,11 +90,13 @@ def test_what_is_refused_is_one_line_and_leaves_nothing(arguments: tuple[str, ..
     assert {each: each.read_bytes() for each in folder.rglob("*") if each.is_file()} == before
 
 
-def test_a_recording_may_take_the_place_of_what_it_is_made_of(folder: Path, run: Run) -> None:
+@pytest.mark.parametrize(("link", "status"), [(os.symlink, 5), (os.link, 0)])  # the file of a hard link keeps its name
+def test_a_link_to_the_recording_is_not_written_over(link: Callable[[str, str], None], status: int, folder: Path, run: Run) -> None:
     os.chdir(folder)
-    assert run("record", "run.mcap", "--with", TREE, "-o", "new.mcap").status == 0
-    assert run("record", "run.mcap", "--with", TREE, "-o", "run.mcap", "--force").status == 0
-    assert (folder / "run.mcap").read_bytes() == (folder / "new.mcap").read_bytes()
+    link("run.mcap", "other.mcap")
+    before = (folder / "run.mcap").read_bytes()
+    assert run("record", "run.mcap", "--with", TREE, "-o", "other.mcap", "--force").status == status
+    assert (folder / "run.mcap").read_bytes() == before
 
 
 def test_without_the_extra_one_line_says_what_to_install(folder: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.options import pose_options, reading_options, verbose_option
 from frametool.cli.output import copied_as, folder_of, opened_place
 from frametool.cli.stderr import say, say_error
 from frametool.cli.trees import FRAME, load_tree, tree_file
-from frametool.errors import BadAnswer, FileProblem, FormatError, ValueInvalid, listing, shown, warn
+from frametool.errors import BadAnswer, FileProblem, FormatError, ValueInvalid, listing, printable, shown, warn
 from frametool.formats.load import FrameFile, Rules
 from frametool.formats.table import FORMATS, is_recording, writers
 from frametool.frames.stamps import parse_time
@@ -15,6 +19,9 @@ from frametool.grammar.edges import Diagnostics
 from frametool.grammar.readers import is_slashed
 from frametool.stream.faults import ON_ERROR, STOP, BadRows
 from frametool.view.progress import ProgressBar
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 messages skipped, 4 lookup, 5 file."
 TRANSFORMS = ("tf", "tf_static")  # how topics of transforms are called, in any namespace
@@ -74,6 +81,7 @@ def command(inputs: Inputs) -> int:
         raise FileProblem("stdin: a recording cannot be read from a pipe; name its file")
     fmt = _format_of(path)
     copy, place = copied_as(fmt, path, inputs.output, inputs.format_name)
+    _refuse_input(place, (path, *map(tree_file, more)))
     tally, edges = Diagnostics(), load_tree(more[0], more[1:], Rules(normalize=normalize)) if more else None
     if edges is not None and (resting := [name for *_, names in edges.robots for name in names]):
         raise BadAnswer(f"joints without a value would be static: {listing(resting)}; --joint NAME=VALUE gives it")
@@ -98,6 +106,15 @@ def command(inputs: Inputs) -> int:
     for sentence in () if quiet else run.summary():
         say(f"{path}: {sentence}")
     return bad.finish(sum(run.moved.values()))
+
+
+def _refuse_input(output: str, inputs: Iterable[str]) -> None:
+    """Raise FileProblem for a place that is an input, in the folder of one, or a folder that has one: data would go."""
+    place = Path(output).resolve()
+    for path in filter(os.path.exists, inputs):
+        read = Path(path).resolve()
+        if place in (read, *read.parents) or read in place.parents:
+            raise FileProblem(f"{printable(output)}: would change {printable(path)}, which is read; give another name")
 
 
 def _bare(frame: str) -> str:
