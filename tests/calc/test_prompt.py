@@ -182,7 +182,7 @@ def test_a_pipe_stops_at_the_first_error_unless_told(run: Callable[..., Any]) ->
     assert in_json.err == '{"error": "calc_error", "message": "something is missing here", "column": 4}\n'
     skipped = run("calc", "--on-error", "skip", stdin=lines)
     assert (skipped.status, skipped.out) == (3, "2.0\n---\n3.0\n")
-    assert "frametool: stdin:2: something is missing here (row skipped)" in skipped.err
+    assert "frametool: stdin:2:4: something is missing here (row skipped)" in skipped.err
     assert "stdin: 1 of 3 rows skipped" in skipped.err
 
 

@@ -154,7 +154,7 @@ def calculate_lines(stream: Stream, output: Output, scope: Scope) -> int:
             except FrametoolError as error:
                 if bad.on_error == STOP:
                     raise
-                bad.take([Fault.of(number, "", error)])
+                bad.take([Fault.of(number, str(error.details().get("column", "")), error)])
                 continue
             if line.name:
                 last = term
