@@ -10,7 +10,8 @@ one line that tells a person what to do.
 
 Long lists of such maps, as in big trees, differ from JSON only in the quotes.  If a strict pattern finds nothing else,
 a few replacements make them JSON, which reads 100 000 of them in a quarter of the time that the parser needs for its
-events (0.5 s against 2.1); anything unusual, also an error, is left to the parser.
+events (0.5 s against 2.1); anything unusual, also an error, is left to the parser.  In other texts plain values in
+brackets after their key, `f1: {xyz: [0.9, 0, 2.0]}`, are read in the same way.
 """
 
 from __future__ import annotations
@@ -64,32 +65,65 @@ _LIST = rf"\[{_WORD}(?:, {_WORD})*+\]"
 _PAIR = rf"{_WORD}: (?:{_WORD}|{_LIST})"
 _BLOCKS = rf"(?a)(?P<indent> *)- {_PAIR}\n(?:(?P=indent)(?:- |  ){_PAIR}\n)*+\Z"
 _FLOWS = rf"(?a)(?P<indent> *)- \{{{_PAIR}(?:, {_PAIR})*+\}}\n(?:(?P=indent)- \{{{_PAIR}(?:, {_PAIR})*+\}}\n)*+\Z"
+_BRACKETED = rf"(?am)^( {{0,99}}+(?:- )?{_WORD}: )(\{{{_PAIR}(?:, {_PAIR})*+\}}|{_LIST})$"
+_NOT_PLAIN = r"""["'|>#&*!%@`?\t\r]"""  # quotes, comments, multi-line texts, anchors: brackets may be text there
 _QUOTES = (
-    ("{", '{"'), ("}", '"}'), (": ", '": "'), (", ", '", "'), ('"[', '["'), (']"', '"]'),
+    ("{", '{"'), ("}", '"}'), (": ", '": "'), (", ", '", "'),
+    ('"[', '["'), (']"', '"]'), ("\n[", '\n["'), ("]\n", '"]\n'),
 )  # fmt: skip
-STANDIN = "0"
+STANDIN = "\ue000"  # replaces a value that is read as JSON
 
 
 def split_run(text: str) -> tuple[str, list[Any]] | None:
-    """Split the list of plain maps off the end of a text.
+    """Replace the list of plain maps at the end of a text by STANDIN; return the rest, and the list as only value.
 
-    Returns the text with STANDIN as the list's only item, and the items; None if the text has no such end.
+    Returns None if the text has no such end.
     """
-    from json import JSONDecoder
-
-    begin = re.search(r"(?m)^ *- (\{?)", text) if len(text) >= sizes.ASIDE else None
+    begin = re.search(r"(?m)^ {0,99}- (\{?)", text)
     run = begin and re.compile(_FLOWS if begin[1] else _BLOCKS).match(text, begin.start())
-    if not begin or not run or run[0].count(":") > MOST_CONTAINERS:
+    if not begin or not run:
         return None
     indent = run["indent"]
     lines = run[0][len(indent) + 2 : -1]
-    if not begin[1]:  # block maps become flow maps, one per line
-        lines = lines.replace(f"\n{indent}  ", ", ").replace(f"\n{indent}- ", f"}}\n{indent}- {{")
+    if begin[1]:
+        lines = lines.replace(f"\n{indent}- ", "\n")
+    else:  # block maps become flow maps, one per line
+        lines = lines.replace(f"\n{indent}  ", ", ").replace(f"\n{indent}- ", "}\n{")
         lines = f"{{{lines}}}"
-    for plain, quoted in (*_QUOTES, (f"\n{indent}- ", ",\n")):
+    items = _as_json(lines)
+    return None if items is None else (f"{text[: run.start()]}{indent} {STANDIN}\n", [items])
+
+
+def split_brackets(text: str) -> tuple[str, list[Any]] | None:
+    """Replace each plain value in brackets that ends a line by STANDIN; return the rest, and the values in order.
+
+    Returns None if there are none or the text is not plain.
+    """
+    if re.search(_NOT_PLAIN, text):
+        return None
+    found: list[str] = []
+
+    def stand_in(match: re.Match[str]) -> str:
+        found.append(match[2])
+        return f"{match[1]}{STANDIN}"
+
+    rest = re.sub(_BRACKETED, stand_in, text)
+    items = _as_json("\n".join(found)) if found else None
+    return None if items is None else (rest, items)
+
+
+def _as_json(lines: str) -> list[Any] | None:
+    """Read one plain value in brackets per line as JSON; None if a key appears twice or there are too many."""
+    from json import JSONDecoder
+
+    if lines.count("{") + lines.count("[") > MOST_CONTAINERS:
+        return None
+    lines = f"\n{lines}\n"
+    for plain, quoted in _QUOTES:
         lines = lines.replace(plain, quoted)
+    lines = lines[1:-1].replace("\n", ",\n")
     items: list[Any] = JSONDecoder(object_pairs_hook=_distinct).decode(f"[{lines}]")
-    return None if None in items else (f"{text[: run.start()]}{indent}- {STANDIN}\n", items)
+    return None if None in items else items
 
 
 def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any] | None:
@@ -178,25 +212,21 @@ def parse_yaml(source: Source, tags: Collection[str] = ()) -> list[Value]:
     if source.text.count("\n%TAG") > _MOST_DIRECTIVES:
         raise error_at(source, source.text.index("\n%TAG") + 1, f"more than {_MOST_DIRECTIVES} %TAG directives")
     with paused_collector():
-        return _read_by_lines(source, tags) or _Builder(source, tags).build()
+        return _read_aside(source, tags) or _Builder(source, tags).build()
 
 
-def _read_by_lines(source: Source, tags: Collection[str]) -> list[Value] | None:
-    """Read a text that ends in a long list of plain maps; None for others and for errors."""
-    split = split_run(source.text)
+def _read_aside(source: Source, tags: Collection[str]) -> list[Value] | None:
+    """Read a long text whose plain lists of maps or values in brackets are read as JSON; None for others and errors."""
+    text = source.text
+    split = None if len(text) < sizes.ASIDE or STANDIN in text else split_run(text) or split_brackets(text)
     if split is None:
         return None
+    aside = iter(split[1])
     try:
-        values = _Builder(Source(source.name, split[0]), tags).build()
+        values = _Builder(Source(source.name, split[0]), tags, aside).build()
     except FormatError:
         return None
-    holder = values[-1]
-    while isinstance(holder, dict) and holder:
-        holder = next(reversed(holder.values()))
-    if holder != [STANDIN]:  # the last list of the last document
-        return None
-    holder[:] = split[1]
-    return values
+    return values if next(aside, None) is None else None
 
 
 def yaml_events(text: str) -> Iterator[Event]:
@@ -222,12 +252,13 @@ def yaml_events(text: str) -> Iterator[Event]:
 class _Builder:
     """Builds the values of one text; stores the state for rare events."""
 
-    __slots__ = ("aliases", "anchors", "copies", "documents", "open", "source", "tags")
+    __slots__ = ("aliases", "anchors", "aside", "copies", "documents", "open", "source", "tags")
 
-    def __init__(self, source: Source, tags: Collection[str]) -> None:
-        """Start with an empty list of documents, the accepted tags, and the budget for aliases."""
+    def __init__(self, source: Source, tags: Collection[str], aside: Iterator[Value] | None = None) -> None:
+        """Start with an empty list of documents, the accepted tags, the values for STANDIN, and the budget."""
         self.source = source
         self.tags = tags
+        self.aside = aside
         self.anchors: dict[str, Value] = {}
         self.aliases = MOST_ALIASES
         self.copies = SPARE_COPIES + len(source.text)
@@ -250,7 +281,7 @@ class _Builder:
         `current` is the dict or list being filled and `key` the key waiting for its value: None if a key is next, _ITEM
         in a list.  A single function, because two million events pass through it for 100 000 frames.
         """
-        stack, nulls, refused_keys, item = self.open, _NULLS, _ODD_KEYS, _ITEM
+        stack, nulls, refused_keys, item, aside = self.open, _NULLS, _ODD_KEYS, _ITEM, self.aside
         current: Any = self.documents
         key: Any = item
         room = MOST_CONTAINERS
@@ -269,6 +300,8 @@ class _Builder:
                     continue
                 if value in nulls and not event.style:
                     value = None
+                elif aside and value == STANDIN and not event.style:
+                    value = next(aside)
             elif kind is MappingStartEvent or kind is SequenceStartEvent:
                 value = {} if kind is MappingStartEvent else []
                 if key is None:
