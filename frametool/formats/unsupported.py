@@ -123,6 +123,15 @@ UNSUPPORTED = {
         "a glTF scene", "glTF has y up and z forward; export URDF, or the poses as JSON",
         (("magic", rb"glTF"), ("json path", "asset/version")), (".gltf", ".glb"),
     ),
+    "unity": Unsupported(
+        "a Unity scene", "Unity is left-handed with y up; export poses as JSON and convert them",
+        (("magic", rb"%YAML 1\.1\r?\n%TAG !u! tag:unity3d"),), (".unity", ".prefab"),
+    ),
+    "itk": Unsupported(
+        "an ITK or ANTs transform",
+        "it maps points about a centre in LPS axes, in mm; convert it to a 4x4 matrix first",
+        (("magic", rb"#Insight Transform File"),), (".tfm",),
+    ),
 }
 
 

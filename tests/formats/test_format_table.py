@@ -332,6 +332,8 @@ KNOWN: dict[str, tuple[bytes, str]] = {
     "USD in binary": (b"PXR-USDC" + bytes(80), "usd"),
     "glTF": (b'{"scene": 0, "asset": {"version": "2.0"}, "nodes": []}', "gltf"),
     "glTF in binary": (b"glTF\x02\0\0\0" + bytes(40), "gltf"),
+    "Unity": (b"%YAML 1.1\r\n%TAG !u! tag:unity3d.com,2011:\n--- !u!1 &1\n", "unity"),
+    "ITK": (b"#Insight Transform File V1.0\n#Transform 0\n", "itk"),
     "xacro": (b'<?xml version="1.0"?>\n<robot name="a">\n<xacro:macro name="b"/>\n</robot>', "xacro"),
     "xacro by its substitutions": (b'<robot name="a"><link name="${b}link"/></robot>', "xacro"),
 }
