@@ -386,7 +386,7 @@ def test_stamped_poses_are_interpolated_else_the_nearest_else_told(run: Run) -> 
     files = {"g.csv": stamped(rig["gripper"], -0.02, 0.02), "t.csv": stamped([*rig["target"], rig["target"][0]], 0.0)}
     done = run("solve", "--hand-eye", "g.csv", "t.csv", "-f", "json", files=files)
     require_near(entries(done.out)["camera"], rig["x"], within=1e-6)
-    assert "frametool: t.csv: 1 of 16 poses have none of g.csv within 50 ms: unpaired\n" in done.err
+    assert "frametool: warning: t.csv: 1 of 16 poses have none of g.csv within 50 ms: unpaired\n" in done.err
     assert done.status == 0
     nearest = run("solve", "--hand-eye", "g.csv", "t.csv", "--max-gap", "30ms", "-f", "json")
     require_near(entries(nearest.out)["camera"], rig["x"], within=1e-6)
@@ -501,8 +501,8 @@ def test_what_has_no_partner_is_counted_and_named(run: Run) -> None:
     files = points_files("points", "csv")
     files["b.csv"] = "".join(files["b.csv"].splitlines(keepends=True)[:-2]) + "extra,1,2,3\n"
     done = run("solve", "--points", "a.csv", "b.csv", files=files)
-    assert "frametool: a.csv: 2 of 8 points have no partner in b.csv: p6, p7\n" in done.err
-    assert "frametool: b.csv: 1 of 7 points have no partner in a.csv: extra\n" in done.err
+    assert "frametool: warning: a.csv: 2 of 8 points have no partner in b.csv: p6, p7\n" in done.err
+    assert "frametool: warning: b.csv: 1 of 7 points have no partner in a.csv: extra\n" in done.err
     assert done.status == 0
 
 
