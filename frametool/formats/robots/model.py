@@ -187,7 +187,7 @@ def _product(*poses: Rigid) -> Rigid:
     product = IDENTITY
     for each in poses:
         if each is not IDENTITY:
-            product = each if product is IDENTITY else rigid.compose(*product, *each)
+            product = each if product is IDENTITY else rigid.go_on(product, each)
     return product
 
 
@@ -392,7 +392,7 @@ class Chain:
         product = None
         for link in links:
             pose = link.pose([self._value(joint.name, values) for joint in link.joints], xp)
-            product = pose if product is None else rigid.compose(*product, *pose)
+            product = pose if product is None else rigid.go_on(product, pose)
         return product or IDENTITY
 
     def _value(self, name: str, values: Values) -> Value:
