@@ -41,7 +41,8 @@ def lookup_many(frames: Frames, target: str, source: str, at_ns: Any, *, missing
     out = np.empty((7, flat.size))
     _fill_sorted(out, frames, target, source, flat if order is None else flat[order])
     if order is not None:
-        out[:, order] = out.copy()
+        for column in out:
+            column[order] = column.copy()
     if missing == "raise" and np.isnan(out[6]).any():
         frames.lookup(target, source, int(flat[np.isnan(out[6]).argmax()]))  # raises, with the reason
     if not times.shape:

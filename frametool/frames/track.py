@@ -106,7 +106,7 @@ class MovingTrack:
         self.varies = False
         self.stamps, self.parents = [stamp_ns], [parent]
         self.samples = [components]  # or Packed, which behaves like such a list
-        self.begin = 0  # the index of the oldest sample: those before it were dropped
+        self.begin = 0  # the index of the oldest sample: those before it were dropped, or are room for older ones
         self.late: list[tuple[int, str, Rigid]] = []
         self.segments: dict[int, Way] = {}  # by the stamp at which they begin
         self.first_ns = self.last_ns = stamp_ns
@@ -154,18 +154,20 @@ class MovingTrack:
 
     def add(self, stamp_ns: int, parent: str, components: Rigid) -> None:
         """Add a sample at a new stamp."""
-        self.varies = self.varies or parent != self.parent
+        self.table = None
         if self.known is not None:
             self.known.add(stamp_ns)
-        self.table = None
         if stamp_ns < self.last_ns:
+            self.varies = self.varies or parent != self.parent
             self.late.append((stamp_ns, parent, components))
             self.first_ns = min(self.first_ns, stamp_ns)
             return
+        if parent != self.parent:
+            self.varies, self.parent = True, parent
         self.stamps.append(stamp_ns)
         self.parents.append(parent)
         self.samples.append(components)
-        self.last_ns, self.parent = stamp_ns, parent
+        self.last_ns = stamp_ns
 
     def has(self, stamp_ns: int) -> bool:
         """Return True if there is a sample at a stamp.
@@ -188,19 +190,33 @@ class MovingTrack:
         if not self.late:
             return
         self._unpack()
+        columns: tuple[list[Any], ...] = self.stamps, self.parents, self.samples
         if len(self.late) > FEW:
-            rows = [*zip(self.stamps, self.parents, self.samples, strict=True), *self.late]
+            rows = [*islice(zip(*columns, strict=True), self.begin, None), *self.late]
             rows.sort(key=itemgetter(0))
             self.stamps[:], self.parents[:], self.samples[:] = zip(*rows, strict=True)
+            self.begin = 0
             self.segments.clear()
         else:
-            for stamp_ns, parent, components in self.late:
-                at = bisect_right(self.stamps, stamp_ns)
-                self.segments.pop(self.stamps[at - 1], None)
-                self.stamps.insert(at, stamp_ns)
-                self.parents.insert(at, parent)
-                self.samples.insert(at, components)
+            for row in self.late:
+                self._insert(columns, row)
         self.late.clear()
+
+    def _insert(self, columns: tuple[list[Any], ...], row: tuple[int, str, Rigid]) -> None:
+        """Insert a late sample; before the oldest there is room, doubled when it is used up, so that this is fast."""
+        at = bisect_right(self.stamps, row[0], self.begin)
+        self.segments.pop(self.stamps[at - 1], None)
+        if at > self.begin:
+            for column, part in zip(columns, row, strict=True):
+                column.insert(at, part)
+            return
+        if not self.begin:
+            self.begin = len(self.stamps)
+            for column in columns:
+                column[:0] = column[:1] * self.begin
+        self.begin -= 1
+        for column, part in zip(columns, row, strict=True):
+            column[self.begin] = part
 
     def _place(self, at_ns: int) -> int:
         """Return the index of the newest sample that is not after a time; `begin` - 1 if there is none."""
@@ -232,7 +248,7 @@ class MovingTrack:
         if oldest <= self.first_ns:
             return
         self._settle()
-        gone = slice(self.begin, bisect_left(self.stamps, oldest))
+        gone = slice(self.begin, bisect_left(self.stamps, oldest, self.begin))
         self.begin = gone.stop
         self.first_ns = self.stamps[self.begin]
         self.table = None
