@@ -455,11 +455,14 @@ class Labels:
         self._flat, self._size = flat, flat.size
         self.placed: list[Label] = []
         self.hidden = 0  # names without room
-        self._taken = {cell for box in blocked for cell in self._cells(box)}
-        self._taken |= {cell for x, y, _ in flat.origins.values() for cell in self._cells((x, y, x, y))}
-        parts = (0.4, 0.7, 1.0)
-        tips = (tip for name in flat.poses for part in parts for tip in flat.tips(name, part))
-        self._axes = {cell for x, y, _ in tips for cell in self._cells((x, y, x, y))}
+        self._taken: set[tuple[float, float]] = {cell for box in blocked for cell in self._cells(box)}
+        wide, high = self._size.cell
+        self._taken |= {(x // wide, y // high) for x, y, _ in flat.origins.values()}
+        axes = ((flat.origins[name], tip) for name in flat.poses for tip in flat.tips(name))
+        self._axes = {
+            ((begin.x + part * (end.x - begin.x)) // wide, (begin.y + part * (end.y - begin.y)) // high)
+            for begin, end in axes for part in (0.4, 0.7, 1.0)
+        }  # fmt: skip
 
     def place_all(self) -> None:
         """Place a name next to each group of frames on one point inside the picture, nearest first."""
@@ -480,11 +483,13 @@ class Labels:
         self.placed.append(found)
         return True
 
-    def at(self, words: str, point: Flat, left: float, middle: float, away: float = 0.0) -> Iterator[Label]:
-        """Yield the label at a place, moved to the nearest cells, if it is inside the picture."""
+    def at(
+        self, words: str, length: float, point: Flat, left: float, middle: float, away: float = 0.0
+    ) -> Iterator[Label]:
+        """Yield the label of some length at a place, moved to the nearest cells, if it is inside the picture."""
         wide, high = self._size.cell
         left, top = wide * round(left / wide), high * round((middle - self._size.line / 2.0) / high)
-        right, bottom = left + wide * math.ceil(self._size.measure(words) / wide), top + self._size.line
+        right, bottom = left + wide * math.ceil(length / wide), top + self._size.line
         if left >= 0.0 and right <= self._size.width and top >= 0.0 and bottom <= self._size.height:
             yield Label(words, point, (left - MARGIN, top, right + MARGIN, bottom), away)
 
@@ -494,7 +499,7 @@ class Labels:
         for away in DISTANCES:
             for dx, dy in SIDES:
                 left = point.x + dx * away * line - (wide if dx < 0.0 else wide / 2.0 if dx == 0.0 else 0.0)
-                yield from self.at(words, point, left, point.y + dy * away * line, away)
+                yield from self.at(words, wide, point, left, point.y + dy * away * line, away)
 
     def _cells(self, box: Box) -> Iterator[tuple[int, int]]:
         """Return the cells that a box covers; a point covers one."""

@@ -163,10 +163,11 @@ class TerminalPicture:
         said = f"{words_of([name])} {away:.0f} m" if away >= 10.0 else f"{words_of([name])} {away:.2g} m"
         words = f"{said} {arrow}" if across > 0.0 else f"{arrow} {said}"
         part = min(half_wide / max(abs(across), 1e-9), half_high / max(abs(down), 1e-9))
-        room = self._flat.size.width - 2.0 * cells(words)
-        left = min(max(half_wide + across * part - (2.0 * cells(words) if across > 0.0 else 0.0), 0.0), room)
+        length = 2.0 * cells(words)
+        left = half_wide + across * part - (length if across > 0.0 else 0.0)
+        left = min(max(left, 0.0), self._flat.size.width - length)
         for line in sorted(range(self._canvas.lines), key=lambda line: abs(4 * line + 2 - half_high - down * part)):
-            yield from labels.at(words, self._flat.origins[name], left, 4 * line + 2)
+            yield from labels.at(words, length, self._flat.origins[name], left, 4 * line + 2)
 
     def _scale_line(self, eye: tuple[float, float], hidden: int) -> list[Run]:
         """Return the scale, the direction of view, and the number of names without room."""
