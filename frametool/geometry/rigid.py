@@ -48,7 +48,7 @@ def compose(
 
 
 def go_on(a: Rigid, b: Rigid) -> Rigid:
-    """Compose poses: as `compose`, but plain zeros, of which robot models are full, cost nothing beside columns."""
+    """Compose poses: as `compose`, but plain zeros, of which robot models are full, cost nothing among columns."""
     if all(type(part) is float for part in (*a, *b)):
         return compose(*a, *b)
     (*shift, ax, ay, az, aw), (btx, bty, btz, bx, by, bz, bw) = a, b
