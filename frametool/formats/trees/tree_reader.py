@@ -40,7 +40,7 @@ TREE_KEYS = frozenset(("frames", "angles"))
 STAMP_KEYS = frozenset(("stamp", "stamp_ns"))
 TIMED = frozenset(("samples", "camera", *STAMP_KEYS))
 XYZ = ("x", "y", "z")
-MOST_KEYS = 5  # of a mapping in a message
+MOST_KEYS, MOST_CHARACTERS = 5, 80  # of a mapping in a message
 NO_NAME = "is in place of a frame's name: a root has no pose, its keys are its children"
 CAMERA_KEYS = ("model", "K", "D", "size", "skew", "xi", "alpha", "beta", "w", "axes", "R", "P")
 LOOSE = frozenset(("x", "roll", "yaw", "theta", "qw", "yaw_deg", "x_mm"))  # single numbers
@@ -88,9 +88,10 @@ def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
     elif not NAMES.isdisjoint(value):
         yield from _entry(value, (), reading)
     else:
+        is_long = len("".join([*value][:MOST_KEYS])) > MOST_CHARACTERS
         raise Misfit(
             f"no frame tree: expected frames:, transforms: or an entry with name: and parent:; "
-            f"found the keys {first_of([*value], MOST_KEYS, quote=shown)} (frametool help frames)",
+            f"found the keys {first_of([*value], 1 if is_long else MOST_KEYS, quote=shown)} (frametool help frames)",
         )
 
 
