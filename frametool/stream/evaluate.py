@@ -135,7 +135,8 @@ class Run:
             self._note_zones()
         if self.request.gathered:
             kept = np.isin(np.arange(self.count), self.rows)
-            self.request.gathered.take(plan.shapes[0], moved[0], kept, weights, self.block.line_of)
+            for shape, parts in zip(plan.shapes, moved, strict=False):
+                self.request.gathered.take(shape, parts, kept, weights, self.block.line_of)
         if self.request.unwrap and len(self.rows):
             _unwrap(self.results, plan.targets[0].angle_columns(), state)
 

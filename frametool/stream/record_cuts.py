@@ -335,13 +335,14 @@ def _as_cut(template: Template, spans: Sequence[Places]) -> Cut:
 
 
 def in_order(cuts: Sequence[Cut]) -> list[Cut]:
-    """Part cuts of several sorts so that their records follow each other as in the text."""
+    """Part cuts of several sorts so that their records follow each other as in the text, one that holds several alone."""
     if not cuts:
         return []
     sorts = np.concatenate([np.full(len(cut.starts), index) for index, cut in enumerate(cuts)])
     rows = np.concatenate([np.arange(len(cut.starts)) for cut in cuts])
     order = np.argsort(np.concatenate([cut.starts[:, 0] for cut in cuts]), kind="stable")
-    changes = np.flatnonzero(np.diff(sorts[order])) + 1
+    several, ordered = np.array([len(cut.template.entries) > 1 for cut in cuts]), sorts[order]
+    changes = np.flatnonzero((np.diff(ordered) != 0) | several[ordered[1:]]) + 1
     parts = [(cuts[sorts[part[0]]], rows[part]) for part in np.split(order, changes)]
     return [Cut(cut.template, cut.starts[part], cut.ends[part]) for cut, part in parts]
 

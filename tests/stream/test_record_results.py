@@ -133,6 +133,23 @@ def test_records_that_are_alike_take_less_time_than_one_by_one(run: Run, kind: s
     assert min(took(), took()) < took(few=2000, small=1 << 30) / 2
 
 
+@pytest.mark.parametrize("count", [2, 50])
+@pytest.mark.parametrize("command", ["relative --consecutive", "relative --first", "relative --consecutive -f csv", "mean"])
+def test_poses_of_one_message_follow_each_other_as_those_of_many(run: Run, command: str, count: int) -> None:
+    poses = [{"position": {"x": at * at / 4, "y": 0.0, "z": 1.0}, "orientation": {"x": 0, "y": 0, "z": 0.6, "w": 0.8}} for at in range(3 * count)]
+    header = {"frame_id": "map", "stamp": {"sec": 1, "nanosec": 0}}
+    messages = [{"header": header, "poses": poses[first : first + 3]} for first in range(0, len(poses), 3)]
+    together = run(*command.split(), stdin="".join(f"{json.dumps(each)}\n" for each in messages))
+    apart = run(*command.split(), stdin="".join(f"{json.dumps({'header': header, 'pose': each})}\n" for each in poses))
+    assert (together.status, apart.status) == (0, 0)
+    if command == "mean" or "csv" in command:
+        assert together.out == apart.out
+        return
+    found = [pose for line in together.out.splitlines() for pose in json.loads(line)["poses"]]
+    wanted = [json.loads(line) for line in apart.out.splitlines()]
+    assert [each["distance"] for each in found] == [each["pose"]["distance"] for each in wanted]
+
+
 def test_a_frame_that_is_left_out_is_told_once(run: Run) -> None:
     line = '{"parent": "map", "xyz": [1, 2, 3], "xyzw": [0, 0, 0, 1]}\n'
     done = run("apply", "--transform", "{xyz: [1, 0, 0]}", "-f", "csv", stdin=line * 100)
