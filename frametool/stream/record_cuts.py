@@ -335,7 +335,7 @@ def _as_cut(template: Template, spans: Sequence[Places]) -> Cut:
 
 
 def in_order(cuts: Sequence[Cut]) -> list[Cut]:
-    """Part cuts of several sorts so that their records follow each other as in the text, one that holds several alone."""
+    """Part cuts so that their records follow each other as in the text; a record that holds several is alone."""
     if not cuts:
         return []
     sorts = np.concatenate([np.full(len(cut.starts), index) for index, cut in enumerate(cuts)])

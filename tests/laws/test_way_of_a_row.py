@@ -48,7 +48,7 @@ class Cost(NamedTuple):
 
 
 MOST = {
-    "one CSV point": Cost(functions=569, files=56, lines=3675),  # the aim: 320 functions, 30 files
+    "one CSV point": Cost(functions=569, files=56, lines=3676),  # the aim: 320 functions, 30 files
     "40 JSON records": Cost(functions=541, files=49, lines=3350),  # 340, 32
     "40 JSON records to CSV": Cost(functions=519, files=50, lines=3211),  # 340, 32
     "TUM to KITTI": Cost(functions=478, files=46, lines=2913),  # 320, 30
