@@ -224,9 +224,9 @@ def _read(argument: str | Source, request: Request, read: Callable[[Source], Ite
         except FormatError as error:
             if source.name == INLINE:
                 raise
-            from frametool.formats.detect import points_to_lookup
+            from frametool.formats.detect import with_hint
 
-            raise points_to_lookup(source.text.encode(), source.name) or error from None
+            raise with_hint(error, source.text.encode(), source.name) from None
 
 
 @contextmanager

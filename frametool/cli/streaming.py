@@ -198,11 +198,11 @@ class Stream:
 
     def _with_remedy(self, error: FormatError, head: bytes) -> FormatError:
         """Return the error that ends a stream with what to do."""
-        from frametool.formats.detect import points_to_lookup
+        from frametool.formats.detect import with_hint
 
         if isinstance(error, BadRow) and not (error.fault.final or head[:1] == b"[" or error.fault.line <= TOP):
             error.remedy = "; --on-error skip goes on"
-        return points_to_lookup(head, self.name) or error
+        return with_hint(error, head, self.name, chosen=bool(self.chosen_format()))
 
     def _run_opened(self, stream: BufferedReader, request: Request, output: Output, *, tables_only: bool) -> int:
         """Run the stream, of whatever format it is."""

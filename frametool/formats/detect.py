@@ -73,6 +73,12 @@ class Beginning:
         return plain or "".join(lines[:1])
 
     @cached_property
+    def has_data(self) -> bool:
+        """Return True for text that may hold frames or poses, False for prose."""
+        is_prose = re.match(_SENTENCE, self.data_line) and not re.search(rf"(?i)\b{_OURS}\b", self.data_line)
+        return not is_prose and re.search(_DATA, self.text[:LOOKED_AT]) is not None
+
+    @cached_property
     def json_paths(self) -> set[tuple[str, ...]]:
         """Return the paths of the keys of JSON; lists on the path do not count."""
         from frametool.documents.json import looks_like_json
@@ -292,7 +298,7 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
         return fmt
     if "tree" not in reads and (what := not_text(head)):
         raise _no_text(what, name)
-    if begin.xml and (begin.elements or not by_suffix(name, readers(*reads))):
+    if "tree" in reads and begin.xml and (begin.elements or not by_suffix(name, readers(*reads))):
         raise _unknown(begin, *reads, name=name)
     if others := _fitting(begin, {"magic": _STRONG["magic"]}, readers("arrays"))[0]:
         what = f"{FORMATS[others[0]].summary}: no frames in it; frametool convert and apply read it"
@@ -306,7 +312,7 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
     if (what := not_text(head)) and not head.startswith(UTF16):
         raise _no_text(what, name)
     found, _ = _fitting(begin, _WEAK, readers(*reads))
-    if found:
+    if found and (otherwise or begin.has_data):
         return found[0]
     if otherwise:
         return otherwise
@@ -314,7 +320,7 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
         return empty
     if not begin.text.strip():
         raise FormatError("nothing in it", source=name or "stdin")
-    if "records" in reads or not re.search(r"(?m):(?:\s|$)|^[^\S\n]*+[-?&!{[]", begin.text):
+    if "records" in reads or not begin.has_data or not re.search(r"(?m):(?:\s|$)|^[^\S\n]*+[-?&!{[]", begin.text):
         raise _unknown(begin, *reads, name=name)
     return "yaml"
 
@@ -331,10 +337,24 @@ def instead_of_text(error: FormatError, path: str) -> FormatError:
     with open(path, "rb") as file:
         head = file.read(HEAD)
     what = not_text(head)
-    return (points_to_lookup(head, path) or _no_text(what, path)) if what else error
+    return (_points_to_lookup(head, path) or _no_text(what, path)) if what else error
 
 
 _LISTED = "`frametool formats` lists what is read"
+_NUM = r"""["']?[-+]?(?:\.?\d[\w.+-]*|nan|inf\w*)["']?"""
+_SENTENCE = r"\W*(?:[A-Za-z][\w'-]*[,;:]? +){3,}[A-Za-z]"
+_KEYS = (
+    "frames?|name|parent|children|child_frame_id|transforms?|header|samples|poses?|point|vector|position|translation|"
+    r"orientation|rotation|quaternion|matrix|(?:xyz|rpy|euler)\w*"
+)
+_OURS = r"(?:\w*[._])?(?:q?[xyz]|qw|roll|pitch|yaw|frame|frame_id|name|parent)"
+# a number as a cell or a value, one at the beginning of a line, a frametool key, a list or map, a header
+_DATA = "(?im)" + "|".join((
+    rf"[,;\t:{{][ \t]*+{_NUM}[ \t]*(?=[,;\t\]}}]|$)|\[[ \t]*{_NUM}[ \t]*[,;]",
+    rf"^[ \t]*+(?:- )*{_NUM}(?:[ \t]+{_NUM}|[ \t]*$|[,;\t])",
+    rf"""(?:^|[\s{{,-])["']?(?:{_KEYS})["']?:(?:\s|$)|^[-\s]*+(?:\{{|\[(?![a-z ]+\]))""",
+    rf"""\A[# ]*x +y\b|\A[#%" ]*(?:[^\n]*[,;\t] *)?["']?{_OURS}["']?\s*(?:[,;\t(\[]|$)""",
+))  # fmt: skip
 _MOST_NAMED = 8
 
 
@@ -361,12 +381,23 @@ _MESSAGES = ("echo", "jsonl", "calls", "csv1", "csv2")  # formats that are read 
 
 def refuse_robots(text: bytes, name: str) -> None:
     """Raise FormatError for XML of a robot or a launch file where a single pose is expected."""
-    if re.match(_ROBOT, text) and (error := points_to_lookup(text, name)):
+    if re.match(_ROBOT, text) and (error := _points_to_lookup(text, name)):
         raise error
 
 
-def points_to_lookup(text: bytes, name: str) -> FormatError | None:
-    """Return the error for a file of frames where a pose is expected, which suggests `lookup`; None for other text."""
+def with_hint(error: FormatError, text: bytes, name: str, *, chosen: bool = False) -> FormatError:
+    """Return the error for text without a pose; for frames it suggests `lookup`; prose is not quoted."""
+    from frametool.grammar.pasted import unsupported_tool
+
+    begin = Beginning(text[:HEAD])
+    has_sign = bool(_fitting(begin, _STRONG, (*FORMATS, *UNSUPPORTED))[0] or unsupported_tool(begin.text))
+    is_known = begin.has_data or by_suffix(name, readers("records", "rows")) or has_sign
+    if begin.data_line and not (chosen or is_known or not_text(begin.head)):
+        error = _unknown(begin, "records", "rows", name=name)
+    return _points_to_lookup(text, name) or error
+
+
+def _points_to_lookup(text: bytes, name: str) -> FormatError | None:
     begin = Beginning(text[:HEAD])
     try:
         fmt = _by_sign(begin, "tree", name=name)

@@ -357,8 +357,8 @@ def test_a_suffix_tells_of_a_form_that_is_not_read_where_no_sign_does(run: Calla
 
 UNKNOWN: dict[str, tuple[bytes, str]] = {
     "prose": (b"The quick brown fox\njumps over it\n", "cannot detect the format of this text; formats: yaml, "),
-    "a note": (b"Note: my password is hunter2\nother: thing\n", "no frame tree: "),
-    "a letter": (b"Dear reader, my password is hunter2.\nThis is prose: it has a colon.\nbye\n", "no columns of a point or pose"),
+    "a note": (b"Note: my password is hunter2\nother: thing\n", "cannot detect the format of this text; formats: yaml, "),
+    "a letter": (b"Dear reader, my password is hunter2.\nThis is prose: it has a colon.\nbye\n", "cannot detect the format of this text"),
     "a word": (b"hunter2", "cannot detect the format of this text"),
     "a picture": (b"\x89PNG\r\n\x1a\n" + bytes(range(256)), "not text but a PNG picture; `frametool formats` lists what is read"),
     "code": (b"import os\nprint(1)\n", "cannot detect the format of this text; formats: yaml, "),
@@ -371,7 +371,7 @@ UNKNOWN: dict[str, tuple[bytes, str]] = {
     "escapes": (b"\x1b[31mred\x1b[0m fox\n", "cannot detect the format of this text"),
     "keys of no tree": (b"".join(b"key_%d: 1\n" % each for each in range(999)), "no frame tree: "),
     "long keys of no tree": (b"{" + b"".join(b'"%d%s": 1,' % (each, b"x" * 500) for each in range(9)) + b'"a": 1}', "no frame tree: "),
-    "text under dashes": (b"--- |\n" + b"  words and more words\n" * 999, "expected a frame tree, found "),
+    "text under dashes": (b"--- |\n" + b"  words and more words\n" * 999, "cannot detect the format of this text"),
 }
 
 
@@ -463,3 +463,14 @@ def test_a_form_that_was_written_is_refused_as_an_output_with_what_to_write(run:
     for output in (("-f", name), ("-o", f"a{UNSUPPORTED[name].suffixes[0]}")):
         found = run("convert", *output, stdin="x,y,z\n1,2,3\n")
         assert (found.status in (1, 2), found.out, found.err.count("\n"), remedy in found.err) == (True, "", 1, True)
+
+
+@pytest.mark.parametrize(("data", "said"), [
+    (b"<note/>", "cannot detect the format of XML with the root element note; none of those read here is XML; `frametool "),
+    (b"<!DOCTYPE note [" + b"<!ELEMENT a>" * 6000, "cannot detect the format of XML without an element in its first 64 KiB; none of"),
+    (b"<!DOCTYPE note", "cannot detect the format of XML without an element; none of those read here is XML; `frametool "),
+])  # fmt: skip
+def test_xml_where_no_form_is_xml_names_no_forms(run: Callable[..., Any], data: bytes, said: str) -> None:
+    found = run("convert", "file.xml", files={"file.xml": data})
+    assert (found.status, found.out) == (1, "")
+    assert said in found.err

@@ -264,7 +264,7 @@ WRONG_FILES = {
     "a list": ("[1, 2]", r"joints:1:2: expected a map of joints"),
     "nothing": ("", r"joints: no values of joints in it"),
     "only a header": ("t,pan\n", r"joints: no values of joints in it"),
-    "XML": ("<html><body/></html>", r"joints:1: cannot detect the format of XML with the root element html; formats: mjcf"),
+    "XML": ("<html><body/></html>", r"joints: this XML has no values of joints"),
     "broken JSON": ('{"pan": 1', r"joints:1:"),
     "binary": (b"\x89PNG\r\n\x1a\n\0\0\0", r"not text but a PNG picture"),
 }

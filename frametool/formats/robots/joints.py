@@ -363,6 +363,8 @@ def read_joint_file(path: str, joints: Mapping[str, Joint]) -> Iterator[JointSam
         elif state:
             having = " and ".join(readers("joints"))
             raise FormatError(f"has no states with names; {having} files do", source=file.name)
+        elif head.lstrip().startswith(b"<"):
+            raise FormatError("this XML has no values of joints; maps, JointState messages, CSV have", source=file.name)
         elif "rows" in FORMATS[fmt].reads:
             yield from _of_table(file, fmt, joints, tally)
         else:
