@@ -81,7 +81,7 @@ class Recorded(NamedTuple):
 class McapFile:
     """An MCAP file.
 
-    compression: of its chunks; stated: the number of messages by channel, None if it does not state them
+    compression: of its chunks; stated: the number of messages by channel, total: of all, None if it does not state them
     """
 
     def __init__(self, path: Path, opened: ExitStack, tally: Diagnostics) -> None:
@@ -96,7 +96,8 @@ class McapFile:
         said = summary.statistics if summary else None
         if said is None:
             tally.note(NO_SUMMARY.format(path.name), 1)
-        self.said, self.stated = said, said.channel_message_counts if said else None
+        self.said, self.total = said, said.message_count if said else None
+        self.stated = (said.channel_message_counts if said else None) or None  # an empty map states nothing
         chunks = summary.chunk_indexes if summary else []
         self._chunks = chunks if said and said.chunk_count == len(chunks) else []
         self.compression = self._chunks[0].compression if self._chunks else ""
@@ -219,7 +220,7 @@ def _in_order(chunks: Iterable[list[Recorded]]) -> Iterator[list[Recorded]]:
 class DatabaseFile:
     """A sqlite3 file of rosbag2; the contents of its tables depend on its version."""
 
-    head, compression, stated = None, "", None
+    head, compression, stated, total = None, "", None, None
 
     def __init__(self, path: Path, opened: ExitStack, _tally: Diagnostics) -> None:
         """Let sqlite3 check its pages, because rows on a broken one would be missing silently, and read its topics."""
@@ -275,6 +276,7 @@ class Bag1File:
             schema = each.msgtype, "ros1msg", each.msgdef.data.encode()
             self.channels[each.id] = Channel(each.topic, each.msgtype, "ros1", schema, about, each.digest)
         self.stated = sum((Counter(each.connection_counts) for each in self.reader.chunk_infos), Counter[int]())
+        self.total = self.stated.total()
         used = {id(each.decompressor) for each in self.reader.chunks.values()}
         names = [name for name, each in decompressors.items() if id(each) in used]
         self.compression = names[0].removeprefix("none") if names else ""
@@ -355,8 +357,9 @@ class RecordingReader:
             for block in _in_order(filter(None, file.found(numbers))):
                 yield map(_unpacked, block) if self._is_packed else block
                 count += len(block)
-            if file.stated is not None:
-                self._check(count, sum(file.stated.get(number, 0) for number in numbers), wanted)
+            known = None if file.stated is None else sum(file.stated.get(number, 0) for number in numbers)
+            self._check(count, known, wanted)
+            self._check(count, file.total if wanted is None else None, wanted)  # a damaged file may lack a channel
             total += count
         self._check(total, self._expected(wanted), wanted)
 

@@ -43,9 +43,12 @@ MOST_STAMPS = 4000  # of a trail; of more, every second, third, .. is taken
 
 
 def _expression(text: str) -> re.Pattern[str]:
-    """Compile a regular expression."""
+    """Compile a regular expression without Python's warnings."""
+    import warnings
+
     try:
-        return re.compile(text)
+        with warnings.catch_warnings(action="ignore", category=FutureWarning):
+            return re.compile(text)
     except (re.error, OverflowError, RecursionError) as error:
         raise ValueInvalid(f"{shown(text)} is not a regular expression: {error}") from None
 

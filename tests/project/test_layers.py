@@ -110,12 +110,12 @@ MOST_LINES = {  # code lines of a room, and behind it what is aimed at; a featur
     "formats": 7_107,  # 6 900; cameras 300, solids 92
     "cli": 5_640,  # 5 200; `run` of programs 97
     "ros": 957,  # with recordings 1 900
-    "recordings": 1_289,
+    "recordings": 1_292,
     "fit": 2_387,  # 2 200
-    "view": 2_266,  # 1 800; the report of compare 294
+    "view": 2_268,  # 1 800; the report of compare 294
     "explain": 1_054,  # 1 000
 }
-MOST_IN_ALL = 42_812  # the aim is 37 000
+MOST_IN_ALL = 42_817  # the aim is 37 000
 MOST_FILES = 259  # 190
 MOST_OF_PAGES = 1_900
 
