@@ -14,7 +14,6 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from rosbags.interfaces import Nodetype
 
 from frametool.ros.messages import PATH
 from frametool.text.spans import MARGIN, Spans, framed, join
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
+    from rosbags.interfaces import Nodetype
 
     from frametool.recordings.made import MessageTypes
     from frametool.recordings.read import Channel, Recorded
@@ -122,7 +122,7 @@ def _repeated(text: bytes, count: int) -> Spans:
     return Spans(framed(text), np.tile(starts + MARGIN, (count, 1)), np.tile(ends + MARGIN, (count, 1)))
 
 
-class Fields:
+class MessageNumbers:
     """The numbers in one message: their places and types, and the parts that other messages must share with it."""
 
     def __init__(self, types: MessageTypes, kind: str, data: bytes) -> None:
@@ -141,6 +141,8 @@ class Fields:
             self._value(*node)
 
     def _value(self, node: Nodetype, what: Any) -> None:
+        from rosbags.interfaces import Nodetype  # the extra is named where it is missing
+
         if node == Nodetype.NAME:
             self._message(what)
         elif node == Nodetype.ARRAY:
@@ -170,7 +172,7 @@ def layout_of(types: MessageTypes, channel: Channel, data: bytes) -> BinaryLayou
     """Return the layout of messages like this one; None unless it gives the same line as the full reader."""
     try:
         line = text_of(types, channel, data)
-        fields = Fields(types, channel.type, data)
+        fields = MessageNumbers(types, channel.type, data)
     except ValueError:
         return None
     places, codes = zip(*fields.numbers, strict=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -104,6 +105,14 @@ def test_without_the_extra_one_line_says_what_to_install(folder: Path, run: Run,
     done = run("record", str(folder / "run.bag"), "--with", TREE, "-o", "new.bag")
     said = "bags are read with an extra; install it: pip install 'frametool[bag]'"
     assert (done.status, done.err) == (5, f"frametool: {folder / 'run.bag'}: {said}\n")
+
+
+@pytest.mark.parametrize("command", ["tree run.mcap", "convert -i run.mcap -f csv", "compare run.mcap run.mcap", "record run.mcap -o new.mcap"])
+def test_a_fresh_process_without_the_libraries_says_the_same(command: str, folder: Path) -> None:
+    code = "import sys; sys.modules |= dict.fromkeys(('rosbags', 'mcap', 'zstandard')); from frametool.cli import main; main()"
+    done = subprocess.run([sys.executable, "-c", code, *command.split()], cwd=folder, capture_output=True, text=True, check=False)
+    said = "run.mcap: bags are read with an extra; install it: pip install 'frametool[bag]'"
+    assert (done.returncode, done.stdout, done.stderr) == (5, "", f"frametool: {said}\n")
 
 
 @pytest.mark.parametrize("name", ["empty.mcap", "empty.bag", "empty.db3"])
