@@ -163,9 +163,8 @@ class MessageNumbers:
 
     def _place(self, size: int) -> int:
         """Skip the next part of this many bytes; return its position."""
-        place = self.at + (-(self.at - self.begin) % size if self.aligned else 0)
-        self.at = place + size
-        return place
+        self.at += size + (-(self.at - self.begin) % size if self.aligned else 0)
+        return self.at - size
 
 
 def layout_of(types: MessageTypes, channel: Channel, data: bytes) -> BinaryLayout | None:
