@@ -16,7 +16,7 @@ from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.geometry import uncertainty
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, places_in, read_number, read_texts, within
 from frametool.text.numbers import ANGLES as UNITS_OF_ANGLE
-from frametool.text.numbers import BRACKETS, NotFinite, read_number_or_angle
+from frametool.text.numbers import BRACKETS, read_number_or_angle
 from frametool.text.numbers import LENGTHS as UNITS_OF_LENGTH
 
 if TYPE_CHECKING:
@@ -123,14 +123,7 @@ def entries_of(value: Any, sizes: Sequence[int]) -> list[tuple[Path, float]]:
         texts = rows
     if len(texts) not in sizes:
         raise NotARotation(uncertainty.wrong_count(len(texts), sizes))
-    return [(path, within(path, _entry, text)) for path, text in texts]
-
-
-def _entry(text: Any) -> float:
-    try:
-        return read_number(text)
-    except NotFinite as error:
-        raise NotARotation(str(error)) from None
+    return [(path, within(path, read_number, text)) for path, text in texts]
 
 
 def read_sigmas(value: Any, reading: Reading) -> list[float]:
@@ -168,10 +161,7 @@ def _three(key: str, value: Any, axes: Sequence[str], reading: Reading) -> list[
 def _sigma(text: Any, degrees: bool | None) -> float:  # noqa: FBT001 - None: it is no angle
     if type(text) is not str:
         raise Misfit(f"expected a number, found {kind(text)}")
-    try:
-        number = read_number_or_angle(text, degrees)
-    except NotFinite as error:
-        raise NotARotation(str(error)) from None
+    number = read_number_or_angle(text, degrees)
     if number < 0.0:
         raise NotARotation(f"sigma is negative: {text}")
     return number

@@ -20,12 +20,12 @@ from frametool.geometry.place import ECEF, ENU, GRID, GRIDDED, LLA, LOCAL, NED, 
 from frametool.geometry.representations import HEADING, POSITIONS
 from frametool.geometry.transverse_mercator import NORTH, SOUTH, ZONES, standard_zone, utm, zone_number
 from frametool.grammar.names import EARTH_FRAMES, FLAT, FLAT_NAMES
-from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_number, read_numbers, within
+from frametool.grammar.readers import Misfit, Reading, kind, read_number, read_numbers, within
 from frametool.grammar.rotation_spelling import AXES_KEY
-from frametool.text.numbers import NotFinite, parse_angle, parse_number
+from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from frametool.grammar.pose import Pose
     from frametool.grammar.readers import Quaternion
@@ -98,10 +98,7 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
     if not needs_axes:
         return inner._replace(position=position, parent=inner.parent or ECEF, read=spots[0])
     place = place._replace(axes=axes)
-    try:
-        place.check(numbers)
-    except ValueInvalid as error:
-        raise Misfit(str(error), (next(iter(own)),)) from None
+    within((next(iter(own)),), place.check, numbers)
     made = placed.compose(place.base(numbers), inner._replace(rotation=rotation, scale=1.0).placed)
     found = inner.of(made, inner.name, inner.parent or ECEF)
     found = found if inner.position else found._replace(read=spots[0])
@@ -113,7 +110,7 @@ def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
     _refuse_not_read(own)
     found = []
     if AT in own:
-        found += within((AT,), _placed_at, own[AT], reading)
+        found.append(within((AT,), read_at, own[AT], reading))
     if ECEF in own:
         found.append(Spot(Place(ECEF, ("x", "y", "z")), within((ECEF,), read_numbers, own[ECEF], ("x", "y", "z"))))
     if UTM in own:
@@ -126,24 +123,16 @@ def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
         found.append(_local(own, reading))
     for name, fields in FLAT.items():
         if {*fields} <= own.keys():
-            numbers = tuple(_member(field, read_number, own[field]) for field in fields)
+            numbers = tuple(within((field,), read_number, own[field]) for field in fields)
             found.append(Spot(Place(name, fields), numbers))
     for spot in found:
-        try:
-            spot.place.check(spot.numbers)
-        except ValueInvalid as error:
-            raise Misfit(str(error), (next(iter(own)),)) from None
+        within((next(iter(own)),), spot.place.check, spot.numbers)
     for other in found[1:]:
         _agree(_position(found[0]), _position(other))
     return found
 
 
 def read_at(value: Any, reading: Reading) -> Spot:
-    """Read the only position of a mapping."""
-    return _placed_at(value, reading)[0]
-
-
-def _placed_at(value: Any, reading: Reading) -> list[Spot]:
     """Read the value of `at:`: lat lon alt, utm or ecef, and nothing else."""
     if type(value) is not dict:
         raise Misfit(f"expected a place like {{lat: 48.1, lon: 11.5, alt: 520}}, found {kind(value)}")
@@ -153,7 +142,7 @@ def _placed_at(value: Any, reading: Reading) -> list[Spot]:
     found = _spots(value, reading)
     if not found:
         raise Misfit(_incomplete(value))
-    return found[:1]
+    return found[0]
 
 
 def _by_field(own: dict[str, Any]) -> dict[str, str]:
@@ -185,7 +174,9 @@ def _lla(own: dict[str, Any], reading: Reading) -> Spot:
     if len(latitude) != 1 or len(longitude) != 1:
         raise Misfit(_incomplete(own), (next(iter(own)),), key=True)
     fields = *latitude, *longitude, *_heights(named, reading, named[latitude[0]])
-    return Spot(Place(LLA, fields), tuple(_member(named[each], coordinate, own[named[each]], each) for each in fields))
+    keys = [named[each] for each in fields]
+    numbers = [within((key,), coordinate, own[key], field) for key, field in zip(keys, fields, strict=True)]
+    return Spot(Place(LLA, fields), tuple(numbers))
 
 
 def coordinate(value: Any, field: str) -> float:
@@ -206,15 +197,10 @@ def coordinate(value: Any, field: str) -> float:
     if max(parts[1:]) >= 60.0 or (sign and letter):
         raise Misfit(f"{shown(value)}: minutes and seconds are below 60, and a sign or a letter states the side")
     size = (parts[0] * 3600.0 + parts[1] * 60.0 + parts[2]) / 3600.0 if minutes else parts[0]
-    return _signed(-size if sign == "-" else size, letter, value, field)
-
-
-def _signed(size: float, letter: str, text: str, field: str) -> float:
-    """Return an angle with the sign of its letter."""
     letter = letter.upper()
     if letter and letter not in ("NS" if field == "lat" else "EW"):
-        raise Misfit(f"{shown(text)} is not a {field}: {letter} belongs to {'lon' if field == 'lat' else 'lat'}")
-    return -size if letter in ("S", "W") else size
+        raise Misfit(f"{shown(value)} is not a {field}: {letter} belongs to {'lon' if field == 'lat' else 'lat'}")
+    return -size if sign == "-" or letter in ("S", "W") else size
 
 
 def _utm(value: Any, reading: Reading) -> Spot:
@@ -230,13 +216,13 @@ def _utm(value: Any, reading: Reading) -> Spot:
     named = _by_field(value)
     zone = reading.earth.zone if reading.earth else None
     if ZONE in named:
-        zone = _member(named[ZONE], _zone, value[named[ZONE]])
+        zone = within((named[ZONE],), _zone, value[named[ZONE]])
     if zone is None:
         raise Misfit("utm needs its zone: 32N, or 32S south of the equator")
     if missing := [key for key in ("easting", "northing") if key not in value]:
         raise Misfit(f"missing {' and '.join(missing)}; utm has zone, easting, northing, alt")
     fields = "easting", "northing", *_heights(named, reading)
-    numbers = zone, *(_member(named[each], read_number, value[named[each]]) for each in fields)
+    numbers = zone, *(within((named[each],), read_number, value[named[each]]) for each in fields)
     if zone < 0.0 and 3.5e6 <= numbers[2] <= 4.5e6:
         reading.note(band_s(zone, numbers[2]), rule="band-s")
     return Spot(Place(UTM, (ZONE, *fields)), numbers)
@@ -255,14 +241,6 @@ def _zone(value: Any) -> float:
     return zone_number(value)
 
 
-def _member(key: str, read: Callable[..., float], *arguments: Any) -> float:
-    """Read the value of a key; an error names the key."""
-    try:
-        return read(*arguments)
-    except ValueInvalid as error:
-        misfit = NotARotation if isinstance(error, NotFinite) else Misfit
-        raise misfit(str(error), (key,), rule=error.rule) from None
-
 
 def _local(own: dict[str, Any], reading: Reading) -> Spot:
     """Read east, north, up or north, east, down of the origin."""
@@ -275,7 +253,7 @@ def _local(own: dict[str, Any], reading: Reading) -> Spot:
     origin = reading.earth.origin if reading.earth else None
     if origin is None:
         raise Misfit("east, north and up need an origin: --origin {lat: .., lon: ..}, or place the frame with at:")
-    numbers = tuple(_member(key, read_number, own[key]) for key in POSITIONS[name].names)
+    numbers = tuple(within((key,), read_number, own[key]) for key in POSITIONS[name].names)
     return Spot(Place(name, POSITIONS[name].names, name, None, origin), numbers)
 
 
@@ -322,10 +300,9 @@ def _heading(own: dict[str, Any], axes: str) -> Quaternion | None:
         return None
     if axes == ECEF:
         raise Misfit("a heading is clockwise from north, which axes ecef do not have; axes: enu, ned or grid", (key,))
-    try:
-        angle, unit = parse_angle(own[key]) if type(own[key]) is str else (read_number(own[key]), None)
-    except ValueInvalid as error:
-        raise Misfit(str(error), (key,)) from None
+    if type(own[key]) is not str:
+        raise Misfit(f"expected a number, found {kind(own[key])}", (key,))
+    angle, unit = within((key,), parse_angle, own[key])
     degrees = HEADINGS[key] if unit is None else unit == "deg"
     if not axes:
         raise Misfit(UNSAID)
@@ -347,8 +324,6 @@ def _incomplete(own: dict[str, Any]) -> str:
 
 # --- writing ---
 
-NOT_IN_ECEF = "--to {} wants poses in ecef: {}"
-
 
 def check_in_ecef(parent: str | None, place: Place) -> None:
     """Raise ValueInvalid unless a result is in the Earth's frame, or its frame is not known and could be."""
@@ -357,7 +332,7 @@ def check_in_ecef(parent: str | None, place: Place) -> None:
     names = ",".join(each.name for each in (place, *place.more))
     unnamed = "this one does not name its frame (--from ecef, or parent: ecef)"
     found = f"this one is in {shown(parent)}" if parent else unnamed
-    raise ValueInvalid(NOT_IN_ECEF.format(names, found))
+    raise ValueInvalid(f"--to {names} wants poses in ecef: {found}")
 
 
 def _numbers_of(frame: str | None, position: Sequence[float], place: Place, read: Spot | None = None) -> list[float]:

@@ -24,6 +24,7 @@ from frametool.grammar.readers import (
     kind,
     read_number,
     read_numbers,
+    within,
 )
 from frametool.grammar.rotation_spelling import (
     AGREEMENT,
@@ -40,7 +41,7 @@ from frametool.grammar.rotation_spelling import (
     rotation_of,
     spelled,
 )
-from frametool.text.numbers import NotFinite, parse_length, parse_number
+from frametool.text.numbers import parse_length, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
@@ -218,15 +219,10 @@ def _read_choice(key: str, value: Any, yes: str, no: str) -> bool:
 
 def read_scale(value: Any) -> float:
     """Read the scale of a similarity; raises Misfit, and NotARotation for one that is not positive."""
-    if type(value) is not str:
-        raise Misfit(f"scale must be one number, found {kind(value)}", (SCALE,))
-    try:
-        scale = parse_number(value)
-    except ValueInvalid as error:
-        raise (NotARotation if isinstance(error, NotFinite) else Misfit)(str(error), (SCALE,)) from None
+    scale = within((SCALE,), read_number, value)
     if scale <= 0.0:
         raise NotARotation(f"scale is {value}; it must be positive", (SCALE,))
-    return scale
+    return float(scale)
 
 
 def refuse_scale(value: Any) -> None:

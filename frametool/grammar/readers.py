@@ -149,11 +149,14 @@ def slash_note(name: str) -> str:
 
 
 def within(path: Path, read: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
-    """Call a reader for a nested value; its errors then have the whole path."""
+    """Call a reader of a nested value; its errors then have the whole path, those of values without a path this one."""
     try:
         return read(*arguments, **options)
     except Misfit as misfit:
         raise misfit.below(*path) from None
+    except ValueInvalid as error:
+        made = NotARotation if isinstance(error, NotFinite) else Misfit
+        raise made(str(error), path, rule=error.rule) from None
 
 
 def kind(value: Any) -> str:
@@ -225,22 +228,5 @@ def read_numbers(
     try:
         return tuple(map(parse_number, texts))
     except (ValueInvalid, TypeError):
-        pass
-    try:
-        return tuple(map(each, texts))
-    except (ValueInvalid, TypeError):
-        raise misfit_among(texts, value, names, each) from None
-
-
-def misfit_among(texts: Sequence[Any], value: Any, names: Sequence[str], read: Callable[[Any], Any]) -> Misfit:
-    """Find out which of several values does not fit, and return the error with its path."""
-    for index, text in enumerate(texts):
-        place: Path = (names[index],) if type(value) is dict else places_in(value)[index]
-        try:
-            read(text)
-        except Misfit as error:
-            return error.below(*place)
-        except ValueInvalid as error:
-            misfit = NotARotation if isinstance(error, NotFinite) else Misfit
-            return misfit(str(error), place, rule=error.rule)
-    return Misfit("expected numbers")
+        places: Sequence[Path] = [(name,) for name in names] if type(value) is dict else places_in(value)
+        return tuple(within(place, each, text) for place, text in zip(places, texts, strict=True))

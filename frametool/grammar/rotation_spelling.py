@@ -18,8 +18,18 @@ from frametool.geometry.representations import (
     axes_name,
 )
 from frametool.geometry.representations import notation as parse_notation
-from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, places_in, read_texts, within
-from frametool.text.numbers import NotFinite, half_unit, parse_angle, parse_number
+from frametool.grammar.readers import (
+    INDICES,
+    Misfit,
+    NotARotation,
+    Reading,
+    kind,
+    places_in,
+    read_number,
+    read_texts,
+    within,
+)
+from frametool.text.numbers import half_unit, parse_angle, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -230,40 +240,34 @@ def as_meant(notation: Notation, numbers: list[float], texts: Sequence[str], rea
 def _read_one_by_one(
     notation: Notation, texts: Sequence[Any], places: Sequence[Path], *, degrees: bool, bare: bool
 ) -> tuple[list[float], bool]:
-    """Read components if an angle has its own unit or one is not a number: then the error states where."""
-    numbers, units, angles = [], [], () if bare else notation.representation.angles
-    for index, text in enumerate(texts):
-        try:
-            if type(text) is not str:
-                raise Misfit(f"expected a number, found {kind(text)}")
-            number, unit = parse_angle(text) if index in angles else (parse_number(text), None)
-            if index in angles:
-                units.append(_unit_for(unit, text, notation))
-        except ValueInvalid as error:
-            misfit = NotARotation if isinstance(error, NotFinite) else Misfit
-            raise misfit(str(error), places[index], rule=error.rule) from None
-        numbers.append(number)
-    return numbers, _one_unit(numbers, angles, units, bare="deg" if degrees else "rad")
+    """Read components if an angle has its own unit or one is not a number: then the error states where.
+
+    The result is in degrees if all angles other than 0 are, else in radians.
+    """
+    angles = () if bare else notation.representation.angles
+    read = [
+        within(place, _with_unit, text, notation if at in angles else None)
+        for at, (text, place) in enumerate(zip(texts, places, strict=False))
+    ]
+    numbers = [number for number, _ in read]
+    in_degrees = [at for at in angles if (read[at][1] or ("deg" if degrees else "rad")) == "deg"]
+    if all(at in in_degrees or numbers[at] == 0.0 for at in angles):
+        return numbers, True
+    for at in in_degrees:
+        numbers[at] = math.radians(numbers[at])
+    return numbers, False
 
 
-def _unit_for(unit: str | None, text: str, notation: Notation) -> str | None:
-    """Refuse an angle whose own unit contradicts its key's."""
-    if unit == "deg" and notation.degrees is False and "pi" not in text:
-        raise ValueInvalid(f"{shown(text)} is in degrees, but {notation.spec} is in radians")
-    if notation.degrees and unit is not None and (unit == "rad" or "pi" in text):
-        raise ValueInvalid(f"{shown(text)} is in radians, but {notation.spec} is in degrees")
-    return unit
-
-
-def _one_unit(numbers: list[float], angles: Sequence[int], units: Sequence[str | None], bare: str) -> bool:
-    """Convert the angles of one rotation to one unit, in place: degrees if all non-zero ones have it, else radians."""
-    own_units = [unit or bare for unit in units]
-    if all(unit == "deg" or numbers[index] == 0.0 for index, unit in zip(angles, own_units, strict=True)):
-        return True
-    for index, unit in zip(angles, own_units, strict=True):
-        if unit == "deg":
-            numbers[index] = math.radians(numbers[index])
-    return False
+def _with_unit(text: Any, notation: Notation | None) -> tuple[float, str | None]:
+    """Read a number, or an angle of a notation with its own unit; raises ValueInvalid if its key has another one."""
+    if notation is None or type(text) is not str:
+        return read_number(text), None
+    number, unit = parse_angle(text)
+    own = "degrees" if "deg" in text or "°" in text else "radians"
+    other = {True: "degrees", False: "radians", None: own}[notation.degrees]
+    if unit and own != other:
+        raise ValueInvalid(f"{shown(text)} is in {own}, but {notation.spec} is in {other}")
+    return number, unit
 
 
 def _note_degrees(notation: Notation, numbers: Sequence[float], places: Sequence[Path], reading: Reading) -> None:

@@ -99,10 +99,7 @@ def _numbered(value: dict[str, Any], keys: tuple[str, ...], request: Request) ->
     """Return a point whose numbers are members of the record."""
     place = Place(LLA, ("lat", "lon", "alt"), request.earth.axes if request.earth else "")
     numbers = tuple(parse_number(value[key]) for key in keys)
-    try:
-        place.check(numbers)
-    except ValueInvalid as error:
-        raise Misfit(str(error), (keys[0],)) from None
+    within((keys[0],), place.check, numbers)
     return Placed(Shape(POINT, place), numbers, keys, is_numbered=True)
 
 

@@ -50,7 +50,7 @@ from frametool.grammar.rotation_spelling import (
 )
 from frametool.stream.row_layout import ACCEL, PARTS, POINT, POSE, TURN, VECTOR, Shape, checked_rotation, doubt
 from frametool.stream.stamp_source import key_path
-from frametool.text.numbers import NotFinite, parse_number, read_number_or_angle
+from frametool.text.numbers import parse_number, read_number_or_angle
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
@@ -700,10 +700,7 @@ def _number(
     """Read a member that is a number, an angle, or a length."""
     if type(value[key]) is not str:
         raise Misfit(f"expected a number, found {kind(value[key])}", (key,))
-    try:
-        return read_number_or_angle(value[key], degrees, metres=metres)
-    except ValueInvalid as error:
-        raise (NotARotation if isinstance(error, NotFinite) else Misfit)(str(error), (key,)) from None
+    return float(within((key,), read_number_or_angle, value[key], degrees, metres=metres))
 
 
 def _check(shape: Shape, values: Sequence[float], names: Sequence[str], reading: Reading) -> None:

@@ -323,10 +323,7 @@ def read_time(entry: dict[str, Any], key: str, example: str = "") -> int:
     text = entry[key]
     if type(text) is not str:
         raise Misfit(f"expected a time{example}, found {kind(text)}", (key,))
-    try:
-        return parse_stamp(f"{text}ns" if key.endswith("_ns") else text)
-    except ValueInvalid as error:
-        raise Misfit(str(error), (key,)) from None
+    return int(within((key,), parse_stamp, f"{text}ns" if key.endswith("_ns") else text))
 
 
 def named(fields: dict[str, Any], key: str) -> str:
