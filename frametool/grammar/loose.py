@@ -10,10 +10,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import bare
+from frametool.geometry.representations import RPY
 from frametool.grammar.names import COLUMN_WORDS
 from frametool.grammar.pose import POSE_KEYS, Pose, read_pose
-from frametool.grammar.readers import Misfit, Reading, Unclear, kind
-from frametool.grammar.rotation_spelling import POSITION_WORDS, ROTATION_WORDS, is_position
+from frametool.grammar.readers import Misfit, Reading, Unclear, kind, within
+from frametool.grammar.rotation_spelling import POSITION_WORDS, ROTATION_WORDS, is_position, own_key
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -30,7 +31,7 @@ _FLAT = {
     **{f"q{axis}": ("quaternion", axis) for axis in "xyzw"},
     **{word: (_SPELLED[name[0]], word[-1]) for word, name in COLUMN_WORDS.items()},
     **{f"{axis}_{unit}": (f"xyz_{unit}", axis) for axis in "xyz" for unit in ("mm", "cm")},
-    **{f"{name}{unit}": (f"rpy{unit}", name) for name in ("roll", "pitch", "yaw") for unit in ("", "_deg", "_rad")},
+    **{f"{name}{unit}": (f"rpy{unit}", name) for name in RPY for unit in ("", "_deg", "_rad")},
     **{f"a{axis}": ("axis", axis) for axis in "xyz"},
     **{f"{name}{unit}": (f"axis_angle{unit}", "angle") for name in ("theta", "angle") for unit in ("", "_deg", "_rad")},
 }
@@ -56,25 +57,20 @@ def _in_grammar(fields: dict[str, Any], order: str, places: dict[Path, str]) -> 
     """
     found: dict[str, Any] = {}
     for key, value in fields.items():
-        if type(value) is not list and type(value) is not dict and key in _FLAT:
+        is_number = type(value) is not list and type(value) is not dict
+        if is_number and key in _FLAT:
             together, part = _FLAT[key]
             parts = found.setdefault(together, {})
-            if type(parts) is not dict or part in parts:
-                raise Misfit(f"{bare(key)} repeats another key; keep one", (key,), key=True)
-            parts[part], places[together, part] = value, key
-        elif key in _WHOLE:
-            if type(value) is not list or len(value) != 7:
-                found_here = f"{len(value)} numbers" if type(value) is list else kind(value)
-                raise Misfit(f"expected 7 numbers, found {found_here}", (key,))
-            _put(found, "xyz", value[:3], key)
-            _put(found, _ordered(value[3:], order, key), value[3:], key)
-        elif key in _POSITIONS and is_position(key, value):
-            _put(found, "xyz", value, key)
-        elif key in _TURNS:
-            _put(found, *_turn(value, order, key), key)
+            is_new = type(parts) is dict and part not in parts
+            if is_new:
+                parts[part], places[together, part] = value, key
         else:
-            _put(found, key, value, key)
-        places |= {(new,): key for new in found if (new,) not in places and type(value) in (list, dict)}
+            meant = _meant(key, value, order)
+            is_new = meant.keys().isdisjoint(found)
+            found |= meant
+            places |= {} if is_number else {(new,): key for new in meant}
+        if not is_new:
+            raise Misfit(f"{bare(key)} repeats another key; keep one", (key,), key=True)
     angle = next((key for key in found if key.startswith("axis_angle") and type(found[key]) is dict), "")
     if axis := found.pop("axis", None):
         if not angle or axis.keys() != {"x", "y", "z"}:
@@ -82,38 +78,33 @@ def _in_grammar(fields: dict[str, Any], order: str, places: dict[Path, str]) -> 
         found[angle] = {"axis": [axis[each] for each in "xyz"], **found[angle]}
     elif angle and found[angle].keys() == {"angle"}:  # about z, as yaw alone
         yaw = angle.replace("axis_angle", "rpy")
-        _put(found, yaw, {"yaw": found.pop(angle)["angle"]}, "theta")
+        if yaw in found:
+            raise Misfit("theta repeats another key; keep one", key=True)
+        found[yaw] = {"yaw": found.pop(angle)["angle"]}
         places[yaw, "yaw"] = places[angle, "angle"]
-    for key, parts, least in (("rpy", ("roll", "pitch", "yaw"), {"yaw"}), ("quaternion", "xyzw", set())):
-        for spelled in (key, f"{key}_deg", f"{key}_rad"):
-            present = found.get(spelled)
-            if type(present) is dict and present.keys() != {*parts} and present.keys() != least:
-                missing = ", ".join(part for part in parts if part not in present)
-                raise Misfit(f"incomplete rotation: missing {missing} beside {', '.join(present)}")
+    for key, present in found.items():
+        wanted = RPY if key.startswith("rpy") else "xyzw" if key == "quaternion" else ()
+        if wanted and type(present) is dict and present.keys() not in ({*wanted}, {"yaw"}):
+            missing = ", ".join(part for part in wanted if part not in present)
+            raise Misfit(f"incomplete rotation: missing {missing} beside {', '.join(present)}")
     return found
 
 
-def _put(found: dict[str, Any], key: str, value: Any, present: str) -> None:
-    """Store a value; raises Misfit for a second position, or for a duplicate."""
-    if key in found:
-        raise Misfit(f"{bare(present)} repeats another key; keep one", (present,), key=True)
-    found[key] = value
-
-
-def _turn(value: Any, order: str, key: str) -> tuple[str, Any]:
-    """Return the key of the grammar for a rotation, by the shape of its value, and the value; raises Misfit."""
-    if type(value) is list and len(value) == 4 and not any(type(each) is list for each in value):
-        return _ordered(value, order, key), value
-    if type(value) is list and (len(value) == 9 or any(type(each) is list for each in value)):
-        return "matrix", value
-    if type(value) is dict and not {"roll", "pitch", "yaw"}.isdisjoint(value):
-        return "rpy", value
+def _meant(key: str, value: Any, order: str) -> dict[str, Any]:
+    """Return the values of the grammar that a key with its value means; raises Misfit."""
+    if key in _WHOLE:
+        if type(value) is not list or len(value) != 7:
+            found_here = f"{len(value)} numbers" if type(value) is list else kind(value)
+            raise Misfit(f"expected 7 numbers, found {found_here}", (key,))
+        return {"xyz": value[:3], _ordered(value[3:], order, key): value[3:]}
+    if key in _POSITIONS and is_position(key, value):
+        return {"xyz": value}
+    if key not in _TURNS:
+        return {key: value}
     if type(value) is dict and value.keys() == {"qx", "qy", "qz", "qw"}:
-        return "quaternion", {name[1]: each for name, each in value.items()}
-    if type(value) is list and len(value) == 3:
-        what = f"{bare(key)} of 3 numbers does not say what they are"
-        raise Misfit(f"{what}; write rpy, rpy_deg or rotvec", (key,), key=True)
-    return "quaternion", value
+        return {"quaternion": {name[1]: each for name, each in value.items()}}
+    turned = within((key,), own_key, key if key in ROTATION_WORDS else "quat", value)
+    return {_ordered(value, order, key) if turned == "quaternion" and type(value) is list else turned: value}
 
 
 def _ordered(value: list[Any], order: str, key: str) -> str:

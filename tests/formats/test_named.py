@@ -200,7 +200,7 @@ def test_python_reads_it_with_the_same_answers(tmp_path: Path) -> None:
         ("qx: 0, qy: 0, qz: 0", "1:4: incomplete rotation: missing w beside x, y, z"),
         ("rot_x: 0, rot_y: 0, rot_z: 0", "1:4: incomplete rotation: missing w beside x, y, z"),
         ("ax: 0, ay: 0, az: 1", "1:4: ax, ay, az and theta belong together: an axis and the angle about it"),
-        ("rot: [1, 2, 3]", "1:23: rot of 3 numbers does not say what they are; write rpy, rpy_deg or rotvec"),
+        ("rot: [1, 2, 3]", "1:28: rot [1, 2, 3] does not say what it is; write rpy: [..], rpy_deg: [..] or rotvec: [..]"),
         ("yaww: 1", "1:23: unknown key 'yaww'; a pose has xyz and one rotation: "),
         ("value: [1, 2]", "1:30: expected 7 numbers, found 2 numbers"),
         ("tx: 4", "1:23: tx repeats another key; keep one"),
