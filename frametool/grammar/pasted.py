@@ -236,33 +236,26 @@ def _members(text: str) -> dict[str, Any] | None:
     text = re.sub(r"\A\s*<Quaternion \((.*)\)>\s*\Z", r"Quaternion(\1)", text)
     if not re.match(rf"\s*+(?:[A-Za-z_][\w.]*\()?{_MEMBERS}", text) or re.match(r"\s*\w+:[^,]*\n", text):
         return None
-    words = re.findall(rf"[A-Za-z_][\w.]*|{NUMBER}|[=(),:]|\S", text.strip())
-    stack: list[dict[str, Any]] = [{}]
-    keys: list[str] = []
-    at = 2 if words[1:2] == ["("] else 0  # the outermost name
-    depth = at // 2
-    while at < len(words):
-        word, after = words[at], words[at + 1 : at + 4]
-        if after[:1] in (["="], [":"]) and len(after) > 1 and word not in stack[-1]:
-            keys.append(word)
-            if after[2:3] == ["("]:
-                stack.append({})
-                at += 4
-                continue
-            if not re.fullmatch(NUMBER, after[1]):
-                return None
-            stack[-1][keys.pop()] = after[1]
-            at += 3
-        elif word == ")" and len(stack) > 1:
-            inner = stack.pop()
-            stack[-1][keys.pop()] = inner
-            at += 1
-        elif word == "," or (word == ")" and depth):
-            depth -= word == ")"
-            at += 1
-        else:
-            return None
-    return stack[0] if len(stack) == 1 and not depth else None
+    import json
+
+    body = re.sub(r"[A-Za-z_][\w.]*\(", "{", text.strip().rstrip(",")).replace(")", "}")
+    body = re.sub(rf"([A-Za-z_][\w.]*)\s*[=:]\s*({NUMBER})?", _member, body)
+    try:
+        found: dict[str, Any] = json.loads(body if body[0] == "{" else f"{{{body}}}", object_pairs_hook=_unrepeated)
+    except ValueError:
+        return None
+    return found
+
+
+def _member(found: re.Match[str]) -> str:
+    return f'"{found[1]}": ' + (f'"{found[2]}"' if found[2] else "")
+
+
+def _unrepeated(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the members of an object; raises ValueError if two have one name."""
+    if len({name for name, _ in pairs}) < len(pairs):
+        raise ValueError
+    return dict(pairs)
 
 
 def _euler(text: str) -> dict[str, Any] | None:
