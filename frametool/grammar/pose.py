@@ -159,8 +159,9 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
             elif key in ROTATION_KEYS or key == AXES_KEY:
                 moved, turned = read_rotation(key, value, reading)
                 rotation = turned if rotation is None else agreeing_rotation(rotation, turned)
-                if moved is not None:
-                    position = _only_position(position, moved)
+                if moved is not None and position is not None:
+                    raise Misfit("a 4x4 matrix is the whole pose; remove xyz, or write the 3x3 rotation")
+                position = position or moved
     except Misfit as error:
         raise error.below(key) if key else error from None
     except ValueInvalid as error:
@@ -183,6 +184,7 @@ def inverted(pose: Pose) -> Pose:
         rotation=None if pose.rotation is None else back.rotation,
         covariance=back.covariance,
         scale=back.scale,
+        read=None,
     )
 
 
@@ -250,12 +252,6 @@ def length_reader(parts: float) -> Callable[[Any], float]:
         return parse_length(text) if type(text) is str and parts == 1.0 else read_number(text)
 
     return read
-
-
-def _only_position(default: Vector | None, moved: Vector) -> Vector:
-    if default is not None:
-        raise Misfit("a 4x4 matrix is the whole pose; remove xyz, or write the 3x3 rotation")
-    return moved
 
 
 def _agreeing_position(first: Vector | None, second: Vector) -> Vector:

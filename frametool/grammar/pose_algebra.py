@@ -14,7 +14,7 @@ from math import isfinite
 from frametool.errors import LookupFailed, ValueInvalid, shown, warn
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, placed, quaternion, rigid
-from frametool.grammar.pose import Pose
+from frametool.grammar.pose import Pose, inverted
 from frametool.grammar.result import Result, uncertain
 
 TYPE_CHECKING = False
@@ -35,18 +35,12 @@ def product(left: Pose, right: Pose) -> Pose:
 
     Raises ValueInvalid if both name the inner frame and the names differ.
     """
-    parent, name = composed_names(left, right)
-    return Pose.of(placed.compose(left.placed, right.placed), name, parent)
-
-
-def composed_names(left: Pose, right: Pose) -> tuple[str | None, str | None]:
-    """Return parent and name of a product; raise ValueInvalid if the inner frames differ."""
     if left.name is not None and right.parent is not None and left.name != right.parent:
         raise ValueInvalid(
             f"frames do not touch: {left.parent or '?'} <- {left.name} is followed by "
             f"{right.parent} <- {right.name or '?'}; change the order, or invert one",
         )
-    return left.parent, right.name
+    return Pose.of(placed.compose(left.placed, right.placed), right.name, left.parent)
 
 
 def shared_stamp(poses: Iterable[Pose]) -> dict[str, Any]:
@@ -59,14 +53,7 @@ def shared_stamp(poses: Iterable[Pose]) -> dict[str, Any]:
 
 def inverse(pose: Pose) -> Pose:
     """Return b_from_a of a_from_b; missing parts remain missing."""
-    back = Pose.of(placed.inverse(pose.placed))
-    return back._replace(
-        position=None if pose.position is None else back.position,
-        rotation=None if pose.rotation is None else back.rotation,
-        name=pose.parent,
-        parent=pose.name,
-        stamp_ns=pose.stamp_ns,
-    )
+    return inverted(pose)._replace(name=pose.parent, parent=pose.name)
 
 
 def relative(a: Pose, b: Pose) -> Result:

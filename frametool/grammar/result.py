@@ -79,28 +79,21 @@ class Style:
         self.full = full
         self.keep_sign = keep_sign
 
-    def with_format(self, fmt: str) -> Style:
-        """Return the same style in another format."""
+    def changed(self, **fields: Any) -> Style:
+        """Return the same style with other fields."""
         style = copy(self)
-        style.format = fmt
-        style.put_at(self.place)
+        vars(style).update(fields)
         return style
 
-    def exact(self) -> Style:
-        """Return the same style with all digits of numbers."""
-        style = self.with_format(self.format)
-        style.precision, style.screen = None, False
+    def with_format(self, fmt: str) -> Style:
+        """Return the same style in another format."""
+        style = self.changed(format=fmt)
+        style.put_at(self.place)
         return style
 
     def put_at(self, place: Place | None) -> None:
         """Write positions as positions on the Earth; tables have no columns for convergence and scale of UTM."""
         self.place = place and place.with_grid(gridded=self.format in ("text", "yaml", "json"))
-
-    def in_notations(self, notations: tuple[Notation, ...]) -> Style:
-        """Return the same style with other notations."""
-        style = copy(self)
-        style.notations = notations
-        return style
 
     def number(self, value: float) -> str:
         """Format a finite number: the shortest text that reads back to the same bits, or fixed decimals; never -0."""
@@ -231,15 +224,8 @@ def tree_entries(tree: Frames, style: Style) -> Iterator[dict[str, Any]]:
             continue
         if covariance and style.place is not None and track.parent in EARTH_FRAMES:
             warn(f"frame {shown(track.child)} is written by xyz: its one covariance is along the axes of ecef")
-        samples = {"samples": list(_samples(track, _by_xyz(style) if covariance else style))}
+        samples = {"samples": list(_samples(track, style.changed(place=None) if covariance else style))}
         yield {"name": track.child, "parent": track.parent} | uncertain(covariance) | samples | camera
-
-
-def _by_xyz(style: Style) -> Style:
-    """Return the same style with positions as x, y, z."""
-    plain = copy(style)
-    plain.place = None
-    return plain
 
 
 def _edge(pose: Pose, style: Style, above: str | None = None) -> dict[str, Any]:
@@ -247,12 +233,13 @@ def _edge(pose: Pose, style: Style, above: str | None = None) -> dict[str, Any]:
 
     above: the parent of a sample that does not name it
     """
+    by_xyz = style.changed(place=None)
     if style.place is None or style.place.name == EARTH_FRAMES[0] or (above or pose.parent) not in EARTH_FRAMES:
-        return Result(pose, uncertain(pose.covariance)).mapping(_by_xyz(style))
+        return Result(pose, uncertain(pose.covariance)).mapping(by_xyz)
     from frametool.grammar.place import frame_entry
 
     at, pose = frame_entry(pose, style.place)
-    entry = Result(pose, uncertain(pose.covariance)).mapping(_by_xyz(style))
+    entry = Result(pose, uncertain(pose.covariance)).mapping(by_xyz)
     return {key: entry.pop(key) for key in ("name", "parent") if key in entry} | at | entry
 
 

@@ -142,7 +142,7 @@ def text_of(singles: Sequence[tuple[int, str]], batches: Sequence[RecordBatch], 
 def documents(blocks: Iterable[BlockResults], style: Style) -> Iterator[bytes]:
     """Yield results as lines of JSON or as documents of YAML."""
     parting, begun = "---\n" if style.format == "yaml" else "", False
-    exact = style.exact()
+    exact = style.changed(precision=None, screen=False)
     for block in blocks:
         singles = [(place, parting + write_poses([value], style)) for place, value in block.values]
         rows = []

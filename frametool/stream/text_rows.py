@@ -43,7 +43,7 @@ YAML = Syntax('"', bytes(range(128)), lambda value: quoted_in_yaml(value) if typ
 def table_rows(batch: RecordBatch, cells: Mapping[str, Any], columns: Iterable[str], style: Style) -> list[Spans]:
     """Return the rows of a batch as lines of CSV; cells: those of the result with marks."""
     parts: list[tuple[str, Syntax]] = []
-    exact = style.exact()
+    exact = style.changed(precision=None, screen=False)
     for at, name in enumerate(columns):
         value = cells.get(name, "")
         parts += [("," * (at > 0) + cell(value, exact), IN_CELL if isinstance(value, (dict, list)) else CELL)]

@@ -150,7 +150,7 @@ def _found(poses: Sequence[Pose], find: str, tolerance: float, style: Style) -> 
     degrees = style.degrees
     angles = [radians(angle) if unit == "deg" or (degrees and unit is None) else angle for angle, unit in read]
     axes = find_euler(Rotation.of(*poses[0].rotation), angles, tolerance=tolerance)
-    return style.in_notations(tuple(notation(f"{'euler_deg' if degrees else 'euler'}:{each}") for each in axes))
+    return style.changed(notations=tuple(notation(f"{'euler_deg' if degrees else 'euler'}:{each}") for each in axes))
 
 
 def _changed(pose: Pose, operation: Operation) -> Pose:
