@@ -37,11 +37,11 @@ class Misfit(ValueInvalid):
         """Return the same error with the path as seen from a higher level."""
         return type(self)(str(self), (*outer, *self.path), key=self.key, rule=self.rule)
 
-    def placed(self, source: Source, document: int) -> FormatError:
-        """Return the error with line and column; the path begins at the top of a document of `source`."""
+    def placed(self, source: Source, *document: int) -> FormatError:
+        """Return the error with line and column; the path begins at the top of `source`, or of a document of it."""
         from frametool.documents.document import format_error
 
-        error = format_error(source, (document, *self.path), str(self), key=self.key)
+        error = format_error(source, (*document, *self.path), str(self), key=self.key)
         error.rule = self.rule
         return error
 
@@ -53,9 +53,9 @@ class NotARotation(Misfit):
 class Unclear(Misfit):
     """A value whose meaning has to be set by an option."""
 
-    def placed(self, source: Source, document: int) -> FormatError:
+    def placed(self, source: Source, *document: int) -> FormatError:
         """Return the error with line and column."""
-        return answerable(super().placed(source, document))
+        return answerable(super().placed(source, *document))
 
 
 def answerable(error: FormatError) -> Unanswered:

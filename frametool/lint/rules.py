@@ -10,23 +10,22 @@ from frametool.documents.document import locate_many, parse_documents
 from frametool.errors import BadTopology, Finding, FormatError, Unanswered, first_of, shown
 from frametool.formats.detect import by_sign
 from frametool.formats.load import refuse_unknown_joints
-from frametool.formats.trees.tree_reader import read_edges, without_slashes
+from frametool.formats.trees.tree_reader import edges_of, located, read_edges
 from frametool.frames import topology
 from frametool.frames.edge_log import EdgeLog
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry.representations import EARTH_FRAMES
 from frametool.grammar.names import may_be_on_earth
-from frametool.grammar.readers import Misfit, Reading
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from frametool.documents.document import Document
     from frametool.documents.source import Source
     from frametool.formats.load import FrameFile
     from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Edge
+    from frametool.grammar.readers import Misfit
 
     Find = Callable[[Finding], None]
 
@@ -108,39 +107,23 @@ def _read_tree(source: Source, find: Find, *, normalize: bool) -> Iterator[State
     except FormatError as error:
         find(error.finding)
         return
-    notes: dict[bool, list[Finding]] = {False: [], True: []}
-    edges = []
-    for document in documents:
-        edges += _read_document(document, Reading(source, normalize=normalize), notes)
-    for key, found in notes.items():
-        places = locate_many(source.text, [each.path for each in found], key=key)
-        for note, (line, column) in zip(found, places, strict=True):
-            find(note._replace(source=source.name, line=line, column=column))
+    values = {each.index: each.value for each in documents}
+    notes: list[Finding] = []
+    faults: list[Misfit] = []
+    edges = [
+        (edge, looks_w_first(edge.components) and _written_xyzw(values, edge))
+        for edge in edges_of(documents, read_edges, notes, faults, normalize=normalize) if edge.parent is not None
+    ]  # fmt: skip
+    for fault, line, column in located(faults, source):
+        find(Finding(fault.rule or "syntax", str(fault), source.name, line, column))
+    for note, (line, column) in zip(notes, locate_many(source.text, [note.path for note in notes]), strict=True):
+        find(note._replace(source=source.name, line=line, column=column))
     for (edge, w_first), place in zip(edges, locate_many(source.text, [edge.path for edge, _ in edges]), strict=True):
         yield Statement(edge.parent or "", *edge[1:4], source.name, *place, w_first)
 
 
-def _read_document(document: Document, reading: Reading, notes: dict[bool, list[Finding]]) -> list[tuple[Edge, bool]]:
-    """Return the edges of a document, each with whether it looks written w first; collect its notes by `Misfit.key`."""
-    reading.faults = []
-    edges = []
-    try:
-        for found in read_edges(document.value, reading):
-            edge = without_slashes(found, reading)
-            if edge.parent is not None:
-                w_first = looks_w_first(edge.components) and _written_xyzw(document.value, edge)
-                edges.append((edge._replace(path=(document.index, *edge.path)), w_first))
-    except Misfit as misfit:
-        reading.faults.append(misfit)
-    for fault in reading.faults:
-        finding = Finding(fault.rule or "syntax", str(fault), path=(document.index, *fault.path))
-        notes[fault.key].append(finding)
-    notes[False] += [note._replace(path=(document.index, *note.path)) for note in reading.notes]
-    return edges
-
-
 def _written_xyzw(value: Any, edge: Edge) -> bool:
-    """Return True if an edge's rotation was written as a quaternion, not as angles."""
+    """Return True if an edge's rotation was written as a quaternion, not as angles, in documents by their index."""
     for step in edge.path:
         value = value[step]
     return type(value) is dict and not WRITTEN_XYZW.isdisjoint(value) and not any(map(may_be_on_earth, value))

@@ -25,7 +25,7 @@ from frametool.grammar.covariance import AXES, columns, is_sigma
 from frametool.grammar.names import NAME_KEYS, STAMP_KEYS
 from frametool.grammar.pose import COVARIANCE_KEYS, Pose, inverted, read_angle_unit
 from frametool.grammar.readers import Misfit, Reading, kind, tell, within
-from frametool.stream.record import INNER, KNOWN, find_records, placed, value_at
+from frametool.stream.record import INNER, KNOWN, find_records, value_at
 from frametool.stream.record_values import pose_of, stamp_of
 from frametool.stream.request import COMBINED, Operation, Request
 from frametool.stream.row_layout import POSE
@@ -240,7 +240,7 @@ def _of_documents(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
                     stamp_ns = stamp_of({document.index: document.value}, record, source)
                     found.append((each, record.path[: max(last + 1, len(path))], stamp_ns))
         except Misfit as misfit:
-            raise placed(misfit, source) from None
+            raise misfit.placed(source) from None
     tell(source, reading.notes)
     places = locate_many(source.text, [path for _, path, _ in found], key=True)
     for (made, _, stamp_ns), (line, column) in zip(found, places, strict=True):

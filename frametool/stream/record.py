@@ -55,8 +55,6 @@ from frametool.text.numbers import parse_number, read_number_or_angle
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
-    from frametool.documents.source import Source
-    from frametool.errors import FormatError
     from frametool.grammar.readers import Path
     from frametool.stream.earth_records import Placed
     from frametool.stream.header import Columns, PoseColumns
@@ -853,12 +851,6 @@ def value_at(value: Any, path: Path) -> Any:
     for step in path:
         value = value[step]
     return value
-
-
-def placed(misfit: Misfit, source: Source) -> FormatError:
-    """Make the error that names line and column of a misfit whose path begins with the index of its document."""
-    index, *path = misfit.path
-    return type(misfit)(str(misfit), tuple(path), key=misfit.key, rule=misfit.rule).placed(source, int(index))
 
 
 def lost_name(record: Record, request: Request) -> str:

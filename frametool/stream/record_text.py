@@ -17,7 +17,7 @@ from frametool.grammar.names import STAMP_KEYS, in_nanoseconds
 from frametool.grammar.readers import Misfit, Reading, within
 from frametool.stream.faults import ZONES, Fault, RowNote
 from frametool.stream.layout import Const, IfLocked, In, Out, Renamed, Word
-from frametool.stream.record import find_records, lost_name, placed, value_at
+from frametool.stream.record import find_records, lost_name, value_at
 from frametool.stream.row_layout import FLAT, LEAVES_PLANE, checked_rotation
 from frametool.stream.splice import Splicer, null_edits, target_of
 from frametool.stream.stamp_source import key_path, read_header_stamp, read_stamp, stamp_keys
@@ -86,7 +86,7 @@ def read_entries(
         note([_at_its_number(each, records) for each in reading.notes])
         return [_entry(document, record, request) for record in records]
     except Misfit as misfit:
-        error = placed(misfit, source)
+        error = misfit.placed(source)
         error.column_name = ".".join(map(str, misfit.path[1:]))  # type: ignore[attr-defined]
         raise error from misfit
 

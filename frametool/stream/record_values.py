@@ -21,7 +21,7 @@ from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import SCALE, Pose, inverted
 from frametool.grammar.readers import Misfit, NotARotation, Reading, tell
 from frametool.grammar.result import Result, with_entries
-from frametool.stream.record import STALE, placed, value_at
+from frametool.stream.record import STALE, value_at
 from frametool.stream.record_text import Answer, Outside, RecordText, wide_turn, written
 from frametool.stream.request import Request
 from frametool.stream.row_layout import AS_READ, PARTS, POSE, ROTATION, VECTOR, checked_rotation
@@ -80,7 +80,7 @@ def stamp_of(documents: dict[int, Any], record: Record, source: Source) -> int |
     try:
         return _read_stamp(key, own[key]) if key else record.stamp_ns
     except ValueInvalid as error:
-        raise placed(Misfit(str(error), (*record.path, key)), source) from None
+        raise Misfit(str(error), (*record.path, key)).placed(source) from None
 
 
 def pose_of(record: Record, request: Request) -> Pose:
@@ -195,10 +195,10 @@ def _answer(known: RecordText, entry: Entry, parts: Components | None, own: Tell
     except Outside:
         return None
     except Misfit as misfit:
-        raise placed(misfit, source) from misfit
+        raise misfit.placed(source) from misfit
     except ValueInvalid as error:
         bad = NotARotation(str(error), record.path)  # what was read well has no result
-        raise placed(bad, source) from bad
+        raise bad.placed(source) from bad
     if (warning := wide_turn(found, known.request.operation)) and not own.counts[warning.rule]:
         own.tell(source, [warning])
     return found

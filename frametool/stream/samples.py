@@ -26,7 +26,7 @@ from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, tell, w
 from frametool.grammar.result import Style
 from frametool.stream.as_poses import FormatConverter
 from frametool.stream.header import listed
-from frametool.stream.record import placed, value_at
+from frametool.stream.record import value_at
 from frametool.stream.record_values import pose_of, read_text
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_poses import plain_cells
@@ -256,7 +256,7 @@ def _of_documents(file: InputFile) -> Points:
     for record in known.records:
         position = pose_of(record, request).position
         if position is None:
-            raise placed(Misfit("expected a point {id: .., xyz: [x, y, z]}", record.path), source)
+            raise Misfit("expected a point {id: .., xyz: [x, y, z]}", record.path).placed(source)
         xyz.append(position)
         paths.append(record.path)
         frames.add(record.parent.text)

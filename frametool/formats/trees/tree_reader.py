@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import InputFile, Source, pointer
-from frametool.errors import Finding, FormatError, Unanswered, ValueInvalid, alternatives, bare, first_of, shown
+from frametool.errors import Finding, FormatError, ValueInvalid, alternatives, bare, first_of, shown
 from frametool.frames.stamps import parse_stamp
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Diagnostics, Edge, Options
@@ -31,6 +31,7 @@ from frametool.text.numbers import parse_number
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 
+    from frametool.documents.document import Document
     from frametool.geometry.place import Earth
     from frametool.grammar.readers import Path
 
@@ -49,18 +50,34 @@ CHILDREN = frozenset(("children", *TIMED))
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the edges of a text of trees, then emit its warnings."""
-    source = file.source
     notes: list[Finding] = []
-    for document in parse_documents(source.text, source.name):
-        reading = Reading(source, normalize=options.normalize)
+    yield from edges_of(parse_documents(file.source.text, file.name), read_edges, notes, normalize=options.normalize)
+    tell(file.source, notes)
+
+
+def edges_of(
+    documents: Iterable[Document], take: Take, notes: list[Finding], faults: list[Misfit] | None = None, *,
+    normalize: bool = False, bare_numbers: bool = False,
+) -> Iterator[Edge]:  # fmt: skip
+    """Yield the edges that `take` finds in each document, with their paths from the top of the text.
+
+    take: (value, reading) to edges with paths relative to the document; raises Misfit, or collects it with
+    `reading.refuse`.
+    notes, faults: receive warnings and errors, with such paths too.  Raises FormatError if errors are not collected.
+    """
+    for document in documents:
+        reading = Reading(document.source, normalize=normalize)
+        reading.faults, reading.bare_numbers = None if faults is None else [], bare_numbers
         try:
-            for edge in read_edges(document.value, reading):
-                bare = without_slashes(edge, reading)
-                yield bare._replace(path=(document.index, *edge.path))
+            for edge in take(document.value, reading):
+                yield without_slashes(edge, reading)._replace(path=(document.index, *edge.path))
         except Misfit as misfit:
-            raise misfit.placed(source, document.index) from None
+            if reading.faults is None:
+                raise misfit.placed(document.source, document.index) from None
+            reading.faults.append(misfit)
+        if faults is not None:
+            faults += [fault.below(document.index) for fault in reading.faults or ()]
         notes += [note._replace(path=(document.index, *note.path)) for note in reading.notes]
-    tell(source, notes)
 
 
 def without_slashes(edge: Edge, reading: Reading) -> Edge:
@@ -341,10 +358,8 @@ def line_error(file: InputFile, line: int, column: int, message: str) -> FormatE
 
 
 def document_edges(file: InputFile, options: Options, take: Take, tags: Collection[str] = ()) -> Iterator[Edge]:
-    """Yield the edges that `take` finds in each document of a file, with their paths from the top of the text.
+    """Yield the edges of a file of another format in YAML or JSON, as `edges_of` does.
 
-    take: (value, reading) to edges with paths relative to the document; raises Misfit, or collects it with
-    `reading.refuse`.
     tags: of YAML, for this format.
     Errors go to `options.report`, warnings to `options.tally`.
     """
@@ -354,35 +369,23 @@ def document_edges(file: InputFile, options: Options, take: Take, tags: Collecti
     except FormatError as error:
         options.report(error)
         return
-    for document in documents:
-        reading = Reading(source, normalize=options.normalize)
-        reading.faults, reading.bare_numbers = [], True
-        try:
-            for edge in take(document.value, reading):
-                yield without_slashes(edge, reading)._replace(path=(document.index, *edge.path))
-        except Misfit as misfit:
-            reading.faults.append(misfit)
-        for fault in _placed(reading.faults, source, document.index):
-            if isinstance(fault, Unanswered):
-                raise fault
-            options.report(fault)
-        paths = [(document.index, *note.path) for note in reading.notes]
-        remember(reading.notes, (line for line, _ in locate_many(source.text, paths)), options.tally)
-
-
-def _placed(faults: Sequence[Misfit], source: Source, document: int) -> Iterator[FormatError]:
-    """Yield the errors in a document; those after the first are located all at once."""
-    for fault in faults[:1]:
-        yield fault.placed(source, document)
-    others = faults[1:]
-    paths = [(document, *fault.path) for fault in others]
-    values, keys = (locate_many(source.text, paths, key=key) for key in (False, True))
-    for fault, *places in zip(others, values, keys, strict=True):
+    notes, faults = list[Finding](), list[Misfit]()
+    yield from edges_of(documents, take, notes, faults, normalize=options.normalize, bare_numbers=True)
+    for at, (fault, line, column) in enumerate(located(faults, source)):
         if isinstance(fault, Unclear):
-            yield fault.placed(source, document)
-        else:
-            line, column = places[fault.key]
-            yield FormatError(str(fault), source=source.name, line=line, column=column, rule=fault.rule)
+            raise fault.placed(source)
+        placed = FormatError(str(fault), source=source.name, line=line, column=column, rule=fault.rule)
+        options.report(placed if at else fault.placed(source))
+    lines = [line for line, _ in locate_many(source.text, [note.path for note in notes])]
+    remember([note._replace(path=note.path[1:]) for note in notes], lines, options.tally)
+
+
+def located(faults: Sequence[Misfit], source: Source) -> Iterator[tuple[Misfit, int, int]]:
+    """Yield errors with paths from the top of a text, each with its line and column."""
+    paths = [fault.path for fault in faults]
+    values, keys = (locate_many(source.text, paths, key=key) for key in (False, True))
+    for fault, *places in zip(faults, values, keys, strict=True):
+        yield fault, *places[fault.key]
 
 
 def remember(notes: Iterable[Finding], lines: Iterable[int], tally: Diagnostics) -> None:
