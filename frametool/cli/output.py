@@ -288,7 +288,7 @@ class Output:
     def tree(self, tree: FrameTree | TransformBuffer, color: str = "auto") -> None:
         """Write a tree; on a terminal in colour, or as `color` says; in a format made of poses with every sample."""
         if tree.drawn and self._format_is_default:
-            self.style = self.style.with_format("text")
+            self.style = self.style.changed(format="text")
         if tree.drawn and self.style.format != "text":
             raise ValueInvalid(f"{tree.name} has no poses to write as {self.style.format}; -f text shows its frames")
         if tree.covariances and self.style.format not in ("yaml", "json", "text"):

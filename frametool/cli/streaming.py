@@ -271,7 +271,7 @@ class Stream:
         no_room = output.is_trajectory and bool(request.extras(Shape(POSE)) or output.notations)
         no_room |= output.is_trajectory and output.style.place is not None
         turns = bool(output.style.axes) and not output.notations
-        no_room |= turns and is_turned(output.style.with_format(output.chosen or fmt))
+        no_room |= turns and is_turned(output.style.changed(format=output.chosen or fmt))
         return self._as_poses if listed or no_room or output.chosen not in (None, fmt) else self._as_text
 
     def _as_columns(self, stream: Any, fmt: str, request: Request, output: Output) -> tuple[Generator[Outcome], About]:
@@ -292,7 +292,7 @@ class Stream:
         into: Any = module
         if output.chosen is not None and request.gathered is None:
             into = import_module(FORMATS[output.chosen].writer)
-        style = output.style.with_format(output.chosen or fmt)
+        style = output.style.changed(format=output.chosen or fmt)
         request = request._replace(by_default=not output.notations)
         return run_columns(opened, request, style, source=self.name, into=None if into is module else into), None
 
@@ -304,7 +304,7 @@ class Stream:
         target = output.chosen or _kept(fmt, output)
         refuse(target not in FORMATS, f"--format {target} is for single results and records, not for a stream of {fmt}")
         request = request._replace(by_default=not output.notations)
-        converted = FormatConverter(fmt, request, output.style.with_format(target), self.name, answers())
+        converted = FormatConverter(fmt, request, output.style.changed(format=target), self.name, answers())
         outcomes = converted.outcomes(stream, header=self.inputs.header)
         return outcomes, lambda: converted.tally.assumed
 
@@ -371,7 +371,7 @@ class Stream:
             inputs.ask("precision")
         return request._replace(
             given=request.given or self.notation, notations=request.notations or output.notations,
-            place=output.style.with_format(output.chosen or fmt).place, given_place=self.place,
+            place=output.style.changed(format=output.chosen or fmt).place, given_place=self.place,
             precision=output.style.precision, keep_sign=output.style.keep_sign, on_error=inputs.on_error,
         )  # fmt: skip
 

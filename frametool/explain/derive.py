@@ -21,7 +21,7 @@ from frametool.geometry import floats, quaternion, representations
 from frametool.grammar import pose_algebra
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import looked_up, looked_up_across
-from frametool.grammar.result import Result, Style, carries_position, pose_numbers
+from frametool.grammar.result import Result, Style, pose_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -86,7 +86,7 @@ def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationSty
         check_rotation(sheet, each, found, own, plan)
     pose = own.pose
     rows: list[Row] = []
-    if pose.position is not None and not any(carries_position(each) for each in plan.notations):
+    if pose.position is not None and not any(each.representation.whole for each in plan.notations):
         rows.append(row("xyz", "xyz", pose.position, METRES))
     for each in plan.notations:
         rows += _rotation_rows(own, each, plan.style)
@@ -108,7 +108,7 @@ def check_rotation(
     off = quaternion.distance(*quaternion.normalized(*found, floats), *target, floats) if any(found) else math.inf
     if not off <= CLOSE * sheet.stretch:
         raise DerivationWrong(f"the derivation in {notation.spec} is off by {off:.3g} rad from the result; {REPORT}")
-    if carries_position(notation) and own.pose.position is not None:
+    if notation.representation.whole and own.pose.position is not None:
         sheet.say("The 4x4 matrix of the pose: R on the left, the position as the fourth column, 0 0 0 1 below.")
 
 

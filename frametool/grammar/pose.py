@@ -153,7 +153,7 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
         for key, value in mapping.items():
             if key in POSITION_KEYS and is_position(key, value):
                 found = read_position(value, POSITION_KEYS[key], bare=reading.bare_numbers)
-                position = _agreeing_position(position, found)
+                position = found if position is None else _agreeing_position(position, found)
             elif key in LISTED_WORDS and not is_rotation(key, value):
                 raise Misfit(f"expected the numbers of {'a position' if key in POSITION_WORDS else 'a rotation'}")
             elif key in ROTATION_KEYS or key == AXES_KEY:
@@ -168,8 +168,9 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
         raise Misfit(str(error), (key,), rule=error.rule) from None
     finally:
         reading.degrees = outer_degrees
-    name, parent = mapping.get("name", ""), mapping.get("parent", "")
-    if not (name and parent and type(name) is type(parent) is str) or not OTHER_NAMES.isdisjoint(mapping):
+    name, parent = mapping.get("name"), mapping.get("parent")
+    is_usual = name and parent and type(name) is type(parent) is str and OTHER_NAMES.isdisjoint(mapping)
+    if not (is_usual or NAMES.isdisjoint(mapping)):
         name, parent = _agreeing_name(mapping, NAME_KEYS), _agreeing_name(mapping, PARENT_NAMES)
     pose = Pose(position, rotation, name, parent, None, uncertain)
     is_inverse = "inverse" in mapping and _read_choice("inverse", mapping["inverse"], "true", "false")
@@ -254,10 +255,8 @@ def length_reader(parts: float) -> Callable[[Any], float]:
     return read
 
 
-def _agreeing_position(first: Vector | None, second: Vector) -> Vector:
+def _agreeing_position(first: Vector, second: Vector) -> Vector:
     """Accept a second notation of the position if both agree."""
-    if first is None:
-        return second
     apart = max(abs(a - b) for a, b in zip(first, second, strict=True))
     if apart > AGREEMENT * (1.0 + max(map(abs, first))):
         raise NotARotation(f"two positions in one entry disagree by {apart:.6g} m; keep one")

@@ -83,12 +83,7 @@ class Style:
         """Return the same style with other fields."""
         style = copy(self)
         vars(style).update(fields)
-        return style
-
-    def with_format(self, fmt: str) -> Style:
-        """Return the same style in another format."""
-        style = self.changed(format=fmt)
-        style.put_at(self.place)
+        style.put_at(style.place)
         return style
 
     def put_at(self, place: Place | None) -> None:
@@ -134,7 +129,7 @@ class Result:
             entry = without_frame(entry, style.place) | written
         elif pose.rotation is None:
             return entry | placed(pose.position or (0.0, 0.0, 0.0), style) | extras
-        elif pose.position is not None and not any(carries_position(each) for each in style.notations):
+        elif pose.position is not None and not any(each.representation.whole for each in style.notations):
             entry |= placed(pose.position, style)
         for each in style.notations if pose.rotation is not None else ():
             key, value = rotation_entry(pose, each, style)
@@ -273,14 +268,9 @@ def edge_results(tree: Frames) -> Iterator[Result]:
     return (Result(Pose.of(transform.components, child, parent), extras) for parent, child, transform in tree.edges())
 
 
-def carries_position(notation: Notation) -> bool:
-    """Return True if a notation includes the position of a pose."""
-    return notation.representation.whole is not None
-
-
 def holds_scale(notations: Sequence[Notation]) -> bool:
     """Return True if a similarity is written as a single matrix whose 3 x 3 is s R."""
-    return len(notations) == 1 and carries_position(notations[0])
+    return len(notations) == 1 and notations[0].representation.whole is not None
 
 
 def is_locked(pose: Pose, notation: Notation) -> bool:

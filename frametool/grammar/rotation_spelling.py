@@ -301,40 +301,30 @@ def _without_order(key: str, notation: Notation, value: list[Any]) -> Misfit:
 
 
 def _take_parts(notation: Notation, value: Any, parts: dict[str, int]) -> Spelled:
-    """Read a mapping whose keys hold several numbers each, with `axes` if Euler axes are named."""
+    """Read a mapping whose keys hold several numbers each, with `axes`, or `order` and `frame`, if axes are named."""
     named = notation.representation.axes == NAMED_AXES
+    keys = ", ".join(f"{key}: [..]" if count > 1 else f"{key}: 90deg" for key, count in parts.items())
+    expected = f"expected {{{'axes: rzyx, ' * named}{keys}}}"
     if type(value) is not dict:
-        keys = ", ".join(f"{key}: [..]" if count > 1 else f"{key}: a" for key, count in parts.items())
-        example = "axes: rzyx, " * named + keys
-        raise Misfit(f"expected {{{example}}}, found {kind(value)}")
-    expected = " and ".join([*["axes"] * named, *parts])
-    if named:
-        expected += f", or order, frame and {' and '.join(parts)}"
-    known = {*parts, *(("axes", "order", "frame") if named else ())}
-    if unknown := [key for key in value if key not in known]:
-        hint = " (90deg has its unit)" if notation.representation.angles and not named else ""
-        raise Misfit(f"unknown key {shown(unknown[0])}; expected {expected}{hint}", (unknown[0],), key=True)
-    try:
-        bound = _with_axes(notation, value) if named else notation
-        held = [(key, value[key], count) for key, count in parts.items()]
-    except KeyError as missing:
-        raise Misfit(f"missing {missing.args[0]}; expected {expected}") from None
+        raise Misfit(f"{expected}, found {kind(value)}")
+    of_axes = () if not named else ("axes",) if value.keys().isdisjoint(("order", "frame")) else ("order", "frame")
+    if unknown := [key for key in value if key not in parts and key not in of_axes]:
+        raise Misfit(f"unknown key {shown(unknown[0])}; {expected}", (unknown[0],), key=True)
+    if missing := [key for key in (*of_axes, *parts) if key not in value]:
+        raise Misfit(f"missing {missing[0]}; {expected}")
+    if wrong := next((key for key in of_axes if type(value[key]) is not str), ""):
+        raise Misfit(f"expected {wrong} like {'intrinsic' if wrong == 'frame' else 'rzyx'}", (wrong,))
+    if of_axes:
+        axes = value["axes"] if "axes" in value else axes_name(value["order"], value["frame"])
+        notation = parse_notation(f"{notation.spec}:{axes}")
     texts: list[Any] = []
     places: list[Path] = []
-    for key, each, count in held:
+    for key, count in parts.items():
         names = notation.representation.names[len(texts) : len(texts) + count]
-        texts += within((key,), read_texts, each, names) if count > 1 else [each]
-        steps = range(count) if type(each) is list else names
+        texts += within((key,), read_texts, value[key], names) if count > 1 else [value[key]]
+        steps = range(count) if type(value[key]) is list else names
         places += [(key, step) for step in steps] if count > 1 else [(key,)]
-    return bound, texts, places
-
-
-def _with_axes(notation: Notation, value: dict[str, Any]) -> Notation:
-    """Return the notation with the Euler axes of a mapping: `axes`, or `order` and `frame`; KeyError if missing."""
-    axes = value["axes"] if "axes" in value else axes_name(value["order"], value["frame"])
-    if type(axes) is not str:
-        raise Misfit(f"expected axes like rzyx, found {kind(axes)}", ("axes",))
-    return parse_notation(f"{notation.spec}:{axes}")
+    return notation, texts, places
 
 
 def _take_rows(notation: Notation, value: Any) -> Spelled:

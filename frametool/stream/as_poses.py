@@ -76,7 +76,7 @@ class FormatConverter:
         self.tally = Diagnostics()
         self.is_table = FORMATS[fmt].is_table
         self.module: Any = None if self.is_table else import_module(FORMATS[fmt].reader)
-        self.style = style.with_format(style.format)
+        self.style = style.changed()
         self.request = request._replace(all_numbers=True, notations=(QUATERNION,), keep_sign=True, place=None)
         self.looks_up_places = request.place is not None and not request.poses  # whose TARGET each row was checked for
         self.stamps = StampFile(answers.stamps) if answers.stamps else None

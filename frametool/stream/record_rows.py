@@ -262,7 +262,7 @@ def marked(template: Template, at: int, request: Request, style: Style, target: 
     stamp = None if record.stamp_ns is None else STAMP_NS
     shown = entry._replace(parent=parent, name=name, record=record._replace(stamp_ns=stamp))
     probe = Answer(shown, parts)
-    own_style = style if style.format in SPELLED else style.with_format("csv")
+    own_style = style if style.format in SPELLED else style.changed(format="csv")
     try:
         root = Node(0, len(text), parse_nodes(text))
         unit = unit_of(record, root.at(record.path[:1]).value)

@@ -268,7 +268,7 @@ class TextWriter:
 
     def _learn(self, block: RowPoses) -> None:
         """See how the format writes a pose whose numbers are all different, and take them for places to fill in."""
-        style = self.style.with_format(self.style.format)
+        style = self.style.changed()
         style.precision = None
         varies = block.extras or {len(block.names), len(block.parents)} != {1}
         is_worded = self.target.place is not None and bool(self.target.place.words)

@@ -111,7 +111,7 @@ class BagOfClouds:
             bad.take([Fault.of(cloud.number, "", error)])
             return 0
         name = self._name(cloud)
-        style = self.output.style.with_format(self.output.chosen or "")
+        style = self.output.style.changed(format=self.output.chosen or "")
         with writing(name, force=self.output.force) as write:
             for outcome in moved_cloud(cloud, pose, style, self.path):
                 for fault in outcome.faults:

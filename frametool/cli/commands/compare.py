@@ -114,7 +114,7 @@ def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], ro
     if rows:
         several = len(found) > 1
         records = [{"est": each.names[1]} | row if several else row for each in found for row in rows_of(each, rows)]
-        output.style = output.style.with_format("csv" if fmt == "text" else fmt)
+        output.style = output.style.changed(format="csv" if fmt == "text" else fmt)
         output.report(records)
     elif fmt in TABLES or (fmt == "text" and len(every) > 1):
         output.text(write_table(every, fmt))

@@ -204,7 +204,7 @@ class CameraTask:
         else:
             status = 0
             if output.style.format == "text":
-                output.style = output.style.with_format("yaml")
+                output.style = output.style.changed(format="yaml")
             request = request._replace(prefix=self.inputs.prefix, precision=output.style.precision)
             output.values(values_of(records, request, output))
         if not self.inputs.quiet and (self.is_stream or seen.lost) and (summary := seen.summary()):

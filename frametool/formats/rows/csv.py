@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid
 from frametool.grammar.pose import NAMES
-from frametool.grammar.result import NoResult, Result, carries_position, in_columns, pose_numbers, without_frame
+from frametool.grammar.result import NoResult, Result, in_columns, pose_numbers, without_frame
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -80,7 +80,7 @@ def _pose_cells(result: Result, style: Style) -> dict[str, Any]:
 
         placed, pose = placed_cells(pose, style.place)
         cells = without_frame(cells, style.place) | placed
-    elif pose.position is not None and not any(carries_position(each) for each in style.notations):
+    elif pose.position is not None and not any(each.representation.whole for each in style.notations):
         cells |= zip("xyz", pose.position, strict=True)
     for notation in style.notations if pose.rotation is not None else ():
         columns, numbers = pose_numbers(pose, notation, style)

@@ -204,7 +204,7 @@ def write_tree(tree: Frames, style: Style) -> str:
 
     if moving := [track.child for track in tree.tracks() if not track.is_static]:
         raise ValueInvalid(f"{publisher.moving_frames(moving[:10])}; give --at TIME")
-    lines = publisher.write_tree(tree, style.with_format("static2")).splitlines()
+    lines = publisher.write_tree(tree, style.changed(format="static2")).splitlines()
     if unsafe := next((line for line in lines if "$(" in line), None):
         names = unsafe[unsafe.index("--frame-id") :]
         raise ValueInvalid(f"a frame name with $( cannot be written in a launch file: {shown(names)}")
