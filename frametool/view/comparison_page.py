@@ -16,23 +16,22 @@ from frametool.errors import printable
 from frametool.view.fit_text import write_comparison, write_table
 from frametool.view.pictures import (
     SERIES,
-    Area,
     Chart,
     ChartLine,
     Picture,
-    PictureBox,
-    PictureDot,
-    PictureLine,
-    PictureWords,
+    box,
+    dot,
     filled,
+    line,
     shade_of,
     svg_element,
+    words,
     write_html,
     write_svg,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from frametool.fit.comparison import Comparison
     from frametool.view.pictures import Shape
@@ -43,8 +42,6 @@ ROW = 38.0  # pixels of an estimate's box and its name
 STRETCHES, FEWEST = 200, 20  # of all paths together, and of one at least, each drawn by its extremes
 LEVELS, BINS = 12, 30  # of error: colours along a path, columns of a histogram
 ERROR_STOPS = ((47, 108, 216), (190, 90, 190), (235, 94, 20))  # seen on white paper and on dark
-SERIES_NAMES = list(SERIES)
-REFERENCE = "reference"
 LEAST_LENGTHS = 3
 STILL = 1e-6  # metres: below, a path is a point
 FAR = 1e3  # times its size is a path away from 0 where the numbers along its axes are shortened
@@ -69,11 +66,11 @@ def write_report(found: Sequence[Comparison], fmt: str, command: str) -> str:
     curves = [_curve(each, at, len(found)) for at, each in enumerate(found)]
     numbers = [each.as_dict() for each in found]
     unit = "pair" if found[0].pairs.ref.stamps_ns is None else "s"
-    map_chart, seen = _map(curves)
+    paths, seen = _map(curves)
     charts = _over_time(curves, "pair" if unit == "pair" else "time (s)")
-    errors = _figure(charts[-1].area.top + HIGH - TOP, [shape for chart in charts for shape in chart.drawn()])
+    errors = _figure(charts[-1].area[1] + HIGH - TOP, [shape for chart in charts for shape in chart.drawn()])
     figures = [{"distribution": _distribution(curves)}, _by_length(curves, numbers)][:: 1 if len(curves) == 1 else -1]
-    columns = ({"path": _path(curves, map_chart, seen), **figures[0]}, {"errors": errors, **figures[1]})
+    columns = ({"path": _path(curves, paths, seen), **figures[0]}, {"errors": errors, **figures[1]})
     what = curves[0].name if len(curves) == 1 else f"{len(curves)} estimates"
     title = f"{what} against {printable(found[0].names[0])}"
     if fmt == "svg":
@@ -83,19 +80,15 @@ def write_report(found: Sequence[Comparison], fmt: str, command: str) -> str:
         for column in columns
     )
     hints = dict.fromkeys(hint for each in numbers for hint in each["hints"])
+    text = "\n".join([*([write_table(numbers)] if len(numbers) > 1 else []), *map(write_comparison, numbers)])
     body = filled(
         "report.html", title=escape(title), made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC, frametool {__version__}",
         command=escape(printable(command)), hints="".join(f"<p class=hint>{escape(hint)}</p>" for hint in hints),
-        text=escape(_text(numbers)), figures=drawn,
+        text=escape(text), figures=drawn,
     )  # fmt: skip
-    samples = {"unit": unit, "curves": [_samples(each, map_chart, seen, charts[0]) for each in curves]}
+    samples = {"unit": unit, "curves": [_samples(each, paths, seen, charts[0]) for each in curves]}
     held = {"numbers": f"[{', '.join(map(dump, numbers))}]", "samples": json.dumps(samples)}
     return write_html(title, body, script="tables.js report.js", data=held)
-
-
-def _text(numbers: Sequence[dict[str, Any]]) -> str:
-    """Return the numbers as the terminal shows them."""
-    return "\n".join([*([write_table(numbers)] if len(numbers) > 1 else []), *map(write_comparison, numbers)])
 
 
 def _curve(found: Comparison, at: int, count: int) -> Curve:
@@ -104,7 +97,7 @@ def _curve(found: Comparison, at: int, count: int) -> Curve:
     every = [ate.m, ate.rad, *((ate.along, ate.across, ate.up) if count == 1 else ())]
     stretches = max(STRETCHES // count, FEWEST)
     chosen = np.unique(np.concatenate([_extremes(each, stretches) for each in every if each is not None]))
-    colour = "trail" if count == 1 else SERIES_NAMES[at % len(SERIES)]
+    colour = "trail" if count == 1 else [*SERIES][at % len(SERIES)]
     return Curve(found, printable(found.names[1]), colour, chosen, times[chosen].tolist())
 
 
@@ -125,23 +118,24 @@ def _figure(high: float, shapes: Sequence[Shape]) -> Picture:
 def _map(curves: Sequence[Curve]) -> tuple[Chart, Any]:
     """Return the chart of all paths, seen along the axis of least extent, and the projection of positions onto it."""
     every = np.concatenate([xyz for each in curves for xyz in (each.found.pairs.ref.xyz, each.found.moved.xyz)])
-    low, high = every.min(0), every.max(0)
-    axes = np.sort(np.argsort(high - low, kind="stable")[1:])
-    span = float((high - low).max())
-    span = span if span > STILL else 1.0
-    base = np.where(np.abs(low) > FAR * span, np.round(low), 0.0)[axes]
-    low, high = low[axes] - base, high[axes] - base
+    axes = np.sort(np.argsort(np.ptp(every, axis=0), kind="stable")[1:])
+    low, high = every[:, axes].min(0), every[:, axes].max(0)
+    span = (high - low).max() if (high - low).max() > STILL else 1.0
+    base = np.where(np.abs(low) > FAR * span, np.round(low), 0.0)
     names = [f"{'xyz'[axis]}{f' - {at:.0f}' if at else ''} (m)" for axis, at in zip(axes, base, strict=True)]
-    tall = WIDE * min(max((high[1] - low[1]) / max(high[0] - low[0], 1e-9), 0.5), 1.0)
-    ends = [(begin - 0.03 * span, end + 0.03 * span) for begin, end in zip(low.tolist(), high.tolist(), strict=True)]
-    chart = Chart(Area(LEFT, TOP, WIDE, float(tall)), (names[0], names[1]), ends=(ends[0], ends[1]), equal=True)
+    wide, tall = np.maximum(high - low, 1e-9)
+    pixels = np.array([WIDE, WIDE * min(max(tall / wide, 0.5), 1.0)])
+    reach = ((high - low + 0.06 * span) / pixels).max() * pixels / 2.0  # metres, at one scale
+    middle = (low + high) / 2.0 - base
+    ends = [*zip((middle - reach).tolist(), (middle + reach).tolist(), strict=True)]
+    chart = Chart((LEFT, TOP, *pixels.tolist()), (names[0], names[1]), ends=ends)
     return chart, lambda xyz: (xyz[:, axes] - base).tolist()
 
 
 def _path(curves: Sequence[Curve], chart: Chart, seen: Any) -> Picture:
     """Draw the paths; a single estimate is coloured by its error."""
     first = curves[0]
-    lines = [ChartLine(REFERENCE, "soft", seen(first.found.pairs.ref.xyz[first.chosen]), 2.0, (5.0, 4.0))]
+    lines = [ChartLine("reference", "soft", seen(first.found.pairs.ref.xyz[first.chosen]), 2.0, (5.0, 4.0))]
     shapes: list[Shape] = []
     if len(curves) == 1:
         lines.append(ChartLine("estimate, by error", shade_of(0.5, ERROR_STOPS), []))
@@ -149,45 +143,45 @@ def _path(curves: Sequence[Curve], chart: Chart, seen: Any) -> Picture:
     else:
         lines += [ChartLine(each.name, each.colour, seen(each.found.moved.xyz[each.chosen])) for each in curves]
     chart.lines = lines
-    start = PictureDot(*chart.place(*seen(first.found.moved.xyz[:1])[0]), 4.0, "ink", "start")
-    return _figure(chart.area.height, [*chart.drawn(), *shapes, start])
+    start = dot(*chart.place(*seen(first.found.moved.xyz[:1])[0]), 4.0, "ink", "start")
+    return _figure(chart.area[3], [*chart.drawn(), *shapes, start])
 
 
 def _coloured(curve: Curve, placed: Sequence[tuple[float, float]], chart: Chart) -> list[Shape]:
     """Draw a path coloured by error, with the colour scale."""
-    errors, low = curve.found.ate.m, chart.area.top + chart.area.height + 25.0
+    errors, low = curve.found.ate.m, chart.area[1] + chart.area[3] + 25.0
     worst = float(errors.max())
     levels = np.minimum((errors[curve.chosen] / (worst or 1.0) * LEVELS).astype(int), LEVELS - 1).tolist()
     shades = [shade_of(level / (LEVELS - 1), ERROR_STOPS) for level in range(LEVELS)]
-    shapes: list[Shape] = [
-        PictureWords(LEFT + LEVELS * 7.0 + 8.0, low + 4.5, f"error 0 .. {worst:.3g} m", "soft", size=11.0)
-    ]
+    shapes = [words(LEFT + LEVELS * 7.0 + 8.0, low + 4.5, f"error 0 .. {worst:.3g} m", "soft", size=11.0)]
     begin = 0
     for level, run in groupby(levels[:-1]):
         end = begin + len([*run])
-        shapes.append(PictureLine(placed[begin : end + 1], shades[level], 2.0))
+        shapes.append(line(placed[begin : end + 1], shades[level], 2.0))
         begin = end
-    return shapes + [PictureBox(LEFT + at * 7.0, low, 7.5, 9.0, shade) for at, shade in enumerate(shades)]
+    return shapes + [box(LEFT + at * 7.0, low, 7.5, 9.0, shade) for at, shade in enumerate(shades)]
 
 
 def _over_time(curves: Sequence[Curve], along: str) -> list[Chart]:
     """Return the charts over time: errors in position, in rotation, and for one estimate along and across its path."""
-    end, ate, one = max(each.times[-1] for each in curves), curves[0].found.ate, len(curves) == 1
-    kinds = {"error in position (m)": [(each.name * (not one), each.colour, each.found.ate.m, each) for each in curves]}
-    if turned := [(each, each.found.ate.rad) for each in curves if each.found.ate.rad is not None]:
-        kinds["error in rotation (deg)"] = [("", each.colour, np.degrees(rad), each) for each, rad in turned]
+
+    def lines(values: Iterable[tuple[str, str, Any, Curve]]) -> list[ChartLine]:
+        return [ChartLine(name, colour, curve.over_time(each), 1.2) for name, colour, each, curve in values]
+
+    ate, one = curves[0].found.ate, len(curves) == 1
+    position = lines((each.name * (not one), each.colour, each.found.ate.m, each) for each in curves)
+    turned = [(each, each.found.ate.rad) for each in curves if each.found.ate.rad is not None]
+    kinds = {"error in position (m)": position}
+    if turned:
+        kinds["error in rotation (deg)"] = lines(("", each.colour, np.degrees(rad), each) for each, rad in turned)
     if one:
-        parts = zip(("along", "across", "up"), "xyz", (ate.along, ate.across, ate.up), strict=True)
-        kinds["error in the path's axes (m)"] = [(*part, curves[0]) for part in parts]
-    charts = []
-    for at, (name, drawn) in enumerate(kinds.items()):
-        lines = [ChartLine(label, colour, each.over_time(values), 1.2) for label, colour, values, each in drawn]
-        if one and at == 0:
-            rmse = float(np.sqrt((ate.m**2).mean()))
-            lines.append(ChartLine(f"rmse {rmse:.3g} m", "soft", [(0.0, rmse), (end, rmse)], 1.0, (4.0, 3.0)))
-        area = Area(LEFT, TOP + at * (HIGH + TOP + BOTTOM - 14.0), WIDE, HIGH)
-        charts.append(Chart(area, (along * (at == len(kinds) - 1), name), lines))
-    return charts
+        rmse, end = float(np.sqrt((ate.m**2).mean())), curves[0].times[-1]
+        position.append(ChartLine(f"rmse {rmse:.3g} m", "soft", [(0.0, rmse), (end, rmse)], 1.0, (4.0, 3.0)))
+        parts = (("along", "x", ate.along), ("across", "y", ate.across), ("up", "z", ate.up))
+        kinds["error in the path's axes (m)"] = lines((*part, curves[0]) for part in parts)
+    step, last = HIGH + TOP + BOTTOM - 14.0, [*kinds][-1]
+    return [Chart((LEFT, TOP + at * step, WIDE, HIGH), (along * (name == last), name), drawn)
+            for at, (name, drawn) in enumerate(kinds.items())]  # fmt: skip
 
 
 def _distribution(curves: Sequence[Curve]) -> Picture:
@@ -198,22 +192,21 @@ def _distribution(curves: Sequence[Curve]) -> Picture:
         counts, edges = np.histogram(errors[0], BINS, ends)
         steps = [*zip(np.repeat(edges, 2)[1:-1].tolist(), np.repeat(counts, 2).tolist(), strict=True)]
         lines = [ChartLine("", curves[0].colour, steps)]
-        return _figure(HIGH, [*Chart(Area(LEFT, TOP, WIDE, HIGH), ("error in position (m)", "poses"), lines).drawn()])
+        return _figure(HIGH, [*Chart((LEFT, TOP, WIDE, HIGH), ("error in position (m)", "poses"), lines).drawn()])
     names = ("error in position (m)", "boxes: half of the poses; lines: 5 to 95 %; dots: median, maximum")
-    chart = Chart(Area(LEFT, TOP, WIDE, ROW * len(curves)), names, ends=(ends, (0.0, 1.0)))
+    chart = Chart((LEFT, TOP, WIDE, ROW * len(curves)), names, ends=(ends, (0.0, 1.0)))
     chart.ticks[1] = []
     shapes = [*chart.drawn()]
     for at, (each, values) in enumerate(zip(curves, errors, strict=True)):
         y, colour = TOP + (at + 0.66) * ROW, each.colour
-        least, first, middle, third, most, worst = (
-            chart.place(value, 0.0)[0] for value in np.percentile(values, (5, 25, 50, 75, 95, 100)).tolist()
-        )
+        marks = np.percentile(values, (5, 25, 50, 75, 95, 100)).tolist()
+        least, first, middle, third, most, worst = (chart.place(mark, 0.0)[0] for mark in marks)
         shapes += [
-            PictureLine([(least, y), (most, y)], colour, 1.5, title=each.name),
-            PictureBox(first, y - 7.0, third - first, 14.0, colour), PictureDot(middle, y, 4.0, "paper"),
-            PictureDot(worst, y, 3.0, colour), PictureWords(LEFT + 4.0, y - 17.0, each.name[:60], size=11.0),
+            line([(least, y), (most, y)], colour, 1.5, title=each.name),
+            box(first, y - 7.0, third - first, 14.0, colour), dot(middle, y, 4.0, "paper"),
+            dot(worst, y, 3.0, colour), words(LEFT + 4.0, y - 17.0, each.name[:60], size=11.0),
         ]  # fmt: skip
-    return _figure(chart.area.height, shapes)
+    return _figure(chart.area[3], shapes)
 
 
 def _by_length(curves: Sequence[Curve], numbers: Sequence[dict[str, Any]]) -> dict[str, Picture]:
@@ -223,23 +216,22 @@ def _by_length(curves: Sequence[Curve], numbers: Sequence[dict[str, Any]]) -> di
         points = [(row["length_m"], row["percent"]) for row in (each["kitti"] or {"lengths": []})["lengths"]]
         deltas = [(float(row["delta"][:-1]), row["percent"]) for row in each["rpe"] if row["percent"] is not None]
         lines.append(ChartLine("", curve.colour, sorted(points or deltas), dots=True))
-    lines = [line for line in lines if len(line.points) >= LEAST_LENGTHS]
+    lines = [each for each in lines if len(each.points) >= LEAST_LENGTHS]
     if not lines:
         return {}
-    chart = Chart(Area(LEFT, TOP, WIDE, HIGH), ("length (m)", "relative error (%)"), lines)
+    chart = Chart((LEFT, TOP, WIDE, HIGH), ("length (m)", "relative error (%)"), lines)
     return {"lengths": _figure(HIGH, [*chart.drawn()])}
 
 
-def _samples(curve: Curve, map_chart: Chart, seen: Any, time_chart: Chart) -> dict[str, Any]:
+def _samples(curve: Curve, paths: Chart, seen: Any, errors: Chart) -> dict[str, Any]:
     """Return the pixels of the drawn pairs in both charts and the values shown on hover."""
     ate, chosen = curve.found.ate, curve.chosen
-    places = [map_chart.place(*point) for point in seen(curve.found.moved.xyz[chosen])]
-    over = [time_chart.place(*point) for point in curve.over_time(ate.m)]
+    points = ("path", paths, seen(curve.found.moved.xyz[chosen])), ("errors", errors, curve.over_time(ate.m))
+    pixels = {key: [chart.place(*each) for each in points_of] for key, chart, points_of in points}
     numbers = {"m": ate.m[chosen], **({} if ate.rad is None else {"deg": np.degrees(ate.rad[chosen])})}
     return {
         "name": curve.name, "colour": curve.colour, "t": [round(each, 3) for each in curve.times],
-        "path": [[round(at, 1) for at in each] for each in places],
-        "errors": [[round(at, 1) for at in each] for each in over],
+        **{key: [[round(x, 1), round(y, 1)] for x, y in places] for key, places in pixels.items()},
         **{key: [float(f"{each:.4g}") for each in values.tolist()] for key, values in numbers.items()},
     }  # fmt: skip
 
@@ -253,5 +245,5 @@ def _side_by_side(title: str, columns: Sequence[dict[str, Picture]]) -> str:
             drawn += svg_element(each, place=f' x="{number * each.width:g}" y="{top:g}"')
             top += each.height
         bottom = max(bottom, top)
-    heading = PictureWords(LEFT, 20.0, title, bold=True)
+    heading = words(LEFT, 20.0, title, weight="bold")
     return write_svg(Picture(len(columns) * columns[0]["path"].width, bottom, [heading], title), drawn)

@@ -23,12 +23,12 @@ from zlib import compress
 
 from frametool import __version__
 from frametool.formats.robots.model import JointValue
-from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry.rigid import IDENTITY
 from frametool.sim.turtle import single
-from frametool.view.pictures import SIZE, page_file, write_html
-from frametool.view.scene import EYES, FrameScene, Projection, can_be_drawn
+from frametool.view.pictures import page_file, write_html
+from frametool.view.scene import Projection, can_be_drawn
+from frametool.view.stills import SIZE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from frametool.formats.robots.solids import Solid
     from frametool.frames.track import MovingTrack
     from frametool.geometry.types import Rigid
-    from frametool.sim.simulate import SimulationStep
+    from frametool.view.scene import FrameScene
 
 
 THICK = 0.02  # half the width of a bar, where its length is 1
@@ -263,20 +263,3 @@ def _drawn_solids(scene: FrameScene, solids: Sequence[Solid]) -> dict[str, Any]:
                 drawn = each._replace(kind="box", size=size, pose=(x, y, z, *IDENTITY[3:]))
             found.append(drawn._asdict() | {"frame": index[each.frame]})
     return {"solids": found, "meshes": sum(each.kind == "mesh" for each in solids)}
-
-
-class RunPage:
-    """Collect all transforms of a run for a page."""
-
-    def __init__(self) -> None:
-        """Create an empty page."""
-        self.buffer = TransformBuffer(name="run")
-
-    def watch(self, step: SimulationStep) -> None:
-        """Add the transforms of a step."""
-        for stamp_ns, parent, child, transform in step.broadcasts:
-            self.buffer.insert(parent, child, transform, stamp_ns)
-
-    def content(self) -> str:
-        """Return the page, seen from above."""
-        return write_page(FrameScene(self.buffer), title="turtles", file="tf.yaml", eye=EYES["top"])

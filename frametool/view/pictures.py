@@ -1,7 +1,7 @@
-"""Static pictures of lines, dots, boxes, text and images, in pixels with y down, written as SVG, HTML or PNG.
+"""Static pictures: elements of SVG in pixels with y down, written as SVG, HTML or PNG; overlays on camera images.
 
 A colour is `#rrggbb` or a name in PALETTE, which has light and dark values.  Only PNG needs a library, matplotlib.
-Also here: charts, the HTML shell of all pages, the static picture of frames, and the HTML of values for notebooks.
+Also here: charts, and the HTML shell of all pages.
 """
 
 from __future__ import annotations
@@ -10,25 +10,24 @@ import io
 import math
 import os
 import warnings
-from base64 import b64encode
-from functools import partial
+from base64 import b64decode, b64encode
 from hashlib import sha256
 from itertools import groupby
+from operator import attrgetter
 from string import Template
 from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.sax.saxutils import escape
 
-from frametool.errors import FileProblem, printable
-from frametool.frames.lookups import Frames
-from frametool.view.scene import SLANTED, FrameScene, Labels, Projection, Size, axis_tips, nice, text_width
+from frametool.documents.source import opened
+from frametool.errors import FileProblem, FormatError, ValueInvalid, printable
+from frametool.view.scene import text_width
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
-    from frametool.geometry.types import Rigid
-    from frametool.view.scene import Label
+    from frametool.geometry.types import Number
+    from frametool.view.scene import Box
 
-    Range = tuple[float, float]
     Point = tuple[float, float]
 
 # name -> light, dark
@@ -56,7 +55,6 @@ NAMED = PALETTE | SERIES
 
 # viridis at five places, dark for little
 STOPS = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))
-PIECES, LAST_SHADE = 24, 0.85  # of a trail, from dark when it begins to a green that white paper still shows
 
 
 def shade_of(part: float, stops: Sequence[tuple[int, int, int]] = STOPS) -> str:
@@ -67,65 +65,44 @@ def shade_of(part: float, stops: Sequence[tuple[int, int, int]] = STOPS) -> str:
     return f"#{''.join(f'{part:02x}' for part in mixed)}"
 
 
-class PictureLine(NamedTuple):
-    """A polyline, broken at NaN.
+class Shape(NamedTuple):
+    """An element of SVG.
 
-    dashes: pixels drawn and skipped in turn; title: its tooltip.
+    kind: path, circle, rect, text or image.  look: its attributes but the colour.  points: of a path.
+    text: that of a text, the tooltip of anything else.
     """
 
-    points: Sequence[tuple[float, float]]
-    colour: str
-    width: float = 1.0
-    alpha: float = 1.0
-    dashes: tuple[float, ...] = ()
-    title: str = ""
-
-
-class PictureDot(NamedTuple):
-    """A disc."""
-
-    x: float
-    y: float
-    radius: float
-    colour: str
-    title: str = ""
-
-
-class PictureBox(NamedTuple):
-    """A filled rectangle; x, y: its upper left corner."""
-
-    x: float
-    y: float
-    width: float
-    height: float
-    colour: str
-
-
-class PictureWords(NamedTuple):
-    """One line of text, vertically centred at y; anchor: which part of it is at x; halo: colour of its outline."""
-
-    x: float
-    y: float
-    text: str
-    colour: str = "ink"
-    anchor: str = "start"
-    size: float = 12.0
-    bold: bool = False
-    halo: str = ""
-
-
-class PictureImage(NamedTuple):
-    """An embedded image file; x, y: its upper left corner; kind: png or jpeg."""
-
-    x: float
-    y: float
-    width: int
-    height: int
     kind: str
-    data: bytes
+    colour: str
+    look: dict[str, Any]
+    points: Sequence[Point] = ()
+    text: str = ""
 
 
-Shape = PictureImage | PictureLine | PictureDot | PictureBox | PictureWords
+def line(
+    points: Sequence[Point], colour: str, width: float = 1.0, alpha: float = 1.0,
+    dashes: tuple[float, ...] = (), title: str = "",
+) -> Shape:  # fmt: skip
+    """Return a polyline; dashes: pixels drawn and skipped in turn; title: its tooltip."""
+    look = {"stroke-width": width, "opacity": alpha, "stroke-dasharray": dashes}
+    return Shape("path", colour, look, points, title)
+
+
+def dot(x: float, y: float, radius: float, colour: str, title: str = "") -> Shape:
+    """Return a disc."""
+    return Shape("circle", colour, {"cx": x, "cy": y, "r": radius}, text=title)
+
+
+def box(x: float, y: float, width: float, height: float, colour: str) -> Shape:
+    """Return a filled rectangle; x, y: its upper left corner."""
+    return Shape("rect", colour, {"x": x, "y": y, "width": width, "height": height})
+
+
+def words(x: float, y: float, text: str, colour: str = "ink", anchor: str = "start", size: float = 12.0,
+          weight: str = "normal", halo: str = "") -> Shape:  # fmt: skip
+    """Return one line of text, vertically centred at y; anchor: the part of it at x; halo: colour of its outline."""
+    look = {"x": x, "y": y, "text-anchor": anchor, "font-size": size, "font-weight": weight, "stroke": halo}
+    return Shape("text", colour, look, text=text)
 
 
 class Picture(NamedTuple):
@@ -135,11 +112,13 @@ class Picture(NamedTuple):
     height: float
     shapes: Sequence[Shape]
     title: str = ""
-    corner: tuple[float, float] = (0.0, 0.0)
+    corner: Point = (0.0, 0.0)
     decimals: int = 1
     notes: Sequence[str] = ()
 
 
+USUAL = {"stroke-width": 1.0, "opacity": 1.0, "text-anchor": "start", "font-size": 12.0, "font-weight": "normal"}
+CLASSES = {"path": "-line", "text": " paper-line"}  # after the name of a colour
 FONT = 'font-family="DejaVu Sans, Verdana, sans-serif" font-size="12" dominant-baseline="central" role="img"'
 SHARED = """\
 path {fill: none; stroke-linecap: round; stroke-linejoin: round}
@@ -167,6 +146,42 @@ def svg_element(picture: Picture, before: str = "", place: str = "") -> str:
     return f"{head}{before}{''.join(_element(each, picture.decimals) for each in picture.shapes)}</svg>\n"
 
 
+def _element(shape: Shape, decimals: int) -> str:
+    """Return an element without the attributes that are as usual; the name of a colour is a class."""
+    kind, colour, look, points, text = shape
+    if colour in NAMED:
+        paint = f' class="{colour}{CLASSES.get(kind, "")}"'
+    else:
+        paint = f' {"stroke" if points else "fill"}="{colour}"' * bool(colour)
+    others = "".join(
+        f' {name}="{_attribute(value, decimals)}"'
+        for name, value in look.items()
+        if value not in ("", (), USUAL.get(name))
+    )
+    if points:
+        others += f' d="M{"L".join(f"{_attribute(x, decimals)} {_attribute(y, decimals)}" for x, y in points)}"'
+    inside = _text(text) if kind == "text" else _title(text)
+    return f"<{kind}{paint}{others}" + (f">{inside}</{kind}>\n" if inside else "/>\n")
+
+
+def _attribute(value: Any, decimals: int) -> str:
+    """Write a number with some decimals, several with blanks between them; a text stays."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, tuple):
+        return " ".join(map("{:g}".format, value))
+    return f"{round(value, decimals) + 0.0:.{5 + decimals}g}" if abs(value) < 1e4 else f"{value:.0f}"
+
+
+def _title(text: str) -> str:
+    return f"<title>{_text(text)}</title>" if text else ""
+
+
+def _text(text: str) -> str:
+    """Escape a text for XML."""
+    return escape(printable(text))
+
+
 def write_html(
     title: str, body: str, *, style: str = "report.css", script: str = "", data: Mapping[str, str] | None = None
 ) -> str:
@@ -181,8 +196,9 @@ def write_html(
         rules = "".join(map(rule.format, NAMED))
         dark = f"@media screen and (prefers-color-scheme: dark) {{:root {{{dark}}}}}"
         texts["style"] = f":root {{{light}}}\n{dark}\n{SHARED}{rules}{texts['style']}"
-    digests = (f"{kind}-src '{_digest(text)}'; " if text else "" for kind, text in texts.items())
-    policy = f"default-src 'none'; img-src data:; {''.join(digests)}base-uri 'none'; form-action 'none'"
+    digests = {kind: b64encode(sha256(text.encode()).digest()).decode() for kind, text in texts.items() if text}
+    allowed = "".join(f"{kind}-src 'sha256-{digest}'; " for kind, digest in digests.items())
+    policy = f"default-src 'none'; img-src data:; {allowed}base-uri 'none'; form-action 'none'"
     held = {name: text.translate(HARMLESS) for name, text in (data or {}).items()}
     scripts = "".join(f'<script type="application/json" id="{name}">{text}</script>' for name, text in held.items())
     if script:
@@ -204,10 +220,6 @@ def filled(name: str, **texts: str) -> str:
     return Template(page_file(name)).substitute(texts)
 
 
-def _digest(text: str) -> str:
-    return f"sha256-{b64encode(sha256(text.encode()).digest()).decode()}"
-
-
 def write_picture(picture: Picture, suffix: str) -> str | bytes:
     """Return a picture as .png, .svg or .html."""
     if suffix == ".png":
@@ -217,65 +229,7 @@ def write_picture(picture: Picture, suffix: str) -> str | bytes:
     return write_html(picture.title, f"<main>\n<figure>\n{svg_element(picture)}</figure>\n</main>\n")
 
 
-def _element(shape: Shape, decimals: int) -> str:
-    number = partial(_number, decimals=decimals)
-    match shape:
-        case PictureImage(x, y, width, height, kind, data):
-            size = f'x="{x:g}" y="{y:g}" width="{width}" height="{height}"'
-            return f'<image {size} href="data:image/{kind};base64,{b64encode(data).decode()}"/>\n'
-        case PictureLine(points, colour, width, alpha, dashes, title):
-            way = "L".join(f"{number(x)} {number(y)}" if x == x else "" for x, y in points)  # noqa: PLR0124 - no number
-            way = way.replace("LL", "M")
-            look = "" if width == 1.0 else f' stroke-width="{width:g}"'
-            look += "" if alpha == 1.0 else f' opacity="{alpha:g}"'
-            look += f' stroke-dasharray="{" ".join(map("{:g}".format, dashes))}"' if dashes else ""
-            stroke = f'class="{colour}-line"' if colour in NAMED else f'stroke="{colour}"'
-            end = f">{_title(title)}</path>" if title else "/>"
-            return f'<path {stroke}{look} d="M{way}"{end}\n'
-        case PictureDot(x, y, radius, colour, title):
-            place = f'cx="{number(x)}" cy="{number(y)}" r="{radius:g}"'
-            end = f">{_title(title)}</circle>" if title else "/>"
-            return f"<circle {place} {_fill(colour)}{end}\n"
-        case PictureBox(x, y, width, height, colour):
-            size = f'width="{number(width)}" height="{number(height)}"'
-            return f'<rect {_fill(colour)} x="{number(x)}" y="{number(y)}" {size}/>\n'
-        case PictureWords(x, y, text, colour, anchor, size_px, bold, outline):
-            look = "" if anchor == "start" else f' text-anchor="{anchor}"'
-            look += "" if size_px == 12.0 else f' font-size="{size_px:g}"'
-            look += ' font-weight="bold"' if bold else ""
-            look += f' stroke="{outline}"' if outline else ""
-            halo = " paper-line" if colour in NAMED else ""
-            return f'<text {_fill(colour, halo)} x="{number(x)}" y="{number(y)}"{look}>{_text(text)}</text>\n'
-
-
-def _fill(colour: str, more: str = "") -> str:
-    return f'class="{colour}{more}"' if colour in NAMED else f'fill="{colour}"'
-
-
-def _title(text: str) -> str:
-    return f"<title>{_text(text)}</title>" if text else ""
-
-
-def _text(text: str) -> str:
-    """Escape a text for XML."""
-    return escape(printable(text))
-
-
-def _number(value: float, decimals: int = 1) -> str:
-    """Write a coordinate with some decimals."""
-    return f"{round(value, decimals) + 0.0:.{5 + decimals}g}" if abs(value) < 1e4 else f"{value:.0f}"
-
-
 LEAST_SPAN, FURTHEST = 1e-300, 1e300  # of values on an axis; what is beyond is drawn at its end
-
-
-class Area(NamedTuple):
-    """The plot area of a chart in pixels, without its labels."""
-
-    left: float
-    top: float
-    width: float
-    height: float
 
 
 class ChartLine(NamedTuple):
@@ -293,30 +247,25 @@ class Chart:
     """Two axes in a plot area, and the mapping from data to pixels."""
 
     def __init__(
-        self, area: Area, names: tuple[str, str], lines: Sequence[ChartLine] = (), *,
-        ends: tuple[Range, Range] | None = None, equal: bool = False,
-    ) -> None:  # fmt: skip
+        self, area: Box, names: tuple[str, str], lines: Sequence[ChartLine] = (), ends: Sequence[Point] = ()
+    ) -> None:
         """Choose the limits of both axes.
 
-        names: titles of the x and the y axis, with units.  ends: least and greatest x and y; by default 0 and those of
-        the lines.  equal: use one scale for both axes.
+        area: left, top, width and height without the labels.  names: titles of the x and the y axis, with units.
+        ends: least and greatest x and y; by default 0 and those of the lines, in y rounded to ticks.
         """
         self.area, self.names, self.lines = area, names, lines
         columns = [(0.0, *column) for column in zip(*(point for line in lines for point in line.points), strict=True)]
-        x, y = ends or [(min(column), max(column)) for column in columns] or [(0.0, 0.0)] * 2
-        if equal:
-            pixels = min(size / max(end - begin, 1e-9) for size, (begin, end) in zip(area[2:], (x, y), strict=True))
-            x, y = (((begin + end - size / pixels) / 2.0, (begin + end + size / pixels) / 2.0)
-                    for size, (begin, end) in zip(area[2:], (x, y), strict=True))  # fmt: skip
-        limits = [(max(begin, -FURTHEST), min(end, FURTHEST)) for begin, end in (x, y)]
-        self.ticks = [ticks(*each) for each in limits]
-        self.x, self.y = ((each[0], each[-1]) for each in self.ticks)
-        if x[1] - x[0] > LEAST_SPAN:  # ends where the values do
+        found = ends or [(min(column), max(column)) for column in columns] or [(0.0, 0.0)] * 2
+        limits = [(max(begin, -FURTHEST), min(end, FURTHEST)) for begin, end in found]
+        rounded = [ticks(*each) for each in limits]
+        self.x, self.y = ((each[0], each[-1]) for each in rounded)
+        if limits[0][1] - limits[0][0] > LEAST_SPAN:
             self.x = limits[0]
-        if equal:
+        if ends:
             self.y = limits[1]
         self.ticks = [[at for at in each if begin <= at <= end]
-                      for each, (begin, end) in zip(self.ticks, (self.x, self.y), strict=True)]  # fmt: skip
+                      for each, (begin, end) in zip(rounded, (self.x, self.y), strict=True)]  # fmt: skip
 
     def place(self, x: float, y: float) -> Point:
         """Return the pixels of a point; values beyond the y axis are clamped to its ends."""
@@ -329,34 +278,34 @@ class Chart:
         """Draw axes, lines and the legend."""
         left, top, width, height = self.area
         right, bottom = left + width, top + height
-        yield PictureWords(left, top - 14.0, self.names[1], "soft")
+        yield words(left, top - 14.0, self.names[1], "soft")
         if self.names[0]:
-            yield PictureWords(right, bottom + 30.0, self.names[0], "soft", "end")
+            yield words(right, bottom + 30.0, self.names[0], "soft", "end")
         for tick in self.ticks[0]:
-            across = self.place(tick, 0.0)[0]
-            yield PictureLine([(across, top), (across, bottom)], "faint")
-            yield PictureWords(across, bottom + 13.0, f"{tick:g}", "soft", "middle", 11.0)
+            across, _ = self.place(tick, 0.0)
+            yield line([(across, top), (across, bottom)], "faint")
+            yield words(across, bottom + 13.0, f"{tick:g}", "soft", "middle", 11.0)
         for tick in self.ticks[1]:
-            down = self.place(0.0, tick)[1]
-            yield PictureLine([(left, down), (right, down)], "faint" if tick else "zero")
-            yield PictureWords(left - 7.0, down, f"{tick:g}", "soft", "end", 11.0)
-        for line in self.lines:
-            points = [self.place(*point) for point in line.points]
+            _, down = self.place(0.0, tick)
+            yield line([(left, down), (right, down)], "faint" if tick else "zero")
+            yield words(left - 7.0, down, f"{tick:g}", "soft", "end", 11.0)
+        for each in self.lines:
+            points = [self.place(*point) for point in each.points]
             if points:
-                yield PictureLine(points, line.colour, line.width, dashes=line.dashes, title=line.name)
-            yield from (PictureDot(x, y, 3.0, line.colour) for x, y in points if line.dots)
-        yield from legend(self.lines, left + text_width(self.names[1]), right, top - 14.0)
+                yield line(points, each.colour, each.width, dashes=each.dashes, title=each.name)
+            yield from (dot(x, y, 3.0, each.colour) for x, y in points if each.dots)
+        yield from _legend(self.lines, left + text_width(self.names[1]), right, top - 14.0)
 
 
-def legend(lines: Sequence[ChartLine], left: float, right: float, y: float) -> Iterator[Shape]:
+def _legend(lines: Sequence[ChartLine], left: float, right: float, y: float) -> Iterator[Shape]:
     """Draw a right-aligned legend on one line, each name after its line; of a long one only dashed lines."""
-    named = [line for line in lines if line.name]
-    if sum(text_width(line.name) + 33.0 for line in named) > right - left:
-        named = [line for line in named if line.dashes]
-    for line in reversed(named):
-        yield PictureWords(right, y, line.name, "ink", "end", 11.0)
-        right -= text_width(line.name) + 5.0
-        yield PictureLine([(right - 16.0, y), (right, y)], line.colour, max(line.width, 2.0), dashes=line.dashes)
+    named = [each for each in lines if each.name]
+    if sum(text_width(each.name) + 33.0 for each in named) > right - left:
+        named = [each for each in named if each.dashes]
+    for each in reversed(named):
+        yield words(right, y, each.name, "ink", "end", 11.0)
+        right -= text_width(each.name) + 5.0
+        yield line([(right - 16.0, y), (right, y)], each.colour, max(each.width, 2.0), dashes=each.dashes)
         right -= 28.0
 
 
@@ -397,9 +346,9 @@ def write_png(picture: Picture) -> bytes:
     FigureCanvasAgg(figure)
     axes: Any = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.axis("off")
-    for order, (kind, run) in enumerate(groupby(picture.shapes, key=type)):
-        if kind is PictureDot:
-            _paint_dots(axes, run, order)
+    for order, (kind, run) in enumerate(groupby(picture.shapes, key=attrgetter("kind"))):
+        if kind == "circle":
+            _paint_dots(axes, [*run], order)
         else:
             for shape in run:
                 _paint(axes, shape, order)
@@ -412,159 +361,127 @@ def write_png(picture: Picture) -> bytes:
     return stream.getvalue()
 
 
-def _paint_dots(axes: Any, dots: Iterable[Any], order: int) -> None:
-    """Paint a run of dots."""
-    rows = ((x, y, (2.0 * radius * POINTS) ** 2, _plain(colour)) for x, y, radius, colour, _ in dots)
-    xs, ys, sizes, colours = zip(*rows, strict=True)
-    axes.scatter(xs, ys, s=sizes, c=colours, linewidths=0.0, zorder=order)
+def _paint_dots(axes: Any, dots: Sequence[Shape], order: int) -> None:
+    """Paint a run of dots at once, for there may be many."""
+    xs, ys, radii = zip(*(each.look.values() for each in dots), strict=True)
+    sizes = [(2.0 * radius * POINTS) ** 2 for radius in radii]
+    axes.scatter(xs, ys, s=sizes, c=[*map(_plain, dots)], linewidths=0.0, zorder=order)
 
 
-def _plain(colour: str) -> str:
-    return NAMED.get(colour, (colour,))[0]
-
-
-def _paint(axes: Any, shape: Any, order: int) -> None:
-    """Paint a shape; gray images stay gray."""
-    look: dict[str, Any] = {"zorder": order}
-    if not isinstance(shape, PictureImage):
-        look["color"] = _plain(shape.colour)
-    match shape:
-        case PictureImage(x, y, width, height, kind, data):
+def _paint(axes: Any, shape: Shape, order: int) -> None:
+    """Paint any other shape; gray images stay gray."""
+    look, style = shape.look, {"color": _plain(shape), "zorder": order}
+    match shape.kind:
+        case "path":
+            dashes = [each * POINTS for each in look["stroke-dasharray"]]
+            style |= {"alpha": look["opacity"], "linestyle": (0, dashes) if dashes else "solid"}
+            axes.plot(*zip(*shape.points, strict=True), linewidth=look["stroke-width"] * POINTS, **style)
+        case "text":
+            style |= {"ha": ANCHORS[look["text-anchor"]], "va": "center", "weight": look["font-weight"]}
+            if look["stroke"]:
+                style["bbox"] = {"color": look["stroke"], "alpha": 0.5, "pad": 1.0}
+            text = printable(shape.text).replace("$", r"\$")
+            axes.text(look["x"], look["y"], text, fontsize=look["font-size"] * POINTS, **style)
+        case "rect":
+            left, right, bottom, top = _edges(look)
+            axes.fill([left, right, right, left], [top, top, bottom, bottom], linewidth=0.0, **style)
+        case "image":
             from matplotlib.image import imread
 
-            pixels = imread(io.BytesIO(data), format=kind)
-            white, ends = 1.0 if pixels.dtype.kind == "f" else 255.0, (x, x + width, y + height, y)
-            axes.imshow(pixels, extent=ends, interpolation="none", cmap="gray", vmin=0.0, vmax=white, **look)
-        case PictureLine(points, _, width, alpha, dashes):
-            xs, ys = zip(*points, strict=True)
-            style = (0, [each * POINTS for each in dashes]) if dashes else "solid"
-            axes.plot(xs, ys, linewidth=width * POINTS, alpha=alpha, linestyle=style, **look)
-        case PictureBox(x, y, width, height):
-            right, bottom = x + width, y + height
-            axes.fill([x, right, right, x], [y, y, bottom, bottom], linewidth=0.0, **look)
-        case PictureWords(x, y, text, _, anchor, size, bold):
-            place: dict[str, Any] = {"ha": ANCHORS[anchor], "va": "center"}
-            weight = "bold" if bold else "normal"
-            if shape.halo:
-                place["bbox"] = {"color": shape.halo, "alpha": 0.5, "pad": 1.0}
-            axes.text(x, y, printable(text).replace("$", r"\$"), fontsize=size * POINTS, weight=weight, **place, **look)
+            kind, _, data = look["href"].removeprefix("data:image/").partition(";base64,")
+            pixels = imread(io.BytesIO(b64decode(data)), format=kind)
+            gray = {"cmap": "gray", "vmin": 0.0, "vmax": 1.0 if pixels.dtype.kind == "f" else 255.0}
+            axes.imshow(pixels, extent=_edges(look), interpolation="none", zorder=order, **gray)
 
 
-WIDTH, HEIGHT = 1000.0, 700.0
-SIZE = Size(WIDTH, HEIGHT, margin=70.0, axes=(14.0, 46.0), cell=(4, 4), line=16.0, measure=text_width)
-CORNER = 46.0  # pixels from the corner to the little axes
-AXES = ("x", "y", "z")
+def _edges(look: Mapping[str, float]) -> tuple[float, float, float, float]:
+    """Return left, right, bottom and top of a box or an image."""
+    return look["x"], look["x"] + look["width"], look["y"] + look["height"], look["y"]
 
 
-def still_picture(
-    scene: FrameScene, eye: tuple[float, float] = SLANTED, title: str = "", other: FrameScene | None = None,
-) -> Picture:  # fmt: skip
-    """Draw a scene from a direction, azimuth and elevation in radians; its notes say what it does not show.
-
-    other: another tree in the same frame; its frames with the same names are drawn faintly.
-    """
-    flat = Projection(scene, SIZE, eye)
-    blocked = [(0.0, HEIGHT - 92.0, 100.0, HEIGHT), (WIDTH - 330.0, HEIGHT - 58.0, WIDTH, HEIGHT)]
-    labels = Labels(flat, blocked)
-    labels.place_all()
-    step, ground = flat.ground()
-    shapes: list[Shape] = [
-        PictureLine([flat.at(a)[:2], flat.at(b)[:2]], "zero" if zero else "faint") for a, b, zero in ground
-    ]
-    for link in flat.links:
-        points = [flat.origins[name][:2] for name in link]
-        shapes.append(PictureLine(points, "soft", alpha=0.7, dashes=(4.0, 3.0)))
-    for frame, stretches in flat.trails.items():
-        shapes += _trail(frame, [[flat.at(point)[:2] for point in stretch] for stretch in stretches])
-    for name, pose in other.poses().items() if other else ():
-        if name in flat.poses:
-            shapes += _other(flat, name, pose)
-    for name in flat.nearest_last():
-        shapes += _frame(flat, name)
-    for label in labels.placed:
-        shapes += _label(label)
-    shapes += [*_corner(flat), *_scale(flat, step)]
-    crowded, hidden = flat.crowded(), labels.hidden
-    notes = [f"{crowded} of {len(scene.names)} frames lie in a small spot; --below FRAME shows a part"] * bool(crowded)
-    notes += [f"{hidden} names found no place"] * bool(hidden)
-    return Picture(WIDTH, HEIGHT, shapes, title, notes=notes)
+def _plain(shape: Shape) -> str:
+    return NAMED.get(shape.colour, (shape.colour,))[0]
 
 
-def _frame(flat: Projection, name: str) -> Iterator[Shape]:
-    """Draw the axes of a frame, the nearest last."""
-    x, y, _ = flat.origins[name]
-    yield from (PictureLine([(x, y), tip[:2]], AXES[axis], 2.0, title=name) for axis, tip in flat.axes(name))
-    yield PictureDot(x, y, 2.2, "ink", name)
+# --- overlays: projected points on the camera's image, coloured by depth; pixels, the centre of the first one at 0, 0
+
+SUFFIXES = (".svg", ".html", ".png")
+MOST, FEW = 20_000, 1000  # points that are drawn, and that are drawn large
+CORNER = (-0.5, -0.5)  # of a picture, whose first pixel has its middle at 0, 0
+SHADES = 24  # of the scale
+PNG, JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
+FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}  # the markers of JPEG that are followed by a size
 
 
-def _trail(frame: str, stretches: Sequence[Sequence[tuple[float, float]]]) -> Iterator[Shape]:
-    """Draw the trail of a frame, coloured by time."""
-    steps = max(sum(len(stretch) - 1 for stretch in stretches), 1)
-    size, done = -(-steps // PIECES), 0
-    for stretch in stretches:
-        for begin in range(0, max(len(stretch) - 1, 1), size):
-            shade = shade_of(LAST_SHADE * (done + begin) / steps)
-            yield PictureLine(stretch[begin : begin + size + 1], shade, 1.5, 0.8, title=frame)
-        done += len(stretch) - 1
+def read_shot(path: str) -> Shape:
+    """Read a PNG or a JPEG; raises FormatError for anything else, FileProblem."""
+    with opened(path) as file:
+        data = file.read()
+    if data.startswith(PNG) and len(data) > 24:
+        width, height = (int.from_bytes(data[begin : begin + 4], "big") for begin in (16, 20))
+        return _image(width, height, "png", data)
+    at = 2 if data.startswith(JPEG) else len(data)
+    while at + 9 < len(data) and data[at] == 0xFF:
+        if data[at + 1] in FRAMES:
+            height, width = (int.from_bytes(data[begin : begin + 2], "big") for begin in (at + 5, at + 7))
+            return _image(width, height, "jpeg", data)
+        is_filled = data[at + 1] == 0xFF  # before a marker there may be more of its first byte
+        at += 1 if is_filled else 2 + int.from_bytes(data[at + 2 : at + 4], "big")
+    raise FormatError("neither a PNG nor a JPEG; an overlay is drawn over one of these", source=path)
 
 
-def _other(flat: Projection, name: str, pose: Rigid) -> Iterator[Shape]:
-    """Draw a frame's pose in the other tree, and a line to it."""
-    x, y, _ = flat.at(pose[:3])
-    for axis, tip in zip(AXES, axis_tips(pose, flat.axis), strict=True):
-        yield PictureLine([(x, y), flat.at(tip)[:2]], axis, 2.0, 0.4, title=name)
-    yield PictureLine([flat.origins[name][:2], (x, y)], "trail", 1.5)
+def _image(width: int, height: int, kind: str, data: bytes) -> Shape:
+    """Return an image whose file is embedded unchanged."""
+    href = f"data:image/{kind};base64,{b64encode(data).decode()}"
+    return Shape("image", "", {"x": CORNER[0], "y": CORNER[1], "width": width, "height": height, "href": href})
 
 
-def _label(label: Label) -> Iterator[Shape]:
-    """Draw a name, with a leader line if it is away from its frame."""
-    left, top, right, bottom = label.box
-    if label.away > 1.1:
-        end = min(max(label.point.x, left), right), top if top > label.point.y else bottom
-        yield PictureLine([label.point[:2], end], "soft", 0.7)
-    yield PictureWords(left + 2.0, (top + bottom) / 2.0, label.words)
+class Overlay:
+    """The points in an image; beyond MOST, every second, fourth .. is drawn."""
 
+    def __init__(self, image: str, path: str) -> None:
+        """Read the image; path: the output file, with one of SUFFIXES.  Raises ValueInvalid."""
+        self.image, self.path = image, path
+        self.suffix = os.path.splitext(path)[1].lower()
+        if self.suffix not in SUFFIXES:
+            raise ValueInvalid(f"{path}: --image draws {', '.join(SUFFIXES)}")
+        if self.suffix == ".png":
+            require_matplotlib()
+        self.shot = read_shot(image)
+        self.size: tuple[int, int] = self.shot.look["width"], self.shot.look["height"]
+        self.points: list[tuple[float, float, float]] = []  # depth, u, v
+        self.count, self.every = 0, 1
 
-def _corner(flat: Projection) -> Iterator[Shape]:
-    """Draw the directions of the axes of the fixed frame."""
-    x, y = CORNER, HEIGHT - CORNER
-    right, up, toward = flat.view
-    for axis in sorted(range(3), key=lambda axis: toward[axis]):
-        dx, dy = right[axis], -up[axis]
-        yield PictureLine([(x, y), (x + 28.0 * dx, y + 28.0 * dy)], AXES[axis], 2.0)
-        yield PictureWords(x + 38.0 * dx, y + 38.0 * dy, AXES[axis], AXES[axis], "middle", bold=True)
+    def take(self, u: Number, v: Number, depth: Number, inside: Any) -> None:
+        """Add the points of a block, or one point, that are in the image."""
+        if isinstance(inside, bool):
+            found = [(depth, u, v)] * inside
+        else:
+            found = [*zip(*(each[inside].tolist() for each in (depth, u, v)), strict=True)]
+        self.points += found[-self.count % self.every :: self.every]
+        self.count += len(found)
+        while len(self.points) > MOST:
+            self.points, self.every = self.points[::2], 2 * self.every
 
+    def drawn(self) -> str | bytes:
+        """Return the overlay in the format of its suffix, with far points below near ones."""
+        self.points.sort(reverse=True)
+        near, far = (self.points[-1][0], self.points[0][0]) if self.points else (0.0, 0.0)
+        wide, high = self.size
+        radius = max(wide / (250.0 if len(self.points) < FEW else 600.0), 0.75)
+        shades = {depth: shade_of((far - depth) / (far - near) if far > near else 1.0) for depth, _, _ in self.points}
+        shapes = [self.shot, *(dot(u, v, radius, shades[depth]) for depth, u, v in self.points)]
+        left, top, part = 0.04 * wide, high - 0.5 - 0.035 * wide, 0.3 * wide / SHADES
+        for at in range(SHADES):
+            colour = shade_of(1.0 - at / (SHADES - 1))
+            shapes.append(box(left + at * part, top, 1.05 * part, 0.015 * wide, colour))
+        for share, unit in ((0.0, ""), (0.5, ""), (1.0, " m")):
+            x, said = left + share * SHADES * part, f"{near + share * (far - near):.3g}{unit}"
+            shapes.append(words(x, top - 0.018 * wide, said, "#ffffff", "middle", 0.022 * wide, halo="#000000"))
+        return write_picture(Picture(wide, high, shapes, "overlay", CORNER, 3), self.suffix)
 
-def _scale(flat: Projection, step: float) -> Iterator[Shape]:
-    """Draw the scale bar, and name the fixed frame."""
-    metres = nice(110.0 / flat.scale)
-    left, right, base = WIDTH - 20.0 - metres * flat.scale, WIDTH - 20.0, HEIGHT - 20.0
-    yield PictureLine([(left, base - 6.0), (left, base), (right, base), (right, base - 6.0)], "soft")
-    yield PictureWords((left + right) / 2.0, base - 10.0, f"{metres:g} m", "soft", "middle", 11.0)
-    yield PictureWords(right, HEIGHT - 46.0, f"in {flat.scene.fixed[:40]}, grid {step:g} m", "soft", "end", 11.0)
-
-
-def html_of(value: Any) -> str | None:
-    """Return the HTML of a transform, rotation, tree, trajectory or comparison; None if its repr is all there is."""
-    if isinstance(value, Frames) and value.frames:
-        # a picture of its own, for the style of an SVG element would count in the whole notebook
-        svg = b64encode(write_svg(still_picture(FrameScene(value), title=value.name)).encode()).decode()
-        return f'<img alt="frames of {escape(value.name)}" src="data:image/svg+xml;base64,{svg}">'
-    if hasattr(value, "as_dict"):
-        from frametool.view.fit_text import write_comparison
-
-        return f"<pre>{escape(write_comparison(value.as_dict()))}</pre>"
-    if hasattr(value, "stamps_ns"):
-        from frametool.frames.trajectory import way
-
-        path = f"{way(value.xyz)[-1]:.3f} m of path" if value.size else "empty"
-        return f"<pre>{value.size} poses of {escape(value.body)} in {escape(value.world)}, {path}</pre>"
-    if isinstance(value, Frames) or value.shape:
-        return None
-    from frametool.grammar.pose import Pose
-    from frametool.grammar.result import Result, Style
-    from frametool.view.pose_text import write_poses
-
-    parts = value.components
-    pose = Pose.of(parts) if len(parts) > len("xyzw") else Pose(rotation=parts)
-    return f"<pre>{escape(write_poses([Result(pose)], Style('text')))}</pre>"
+    def summary(self) -> str:
+        """Return what was drawn."""
+        thinned = f", 1 in {self.every} of {self.count}" if self.every > 1 else ""
+        points = f"{len(self.points)} point{'s' * (len(self.points) != 1)}"
+        return f"{self.path}: {points} over {self.image}{thinned}"

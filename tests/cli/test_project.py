@@ -252,7 +252,7 @@ def test_rows_without_pixels_are_refused(run: Run) -> None:
 
 
 def circles(svg: str) -> list[list[float]]:
-    return [[float(each) for each in found] for found in re.findall(r'<circle cx="([^"]*)" cy="([^"]*)"', svg)]
+    return [[float(each) for each in found] for found in re.findall(r'<circle[^>]* cx="([^"]*)" cy="([^"]*)"', svg)]
 
 
 def test_the_overlay_has_a_circle_at_each_pixel_in_the_image_far_ones_first(run: Run, tmp_path: Path) -> None:

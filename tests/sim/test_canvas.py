@@ -10,27 +10,16 @@ from rich.console import Console
 from frametool.sim.scene import tutorial
 from frametool.sim.simulate import simulate
 from frametool.view.pictures import ticks, write_svg
-from frametool.view.run_plot import Drawing, run_picture
-from frametool.view.terminal import Canvas, Screen
+from frametool.view.stills import Canvas
+from frametool.view.turtles import Drawing, Screen, run_picture
 
 
-@pytest.mark.parametrize(
-    ("place", "line", "column", "character"),
-    [((0.0, 1.0), 0, 0, "⠁"), ((0.0, 0.0), 4, 0, "⡀"), ((0.999, 0.999), 0, 9, "⠈"), ((2.0, -1.0), 4, 9, "⢀")],
-)
-def test_a_dot_stands_where_it_belongs(place: tuple[float, float], line: int, column: int, character: str) -> None:
-    canvas = Canvas(5)
-    canvas.dot(*place, "red")
-    assert list(canvas.row(line))[column] == (character, "red")
-
-
-def test_dots_of_a_cell_add_up_and_can_be_cleared() -> None:
-    canvas = Canvas(5)
-    for step in range(100):
-        canvas.dot(step / 100, step / 100, "red")
-    assert sum(character != " " for line in range(5) for character, _ in canvas.row(line)) in range(10, 15)
-    canvas.clear()
-    assert {character for line in range(5) for character, _ in canvas.row(line)} == {" "}
+def test_dots_of_a_cell_add_up() -> None:
+    canvas = Canvas(5, 10)
+    for step in range(20):
+        canvas.mark(step, step, "red")
+    drawn = ["".join(text for text, _ in canvas.runs(line, {})) for line in range(5)]
+    assert drawn == ["⠑⢄        ", "  ⠑⢄      ", "    ⠑⢄    ", "      ⠑⢄  ", "        ⠑⢄"]
 
 
 def test_a_screen_draws_turtles_and_what_they_say() -> None:

@@ -15,9 +15,9 @@ from frametool.errors import FrametoolError, ValueInvalid
 from frametool.frames.buffer import TransformBuffer
 from frametool.geometry.transform import Transform
 from frametool.view.exports import write_glb, write_page
-from frametool.view.pictures import still_picture, write_svg
+from frametool.view.pictures import write_svg
 from frametool.view.scene import FrameScene
-from frametool.view.terminal import TerminalPicture
+from frametool.view.stills import still_picture, terminal_text
 
 VALUES = (0.0, 1.0, -1.0, 1e-9, 1e-300, 5e-324, 1e9, 1e29, 1e150, 1e300, -1e300, 1.7e308, 123.456)
 TIMES = (None, 0, 10**9, 10**18 + 5)
@@ -61,7 +61,7 @@ def test_any_tree_is_drawn_in_every_form_or_says_that_nothing_is_left(seed: int)
         scene = FrameScene(tree, at_ns=at_ns, fixed=fixed, below=below)
         assert not re.search(r'[" ](nan|-?inf)[" ]', write_svg(still_picture(scene, eye)))
         columns, lines = generator.randrange(1, 120), generator.randrange(1, 40)
-        assert len(TerminalPicture(scene, columns, lines, eye).text().splitlines()) == max(lines, 4)
+        assert len(terminal_text(scene, columns, lines, eye).splitlines()) == max(lines, 4)
         assert write_page(scene, title="x").startswith("<!DOCTYPE html>")
         data = write_glb(scene)
         text = data[20 : 20 + int.from_bytes(data[12:16], "little")]
@@ -78,7 +78,7 @@ def test_a_choice_that_leaves_nothing_says_so() -> None:
 def test_a_terminal_begins_where_most_frames_are_and_points_to_the_others() -> None:
     """As the page does; where no frame is far away all of them are inside."""
     tree = frametool.load(ROOT / "examples" / "robot.yaml")
-    text = TerminalPicture(FrameScene(tree), 100, 30).text()
+    text = terminal_text(FrameScene(tree), 100, 30)
     assert re.findall(r"(?m)^([←-⇿]) (\w+) ([\d.]+) m", text) == [("↖", "map", "14"), ("←", "charging_dock", "7.4"), ("←", "odom", "2.4")]
     assert "0.2 m  in map" in text.splitlines()[-1]
-    assert not re.search("[←-⇿]", TerminalPicture(FrameScene(tree, below="base_link"), 100, 30).text())
+    assert not re.search("[←-⇿]", terminal_text(FrameScene(tree, below="base_link"), 100, 30))

@@ -17,19 +17,9 @@ import frametool
 from frametool.errors import FileProblem
 from frametool.frames.lookups import FrameTree
 from frametool.geometry.transform import Transform
-from frametool.view.pictures import (
-    HEIGHT,
-    SIZE,
-    WIDTH,
-    PictureDot,
-    PictureLine,
-    PictureWords,
-    still_picture,
-    write_png,
-    write_svg,
-)
+from frametool.view.pictures import write_png, write_svg
 from frametool.view.scene import EYES, FrameScene, Labels, Projection, nice
-from frametool.view.terminal import Canvas, TerminalPicture
+from frametool.view.stills import HEIGHT, SIZE, WIDTH, Canvas, still_picture, terminal_lines, terminal_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -94,7 +84,7 @@ def test_an_odd_tree_is_drawn_in_every_form(name: str) -> None:
     ET.fromstring(text)  # noqa: S314 - our own
     assert not re.search(r"\b(nan|inf)\b", text)
     for columns, lines in ((80, 24), (200, 60), (20, 4), (1, 1)):
-        picture = TerminalPicture(scene, columns, lines).text().splitlines()
+        picture = terminal_text(scene, columns, lines).splitlines()
         assert len(picture) == max(lines, 4)
         assert max(map(len, picture)) <= max(columns, 20)
         assert "\x1b" not in "".join(picture)
@@ -150,9 +140,9 @@ def test_a_nice_length_is_one_two_or_five(length: float, expected: float) -> Non
 
 def test_shapes_of_a_frame_come_farthest_first() -> None:
     shapes = still_picture(FrameScene(star((0, 0, 0), (2, 0, 0)))).shapes
-    dots = [shape for shape in shapes if isinstance(shape, PictureDot)]
-    assert [dot.title for dot in dots][-1] == "f1"
-    assert {type(shape) for shape in shapes} == {PictureDot, PictureLine, PictureWords}
+    dots = [shape for shape in shapes if shape.kind == "circle"]
+    assert [dot.text for dot in dots][-1] == "f1"
+    assert {shape.kind for shape in shapes} == {"circle", "path", "text"}
 
 
 @pytest.mark.parametrize("tree", ["robot.yaml", "drive.yaml", "hostile"])
@@ -172,26 +162,26 @@ def test_a_png_needs_matplotlib_and_says_so(tree: str) -> None:
 
 @pytest.mark.parametrize(("columns", "lines"), [(80, 24), (200, 60), (40, 12)])
 def test_a_terminal_shows_names_axes_and_how_long_a_metre_is(columns: int, lines: int) -> None:
-    picture = TerminalPicture(FrameScene(frametool.load(ROOT / "examples" / "robot.yaml"), below="base_link"), columns, lines)
-    text = picture.text()
+    scene = FrameScene(frametool.load(ROOT / "examples" / "robot.yaml"), below="base_link")
+    text = terminal_text(scene, columns, lines)
     assert "tool" in text
     assert any(0x2800 < ord(letter) < 0x2900 for letter in text)
     assert " m  in base_link" in text.splitlines()[-1]
-    styles = {style for line in picture.lines() for _, style in line}
+    styles = {style for line in terminal_lines(scene, columns, lines) for _, style in line}
     assert {"red", "green", "blue", "bold"} <= styles
 
 
 def test_names_in_a_terminal_do_not_collide() -> None:
     tree = star(*((k / 10, 0, 0) for k in range(10)), names=[f"frame_{k}" for k in range(10)])
-    text = TerminalPicture(FrameScene(tree), 80, 24).text()
+    text = terminal_text(FrameScene(tree), 80, 24)
     whole = [name for name in tree.frames if name in text]
     hidden = [part for part in text.splitlines()[-1].split(", ") if "hidden" in part]
     assert len(whole) + (int(hidden[0].split()[0]) if hidden else 0) >= 10
 
 
 def test_a_wide_letter_takes_two_cells() -> None:
-    picture = TerminalPicture(FrameScene(star((1, 0, 0), names=["界界"])), 80, 24)
-    line = next(line for line in picture.text().splitlines() if "界" in line)
+    text = terminal_text(FrameScene(star((1, 0, 0), names=["界界"])), 80, 24)
+    line = next(line for line in text.splitlines() if "界" in line)
     assert "界界" in line
 
 
@@ -201,11 +191,11 @@ def test_the_dot_of_the_highest_rank_colours_a_cell() -> None:
     canvas.mark(1, 0, "grey", 0)
     canvas.mark(6, 0, "out", 0)
     canvas.mark(-1, 0, "out", 0)
-    assert list(canvas.row(0)) == [("⠉", "red"), (" ", ""), (" ", "")]
+    assert canvas.runs(0, {}) == [("⠉", "red"), ("  ", "")]
 
 
 def test_a_tree_of_two_thousand_frames_fits_a_terminal(tmp_path: Path) -> None:
     grid = [{"name": f"f{k}", "parent": f"f{(k - 1) // 3}" if k else "map", "xyz": [k % 7, k % 11, k % 5]} for k in range(2000)]
     (tmp_path / "many.json").write_text(json.dumps({"frames": [{"name": "map"}, *grid]}))
     tree = frametool.load(tmp_path / "many.json")
-    assert "names hidden" in TerminalPicture(FrameScene(tree), 100, 30).text()
+    assert "names hidden" in terminal_text(FrameScene(tree), 100, 30)

@@ -100,7 +100,7 @@ def command(inputs: Inputs) -> int:
     overlay = None
     if inputs.image is not None:
         from frametool.formats.cameras import resized
-        from frametool.view.overlay import Overlay
+        from frametool.view.pictures import Overlay
 
         refuse_existing(inputs.output, force=inputs.force)
         overlay = Overlay(inputs.image, inputs.output)

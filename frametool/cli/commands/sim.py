@@ -142,12 +142,12 @@ class SimOutput:
         pictures: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
         if self.plot:
             from frametool.view.pictures import write_picture
-            from frametool.view.run_plot import Drawing, run_picture
+            from frametool.view.turtles import Drawing, run_picture
 
             run, suffix = Drawing(scene), suffix_of(self.plot)
             pictures[self.plot] = run.watch, lambda: write_picture(run_picture(run), suffix)
         if self.view:
-            from frametool.view.exports import RunPage
+            from frametool.view.turtles import RunPage
 
             page = RunPage()
             pictures[self.view] = page.watch, page.content
@@ -158,7 +158,7 @@ class SimOutput:
         if self.realtime or self.live:
             yield real_time()
         if self.live:
-            from frametool.view.terminal import Screen
+            from frametool.view.turtles import Screen
 
             clean_up()  # the terminal's cursor
             yield stack.enter_context(Screen(scene, to_stderr=not sys.stdout.isatty())).watch

@@ -98,7 +98,7 @@ def command(inputs: Inputs) -> None:
     if chosen == "text" and output is None:
         color = inputs.color
         if sys.stdout.isatty():
-            from frametool.view.terminal import print_terminal
+            from frametool.view.stills import print_terminal
 
             print_terminal(scene, eye, color)
             return
@@ -143,10 +143,11 @@ def _content(
 
         return write_glb(scene)
     if fmt == "text":
-        from frametool.view.terminal import TerminalPicture
+        from frametool.view.stills import terminal_text
 
-        return TerminalPicture(scene, *get_terminal_size(PIPE_SIZE), eye).text()
-    from frametool.view.pictures import still_picture, write_picture
+        return terminal_text(scene, *get_terminal_size(PIPE_SIZE), eye)
+    from frametool.view.pictures import write_picture
+    from frametool.view.stills import still_picture
 
     still = still_picture(scene, eye, title, before)
     for note in still.notes:
