@@ -1,12 +1,15 @@
-"""The data of one control step of the followers of a run, for its derivation."""
+"""The derivation of one control step of the followers of a run."""
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
-from typing import TYPE_CHECKING
+from operator import itemgetter
+from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import ValueInvalid
-from frametool.explain.derive import FollowStep, PlanarSample, Sighting
+from frametool.errors import ValueInvalid, printable
+from frametool.explain.derive import CLOSE, METRES, RADIANS, REPORT, DerivationWrong, explained, row
+from frametool.explain.operations import spans
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.sim.drivers import ARRIVED, frame_of
 from frametool.sim.simulate import simulate
@@ -14,8 +17,40 @@ from frametool.sim.simulate import simulate
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from frametool.explain.derive import DerivationStyle
+    from frametool.explain.render import Explanation
+    from frametool.explain.run import Sheet, Values
     from frametool.sim.scene import Follow, Scene
     from frametool.sim.simulate import IssuedCommand
+
+    Sample = tuple[int, float, float, float]  # the pose of a frame in its parent: stamp in ns, x, y, theta
+
+
+class Sighting(NamedTuple):
+    """The position of a frame at a time, between two samples or at the first of them."""
+
+    at_ns: int
+    before: Sample
+    after: Sample | None = None
+
+
+class FollowStep(NamedTuple):
+    """One control step of a follower.
+
+    own, led: the follower and its leader in the world; carrot: the target in the leader's frame, if it is another frame
+    """
+
+    number: int
+    command: IssuedCommand
+    follow: Follow
+    own: Sighting
+    led: Sighting
+    carrot: Sighting | None
+
+    @property
+    def target(self) -> str:
+        """Return the frame that is followed."""
+        return frame_of(self.follow.leader, self.follow.target)
 
 
 def follow_steps(scene: Scene, number: int) -> list[FollowStep]:
@@ -28,23 +63,21 @@ def follow_steps(scene: Scene, number: int) -> list[FollowStep]:
     followers = scene.followers
     if not followers:
         raise ValueInvalid("nobody follows in this scene")
-    if number < 0:
-        raise ValueInvalid(f"control steps are counted from 0, found {number}")
+    rate = min(follow.controller.rate for follow in followers.values())
+    last = math.inf if scene.duration_ns is None else int(scene.duration_ns / BILLION * rate + 1e-9)
+    if not 0 <= number <= last:
+        raise ValueInvalid(f"no control step {number} in this run; steps: 0 .. {last}")
     due = {name: follow.controller.due_ns(number) for name, follow in followers.items()}
-    if scene.duration_ns is not None and max(due.values()) > scene.duration_ns:
-        rate = followers[max(due, key=due.__getitem__)].controller.rate
-        end, last = format_stamp(scene.duration_ns)[:-6], int(scene.duration_ns / BILLION * rate + 1e-9)
-        raise ValueInvalid(f"step {number} comes after the end of the run at {end} s; steps: 0 .. {last}")
-    samples: dict[str, list[PlanarSample]] = {}  # turtles in the world, carrots relative to their leader
+    samples: dict[str, list[Sample]] = {}  # turtles in the world, carrots relative to their leader
     reason, found = "", {}
     for step in simulate(scene):
         for sent in step.broadcasts:
             x, y, theta, *_ = step.poses.get(sent.child) or (*sent.transform.components[:2], 0.0)
-            samples.setdefault(sent.child, []).append(PlanarSample(sent.stamp_ns, x, y, theta))
+            samples.setdefault(sent.child, []).append((sent.stamp_ns, x, y, theta))
         reason = next((line for line in step.log if line.startswith("Could not transform")), reason)
         for command in step.commands:
             if due.get(command.turtle) == step.t_ns:
-                found[command.turtle] = _step(command, followers[command.turtle], number, samples)
+                found[command.turtle] = _step(number, command, followers[command.turtle], samples)
         if step.t_ns >= max(due.values()):
             break
     if missing := [name for name in followers if name not in found]:
@@ -53,27 +86,87 @@ def follow_steps(scene: Scene, number: int) -> list[FollowStep]:
     return [found[name] for name in followers]
 
 
-def _step(
-    command: IssuedCommand, follow: Follow, number: int, samples: Mapping[str, Sequence[PlanarSample]]
-) -> FollowStep:
-    """Return the input and the command of a follower."""
-    target = frame_of(follow.leader, follow.target)
-    own_ns = min(samples[name][-1].stamp_ns for name in (command.turtle, follow.leader, target))
-    led_ns = own_ns
+def _step(number: int, command: IssuedCommand, follow: Follow, samples: Mapping[str, Sequence[Sample]]) -> FollowStep:
+    frames = command.turtle, follow.leader, frame_of(follow.leader, follow.target)
+    own, led, target = (samples[name] for name in frames)
+    own_ns = led_ns = min(own[-1][0], led[-1][0], target[-1][0])
     if follow.delay_ns:
-        own_ns, led_ns = samples[command.turtle][-1].stamp_ns, command.t_ns - follow.delay_ns
-    controller, twist = follow.controller, command.twist
-    return FollowStep(
-        number, command.t_ns, command.turtle, follow.leader, target,
-        _at(samples[command.turtle], own_ns), _at(samples[follow.leader], led_ns),
-        _at(samples[target], led_ns) if target != follow.leader else None,
-        (controller.gain_linear, controller.gain_angular), (controller.max_linear, controller.max_angular),
-        ARRIVED, command.distance or 0.0, twist.linear_x, twist.angular_z,
-    )  # fmt: skip
+        own_ns, led_ns = own[-1][0], command.t_ns - follow.delay_ns
+    carrot = None if target is led else _at(target, led_ns)
+    return FollowStep(number, command, follow, _at(own, own_ns), _at(led, led_ns), carrot)
 
 
-def _at(samples: Sequence[PlanarSample], at_ns: int) -> Sighting:
+def _at(samples: Sequence[Sample], at_ns: int) -> Sighting:
     """Return the samples around a time; only one if it is at that time, or the last."""
-    after = bisect_right(samples, at_ns, key=lambda sample: sample.stamp_ns)
+    after = bisect_right(samples, at_ns, key=itemgetter(0))
     before = samples[max(after - 1, 0)]
-    return Sighting(at_ns, before, None if before.stamp_ns == at_ns or after == len(samples) else samples[after])
+    return Sighting(at_ns, before, None if before[0] == at_ns or after == len(samples) else samples[after])
+
+
+def derive_follow(plan: DerivationStyle, steps: Sequence[FollowStep]) -> Explanation:
+    """Derive the commands of followers at one step."""
+
+    def write(sheet: Sheet) -> None:
+        rows = []
+        for step in steps:
+            _add_law(sheet, step, _seen(sheet, step))
+            twist, name = step.command.twist, printable(step.command.turtle)
+            label = f"{name} " if len(steps) > 1 else ""
+            rows += [
+                row(f"{label}linear_x", [""], [twist.linear_x], "m/s"),
+                row(f"{label}angular_z", [""], [twist.angular_z], "rad/s"),
+                row(f"{label}distance", [""], [step.command.distance or 0.0], METRES),
+            ]
+        sheet.result(f"the command of {', '.join(printable(step.command.turtle) for step in steps)}", rows)
+
+    return explained(plan, f"follow, step {steps[0].number}", write)
+
+
+def _seen(sheet: Sheet, step: FollowStep) -> Values:
+    """Add the position of the target in the follower's frame, as x and y."""
+    follower, leader, target = map(printable, (step.command.turtle, step.follow.leader, step.target))
+    way = f"world_from_{leader}" + (f" @ {leader}_from_{target}" if step.carrot else "")
+    words = {"follower": follower, "target": target, "way": way, "t": "t" if step.carrot else "1"}
+    sheet.play("follow seen", {}, number=step.number, time=format_stamp(step.command.t_ns)[:-6], **words)
+    values: Values = {"carrot": float(step.carrot is not None)}
+    _add_place(sheet, values, step.led, leader, "1", turns=step.carrot is not None)
+    _add_place(sheet, values, step.own, follower, "2", turns=True)
+    if step.carrot:
+        _add_place(sheet, values, step.carrot, f"{target} in {leader}", "c", turns=False)
+    return sheet.play("follow target", values, **words)
+
+
+def _add_place(sheet: Sheet, values: Values, seen: Sighting, name: str, index: str, *, turns: bool) -> None:
+    """Add the position of a frame: as published, or between two samples."""
+    at, (begin_ns, *before) = format_stamp(seen.at_ns), seen.before
+    if seen.after is None:
+        units = {"x": METRES, "y": METRES} | ({"h": RADIANS} if turns else {})
+        values |= dict(zip((letter + index for letter in units), before, strict=False))
+        texts = (f"{letter}{index} {sheet.number(values[letter + index])} {unit}" for letter, unit in units.items())
+        sheet.say(f"{name} at {at} s: {', '.join(texts)}")
+        return
+    end_ns, *after = seen.after
+    values |= dict(zip(("ax", "ay", "ah", "bx", "by", "bh"), (*before, *after), strict=True))
+    values |= spans(begin_ns, end_ns, seen.at_ns) | {"turns": float(turns)}
+    begin, end = format_stamp(begin_ns), format_stamp(end_ns)
+    sheet.play("follow between", values, name=name, i=index, at=at, begin=begin, end=end)
+
+
+def _add_law(sheet: Sheet, step: FollowStep, values: Values) -> None:
+    """Add the command for a target at x, y; raises DerivationWrong if it is not the follower's."""
+    law, (linear, angular, _), distance = step.follow.controller, step.command.twist, step.command.distance or 0.0
+    bearing = math.atan2(values["y"], values["x"])
+    behind = bearing * angular * law.gain_angular < 0.0 and abs(abs(bearing) - math.pi) < 1e-9
+    values |= {"behind": float(behind), "arrived": ARRIVED}
+    values |= {"slow": float(law.max_linear < math.inf), "steady": float(law.max_angular < math.inf)}
+    constants = {
+        "linear": law.gain_linear, "angular": law.gain_angular,
+        "max_linear": law.max_linear, "max_angular": law.max_angular,
+    }  # fmt: skip
+    texts = {name: f"{each:g}" if float(f"{each:g}") == each else repr(each) for name, each in constants.items()}
+    sheet.play("follow law", values, follower=printable(step.command.turtle), **texts)
+    near = CLOSE * (1.0 + distance + 1.0 / max(distance, ARRIVED))  # largest for a small distance
+    for name, own, gain in (("d", distance, 1.0), ("linear_x", linear, law.gain_linear),
+                            ("angular_z", angular, law.gain_angular)):  # fmt: skip
+        if not abs(values[name] - own) <= near * max(1.0, abs(gain)):
+            raise DerivationWrong(f"the derived {name} is {values[name]!r}, not {own!r}; {REPORT}")

@@ -290,8 +290,8 @@ def _explain(inputs: Inputs) -> None:
     scene = scene_of(inputs, leader_of(inputs))
     output = Output(inputs, "report", otherwise="text")
     refuse(output.style.format != "text", f"--explain-step writes text, not {output.style.format}")
-    from frametool.explain.derive import DerivationStyle, derive_follow
-    from frametool.sim.followed import follow_steps
+    from frametool.explain.derive import DerivationStyle
+    from frametool.sim.followed import derive_follow, follow_steps
 
     plan = DerivationStyle(output.style, significant(inputs.precision))
     output.text(derive_follow(plan, follow_steps(scene, inputs.explain_step)).render(inputs.explain or "text"))
