@@ -11,12 +11,13 @@ vector or a twist in the notation of results.
 
 from __future__ import annotations
 
+import re
 from copy import copy
 from typing import TYPE_CHECKING, Any
 
-from frametool.calc import rules
-from frametool.calc.functions import FUNCTIONS
-from frametool.calc.parser import PLAIN, RESERVED, UNITS, CalcError, NoTree, column_name, parse_line
+from frametool.calc import operations
+from frametool.calc.operations import FUNCTIONS
+from frametool.calc.parser import PLAIN, RESERVED, UNITS, CalcError, NoTree, column_name, frame_text, parse_line
 from frametool.calc.values import LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TWIST, VECTOR, Term, Type
 from frametool.documents.document import parse_documents
 from frametool.documents.source import Source
@@ -184,7 +185,7 @@ class _Walk:
         """Return the value of a part that is neither a tree nor a list."""
         term = self.term(branch)
         try:
-            return rules.wanted(term)
+            return operations.wanted(term)
         except CalcError as error:
             raise placed(error, branch.at) from None
 
@@ -213,7 +214,7 @@ class _Walk:
         if name in UNITS:
             raise CalcError(f"unknown name {shown(name)}; write a unit directly after its number: 1{name}")
         if name in FUNCTIONS:
-            raise CalcError(f"{name} is a function: {name}({FUNCTIONS[name].takes})")
+            raise CalcError(f"{name} is a function: {name}(..) takes {FUNCTIONS[name][0]}")
         if any(name in tree.frames for _, tree in scope.trees):
             raise CalcError(f"unknown name {shown(name)}; a frame is asked for as TARGET<-SOURCE")
         known = [*(each for each in scope.names if each != "ans"), *FUNCTIONS, *RESERVED]
@@ -247,7 +248,7 @@ class _Walk:
     def _list(self, branch: Branch) -> Term:
         items = tuple(map(self._value, branch.parts))
         if all(item.type.kind == NUMBER for item in items):
-            return rules.list_of_numbers(items)
+            return operations.list_of_numbers(items)
         other = next((item for item in items if item.type.kind != items[0].type.kind), None)
         if other is not None:
             raise CalcError(f"a list holds values of one kind, found {items[0].type.named} and {other.type.named}")
@@ -260,36 +261,33 @@ class _Walk:
             if name in self.scope.names:
                 hint = f"; {name} is a value, poses are joined by *"
             raise CalcError(f"unknown function {shown(name)}{hint}")
-        row = FUNCTIONS[name]
-        if not row.least <= len(branch.parts) <= row.most:
-            count = f"{len(branch.parts)} value{'s' * (len(branch.parts) != 1)}"
-            raise CalcError(f"{name}() takes {row.takes}; found {count}")
         read = self.term if name == "mean" and len(branch.parts) == 1 else self._value
-        return row.rule(name, [read(part) for part in branch.parts])
+        terms = [read(part) for part in branch.parts]
+        return operations.called(name, terms[0].items if terms and terms[0].type.kind == LIST else terms)
 
     def _chain(self, branch: Branch) -> Term:
         left = self._value(branch.parts[0])
         for (operator, at), part in zip(branch.value, branch.parts[1:], strict=True):
             right = self._value(part)
             try:
-                left = rules.OPERATORS[operator](left, right)
+                left = operations.operated(operator, left, right)
             except FrametoolError as error:
                 raise placed(error, at) from None
         return left
 
     def _sign(self, branch: Branch) -> Term:
         below = self._value(branch.parts[0])
-        return rules.negated(below) if branch.value == "-" else below
+        return operations.operated("negate", below) if branch.value == "-" else below
 
     def _power(self, branch: Branch) -> Term:
-        return rules.power(*map(self._value, branch.parts))
+        return operations.power(*map(self._value, branch.parts))
 
     def _as(self, branch: Branch) -> Term:
         target, source = map(self._bare, branch.value)
-        return rules.as_frames(self._value(branch.parts[0]), target, source)
+        return operations.as_frames(self._value(branch.parts[0]), target, source)
 
     def _in(self, branch: Branch) -> Term:
-        return rules.in_frame(self._value(branch.parts[0]), self._bare(branch.value.strip('"')))
+        return operations.in_frame(self._value(branch.parts[0]), self._bare(branch.value.strip('"')))
 
     def _bare(self, name: str, tree: Frames | None = None) -> str:
         """Remove one leading `/` from a frame's name, as tf2 does, unless a frame has this name.
@@ -360,3 +358,33 @@ def once_a_block(term: Term) -> Term:
         return row.bound[id(compute)]
 
     return term._replace(compute=once)
+
+
+BETWEEN_WORDS = " \t()[]{},*^@+="
+WORDS = ("row", "pi", "ans", "as ", "in ")
+
+
+class Completer:
+    """Completes frames on both sides of an arrow, names, and functions with their bracket."""
+
+    def __init__(self, scope: Scope, line: Any) -> None:
+        """Store the scope, and readline, which knows the line."""
+        self.scope = scope
+        self.line = line
+
+    def __call__(self, text: str, state: int) -> str | None:
+        """Return one completion after another."""
+        found = self.completions(text, self.line.get_line_buffer()[: self.line.get_begidx()])
+        return found[state] if state < len(found) else None
+
+    def completions(self, text: str, before: str) -> list[str]:
+        """Return all completions of a word after the rest of a line."""
+        opened = re.search(r"(\w+) *\[$", before)  # the bracket of a named tree
+        asked = self.scope.names[opened[1]].tree if opened and opened[1] in self.scope.names else None
+        tree = asked or self.scope.tree
+        frames = sorted(map(frame_text, tree.frames)) if tree else []
+        head, arrow, tail = text.partition("<-")
+        if arrow:
+            return [f"{head}<-{frame}" for frame in frames if frame.startswith(tail)]
+        words = () if asked else (*self.scope.names, *(f"{name}(" for name in FUNCTIONS), *WORDS)
+        return [word for word in (*words, *(f"{frame}<-" for frame in frames)) if word.startswith(text)]

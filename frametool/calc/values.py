@@ -97,11 +97,6 @@ class Term(NamedTuple):
             raise CalcError("row is known in streams only: -i FILE, or standard input")
         return self.compute(row)
 
-def arithmetic(type_: Type, kernel: Kernel, *operands: Term, check: Check | None = None) -> Term:
-    """Like `made`, for a kernel that needs no namespace."""
-    return made(type_, lambda *numbers: kernel(*numbers[:-1]), *operands, check=check)
-
-
 def made(type_: Type, kernel: Kernel, *operands: Term, check: Check | None = None) -> Term:
     """Return the result of a kernel for the numbers of all operands: at once if they are known, else for each row.
 

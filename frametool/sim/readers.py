@@ -22,11 +22,10 @@ from frametool.documents.source import Source, error_at
 from frametool.errors import FormatError, ValueInvalid, alternatives, shown
 from frametool.formats.detect import detect
 from frametool.formats.rows.csv import split_line
-from frametool.frames.stamps import BILLION, format_stamp, parse_time
+from frametool.frames.stamps import BILLION, FURTHEST_NS, format_stamp, parse_time
 from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
 from frametool.ros.message_stream import NOISE
 from frametool.sim.drivers import KEYS
-from frametool.sim.scene import nanoseconds
 from frametool.sim.turtle import Twist
 from frametool.text.numbers import parse_number, read_number_or_angle
 
@@ -36,11 +35,12 @@ if TYPE_CHECKING:
 
     from frametool.grammar.readers import Path
     from frametool.sim.drivers import TimedTwist
-    from frametool.sim.scene import Place
 
     NumberedLines = Iterator[tuple[int, str]]
+    Place = tuple[float, float, float]  # metres, radians
     Value = TypeVar("Value")
 
+LONGEST = FURTHEST_NS // BILLION  # seconds: the range of the buffer's stamps
 FLAGS = {"true": "1", "false": "0"}  # as in turtlesim's services
 
 
@@ -129,6 +129,16 @@ def parse_seconds(text: str) -> float:
     seconds = parse_number(text)
     nanoseconds("a time", seconds)
     return seconds
+
+
+def nanoseconds(name: str, seconds: float) -> int:
+    """Return a duration in nanoseconds.
+
+    Raises ValueInvalid with its name if it is negative or longer than stamps allow.
+    """
+    if not 0.0 <= seconds <= LONGEST:
+        raise ValueInvalid(f"{name} must be 0 .. {LONGEST} s, found {seconds:g}")
+    return round(seconds * BILLION)
 
 
 NEEDED = ("t", "linear", "angular")

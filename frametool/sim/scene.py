@@ -1,24 +1,36 @@
-"""The initial state of a simulation: turtles with their drivers, service calls at times, the duration."""
+"""Scenes of turtles: the input of a simulation, in Python or in a YAML or JSON file: spawn poses, drivers, events.
+
+    duration: 20                                                  # seconds, or inf; also turtlesim: ros2, seed: 1
+    turtles: {turtle1: {leader: square},                          # still, circle, square, figure8, random, or a file
+              turtle2: {spawn: [4, 2, 0], follow: turtle1}}       # metres, radians (or 90deg); law: ros1, gains, ..
+    events: [{t: 5, teleport_absolute: {turtle: turtle1, x: 2, y: 2, theta: 0}}]
+
+Leader files are relative to the scene.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+import os
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid, shown
-from frametool.frames.stamps import BILLION, FURTHEST_NS
-from frametool.sim.drivers import TARGETS, FollowController, built_in
-from frametool.sim.turtle import CENTRE, TICK_NS
+from frametool.documents.document import format_error, parse_documents
+from frametool.documents.source import Source, read_text
+from frametool.errors import ValueInvalid, alternatives, shown
+from frametool.frames.stamps import BILLION
+from frametool.grammar.readers import Misfit, as_mapping, kind, within
+from frametool.sim import readers
+from frametool.sim.drivers import LAWS, LEADERS, TARGETS, FollowController, built_in, scripted
+from frametool.sim.readers import guarded, known_keys, nanoseconds
+from frametool.sim.turtle import CENTRE, SERVICES, TICK_NS, VARIANTS, complete
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from frametool.sim.drivers import MakeLeader
-
-    Place = tuple[float, float, float]
+    from frametool.sim.readers import Place
 
 TUTORIAL_SPAWN: Place = (4.0, 2.0, 0.0)
-LONGEST = FURTHEST_NS // BILLION  # seconds: the range of the buffer's stamps
 
 
 class Follow(NamedTuple):
@@ -108,11 +120,147 @@ def duration_ns(seconds: float | None) -> int | None:
     return None if seconds is None or seconds == math.inf else nanoseconds("duration", seconds)
 
 
-def nanoseconds(name: str, seconds: float) -> int:
-    """Return a duration in nanoseconds.
+SCENE_KEYS = ("turtles", "events", "duration", "turtlesim", "holonomic", "seed")
+CONTROLLER_KEYS = ("rate", "gain_linear", "gain_angular", "max_linear", "max_angular")
+FOLLOW_KEYS = ("follow", "law", *CONTROLLER_KEYS, "target", "delay")
+TURTLE_KEYS = ("spawn", "leader", *FOLLOW_KEYS)
 
-    Raises ValueInvalid with its name if it is negative or longer than stamps allow.
+
+def _name(value: Any) -> str:
+    if type(value) is not str or not value:
+        raise Misfit(f"expected a turtle's name, found {kind(value or None)}")
+    return value
+
+
+def _place(value: Any) -> Place:
+    """Read [x, y] or [x, y, theta]: metres, radians."""
+    if type(value) is not list or len(value) not in (2, 3):
+        raise Misfit(f"expected [x, y, theta], found {kind(value)}")
+    x, y = (within((index,), readers.read_number, value[index]) for index in (0, 1))
+    return x, y, within((2,), readers.read_angle, value[2]) if len(value) == 3 else 0.0
+
+
+# key, also of a service's argument -> its reader; others are numbers
+READERS: dict[str, Callable[[Any], Any]] = {
+    "duration": readers.read_duration,
+    "turtlesim": readers.one_of(VARIANTS),
+    "holonomic": readers.read_boolean,
+    "seed": readers.read_seed,
+    "spawn": _place,
+    "follow": _name,
+    "law": readers.one_of(LAWS),
+    "target": readers.one_of(TARGETS),
+    "delay": readers.read_time,
+    "t": readers.read_time,
+    "turtle": _name,
+    "name": _name,
+    "theta": readers.read_angle,
+    "angular": readers.read_angle,
+    "off": readers.read_flag,
+    **dict.fromkeys(("r", "g", "b", "width"), readers.read_byte),
+}
+
+
+def _field(mapping: Mapping[str, Any], key: str, default: Any = None) -> Any:
+    """Read the value of a key, or its default."""
+    return within((key,), READERS.get(key, readers.read_number), mapping.get(key, default))
+
+
+def read_scene(source: Source, *, seed: int | None = None) -> Scene:
+    """Read the only scene of a text; files that it names are relative to it.
+
+    seed: overrides the scene's own.
+    Raises FormatError with file, line and column.
     """
-    if not 0.0 <= seconds <= LONGEST:
-        raise ValueInvalid(f"{name} must be 0 .. {LONGEST} s, found {seconds:g}")
-    return round(seconds * BILLION)
+    documents = parse_documents(source.text, source.name)
+    if len(documents) != 1:
+        raise format_error(source, (0,), f"expected one scene, found {len(documents)} documents")
+    try:
+        return _scene(documents[0].value, source, seed)
+    except Misfit as misfit:
+        raise misfit.placed(source, documents[0].index) from None
+
+
+def _scene(value: Any, source: Source, seed: int | None) -> Scene:
+    scene = known_keys(value, SCENE_KEYS, "a scene {turtles: .., events: .., duration: ..}")
+    if "turtles" not in scene:
+        raise Misfit(f"no turtles; expected {', '.join(SCENE_KEYS)}")
+    own = _field(scene, "seed", "0")
+    variant, holonomic = _field(scene, "turtlesim", "ros1"), _field(scene, "holonomic", "false") == "true"
+    calls = within(("events",), _calls, scene.get("events") or [], source)
+    entries = within(("turtles",), as_mapping, scene["turtles"], "the turtles by name")
+    turtles = [
+        within(("turtles", name), _turtle, name, entry or {}, source, own if seed is None else seed)
+        for name, entry in entries.items()
+    ]
+    return Scene(turtles, calls, _field(scene, "duration", "20"), variant, holonomic)
+
+
+def _turtle(name: str, value: Any, source: Source, seed: int) -> SceneTurtle:
+    entry = known_keys(value, TURTLE_KEYS, "a turtle {spawn: [x, y, theta], leader: .. or follow: ..}")
+    if name in ("", "world"):
+        raise Misfit(f"a turtle cannot be called {shown(name)}", key=True)
+    spawn = _field(entry, "spawn", [repr(CENTRE), repr(CENTRE), "0"])
+    if "follow" in entry and "leader" in entry:
+        raise Misfit("a turtle has a leader script or follows another, not both", ("leader",), key=True)
+    if "follow" in entry:
+        return SceneTurtle(name, spawn, _follow(name, entry))
+    if stray := [key for key in entry if key in FOLLOW_KEYS]:
+        raise Misfit(f"{stray[0]} says how to follow; add follow: NAME", (stray[0],), key=True)
+    leader = within(("leader",), _leader, entry["leader"], source, seed) if "leader" in entry else None
+    return SceneTurtle(name, spawn, leader)
+
+
+def _leader(value: Any, source: Source, seed: int) -> MakeLeader:
+    """Read a leader: a built-in name, a file relative to the scene, or the commands themselves."""
+    if type(value) is list:
+        return scripted(list(readers.timed_commands(value)))
+    if type(value) is not str:
+        raise Misfit(f"expected a leader's name, a file or a list of commands, found {kind(value)}")
+    if value in LEADERS:
+        return built_in(value, seed)
+    path = os.path.join(os.path.dirname(source.name), value)
+    if not os.path.exists(path):
+        raise Misfit(f"no file {path} and no leader {shown(value)}{alternatives(value, LEADERS, 'leaders')}")
+    return scripted(readers.read_script(Source(path, read_text(path))))
+
+
+def _follow(name: str, entry: Mapping[str, Any]) -> Follow:
+    """Read the follower settings of a turtle."""
+    leader = _field(entry, "follow")
+    if leader == name:
+        raise Misfit(f"{name} cannot follow itself", ("follow",))
+    law = _field(entry, "law", "ros1")
+    numbers = {key: _field(entry, key) for key in CONTROLLER_KEYS if key in entry}
+    for key, number in numbers.items():
+        within((key,), guarded, FollowController, law, **{key: number})
+    target, delay_ns = _field(entry, "target", "leader"), _field(entry, "delay", "0")
+    return Follow(leader, FollowController(law, **numbers), target, delay_ns)
+
+
+def _calls(value: Any, source: Source) -> list[ServiceCall]:
+    if type(value) is not list:
+        raise Misfit(f"expected a list of {{t: .., SERVICE: {{..}}}}, found {kind(value)}")
+    calls = [within((index,), _call, entry) for index, entry in enumerate(value)]
+    return [call._replace(place=f"{source.name}, event {number}") for number, call in enumerate(calls, 1)]
+
+
+def _call(value: Any) -> ServiceCall:
+    """Read {t: .., SERVICE: {..}}; kill also takes only the name."""
+    entry = known_keys(value, ("t", *SERVICES), "an event {t: .., SERVICE: {..}}")
+    named = [key for key in entry if key != "t"]
+    if "t" not in entry or len(named) != 1:
+        raise Misfit(f"an event has t and one of {', '.join(SERVICES)}")
+    service = named[0]
+    arguments = entry[service]
+    if service == "kill" and type(arguments) is str:
+        arguments = {"name": arguments}
+    read = within((service,), _arguments, service, arguments or {})
+    return ServiceCall(_field(entry, "t"), service, read)
+
+
+def _arguments(service: str, value: Any) -> dict[str, float | str]:
+    """Read a service's arguments and check that none is missing."""
+    arguments = {key: _field(value, key) for key in known_keys(value, SERVICES[service], f"the arguments of {service}")}
+    guarded(complete, service, arguments)
+    return arguments

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import frametool
 from frametool.calc.evaluate import Scope, evaluate
-from frametool.calc.functions import FUNCTIONS
+from frametool.calc.operations import FUNCTIONS
 from frametool.calc.values import TREE, Term, Type
 from frametool.errors import FrametoolError
 
@@ -181,7 +181,7 @@ frametool: unexpected 'm'; write a unit directly after its number: 1m
 frametool: expected ')' here
   (map<-tool
             ^
-frametool: inv() takes pose; found 2 values
+frametool: inv() takes a pose, found the pose map<-tool, a number
   inv(map<-tool, 1)
   ^
 frametool: unknown function 'iv'; did you mean 'inv'?
@@ -235,19 +235,19 @@ frametool: sin() takes an angle, found a number in m
 frametool: the sum of two points depends on the origin; subtract them, or use mean(..)
   trans(map<-tool) + trans(map<-lidar)
                    ^
-frametool: cannot multiply a number in m by a number in m; units have no powers
+frametool: cannot multiply a number in m by a number in m
   3m * 3m
      ^
 frametool: cannot divide a number in m by a number in s
   10m / 4s
       ^
-frametool: a power takes a plain number, found a number in m
+frametool: cannot raise a number in m to a number: a power is that of a pose or a plain number, an exponent a plain number
   3m ^ 2
      ^
 frametool: sqrt() takes a plain number, found a number in m
   sqrt(4m)
   ^
-frametool: an exponent is a plain number, found a number in m
+frametool: cannot raise a number to a number in m: a power is that of a pose or a plain number, an exponent a plain number
   2 ^ 1m
     ^
 frametool: expected a time with its unit, 2.5s or 2500000000ns, or latest or row, found '3'
@@ -280,7 +280,7 @@ def test_what_does_not_fit_is_refused_with_its_place(sentence: str, text: str, c
     ("map tool", "unexpected 'tool'"),
     ("(map<-tool) map<-lidar", "unexpected 'map<-lidar'; poses are joined by *"),
     ("3 * deg", "unknown name 'deg'; write a unit directly after its number: 1deg"),
-    ("inv", "inv is a function: inv(pose)"),
+    ("inv", "inv is a function: inv(..) takes a pose"),
     ("goal = map<-tool;goal(1)", "unknown function 'goal'; goal is a value, poses are joined by *"),
 ])  # fmt: skip
 def test_a_mistake_names_what_was_meant(text: str, hint: str) -> None:

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from frametool.calc.evaluate import Scope
-from frametool.calc.functions import Completer
+from frametool.calc.evaluate import Completer, Scope
 from frametool.calc.values import TREE, Term, Type
 from frametool.formats.load import load
 

@@ -12,8 +12,7 @@ from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid
 from frametool.grammar.result import Style
 from frametool.sim.drivers import scripted
-from frametool.sim.scene import tutorial
-from frametool.sim.scene_file import read_scene
+from frametool.sim.scene import read_scene, tutorial
 from frametool.sim.simulate import simulate
 from frametool.sim.step_writer import FORMS, StepWriter
 from frametool.sim.turtle import FASTEST_TURN, Turtle, Twist, World

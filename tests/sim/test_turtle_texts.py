@@ -13,8 +13,7 @@ from frametool.errors import FormatError
 from frametool.grammar.result import Style
 from frametool.sim.drivers import KEYS, FollowController, scripted
 from frametool.sim.readers import read_commands, read_script
-from frametool.sim.scene import Follow, tutorial
-from frametool.sim.scene_file import read_scene
+from frametool.sim.scene import Follow, read_scene, tutorial
 from frametool.sim.simulate import RunSummary, simulate
 from frametool.sim.step_writer import EMITS, SHORT, StepWriter
 from frametool.sim.turtle import CENTRE, Twist

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.calc.api import line_of_value, machine_table, machine_text, plain_result
-from frametool.calc.evaluate import Scope, evaluate_line, read_line
-from frametool.calc.functions import BETWEEN_WORDS, FUNCTIONS, Completer
+from frametool.calc.evaluate import BETWEEN_WORDS, Completer, Scope, evaluate_line, read_line
+from frametool.calc.operations import FUNCTIONS, wanted
 from frametool.calc.parser import Line, mentions_row, walk
-from frametool.calc.rules import wanted
 from frametool.calc.values import LIST, POINT, POSE, TREE, VECTOR, Term, Type
 from frametool.cli.command import Command, Inputs, Text, argument, command_named, option, refuse
 from frametool.cli.commands.help import topic

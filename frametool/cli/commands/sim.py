@@ -26,8 +26,7 @@ from frametool.errors import FileProblem, alternatives, shown
 from frametool.frames.stamps import BILLION
 from frametool.sim import drivers
 from frametool.sim.readers import lines_as_they_come, parse_seconds, parse_spawn, read_commands, read_script
-from frametool.sim.scene import Scene, duration_ns, tutorial
-from frametool.sim.scene_file import read_scene
+from frametool.sim.scene import Scene, duration_ns, read_scene, tutorial
 from frametool.sim.simulate import RunSummary, SimulationStep, simulate
 from frametool.sim.step_writer import EMITS, FORMS, StepWriter
 from frametool.sim.turtle import VARIANTS
