@@ -1,4 +1,4 @@
-"""XML as a stream of elements with their places, or as a tree of selected elements; without entities.
+"""XML as a tree of elements with their places; without entities.
 
 It uses expat of the standard library and knows syntax only.  Names keep their prefix as written (`sensor:camera`), so
 that files with undeclared prefixes can be read too.
@@ -7,8 +7,7 @@ that files with undeclared prefixes can be read too.
 from __future__ import annotations
 
 import re
-from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 from xml.parsers import expat
 
 from frametool.documents.source import MOST_CHARACTERS, Source, line_of, not_text, pointer
@@ -16,7 +15,7 @@ from frametool.errors import FileProblem, FormatError, bare, shown
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping
+    from collections.abc import Iterator
     from typing import NoReturn
 
     from frametool.documents.source import InputFile
@@ -26,29 +25,11 @@ _BLOCK = 1 << 16
 _OTHER_ENTITY = re.compile(rb"&(?!(?:amp|lt|gt|quot|apos|#[0-9]+|#x[0-9a-fA-F]+);)[^\s;&]++;")
 
 
-class Element(NamedTuple):
-    """The beginning or the end of an element.
-
-    ends: True for the end; then `text` is the text directly in the element, the rest is as at its beginning
-    depth: 1 for the root
-    offset: of its first character, in bytes
-    """
-
-    ends: bool
-    tag: str
-    attributes: dict[str, str]
-    depth: int
-    line: int
-    column: int
-    offset: int
-    text: str = ""
-
-
 class XmlFile:
-    """The elements of one XML file, and errors that point into it."""
+    """The bytes of an XML file, and errors that point into it."""
 
     def __init__(self, file: InputFile) -> None:
-        """Read the bytes of a file; raises FileProblem, and FormatError if they are too many or not text."""
+        """Read the bytes; raises FileProblem, and FormatError if they are too many."""
         self.name = file.name
         try:
             self.data = file.stream.read(MOST_CHARACTERS + 1)
@@ -57,154 +38,49 @@ class XmlFile:
         if len(self.data) > MOST_CHARACTERS:
             raise FormatError(f"longer than {MOST_CHARACTERS} bytes, the most in one file", source=self.name)
 
-    def elements(self, deepest: int = DEEPEST_ELEMENT, *, ends: bool = True) -> Iterator[Element]:
-        """Yield the beginnings and ends of all elements, in order.
-
-        deepest: omit elements below this depth; ends: without them the text of elements is omitted too.
-        Raises FormatError if it is not XML, and for declarations of entities.
-        """
-        opened: list[Element] = []
-        texts: list[list[str]] = []
-        found: list[Element] = []
-        parser = expat.ParserCreate()
-        depth = 0
-
-        def start(tag: str, attributes: dict[str, str]) -> None:
-            nonlocal depth
-            depth += 1
-            if depth <= deepest:
-                place = parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, parser.CurrentByteIndex
-                found.append(Element(False, tag, attributes, depth, *place))  # noqa: FBT003 - a field of a record
-                if ends:
-                    opened.append(found[-1])
-                    texts.append([])
-            if depth > DEEPEST_ELEMENT:
-                message = f"more than {DEEPEST_ELEMENT} elements inside one another"
-                raise self._at(parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, message)
-
-        def end(_: str) -> None:
-            nonlocal depth
-            if ends and depth <= deepest:
-                found.append(Element(True, *opened.pop()[1:7], "".join(texts.pop())))  # noqa: FBT003 - a field
-            depth -= 1
-
-        def read_text(text: str) -> None:
-            if depth <= deepest:
-                texts[-1].append(text)
-
-        def refuse(*_: object) -> NoReturn:
-            message = "a DOCTYPE with entities is not read; expand them: xmllint --noent FILE"
-            raise self._at(parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, message)
-
-        parser.StartElementHandler, parser.EndElementHandler = start, end
-        if ends:
-            parser.CharacterDataHandler = read_text
-        parser.StartDoctypeDeclHandler = partial(self._check_doctype, parser)
-        parser.EntityDeclHandler = refuse
-        parser.ExternalEntityRefHandler = refuse
-        for begin in range(0, len(self.data) or 1, _BLOCK):
-            block = self.data[begin : begin + _BLOCK]
-            try:
-                parser.Parse(block, begin + _BLOCK >= len(self.data))
-            except expat.ExpatError as error:
-                yield from found
-                raise self._broken(error) from None
-            except (LookupError, ValueError) as error:  # of Python's codecs
-                if isinstance(error, FormatError):
-                    raise
-                raise self._at(1, 1, f"not XML: {error}") from None
-            yield from found
-            found.clear()
-
-    def _check_doctype(self, parser: expat.XMLParserType, _: str, file: str | None, *_more: object) -> None:
-        """Refuse entities of another file, which expat would omit silently."""
-        if file and _OTHER_ENTITY.search(self.data.replace(b"\0", b"")):
-            message = f"a DOCTYPE with entities of {shown(file)} is not read; expand: xmllint --noent --loaddtd FILE"
-            raise self._at(parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, message)
-
-    def _broken(self, error: expat.ExpatError) -> FormatError:
-        """Return a one-line error for invalid XML."""
-        if what := not_text(self.data):
-            return FormatError(what, source=self.name, line=1, column=1)
-        problem = "it ends too early" if error.code == _ENDS_EARLY else expat.ErrorString(error.code)
-        return self._at(error.lineno, error.offset + 1, f"not XML: {problem}")
-
-    def error(self, element: Element, message: str, attribute: str = "", *, rule: str = "") -> FormatError:
-        """Return the error for an element, or for the value of one of its attributes."""
-        line, column = self.place(element, attribute)
-        return self._at(line, column, message, rule=rule)
-
-    def place(self, element: Element, attribute: str = "") -> tuple[int, int]:
-        """Return line and column of an element, or of the value of one of its attributes."""
-        line, column = element.line, element.column
-        name = re.compile(rb"""\b%s\s*=\s*["']""" % re.escape(attribute.encode()))
-        value = name.search(self.data, element.offset, element.offset + _BLOCK) if attribute else None
-        if value:
-            before = self.data[element.offset : value.end()].decode("utf-8", "replace")
-            line += before.count("\n")
-            column = len(before) - before.rfind("\n") if "\n" in before else column + len(before)
-        return line, column
-
-    def _at(self, line: int, column: int, message: str, *, rule: str = "") -> FormatError:
+    def at(self, line: int, column: int, message: str, *, rule: str = "") -> FormatError:
+        """Return the error for a place."""
         # lines as expat counts them, the same as in editors
         text = self.data.decode("utf-8", "replace").split("\n")[line - 1 : line] or [""]
         snippet = pointer(line_of(text[0], 1), column)
         return FormatError(message, source=self.name, line=line, column=column, snippet=snippet, rule=rule)
 
-    def required(self, element: Element, attribute: str) -> str:
-        """Return an attribute that must be present and not empty."""
-        value = element.attributes.get(attribute)
-        if not value:
-            raise self.error(element, f"<{element.tag}> has no {attribute}", attribute if value is not None else "")
-        return value
-
-    def numbers(self, element: Element, attribute: str, count: int, default: str | None = None) -> tuple[float, ...]:
-        """Read an attribute as this many finite numbers between blanks; without it the default."""
-        text = element.attributes.get(attribute, default)
-        if text is None:
-            raise self.error(element, f"<{element.tag}> has no {attribute}")
-        return self.numbers_in(text, element, attribute, count)
-
-    def numbers_in(self, text: str, element: Element, attribute: str, count: int) -> tuple[float, ...]:
-        """Read a text of an element as this many finite numbers; the attribute, if any, is its place."""
-        words = text.split()
-        if len(words) != count:
-            found = f"found {len(words)} in {shown(text)}"
-            expected = f"{count} number{'s' * (count != 1)}"
-            raise self.error(element, f"{attribute or element.tag}: expected {expected}, {found}", attribute)
-        try:
-            return tuple(map(parse_number, words))
-        except ValueError as error:
-            raise self.error(element, f"{attribute or element.tag}: {error}", attribute) from None
-
-    @property
-    def source(self) -> Source:
-        """Return the text under its name."""
-        return Source(self.name, self.data.decode("utf-8", "replace"))
+    def broken(self, error: expat.ExpatError) -> FormatError:
+        """Return a one-line error for invalid XML."""
+        if what := not_text(self.data):
+            return FormatError(what, source=self.name, line=1, column=1)
+        problem = "it ends too early" if error.code == _ENDS_EARLY else expat.ErrorString(error.code)
+        return self.at(error.lineno, error.offset + 1, f"not XML: {problem}")
 
 
 _ENDS_EARLY = 3  # expat's code for "no element found", also used for truncated text
 
 
-class XmlNode:
-    """One element: its attributes and place, its text, and its selected children."""
+class Element:
+    """One element: its attributes, its place, the text directly in it, and its children.
 
-    __slots__ = ("children", "element", "line", "tag", "text", "xml")
+    offset: of its first character, in bytes
+    """
 
-    def __init__(self, element: Element, xml: XmlFile) -> None:
+    __slots__ = ("attributes", "children", "column", "file", "line", "offset", "tag", "text")
+
+    def __init__(self, file: XmlFile, tag: str, attributes: dict[str, str], place: tuple[int, int, int]) -> None:
         """Create it as it begins."""
-        self.xml = xml
-        self.element = element
-        self.line = element.line
-        self.tag = element.tag
-        self.children: list[XmlNode] = []
+        self.file, self.tag, self.attributes = file, tag, attributes
+        self.line, self.column, self.offset = place
+        self.children: list[Element] = []
         self.text = ""
 
-    def all(self, *tags: str) -> Iterator[XmlNode]:
+    @property
+    def source(self) -> Source:
+        """Return the text of its file, without its contents."""
+        return Source(self.file.name, "")
+
+    def all(self, *tags: str) -> Iterator[Element]:
         """Yield the direct children of some kinds."""
         return (child for child in self.children if child.tag in tags)
 
-    def first(self, tag: str) -> XmlNode | None:
+    def first(self, tag: str) -> Element | None:
         """Return the first child of a kind, if there is one."""
         return next(self.all(tag), None)
 
@@ -215,48 +91,97 @@ class XmlNode:
 
     def attribute(self, name: str) -> str:
         """Return an attribute; "" if it is missing."""
-        return self.element.attributes.get(name, "").strip()
+        return self.attributes.get(name, "").strip()
+
+    def required(self, attribute: str) -> str:
+        """Return an attribute that must be present and not empty."""
+        value = self.attributes.get(attribute)
+        if not value:
+            raise self.error(f"<{self.tag}> has no {attribute}", attribute if value is not None else "")
+        return value
+
+    def numbers(self, count: int, attribute: str = "", default: str | None = None) -> tuple[float, ...]:
+        """Read its text, or an attribute, as this many finite numbers between blanks; without it the default."""
+        text = self.attributes.get(attribute, default) if attribute else self.text
+        if text is None:
+            raise self.error(f"<{self.tag}> has no {attribute}")
+        words = text.split()
+        if len(words) != count:
+            found = f"found {len(words)} in {shown(text)}"
+            expected = f"{count} number{'s' * (count != 1)}"
+            raise self.error(f"{attribute or self.tag}: expected {expected}, {found}", attribute)
+        try:
+            return tuple(map(parse_number, words))
+        except ValueError as error:
+            raise self.error(f"{attribute or self.tag}: {error}", attribute) from None
 
     def error(self, message: str, attribute: str = "", *, rule: str = "") -> FormatError:
         """Return the error for it, or for the value of one of its attributes."""
-        return self.xml.error(self.element, message, attribute, rule=rule)
+        return self.file.at(*self.place(attribute), message, rule=rule)
 
-    def numbers(self, count: int) -> tuple[float, ...]:
-        """Read its text as this many finite numbers."""
-        return self.xml.numbers_in(self.text, self.element, "", count)
+    def place(self, attribute: str = "") -> tuple[int, int]:
+        """Return its line and column, or those of the value of one of its attributes."""
+        line, column, data = self.line, self.column, self.file.data
+        name = re.compile(rb"""\b%s\s*=\s*["']""" % re.escape(attribute.encode()))
+        value = name.search(data, self.offset, self.offset + _BLOCK) if attribute else None
+        if value:
+            before = data[self.offset : value.end()].decode("utf-8", "replace")
+            line += before.count("\n")
+            column = len(before) - before.rfind("\n") if "\n" in before else column + len(before)
+        return line, column
 
 
-def read_nodes(xml: XmlFile, held: Mapping[str, Collection[str]], fmt: str = "", *, texts: bool = True) -> XmlNode:
-    """Return the root element with the selected elements below it.
+def read_xml(file: InputFile, root: str = "", fmt: str = "") -> Element:
+    """Return the root element.
 
-    held: the children kept for each element, the root first; all others are dropped.
-    fmt: the format's name, for a file with another root.  texts: without them it is faster.
-    Raises FormatError.
+    root: its tag, if there is only one; fmt: the format's name, for a file with another root
+    Raises FormatError if it is not XML, and for declarations of entities.
     """
-    top = next(iter(held))
-    root: XmlNode | None = None
-    opened: list[XmlNode] = []
-    skipped = 0  # the depth below which nothing is kept
-    for element in xml.elements(DEEPEST_ELEMENT if texts else len(held) + 1, ends=texts):
-        if skipped and element.depth > skipped:
-            continue
-        skipped = 0
-        if element.ends and opened and opened[-1].element.depth == element.depth:
-            opened[-1].text = element.text.strip()
-        while opened and opened[-1].element.depth >= element.depth:
-            opened.pop()
-        if element.ends:
-            continue
-        if root is None and element.tag != top:
-            expected = f"{fmt} begins with <{top}>" if fmt else f"expected <{top}>"
-            raise xml.error(element, f"{expected}, found <{bare(element.tag)}>")
-        if opened and element.tag not in held.get(opened[-1].tag, ()):
-            skipped = element.depth
-            continue
-        node = XmlNode(element, xml)
-        if opened:
-            opened[-1].children.append(node)
-        opened.append(node)
-        root = root or node
-    assert root is not None  # noqa: S101 - XML without an element is an error of its own
-    return root
+    xml = XmlFile(file)
+    top = Element(xml, "", {}, (0, 0, 0))  # above the root
+    opened = [top]
+    texts: list[list[str]] = [[]]
+    parser = expat.ParserCreate()
+
+    def place() -> tuple[int, int, int]:
+        return parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, parser.CurrentByteIndex
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        if len(opened) > DEEPEST_ELEMENT:
+            raise xml.at(*place()[:2], f"more than {DEEPEST_ELEMENT} elements inside one another")
+        element = Element(xml, tag, attributes, place())
+        opened[-1].children.append(element)
+        opened.append(element)
+        texts.append([])
+
+    def end(_: str) -> None:
+        opened.pop().text = "".join(texts.pop()).strip()
+
+    def add_text(text: str) -> None:
+        texts[-1].append(text)
+
+    def check_doctype(_: str, other: str | None, *_more: object) -> None:
+        if other and _OTHER_ENTITY.search(xml.data.replace(b"\0", b"")):  # expat would omit these silently
+            problem = f"a DOCTYPE with entities of {shown(other)} is not read; expand: xmllint --noent --loaddtd FILE"
+            raise xml.at(*place()[:2], problem)
+
+    def refuse(*_: object) -> NoReturn:
+        raise xml.at(*place()[:2], "a DOCTYPE with entities is not read; expand them: xmllint --noent FILE")
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler = add_text
+    parser.StartDoctypeDeclHandler = check_doctype
+    parser.EntityDeclHandler = parser.ExternalEntityRefHandler = refuse
+    try:
+        parser.Parse(xml.data, True)  # noqa: FBT003 - expat's only way to say that this is all
+    except expat.ExpatError as error:
+        raise xml.broken(error) from None
+    except (LookupError, ValueError) as error:  # of Python's codecs
+        if isinstance(error, FormatError):
+            raise
+        raise xml.at(1, 1, f"not XML: {error}") from None
+    (found,) = top.children
+    if root and found.tag != root:
+        expected = f"{fmt} begins with <{root}>" if fmt else f"expected <{root}>"
+        raise found.error(f"{expected}, found <{bare(found.tag)}>")
+    return found

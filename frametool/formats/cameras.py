@@ -174,10 +174,10 @@ def _read(file: InputFile) -> Found:
         if of_folder(file.path) or file.path.endswith(".db3") or file.head().startswith((b"#ROSBAG ", b"\x89MCAP")):
             return _in_bag(file)
         if file.head().lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
-            from frametool.documents.xml import XmlFile
+            from frametool.documents.xml import read_xml
             from frametool.formats.trees.matrix_files import StoredXml
 
-            return _in_document(StoredXml(XmlFile(file)).value, file)
+            return _in_document(StoredXml(read_xml(file)).value, file)
     if re.search(r"(?m)^(?:P[0-3]|P_rect_0\d|K_0\d):", file.text):
         return _kitti(file)
     if re.match(r"(?:\s*#.*\n)*\s*\d+\s+[A-Z_]+\s+\d+\s+\d+\s", file.text):

@@ -19,8 +19,7 @@ from __future__ import annotations
 from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.documents.source import InputFile, Source
-from frametool.documents.xml import XmlFile, XmlNode, read_nodes
+from frametool.documents.xml import Element, read_xml
 from frametool.errors import FormatError, alternatives, shown
 from frametool.formats.robots.joints import JointSample, JointState
 from frametool.formats.robots.model import Joint, JointValue, Link
@@ -33,6 +32,7 @@ from frametool.grammar.edges import Diagnostics, Edge, Options, Topics
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
+    from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Path, Quaternion, Vector
 
@@ -43,15 +43,7 @@ WHOLE = "save it whole: mujoco.mj_saveLastXML('whole.xml', mujoco.MjModel.from_x
 REFUSED = ("include", "replicate", "attach")
 MADE = ("composite", "flexcomp")
 JOINTS = ("joint", "freejoint")
-INSIDE = ("body", "frame", *JOINTS, "site", "camera", *REFUSED, *MADE)
-HELD = {
-    "mujoco": ("compiler", "default", "worldbody", "keyframe", "include"),
-    "default": ("default", "joint", "site", "camera", "include"),
-    "worldbody": INSIDE,
-    "body": INSIDE,
-    "frame": INSIDE,
-    "keyframe": ("key", "include"),
-}
+NESTING = ("mujoco", "default", "worldbody", "body", "frame", "keyframe")  # with elements that are read
 TYPES = {"hinge": "revolute", "slide": "prismatic", "ball": "ball", "free": "floating"}
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 MAIN = "main"
@@ -71,12 +63,12 @@ class _Inside(NamedTuple):
 class MjcfModel:
     """The frames of a model, parents before children."""
 
-    def __init__(self, root: XmlNode, options: Options) -> None:
+    def __init__(self, root: Element, options: Options) -> None:
         """Read a model; raises FormatError."""
         self.options = options
         nodes = [root]
         for node in nodes:  # grows during the loop
-            nodes += node.children
+            nodes += node.children if node.tag in NESTING else ()
             if node.tag in REFUSED:
                 raise node.error(f"<{node.tag}> is not expanded here; {WHOLE}")
         self.poses = PoseReader(root)
@@ -87,7 +79,7 @@ class MjcfModel:
         for section in root.all("worldbody"):
             self._walk(section)
 
-    def _walk(self, section: XmlNode) -> None:
+    def _walk(self, section: Element) -> None:
         """Read the contents of a world in the order of the file; with a stack, because bodies may be deep."""
         pending = [(child, _Inside(WORLD, "", IDENTITY)) for child in reversed(section.children)]
         while pending:
@@ -95,7 +87,7 @@ class MjcfModel:
             if (inside := self._take(node, around)) is not None:
                 pending += [(child, inside) for child in reversed(node.children)]
 
-    def _take(self, node: XmlNode, inside: _Inside) -> _Inside | None:
+    def _take(self, node: Element, inside: _Inside) -> _Inside | None:
         """Read one element; for a body or frame return the context of its children."""
         if node.tag in MADE:
             self.options.tally.note_each(f"<{node.tag}> is left out: its bodies are made by MuJoCo; {WHOLE}", node.line)
@@ -107,18 +99,18 @@ class MjcfModel:
             return _Inside(name, self._class(node, inside.around), IDENTITY)
         elif node.tag in JOINTS:
             self._join(node, inside)
-        else:
+        elif node.tag in ("site", "camera"):
             self._mark(node, inside)
         return None
 
-    def _class(self, node: XmlNode, around: str) -> str:
+    def _class(self, node: Element, around: str) -> str:
         """Return the default class for the children of a body or frame."""
         name = node.attribute("childclass")
         if name:
             self.classes.check(name, node, "childclass")
         return name or around
 
-    def _mark(self, node: XmlNode, inside: _Inside) -> None:
+    def _mark(self, node: Element, inside: _Inside) -> None:
         """Read a site or camera."""
         attributes = self.classes.attributes(node, inside.around)
         pose = self.poses.pose_of_site(attributes) if node.tag == "site" else self.poses.pose(attributes)
@@ -129,7 +121,7 @@ class MjcfModel:
             message = f"{name} has the mode {shown(mode)}, in which MuJoCo rotates it over time; its pose is as written"
             self.options.tally.note_each(message, node.line)
 
-    def _place(self, node: XmlNode, inside: _Inside, pose: Rigid) -> str:
+    def _place(self, node: Element, inside: _Inside, pose: Rigid) -> str:
         """Add a body, site or camera at its rest pose; return its name, whose prefix shows whether it is a body."""
         name = node.attribute("name")
         if not name:  # numbered in its body
@@ -144,7 +136,7 @@ class MjcfModel:
         self.links[name] = Link(inside.body, name, pose, line=node.line)
         return name
 
-    def _join(self, node: XmlNode, inside: _Inside) -> None:
+    def _join(self, node: Element, inside: _Inside) -> None:
         """Read a joint of a body."""
         if inside.body == WORLD:
             raise node.error("the world has no joints; put it into a <body>")
@@ -190,7 +182,7 @@ SIZES = {"floating": 7, "ball": 4}  # numbers of a joint in qpos; the others hav
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the edges of a model, with joint values from options, default at their references."""
-    model = MjcfModel(read_nodes(XmlFile(file), HELD), options)
+    model = MjcfModel(read_xml(file, "mujoco"), options)
     yield from JointState.of(model.links.values(), options, file.name).edges(model.links.values())
 
 
@@ -199,28 +191,27 @@ def read_joints(file: InputFile, state: str) -> Iterator[JointSample]:
 
     Raises FormatError.
     """
-    xml = XmlFile(file)
-    root = read_nodes(xml, HELD)
+    root = read_xml(file, "mujoco")
     links = MjcfModel(root, Options(Diagnostics(), Topics())).links.values()
     joints = [joint for link in links for joint in link.joints]  # a body's before those of its children
     key = _key(root, state)
     if not key.attribute("qpos"):
         raise key.error(f"key {shown(state)} has no qpos")
     sizes = [SIZES.get(joint.kind, 1) for joint in joints]
-    numbers = iter(xml.numbers(key.element, "qpos", sum(sizes)))
+    numbers = iter(key.numbers(sum(sizes), "qpos"))
 
     def refuse(problem: str, _path: Path) -> FormatError:
         return key.error(problem, "qpos")
 
     for joint, size in zip(joints, sizes, strict=True):
         value = _value(joint, list(islice(numbers, size)), refuse)
-        yield JointSample(joint.name, value, None, refuse, Source(xml.name, ""))
+        yield JointSample(joint.name, value, None, refuse, root.source)
 
 
-def _key(root: XmlNode, state: str) -> XmlNode:
+def _key(root: Element, state: str) -> Element:
     """Return the key of a name or number."""
     keys = [key for frames in root.all("keyframe") for key in frames.all("key")]
-    file = root.xml.name
+    file = root.file.name
     if not keys:
         raise FormatError("no <key> in it, which would have joint values", source=file)
     names = {key.attribute("name") or str(index): key for index, key in enumerate(keys)}
@@ -247,16 +238,16 @@ class Attribute(NamedTuple):
 
     name: str
     text: str
-    node: XmlNode
+    node: Element
 
     def error(self, message: str) -> FormatError:
         """Make the error for its place."""
         return self.node.error(message, self.name)
 
 
-def own_attributes(node: XmlNode) -> dict[str, Attribute]:
+def own_attributes(node: Element) -> dict[str, Attribute]:
     """Return the attributes of an element; empty ones count as missing."""
-    return {name: Attribute(name, text, node) for name, text in node.element.attributes.items() if text.strip()}
+    return {name: Attribute(name, text, node) for name, text in node.attributes.items() if text.strip()}
 
 
 def over(inner: Attributes, outer: Attributes) -> dict[str, Attribute]:
@@ -272,7 +263,7 @@ class Classes:
     A class may be used before it is defined.
     """
 
-    def __init__(self, root: XmlNode) -> None:
+    def __init__(self, root: Element) -> None:
         """Read all sections of defaults; raises FormatError."""
         self.classes: dict[str, dict[str, Attributes]] = {MAIN: {}}
         for section in root.all("default"):
@@ -281,7 +272,7 @@ class Classes:
                 raise section.error(f"the outermost default class is called main, found {shown(name)}", "class")
             self._take(section)
 
-    def _take(self, section: XmlNode) -> None:
+    def _take(self, section: Element) -> None:
         """Read one section, then its children, each from a copy; with a stack, because they may be deep."""
         pending = [(section, MAIN)]
         while pending:
@@ -298,14 +289,14 @@ class Classes:
                 self.classes[inner] = dict(mine)
                 pending.append((child, inner))
 
-    def attributes(self, node: XmlNode, around: str) -> dict[str, Attribute]:
+    def attributes(self, node: Element, around: str) -> dict[str, Attribute]:
         """Return the attributes of an element; `around` is the class inherited from the enclosing bodies, if any."""
         own = own_attributes(node)
         name = own["class"].text if "class" in own else around or MAIN
         self.check(name, node, "class")
         return over(own, self.classes[name].get(node.tag, {}))
 
-    def check(self, name: str, node: XmlNode, attribute: str) -> None:
+    def check(self, name: str, node: Element, attribute: str) -> None:
         """Raise FormatError for an undefined class."""
         if name not in self.classes:
             raise node.error(f"no default class {shown(name)}{alternatives(name, self.classes, 'classes')}", attribute)
@@ -314,7 +305,7 @@ class Classes:
 class PoseReader:
     """Reads numbers, angles and poses according to the compiler section of a model."""
 
-    def __init__(self, root: XmlNode) -> None:
+    def __init__(self, root: Element) -> None:
         """Read the compiler sections, anywhere in the file: the last value of a setting counts; raises FormatError."""
         said: dict[str, Attribute] = {}
         for section in root.all("compiler"):
@@ -343,8 +334,7 @@ class PoseReader:
         """Read an attribute of this many numbers; without it the default."""
         if name not in attributes:
             return default
-        text, node = attributes[name][1:]
-        return node.xml.numbers_in(text, node.element, name, count)
+        return attributes[name].node.numbers(count, name)
 
     def direction(self, attributes: Attributes, name: str, default: Vector) -> Vector:
         """Read a vector of any length but zero, as a unit one."""

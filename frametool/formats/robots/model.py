@@ -37,7 +37,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
 
-    from frametool.documents.xml import Element, XmlFile
+    from frametool.documents.xml import Element
     from frametool.geometry.types import Components, Condition, Namespace, Number, Numbers, Rigid
     from frametool.grammar.edges import Options
     from frametool.grammar.readers import Quaternion, Vector
@@ -50,15 +50,13 @@ POSED = ("planar", "floating", "ball")  # their value is a pose, not a number
 OUT_OF_PLANE = 1e-9
 
 
-def read_quaternion(
-    xml: XmlFile, element: Element, texts: Sequence[str], options: Options, attribute: str = ""
-) -> Quaternion:
+def read_quaternion(element: Element, texts: Sequence[str], options: Options, attribute: str = "") -> Quaternion:
     """Read x, y, z, w of an element by the rules of the grammar; warnings are recorded.  Raises FormatError."""
-    reading = Reading(Source(xml.name, ""), normalize=options.normalize)
+    reading = Reading(element.source, normalize=options.normalize)
     try:
         rotation = rotation_of(notation("xyzw"), texts, INDICES, reading)
     except ValueInvalid as error:
-        raise xml.error(element, str(error), attribute, rule=error.rule) from None
+        raise element.error(str(error), attribute, rule=error.rule) from None
     options.tally.note_all(reading.notes, element.line)
     return rotation
 

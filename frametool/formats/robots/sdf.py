@@ -21,7 +21,7 @@ from collections import Counter
 from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.documents.xml import XmlFile, XmlNode, read_nodes
+from frametool.documents.xml import Element, read_xml
 from frametool.errors import alternatives, shown
 from frametool.formats.robots.joints import JointState
 from frametool.formats.robots.model import Joint, Link, Mimic, read_quaternion
@@ -39,24 +39,8 @@ if TYPE_CHECKING:
     from frametool.grammar.edges import Edge, Options
     from frametool.grammar.readers import Vector
 
-_AXIS = frozenset(("xyz", "limit", "mimic", "use_parent_model_frame"))
-HELD = {
-    "sdf": frozenset(("world", "model", "include")),
-    "world": frozenset(("model", "frame", "joint", "include", "state")),
-    "model": frozenset(("model", "link", "joint", "frame", "pose", "include")),
-    "link": frozenset(("pose", "sensor")),
-    "sensor": frozenset(("pose",)),
-    "frame": frozenset(("pose",)),
-    "joint": frozenset(("pose", "parent", "child", "axis", "axis2")),
-    "axis": _AXIS,
-    "axis2": _AXIS,
-    "limit": frozenset(("lower", "upper")),
-    "mimic": frozenset(("multiplier", "offset", "reference")),
-    "include": frozenset(("uri", "name")),
-}
 
-
-def read_pose(holder: XmlNode, options: Options) -> tuple[Rigid, str]:
+def read_pose(holder: Element, options: Options) -> tuple[Rigid, str]:
     """Read the pose of an element: x y z roll pitch yaw, or x y z qx qy qz qw.
 
     Missing or empty is the identity.  Returns the pose and the frame it is relative to, "" for the default.
@@ -78,7 +62,7 @@ def read_pose(holder: XmlNode, options: Options) -> tuple[Rigid, str]:
         return IDENTITY, relative_to
     x, y, z, roll, pitch, yaw = pose.numbers(7 if fmt == "quat_xyzw" else 6)[:6]
     if fmt == "quat_xyzw":
-        rotation = read_quaternion(pose.xml, pose.element, pose.text.split()[3:], options)
+        rotation = read_quaternion(pose, pose.text.split()[3:], options)
     else:
         rotation = euler.to_quaternion(roll, pitch, yaw, "sxyz", floats, degrees=degrees)
     return (x, y, z, *rotation), relative_to
@@ -102,7 +86,7 @@ class SdfFrame:
 
     __slots__ = ("attached_to", "holder", "kind", "local", "name", "placement", "pose", "relative_to", "scope")
 
-    def __init__(self, kind: str, local: str, scope: SdfFrame | None, holder: XmlNode) -> None:
+    def __init__(self, kind: str, local: str, scope: SdfFrame | None, holder: Element) -> None:
         """Create a frame without a pose."""
         self.kind, self.local = kind, local
         self.scope: SdfFrame = scope or self
@@ -124,7 +108,7 @@ class SdfFrame:
 class SdfFrames:
     """All frames of a file by name."""
 
-    def __init__(self, root: XmlNode, options: Options) -> None:
+    def __init__(self, root: Element, options: Options) -> None:
         """Read the frames and the poses; raises FormatError."""
         self.options = options
         worlds = list(root.all("world"))
@@ -155,26 +139,26 @@ class SdfFrames:
                     name = shown(holder.text_of("name") or holder.text_of("uri"))
                     self.note(holder, f"<include> {name} is left out, it needs other files; with them: {WHOLE}")
                     self.included = True
-                elif holder.tag == "state":
+                elif holder.tag == "state" and scope is self.top:
                     self.note(holder, "<state> is left out: every model is at its own pose")
                 elif holder.tag in ("model", "link", "joint", "frame"):
                     frame = self._named(holder, scope)
                     if holder.tag == "model":
                         scopes.append(frame)
-                    for sensor in holder.all("sensor"):
+                    for sensor in holder.all("sensor") if holder.tag == "link" else ():
                         self.sensors.append(SdfFrame("sensor", self._name(sensor), frame, sensor))
 
-    def note(self, holder: XmlNode, message: str) -> None:
+    def note(self, holder: Element, message: str) -> None:
         """Record a warning about an element."""
         self.options.tally.note_each(message, holder.line)
 
-    def _name(self, holder: XmlNode) -> str:
+    def _name(self, holder: Element) -> str:
         name = holder.attribute("name")
         if not name:
             raise holder.error(f"<{holder.tag}> has no name")
         return name
 
-    def _named(self, holder: XmlNode, scope: SdfFrame) -> SdfFrame:
+    def _named(self, holder: Element, scope: SdfFrame) -> SdfFrame:
         """Register one element under its name."""
         frame = SdfFrame(holder.tag, self._name(holder), scope, holder)
         if frame.local in (WORLD, INSIDE):
@@ -215,7 +199,7 @@ class SdfFrames:
             return self.top
         return self.find(holder.text, joint.scope, holder, "")
 
-    def find(self, name: str, scope: SdfFrame, holder: XmlNode, attribute: str) -> SdfFrame:
+    def find(self, name: str, scope: SdfFrame, holder: Element, attribute: str) -> SdfFrame:
         """Return the frame that a name means in a scope.
 
         Raises FormatError with the names that exist.
@@ -288,7 +272,7 @@ class SdfJoint(NamedTuple):
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the edges of a world or model, with joint values from options, default as in the file."""
-    yield from _SdfTree(SdfFrames(read_nodes(XmlFile(file), HELD), options)).edges()
+    yield from _SdfTree(SdfFrames(read_xml(file, "sdf"), options)).edges()
 
 
 class _SdfTree:
@@ -372,7 +356,7 @@ class _SdfTree:
                 self.frames.note(frame.holder, f"joint {shown(frame.local)} has no <{tag}>: it takes no value there")
         return tuple(motions)
 
-    def _direction(self, frame: SdfFrame, axis: XmlNode) -> Vector:
+    def _direction(self, frame: SdfFrame, axis: Element) -> Vector:
         """Return an axis in the joint's frame."""
         xyz = axis.first("xyz")
         if xyz is None:
@@ -389,7 +373,7 @@ class _SdfTree:
             x, y, z = quaternion.rotate(*self.frames.relative(frame, outer)[3:], x, y, z)
         return unit_vector(x, y, z, floats)
 
-    def _limit(self, limit: XmlNode | None, which: str) -> float | None:
+    def _limit(self, limit: Element | None, which: str) -> float | None:
         """Read one limit; None for no limit, which SDF writes as 1e16 or inf."""
         held = limit.first(which) if limit is not None else None
         if held is None or held.text.lstrip("+-").lower() in ("inf", "infinity"):
@@ -397,7 +381,7 @@ class _SdfTree:
         (value,) = held.numbers(1)
         return value if isfinite(value) and abs(value) < UNLIMITED else None
 
-    def _mimic(self, frame: SdfFrame, axis: XmlNode) -> Mimic | None:
+    def _mimic(self, frame: SdfFrame, axis: Element) -> Mimic | None:
         """Read a mimic: multiplier * (leader - reference) + offset, of either axis of the leader."""
         mimic = axis.first("mimic")
         if mimic is None:
@@ -410,7 +394,7 @@ class _SdfTree:
         offset, reference = self._number(mimic, "offset", 0.0), self._number(mimic, "reference", 0.0)
         return Mimic(name, multiplier, offset - multiplier * reference)
 
-    def _number(self, holder: XmlNode, tag: str, default: float) -> float:
+    def _number(self, holder: Element, tag: str, default: float) -> float:
         held = holder.first(tag)
         return default if held is None else held.numbers(1)[0]
 
@@ -471,4 +455,4 @@ class _SdfTree:
         answers = self.options.answers
         values = {self.names.get(name, name): value for name, value in answers.joints.items()}
         options = self.options._replace(answers=answers._replace(joints=values))
-        return JointState(moving, options, self.frames.top.holder.xml.name, fixed=fixed)
+        return JointState(moving, options, self.frames.top.holder.file.name, fixed=fixed)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from math import dist
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.documents.xml import XmlFile, read_nodes
+from frametool.documents.xml import read_xml
 from frametool.formats.robots import mjcf, sdf
 from frametool.geometry import euler, floats, rigid
 from frametool.geometry.rigid import IDENTITY
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
     from frametool.documents.source import InputFile
-    from frametool.documents.xml import XmlNode
+    from frametool.documents.xml import Element
     from frametool.formats.robots.mjcf import _Inside
     from frametool.geometry.types import Rigid
 
@@ -30,16 +30,6 @@ SHAPES = (*SIZES, "mesh")
 DRAWN = ("visual", "collision")
 SHOWN_GROUPS = 3  # of MJCF's geoms; its viewer draws those below
 PARTS = {"size": 3, "radius": 1, "length": 1}  # what says how large a shape is, and with how many numbers
-URDF_HELD = {
-    "robot": ("link",), "link": DRAWN, **dict.fromkeys(DRAWN, ("origin", "geometry")), "geometry": SHAPES,
-}  # fmt: skip
-SDF_HELD = sdf.HELD | {
-    "link": sdf.HELD["link"] | {*DRAWN}, **dict.fromkeys(DRAWN, ("pose", "geometry")), "geometry": SHAPES,
-    **dict.fromkeys(SHAPES, tuple(PARTS)),
-}  # fmt: skip
-MJCF_HELD = {tag: (*inner, "geom") if tag in ("default", "worldbody", "body", "frame") else inner
-             for tag, inner in mjcf.HELD.items()}  # fmt: skip
-
 
 class Solid(NamedTuple):
     """A solid in a frame: a kind of SHAPES, its pose, and its size in metres.
@@ -60,12 +50,12 @@ def read_solids(file: InputFile, fmt: str) -> list[Solid]:
 
 
 def _seen(
-    name: str, link: XmlNode, pose_of: Callable[[XmlNode], Rigid], numbers_of: Callable[[XmlNode], Iterable[float]]
+    name: str, link: Element, pose_of: Callable[[Element], Rigid], numbers_of: Callable[[Element], Iterable[float]]
 ) -> list[Solid]:
     """Return what a link shows; of one that shows meshes alone the simple shapes it collides with, if there are any."""
     visual, collision = (
         [Solid(name, shape.tag, tuple(numbers_of(shape)), pose_of(node))
-         for node in link.all(tag) for geometry in node.all("geometry") for shape in geometry.children]
+         for node in link.all(tag) for geometry in node.all("geometry") for shape in geometry.all(*SHAPES)]
         for tag in DRAWN
     )  # fmt: skip
     simple = [each for each in collision if each.kind != "mesh"]
@@ -73,30 +63,28 @@ def _seen(
 
 
 def _of_urdf(file: InputFile) -> Iterator[Solid]:
-    xml = XmlFile(file)
-
-    def pose(node: XmlNode) -> Rigid:
+    def pose(node: Element) -> Rigid:
         origin = node.first("origin")
         if origin is None:
             return IDENTITY
-        x, y, z = xml.numbers(origin.element, "xyz", 3, "0 0 0")
-        roll, pitch, yaw = xml.numbers(origin.element, "rpy", 3, "0 0 0")
+        x, y, z = origin.numbers(3, "xyz", "0 0 0")
+        roll, pitch, yaw = origin.numbers(3, "rpy", "0 0 0")
         return x, y, z, *euler.to_quaternion(roll, pitch, yaw, "sxyz", floats)
 
-    def numbers(shape: XmlNode) -> Iterator[float]:
+    def numbers(shape: Element) -> Iterator[float]:
         for part, count in PARTS.items():
-            if part in shape.element.attributes:
-                yield from xml.numbers(shape.element, part, count)
+            if part in shape.attributes:
+                yield from shape.numbers(count, part)
 
-    for link in read_nodes(xml, URDF_HELD, texts=False).children:
+    for link in read_xml(file, "robot").all("link"):
         yield from _seen(link.attribute("name").lstrip("/"), link, pose, numbers)
 
 
 def _of_sdf(file: InputFile) -> Iterator[Solid]:
-    frames = sdf.SdfFrames(read_nodes(XmlFile(file), SDF_HELD), Options(Diagnostics(), Topics()))
+    frames = sdf.SdfFrames(read_xml(file, "sdf"), Options(Diagnostics(), Topics()))
 
-    def numbers(shape: XmlNode) -> Iterator[float]:
-        for part in shape.children:
+    def numbers(shape: Element) -> Iterator[float]:
+        for part in shape.all(*PARTS):
             yield from part.numbers(PARTS[part.tag])
 
     for frame in frames.all.values():
@@ -107,11 +95,11 @@ def _of_sdf(file: InputFile) -> Iterator[Solid]:
 class _Geoms(mjcf.MjcfModel):
     """A model of MuJoCo, read for its geoms."""
 
-    def __init__(self, root: XmlNode) -> None:
+    def __init__(self, root: Element) -> None:
         self.solids: list[Solid] = []
         super().__init__(root, Options(Diagnostics(), Topics()))
 
-    def _take(self, node: XmlNode, inside: _Inside) -> _Inside | None:
+    def _take(self, node: Element, inside: _Inside) -> _Inside | None:
         if node.tag != "geom":
             return super()._take(node, inside)
         attributes = self.classes.attributes(node, inside.around)
@@ -131,4 +119,4 @@ class _Geoms(mjcf.MjcfModel):
 
 
 def _of_mjcf(file: InputFile) -> Iterator[Solid]:
-    yield from _Geoms(read_nodes(XmlFile(file), MJCF_HELD)).solids
+    yield from _Geoms(read_xml(file, "mujoco")).solids

@@ -15,8 +15,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.documents.source import UTF16, InputFile, paused_collector
-from frametool.documents.xml import Element, XmlFile, XmlNode, read_nodes
+from frametool.documents.source import InputFile, paused_collector
+from frametool.documents.xml import Element, read_xml
 from frametool.errors import BadTopology, FormatError, ValueInvalid, alternatives, bare, first_of, listing, shown
 from frametool.formats.load import FrameFile, refuse_unknown_joints
 from frametool.formats.robots.joints import JointState
@@ -34,7 +34,7 @@ from frametool.grammar.result import Style, rotation_numbers
 from frametool.grammar.rotation_spelling import TURN, agreeing_rotation
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
     from os import PathLike
 
     from frametool.frames.lookups import Frames
@@ -44,11 +44,7 @@ if TYPE_CHECKING:
 KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
 LIMITED = ("revolute", "prismatic")
-HELD = {
-    "robot": ("link", "joint"),
-    "link": ("link", "joint"),
-    "joint": ("origin", "parent", "child", "axis", "limit", "mimic"),
-}
+PARTS = ("origin", "parent", "child", "axis", "limit", "mimic")
 _XACRO = f"xacro, not yet URDF; {UNSUPPORTED['xacro'].remedy}"
 
 
@@ -79,150 +75,134 @@ def describe(file: InputFile, options: Options) -> RobotDescription:
 
     Raises FormatError if it is not URDF; errors in one joint go to `options.report`.
     """
-    xml = XmlFile(file)
-    # few files have xacro, whose expressions would have to be searched for in every attribute
-    if b"$" in xml.data or b"xacro" in xml.data or xml.data.startswith(UTF16):
-        for element in xml.elements(deepest=3, ends=False):
-            _refuse_xacro(xml, element)
-    reader = _Reader(xml, options)
-    for node in read_nodes(xml, HELD, "URDF", texts=False).children:
+    root = read_xml(file, "robot", "URDF")
+    _refuse_xacro(root)
+    frames: dict[str, int] = {}
+    joints: dict[str, tuple[Link, Element]] = {}
+    for element in root.all("link", "joint"):
         try:
-            reader.take(node)
+            if element.tag == "link":
+                _take_frame(element, frames, options)
+            else:
+                link = _link(element, joints, options)
+                joints[element.attributes["name"]] = link, element
         except FormatError as error:
             options.report(error)
-    links = list(reader.connected())
-    robot = RobotDescription(reader.frames, links, JointState.of(links, options, file.name))
-    if not robot.frames:
+    links = list(_connected(joints, frames, options))
+    robot = RobotDescription(frames, links, JointState.of(links, options, file.name))
+    if not frames:
         raise FormatError("no links in it", source=file.name)
     if len(roots := robot.roots) > 1:
         named = first_of(roots, 5, quote=bare)
         message = f"{len(roots)} roots, where a robot has one: {named}; they are not connected"
-        options.tally.note(message, robot.frames[roots[1]], "several-roots")
+        options.tally.note(message, frames[roots[1]], "several-roots")
     return robot
 
 
-def _refuse_xacro(xml: XmlFile, element: Element) -> None:
+def _refuse_xacro(root: Element) -> None:
     """Refuse elements and expressions that xacro would have to expand first."""
-    if element.tag.startswith("xacro:"):
-        raise xml.error(element, f"<{bare(element.tag)}> is {_XACRO}")
-    for name, value in element.attributes.items():
-        if "${" in value or "$(" in value:
-            raise xml.error(element, f"{shown(value)} is {_XACRO}", name)
+    for element in (root, *root.children, *(inner for outer in root.children for inner in outer.children)):
+        if element.tag.startswith("xacro:"):
+            raise element.error(f"<{bare(element.tag)}> is {_XACRO}")
+        for name, value in element.attributes.items():
+            if "$" in value and ("${" in value or "$(" in value):
+                raise element.error(f"{shown(value)} is {_XACRO}", name)
 
 
-class _Reader:
-    """Read links and joints one by one."""
+def _take_frame(element: Element, frames: dict[str, int], options: Options) -> None:
+    """Read a link; raises FormatError."""
+    for inner in element.all("link", "joint"):
+        raise inner.error(f"<{inner.tag}> inside a <link>; links and joints are siblings in <robot>")
+    name = options.tally.names.bare(element.required("name"))
+    if name in frames:
+        raise element.error(f"link {shown(name)} twice; first in line {frames[name]}", "name")
+    frames[name] = element.line
 
-    def __init__(self, xml: XmlFile, options: Options) -> None:
-        self.xml, self.options = xml, options
-        self.frames: dict[str, int] = {}
-        self.joints: dict[str, tuple[Link, Element]] = {}
 
-    def take(self, node: XmlNode) -> None:
-        """Read one link or joint; raises FormatError."""
-        if node.tag == "link":
-            self._frame(node)
-            return
-        parts: dict[str, Element] = {}
-        for part in node.children:
-            if parts.setdefault(part.tag, part.element) is not part.element:
-                self.options.report(self.xml.error(part.element, f"<{part.tag}> twice in one joint"))
-        self._link(node.element, parts)
+def _link(element: Element, joints: Mapping[str, tuple[Link, Element]], options: Options) -> Link:
+    """Read one joint; raises FormatError."""
+    parts: dict[str, Element] = {}
+    for part in element.all(*PARTS):
+        if parts.setdefault(part.tag, part) is not part:
+            options.report(part.error(f"<{part.tag}> twice in one joint"))
+    name, kind = element.required("name"), element.required("type")
+    if name in joints:
+        raise element.error(f"joint {shown(name)} twice; first in line {joints[name][1].line}", "name")
+    if kind not in KINDS:
+        message = f"joint {shown(name)} has the type {shown(kind)}{alternatives(kind, KINDS, 'types')}"
+        raise element.error(message, "type")
+    if "parent" not in parts or "child" not in parts:
+        raise element.error(f"joint {shown(name)} has no <{'child' if 'parent' in parts else 'parent'}>")
+    parent, child = (options.tally.names.bare(parts[end].required("link")) for end in ("parent", "child"))
+    origin = _origin(parts["origin"], options) if "origin" in parts else IDENTITY
+    moving = () if kind == "fixed" else (_moving(name, kind, element.line, parts, options),)
+    return Link(parent, child, origin, moving, element.line, fixed="" if moving else name)
 
-    def _frame(self, node: XmlNode) -> None:
-        for inner in node.children:
-            message = f"<{inner.tag}> inside a <link>; links and joints are siblings in <robot>"
-            raise self.xml.error(inner.element, message)
-        name = self._bare(node.element, "name")
-        if name in self.frames:
-            raise self.xml.error(node.element, f"link {shown(name)} twice; first in line {self.frames[name]}", "name")
-        self.frames[name] = node.element.line
 
-    def _bare(self, element: Element, attribute: str) -> str:
-        """Return the name of a frame without its leading slash."""
-        return self.options.tally.names.bare(self.xml.required(element, attribute))
+def _origin(element: Element, options: Options) -> Rigid:
+    """Read the pose of a joint in its parent: rpy, or a quaternion."""
+    x, y, z = element.numbers(3, "xyz", "0 0 0")
+    roll, pitch, yaw = element.numbers(3, "rpy", "0 0 0")
+    rotation = IDENTITY[3:]
+    if beyond := next((each for each in (roll, pitch, yaw) if abs(each) > TURN), None):
+        options.tally.note(f"rpy {beyond:g} is more than a full turn in radians; degrees?", element.line, "degrees")
+    if roll or pitch or yaw:
+        rotation = euler.to_quaternion(roll, pitch, yaw, "sxyz", floats)
+    if "quat_xyzw" not in element.attributes:
+        return x, y, z, *rotation
+    element.numbers(4, "quat_xyzw")
+    texts = element.attributes["quat_xyzw"].split()
+    exact = read_quaternion(element, texts, options, "quat_xyzw")  # more digits than angles
+    if "rpy" in element.attributes:
+        try:
+            agreeing_rotation(exact, rotation)
+        except ValueInvalid as error:
+            raise element.error(str(error), "quat_xyzw", rule=error.rule) from None
+    return x, y, z, *exact
 
-    def _link(self, element: Element, parts: dict[str, Element]) -> None:
-        """Read one joint from its child elements."""
-        name, kind = self.xml.required(element, "name"), self.xml.required(element, "type")
-        if name in self.joints:
-            line = self.joints[name][1].line
-            raise self.xml.error(element, f"joint {shown(name)} twice; first in line {line}", "name")
-        if kind not in KINDS:
-            message = f"joint {shown(name)} has the type {shown(kind)}{alternatives(kind, KINDS, 'types')}"
-            raise self.xml.error(element, message, "type")
-        if "parent" not in parts or "child" not in parts:
-            missing = "child" if "parent" in parts else "parent"
-            raise self.xml.error(element, f"joint {shown(name)} has no <{missing}>")
-        parent, child = self._bare(parts["parent"], "link"), self._bare(parts["child"], "link")
-        origin = self._origin(parts["origin"]) if "origin" in parts else IDENTITY
-        joints = () if kind == "fixed" else (self._joint(name, kind, element, parts),)
-        link = Link(parent, child, origin, joints, element.line, fixed="" if joints else name)
-        self.joints[name] = link, element
 
-    def _origin(self, element: Element) -> Rigid:
-        """Read the pose of a joint in its parent: rpy, or a quaternion."""
-        numbers = self.xml.numbers
-        x, y, z = numbers(element, "xyz", 3, "0 0 0")
-        roll, pitch, yaw = numbers(element, "rpy", 3, "0 0 0")
-        rotation = IDENTITY[3:]
-        if beyond := next((each for each in (roll, pitch, yaw) if abs(each) > TURN), None):
-            message = f"rpy {beyond:g} is more than a full turn in radians; degrees?"
-            self.options.tally.note(message, element.line, "degrees")
-        if roll or pitch or yaw:
-            rotation = euler.to_quaternion(roll, pitch, yaw, "sxyz", floats)
-        if "quat_xyzw" not in element.attributes:
-            return x, y, z, *rotation
-        numbers(element, "quat_xyzw", 4)
-        texts = element.attributes["quat_xyzw"].split()
-        exact = read_quaternion(self.xml, element, texts, self.options, "quat_xyzw")  # more digits than angles
-        if "rpy" in element.attributes:
-            try:
-                agreeing_rotation(exact, rotation)
-            except ValueInvalid as error:
-                raise self.xml.error(element, str(error), "quat_xyzw", rule=error.rule) from None
-        return x, y, z, *exact
-
-    def _joint(self, name: str, kind: str, element: Element, parts: dict[str, Element]) -> Joint:
-        """Read axis, limits, and the joint to mimic."""
-        axis = self._axis(name, parts["axis"]) if "axis" in parts and kind in WITH_AXIS else (1.0, 0.0, 0.0)
-        lower, upper = self._limits(name, parts["limit"]) if "limit" in parts and kind in LIMITED else (None, None)
-        mimic = self._mimic(name, kind, parts["mimic"]) if "mimic" in parts else None
-        return Joint(name, kind, axis, lower, upper, mimic, line=element.line)
-
-    def _axis(self, name: str, element: Element) -> Vector:
-        x, y, z = self.xml.numbers(element, "xyz", 3, "1 0 0")
-        if not (x or y or z):
-            raise self.xml.error(element, f"joint {shown(name)} has the axis 0 0 0, which is not a direction", "xyz")
-        return (x, y, z) if x * x + y * y + z * z == 1.0 else unit_vector(x, y, z, floats)
-
-    def _limits(self, name: str, element: Element) -> tuple[float | None, float | None]:
-        """Read lower and upper; a missing one is 0, and no limits are None."""
-        if not ("lower" in element.attributes or "upper" in element.attributes):
-            return None, None
-        (lower,), (upper,) = self.xml.numbers(element, "lower", 1, "0"), self.xml.numbers(element, "upper", 1, "0")
-        if lower > upper:
-            message = f"joint {shown(name)} has the limits {lower:g} .. {upper:g}, which nothing fits"
-            self.options.tally.note(message, element.line, "limit")
-        return lower, upper
-
-    def _mimic(self, name: str, kind: str, element: Element) -> Mimic:
-        leader = self.xml.required(element, "joint")
+def _moving(name: str, kind: str, line: int, parts: Mapping[str, Element], options: Options) -> Joint:
+    """Read axis, limits, and the joint to mimic."""
+    axis = _axis(name, parts["axis"]) if "axis" in parts and kind in WITH_AXIS else (1.0, 0.0, 0.0)
+    lower, upper = _limits(name, parts["limit"], options) if "limit" in parts and kind in LIMITED else (None, None)
+    mimic = None
+    if follows := parts.get("mimic"):
+        leader = follows.required("joint")
         if kind in ("planar", "floating"):
-            raise self.xml.error(element, f"joint {shown(name)} is {kind}: it follows no other")
-        (multiplier,) = self.xml.numbers(element, "multiplier", 1, "1")
-        (offset,) = self.xml.numbers(element, "offset", 1, "0")
-        return Mimic(leader, multiplier, offset)
+            raise follows.error(f"joint {shown(name)} is {kind}: it follows no other")
+        mimic = Mimic(leader, *follows.numbers(1, "multiplier", "1"), *follows.numbers(1, "offset", "0"))
+    return Joint(name, kind, axis, lower, upper, mimic, line=line)
 
-    def connected(self) -> Iterator[Link]:
-        """Yield the links whose ends exist."""
-        for name, (link, element) in self.joints.items():
-            missing = next((end for end in (link.parent, link.child) if end and end not in self.frames), None)
-            if missing is None:
-                yield link
-                continue
-            message = f"joint {shown(name)}: no link {shown(missing)}{alternatives(missing, self.frames, 'links')}"
-            self.options.report(self.xml.error(element, message))
+
+def _axis(name: str, element: Element) -> Vector:
+    x, y, z = element.numbers(3, "xyz", "1 0 0")
+    if not (x or y or z):
+        raise element.error(f"joint {shown(name)} has the axis 0 0 0, which is not a direction", "xyz")
+    return (x, y, z) if x * x + y * y + z * z == 1.0 else unit_vector(x, y, z, floats)
+
+
+def _limits(name: str, element: Element, options: Options) -> tuple[float | None, float | None]:
+    """Read lower and upper; a missing one is 0, and no limits are None."""
+    if not ("lower" in element.attributes or "upper" in element.attributes):
+        return None, None
+    (lower,), (upper,) = element.numbers(1, "lower", "0"), element.numbers(1, "upper", "0")
+    if lower > upper:
+        message = f"joint {shown(name)} has the limits {lower:g} .. {upper:g}, which nothing fits"
+        options.tally.note(message, element.line, "limit")
+    return lower, upper
+
+
+def _connected(
+    joints: Mapping[str, tuple[Link, Element]], frames: Collection[str], options: Options
+) -> Iterator[Link]:
+    """Yield the links whose ends exist."""
+    for name, (link, element) in joints.items():
+        missing = next((end for end in (link.parent, link.child) if end and end not in frames), None)
+        if missing is None:
+            yield link
+        else:
+            message = f"joint {shown(name)}: no link {shown(missing)}{alternatives(missing, frames, 'links')}"
+            options.report(element.error(message))
 
 
 def load_robot(path: str | PathLike[str]) -> Robot:

@@ -15,7 +15,7 @@ import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import format_error, locate_many, parse_documents
-from frametool.documents.xml import XmlFile
+from frametool.documents.xml import Element, read_xml
 from frametool.errors import ValueInvalid, shown
 from frametool.formats.detect import Beginning
 from frametool.grammar.readers import Misfit, kind
@@ -132,24 +132,17 @@ def _open_conditions(action: Action) -> list[str]:
 
 
 def _of_xml(file: InputFile) -> Iterator[Action]:
-    """Yield the actions of XML."""
-    xml = XmlFile(file)
-    groups: list[tuple[int, list[str]]] = []  # enclosing groups: their depth, their conditions
-    for element in xml.elements():
-        if element.depth == 1 and element.tag != "launch":
-            raise xml.error(element, f"expected <launch>, found <{element.tag}>")
-        if element.ends:
-            if groups and groups[-1][0] == element.depth:
-                groups.pop()
-            continue
-        own = _conditions(element.attributes)
-        if element.tag == "group":
-            groups.append((element.depth, own))
-            continue
-        action = Action(element.tag, element.attributes, [each for _, group in groups for each in group] + own)
+    """Yield the actions of XML, each under the conditions of the groups around it."""
+    pending: list[tuple[Element, list[str]]] = [(read_xml(file, "launch"), [])]
+    while pending:
+        element, groups = pending.pop()
+        conditions = groups + _conditions(element.attributes)
+        action = Action(element.tag, element.attributes, conditions)
         if _is_reported(action):
-            line, column = xml.place(element, _key(action))
+            line, column = element.place(_key(action))
             yield action._replace(line=line, column=column)
+        inner = conditions if element.tag == "group" else groups
+        pending += [(child, inner) for child in reversed(element.children)]
 
 
 def _of_yaml(source: Source) -> Iterator[Action]:

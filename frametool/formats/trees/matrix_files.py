@@ -20,7 +20,7 @@ import os
 import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.documents.xml import Element, XmlFile
+from frametool.documents.xml import Element, read_xml
 from frametool.documents.yaml import TAG
 from frametool.documents.yaml_writer import flow, quoted
 from frametool.errors import FormatError, ValueInvalid, bare, first_of, listing, shown, warn
@@ -250,16 +250,15 @@ def _blocks(entries: dict[str, Any], name: str, path: Path) -> Iterator[MatrixBl
 
 def _read_xml(file: InputFile, options: Options, take: Any) -> Iterator[Edge]:
     """Read OpenCV's XML."""
-    xml = XmlFile(file)
     try:
-        stored = StoredXml(xml)
-        reading = Reading(xml.source, normalize=options.normalize)
+        stored = StoredXml(read_xml(file))
+        reading = Reading(stored.root.source, normalize=options.normalize)
         reading.bare_numbers = True
         for edge in take(stored.value, reading):
             yield edge._replace(path=(), line=stored.element(edge.path).line)
         remember(reading.notes, [stored.element(note.path).line for note in reading.notes], options.tally)
     except Misfit as misfit:
-        error = xml.error(stored.element(misfit.path), str(misfit), rule=misfit.rule)
+        error = stored.element(misfit.path).error(str(misfit), rule=misfit.rule)
         if isinstance(misfit, Unclear):
             raise answerable(error) from None
         options.report(error)
@@ -270,34 +269,30 @@ def _read_xml(file: InputFile, options: Options, take: Any) -> Iterator[Edge]:
 class StoredXml:
     """The `<opencv_storage>` as one document: its value, and the element at which each path begins."""
 
-    def __init__(self, xml: XmlFile) -> None:
-        """Read the whole text; raises FormatError."""
-        self.xml = xml
-        elements = iter(xml.elements())
-        self._elements: dict[Path, Element] = {(): next(elements)}
-        inside = self._inside(elements, ())
-        self.value: dict[str, Any] = inside if type(inside) is dict else {}
+    def __init__(self, root: Element) -> None:
+        """Convert all elements; raises FormatError."""
+        self.root = root
+        self._elements: dict[Path, Element] = {}
+        found = self._inside(root, ())
+        self.value: dict[str, Any] = found if type(found) is dict else {}
 
     def element(self, path: Path) -> Element:
         """Return the element of a path, or the nearest enclosing one."""
         return next(self._elements[path[:end]] for end in range(len(path), -1, -1) if path[:end] in self._elements)
 
-    def _inside(self, elements: Iterator[Element], path: Path) -> Any:
-        """Return the contents of an element up to its end: a map, a list of `_`, the words of a matrix, or a text."""
+    def _inside(self, outer: Element, path: Path) -> Any:
+        """Return the contents of an element: a map, a list of `_`, the words of a matrix, or a text."""
+        if len(path) >= DEEPEST:
+            raise outer.error(f"more than {DEEPEST} elements inside one another")
+        self._elements[path] = outer
         found: dict[str | int, Any] = {}
-        for element in elements:
-            if element.ends:
-                text = element.text.strip()
-                plain = text.split() if element.tag == "data" else text.strip('"')
-                return ([*found.values()] if 0 in found else found) or plain
-            if element.depth > DEEPEST:
-                raise self.xml.error(element, f"more than {DEEPEST} elements inside one another")
+        for element in outer.children:
             key = len(found) if element.tag == "_" else element.tag
             if key in found:
-                raise self.xml.error(element, f"key {element.tag!r} appears twice")
-            self._elements[*path, key] = element
-            found[key] = self._inside(elements, (*path, key))
-        return found
+                raise element.error(f"key {element.tag!r} appears twice")
+            found[key] = self._inside(element, (*path, key))
+        plain = outer.text.split() if outer.tag == "data" else outer.text.strip('"')
+        return ([*found.values()] if 0 in found else found) or plain
 
 
 def write_tree(tree: Frames, style: Style) -> str:
