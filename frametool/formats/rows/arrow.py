@@ -171,54 +171,34 @@ NEW_GROUP = 1 << 20  # rows of a group if the input has none
 HEADROOM, LEAST_ROOM = 3, 1 << 26  # memory for writing a group: this multiple of its size, and these additional bytes
 NULLS = True  # its columns may hold nulls
 AT_ONCE = 1 << 16  # rows of a batch: results stay near the cache
+CODECS = {b"\x04\x22\x4d\x18": "lz4", b"\x28\xb5\x2f\xfd": "zstd"}  # of Arrow's batches, by their magic numbers
+BUFFER = 1 << 20  # bytes of a column of Parquet that are read at once
+SIZES = {"INT32": 4, "FLOAT": 4, "INT64": 8, "DOUBLE": 8}  # bytes of an uncompressed number
+DICTIONARIES = {"PLAIN_DICTIONARY", "RLE_DICTIONARY"}
+OWN_SCHEMA = b"ARROW:schema"
+OLD_LIST = ".list.item"  # the name of lists before the standard's `.list.element`
 
 
 class ArrowFile(column_file.ColumnFile):
     """An opened file: its schema is read, its rows are not."""
 
     gaps = False
-    source: Any  # pyarrow's source
 
     def __init__(self, file: InputFile, fmt: str) -> None:
         """Read the schema; raises FormatError."""
         self.name = file.name
         self.format = fmt
         with column_file.translated(self.name):
-            self.schema = self.opened(file)
+            codec = codec_in(file.head())
+            self.source = self._random_access(file)
+            self.reader: IpcReader | ParquetReader
+            self.reader = ParquetReader(self.source, file.name) if fmt == "parquet" else IpcReader(self.source, codec)
+            self.schema = self.reader.schema
             self.names: tuple[str, ...] | None = tuple(self.schema.names)
         self.width = len(self.schema.names)
         self.kinds = [kind_of(field.type) for field in self.schema]
 
-    def opened(self, file: InputFile) -> Any:
-        """Open the file and return its schema."""
-        raise NotImplementedError
-
-    def encoding(self) -> dict[str, Any]:
-        """Return the compression and encoding of the file, for the writer of the same format."""
-        raise NotImplementedError
-
-    def read(self) -> Iterator[ArrowBatch]:
-        """Yield the rows; raises FormatError if the file is broken."""
-        raise NotImplementedError
-
-    def batches(self) -> Iterator[ArrowBatch]:
-        """Yield the rows, and close the file; raises FormatError if it is broken."""
-        with self.source:  # a thread of pyarrow may hold it longer than its reader
-            for batch in self.read():
-                yield batch
-                batch.rows = None  # frees their group
-
-    def guarded(self, found: Iterator[Any]) -> Iterator[Any]:
-        """Yield the items that pyarrow reads; raises FormatError if the file is broken."""
-        while True:
-            with column_file.translated(self.name):
-                rows = next(found, None)
-            if rows is None:
-                return
-            yield rows
-            del rows  # before the next are read
-
-    def random_access(self, file: InputFile) -> Any:
+    def _random_access(self, file: InputFile) -> Any:
         """Return a source with random access; a pipe is first copied to an unnamed file."""
         pa = require_pyarrow(self.name)
         if file.path != "-" and os.path.isfile(file.path):
@@ -227,12 +207,113 @@ class ArrowFile(column_file.ColumnFile):
         stream.seek(0)
         return pa.PythonFile(stream, mode="r")
 
+    def batches(self) -> Iterator[ArrowBatch]:
+        """Yield the rows, and close the file; raises FormatError if it is broken."""
+        with self.source:  # a thread of pyarrow may hold it longer than its reader
+            found = self.reader.batches()
+            while True:
+                with column_file.translated(self.name):
+                    batch = next(found, None)
+                if batch is None:
+                    return
+                yield batch
+                batch.rows = None  # before the next are read
+
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> GroupWriter:
         """Return a writer with the same schema and compression; the output may be the other Arrow format."""
         del drops
-        fmt = style.format if style.format in WRITERS else self.format
-        same = WRITERS[fmt] is WRITERS[self.format]
-        return WRITERS[fmt](fmt, columns, self.schema, self.encoding() if same else {})
+        fmt = style.format if style.format in BEGINNINGS.values() else self.format
+        return GroupWriter(fmt, columns, self.schema, self.reader.encoding() if fmt == self.format else {})
+
+
+class IpcReader:
+    """Reads a file of Arrow: batches of rows, with a directory at its end (Feather)."""
+
+    def __init__(self, source: Any, codec: str | None) -> None:
+        """Read the schema."""
+        self.codec = codec
+        self.reader = require_pyarrow("Arrow", "ipc").open_file(source)
+        self.schema = self.reader.schema
+
+    def encoding(self) -> dict[str, Any]:
+        """Return the arguments of the writer for the same compression."""
+        return {"compression": self.codec}
+
+    def batches(self) -> Iterator[ArrowBatch]:
+        """Yield the rows."""
+        for group in range(self.reader.num_record_batches):
+            rows = self.reader.get_batch(group)
+            rows.validate(full=True)  # broken data would end the process later
+            for start in range(0, max(rows.num_rows, 1), AT_ONCE):
+                part = rows.slice(start, AT_ONCE)
+                yield ArrowBatch(part, bytes_of(part), ends_group=start + AT_ONCE >= rows.num_rows)
+            del rows, part  # before the next are read
+
+
+class ParquetReader:
+    """Reads a file of Parquet."""
+
+    def __init__(self, source: Any, name: str) -> None:
+        """Read the schema."""
+        self.name = name
+        parquet = require_pyarrow(name, "parquet")
+        self.file = parquet.ParquetFile(source, pre_buffer=False, buffer_size=BUFFER)
+        self.about = self.file.metadata
+        if self.about.num_row_groups:
+            next(self.file.iter_batches(1, [0]), None)  # raises for a damaged group, where reading it would abort
+        self.schema = self.file.schema_arrow
+
+    def batches(self) -> Iterator[ArrowBatch]:
+        """Yield the rows, group by group."""
+        groups = [self.about.row_group(at) for at in range(self.about.num_row_groups)]
+        if any(group.total_byte_size > sizes.GROUP for group in groups):
+            warn(f"{self.name}: groups of rows beyond {sizes.GROUP >> 20} MiB are written in parts")
+        for at, group in enumerate(groups):
+            left = group.num_rows
+            share = sum(group.column(place).total_compressed_size for place in range(group.num_columns)) / max(left, 1)
+            for rows in self.file.iter_batches(AT_ONCE, [at]) if left else [empty_rows(self.schema)]:
+                left -= rows.num_rows
+                yield ArrowBatch(rows, int(share * rows.num_rows), ends_group=left <= 0)
+                del rows  # before the next are read
+
+    def encoding(self) -> dict[str, Any]:
+        """Return the compression and encoding of the columns, as arguments of pyarrow's writer."""
+        if not self.about.num_row_groups:
+            return {}
+        group = self.about.row_group(0)
+        columns = [group.column(at) for at in range(group.num_columns)]
+        codecs = {column.path_in_schema: column.compression.replace("UNCOMPRESSED", "NONE") for column in columns}
+        return {
+            "compression": codecs,
+            "use_dictionary": [column.path_in_schema for column in columns if _repeats(column)],
+            "use_deprecated_int96_timestamps": any(column.physical_type == "INT96" for column in columns),
+            "use_compliant_nested_type": not any(OLD_LIST in column.path_in_schema for column in columns),
+            "store_schema": OWN_SCHEMA in (self.about.metadata or {}),
+        }
+
+
+def codec_in(data: bytes) -> str | None:
+    """Return the compression of the first batch of Arrow, by its magic number; None for none in these bytes."""
+    return next((codec for magic, codec in CODECS.items() if magic in data), None)
+
+
+def _repeats(column: Any) -> bool:
+    """Return True if a dictionary made a column smaller; for others trying costs time."""
+    plain = SIZES.get(column.physical_type, 0) * column.num_values
+    return not DICTIONARIES.isdisjoint(column.encodings) and not 0 < plain <= column.total_uncompressed_size
+
+
+def empty_rows(schema: Any) -> Any:
+    """Return a RecordBatch without rows."""
+    return require_pyarrow("Arrow").RecordBatch.from_pylist([], schema=schema)
+
+
+def bytes_of(rows: Any) -> int:
+    """Return the memory size of rows; pyarrow before 22 does not measure views of texts: an estimate."""
+    try:
+        return int(rows.nbytes)
+    except TypeError:
+        return 16 * int(rows.num_rows * rows.num_columns)
 
 
 class Collected(BytesIO):
@@ -257,27 +338,18 @@ class Collected(BytesIO):
 
 
 class GroupWriter:
-    """Collects rows until a group is complete; subclasses define the beginning of a file and the writing of a group."""
+    """Collects rows until a group is complete: one of Parquet, or a batch of Arrow."""
 
     def __init__(self, fmt: str, columns: Sequence[OutColumn], of_input: Any | None, how: dict[str, Any]) -> None:
         """Store the columns of the result, the schema of the input if it has one, and its encoding."""
         self.pa = require_pyarrow("Arrow")
         self.format, self.columns, self.how = fmt, columns, how
         self.sink = Collected()
-        self.file = self.pa.PythonFile(self.sink, mode="w")
         fields = [self._field(column, of_input) for column in columns]
         self.schema = self.pa.schema(fields, metadata=None if of_input is None else of_input.metadata)
         self.writer: Any = None
         self.waiting: list[Any] = []
         self.size = self.count = self.read = 0
-
-    def begin(self) -> Any:
-        """Return the writer for `file`; it can be closed."""
-        raise NotImplementedError
-
-    def write(self, table: Any) -> None:
-        """Write a group of rows."""
-        raise NotImplementedError
 
     def of_rows(self, batch: Any, rows: Ints | None, made: Sequence[Made]) -> bytes:
         """Return the bytes written once a group of rows is complete."""
@@ -331,189 +403,27 @@ class GroupWriter:
         return texts.cast(field.type)
 
     def _write_group(self) -> None:
-        """Write the collected rows; a group without rows is not written."""
+        """Write the collected rows; a group without rows is not written, unless the input has one."""
         table = self.pa.Table.from_batches(self.waiting, self.schema)
         np.empty(HEADROOM * self.size + LEAST_ROOM, np.uint8)  # raises MemoryError, while pyarrow would end the process
         if self.writer is None:
-            self.writer = self.begin()
+            self.writer = self._opened()
         if self.count or (self.waiting and not self.read):
-            self.write(table)
+            for batch in table.combine_chunks().to_batches() or [empty_rows(self.schema)]:
+                self.writer.write_batch(batch, *[max(batch.num_rows, 1)] * (self.format == "parquet"))
         self.waiting, self.size, self.count, self.read = [], 0, 0, 0
 
-
-# --- Arrow IPC: batches as a file with a directory at its end (Feather) ---
-
-CODECS = {b"\x04\x22\x4d\x18": "lz4", b"\x28\xb5\x2f\xfd": "zstd"}
-
-
-class IpcFile(ArrowFile):
-    """A file of Arrow."""
-
-    def opened(self, file: InputFile) -> Any:
-        """Open the file and return its schema."""
-        ipc = require_pyarrow(self.name, "ipc")
-        self.codec = codec_in(file.head())
-        self.source = self.random_access(file)
-        self.reader = ipc.open_file(self.source)
-        return self.reader.schema
-
-    def encoding(self) -> dict[str, Any]:
-        """Return the codec of the batches."""
-        return {"compression": self.codec}
-
-    def _records(self) -> Iterator[Any]:
-        """Yield the batches of the file."""
-        for rows in map(self.reader.get_batch, range(self.reader.num_record_batches)):
-            rows.validate(full=True)  # broken data would end the process later
-            yield rows
-            del rows
-
-    def read(self) -> Iterator[ArrowBatch]:
-        """Yield the rows; raises FormatError where the file is broken."""
-        for rows in self.guarded(self._records()):
-            for start in range(0, max(rows.num_rows, 1), AT_ONCE):
-                part = rows.slice(start, AT_ONCE)
-                yield ArrowBatch(part, bytes_of(part), ends_group=start + AT_ONCE >= rows.num_rows)
-            del rows, part  # before the next are read
-
-
-def bytes_of(rows: Any) -> int:
-    """Return the memory size of rows; pyarrow before 22 does not measure views of texts: an estimate."""
-    try:
-        return int(rows.nbytes)
-    except TypeError:
-        return 16 * int(rows.num_rows * rows.num_columns)
-
-
-def codec_in(data: bytes) -> str | None:
-    """Return the compression of the first batch of rows, if it is within the first bytes, by its magic number."""
-    return next((codec for magic, codec in CODECS.items() if magic in data), None)
-
-
-class IpcWriter(GroupWriter):
-    """Write each group of rows as one batch."""
-
-    def begin(self) -> Any:
-        """Return the writer of a file."""
-        ipc = require_pyarrow("Arrow", "ipc")
-        return ipc.new_file(self.file, self.schema, options=ipc.IpcWriteOptions(**self.how))
-
-    def write(self, table: Any) -> None:
-        """Write a batch."""
-        empty = self.pa.RecordBatch.from_pylist([], schema=self.schema)
-        for batch in table.combine_chunks().to_batches() or [empty]:
-            self.writer.write_batch(batch)
-
-
-# --- Parquet ---
-
-SMALL = 1 << 26  # bytes of a group that may be in memory together with another one
-BUFFER = 1 << 20  # bytes read at once of a group that is not in memory
-SIZES = {"INT32": 4, "FLOAT": 4, "INT64": 8, "DOUBLE": 8}  # bytes of an uncompressed number
-DICTIONARIES = {"PLAIN_DICTIONARY", "RLE_DICTIONARY"}
-OWN_SCHEMA = b"ARROW:schema"
-OLD_LIST = ".list.item"  # the name of lists before the standard's `.list.element`
-
-
-class ParquetFile(ArrowFile):
-    """A file of Parquet."""
-
-    def opened(self, file: InputFile) -> Any:
-        """Open the file and return its schema."""
-        self.source = self.random_access(file)
-        self.file = require_pyarrow(self.name, "parquet").ParquetFile(self.source, pre_buffer=False)
-        self.about = self.file.metadata
-        self.warned = False
-        if self.about.num_row_groups:
-            next(self._rows_of(0, 1), None)  # raises an exception for a damaged group, where reading it would abort
-        return self.file.schema_arrow
-
-    def read(self) -> Iterator[ArrowBatch]:
-        """Yield the rows, group by group; while a small one is processed, the next is read."""
-        from concurrent.futures import ThreadPoolExecutor
-
-        count = self.about.num_row_groups
-        following = None
-        with ThreadPoolExecutor(1) as ahead:
-            for group in range(count):
-                table = self._table(group) if following is None else following.result()
-                is_small = self.about.row_group(group).total_byte_size <= SMALL
-                following = ahead.submit(self._table, group + 1) if is_small and group + 1 < count else None
-                yield from self._of_group(group, table)
-                table = None  # before the next is read
-
-    def _table(self, group: int) -> Any:
-        """Read a whole group; None for one that is too large for memory."""
-        if self.about.row_group(group).total_byte_size > sizes.GROUP:
-            return None
-        with column_file.translated(self.name):
-            return self.file.read_row_group(group)
-
-    def _of_group(self, group: int, table: Any) -> Iterator[ArrowBatch]:
-        """Yield the batches of a group, from memory or, if it is too large, as they are read."""
-        about = self.about.row_group(group)
-        left = about.num_rows
-        packed = sum(about.column(at).total_compressed_size for at in range(about.num_columns))
-        share = packed / max(left, 1)
-        if table is not None:
-            empty = require_pyarrow("Arrow").RecordBatch.from_pylist([], schema=self.schema)
-            parts = iter(table.to_batches(max_chunksize=AT_ONCE) or [empty])
-        else:
-            parts = self.guarded(self._rows_of(group, AT_ONCE))
-            if not self.warned:
-                warn(f"{self.name}: groups of rows beyond {sizes.GROUP >> 20} MiB are written in parts")
-            self.warned = True
-        for rows in parts:
-            left -= rows.num_rows
-            yield ArrowBatch(rows, int(share * rows.num_rows), ends_group=left <= 0)
-
-    def _rows_of(self, group: int, count: int) -> Iterator[Any]:
-        """Return an iterator that reads this many rows of a group at a time."""
-        parquet = require_pyarrow(self.name, "parquet")
-        file = parquet.ParquetFile(self.source, metadata=self.about, buffer_size=BUFFER, pre_buffer=False)
-        found: Iterator[Any] = file.iter_batches(batch_size=count, row_groups=[group])
-        return found
-
-    def encoding(self) -> dict[str, Any]:
-        """Return the compression and encoding of the columns, as arguments of pyarrow's writer."""
-        if not self.about.num_row_groups:
-            return {}
-        group = self.about.row_group(0)
-        columns = [group.column(at) for at in range(group.num_columns)]
-        codecs = {column.path_in_schema: column.compression.replace("UNCOMPRESSED", "NONE") for column in columns}
-        return {
-            "compression": codecs,
-            "use_dictionary": [column.path_in_schema for column in columns if _repeats(column)],
-            "use_deprecated_int96_timestamps": any(column.physical_type == "INT96" for column in columns),
-            "use_compliant_nested_type": not any(OLD_LIST in column.path_in_schema for column in columns),
-            "store_schema": OWN_SCHEMA in (self.about.metadata or {}),
-        }
-
-
-def _repeats(column: Any) -> bool:
-    """Return True if a dictionary made a column smaller; for others trying costs time."""
-    plain = SIZES.get(column.physical_type, 0) * column.num_values
-    return not DICTIONARIES.isdisjoint(column.encodings) and not 0 < plain <= column.total_uncompressed_size
-
-
-class ParquetWriter(GroupWriter):
-    """Write groups of rows."""
-
-    def begin(self) -> Any:
-        """Return the writer of a file; new columns are compressed as most columns of the input."""
-        how, codecs = self.how, self.how.get("compression")
-        if codecs:
+    def _opened(self) -> Any:
+        """Return pyarrow's writer; in Parquet new columns are compressed as most columns of the input."""
+        file = self.pa.PythonFile(self.sink, mode="w")
+        if self.format == "arrow":
+            ipc = require_pyarrow("Arrow", "ipc")
+            return ipc.new_file(file, self.schema, options=ipc.IpcWriteOptions(**self.how))
+        how = self.how
+        if codecs := how.get("compression"):
             usual = Counter(codecs.values()).most_common(1)[0][0]
-            missing = [field.name for field in self.schema if field.name not in codecs]
-            how = {**how, "compression": {**dict.fromkeys(missing, usual), **codecs}}
-        return require_pyarrow("Parquet", "parquet").ParquetWriter(self.file, self.schema, **how)
-
-    def write(self, table: Any) -> None:
-        """Write a group."""
-        self.writer.write_table(table, row_group_size=max(table.num_rows, 1))
-
-
-WRITERS: dict[str, type[GroupWriter]] = {"parquet": ParquetWriter, "arrow": IpcWriter}
+            how = {**how, "compression": {field.name: usual for field in self.schema} | codecs}
+        return require_pyarrow("Parquet", "parquet").ParquetWriter(file, self.schema, **how)
 
 
 def open_columns(file: InputFile, _options: Options) -> ArrowFile:
@@ -524,9 +434,9 @@ def open_columns(file: InputFile, _options: Options) -> ArrowFile:
     if not fmt:
         found = f"it begins with {shown(head[:8])}" if head else "it is empty"
         raise FormatError(f"neither Parquet (PAR1) nor Arrow (ARROW1): {found}", source=file.name)
-    return (ParquetFile if fmt == "parquet" else IpcFile)(file, fmt)
+    return ArrowFile(file, fmt)
 
 
 def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> GroupWriter:
     """Return a writer for new rows."""
-    return WRITERS[style.format](style.format, columns, None, {})
+    return GroupWriter(style.format, columns, None, {})
