@@ -313,3 +313,9 @@ def test_whole_numbers_in_a_column_of_stamps_are_seconds(run: Any) -> None:
     np.save(file, rows)
     done = run("convert", "-i", "rows.npy", "-f", "tum", "--quiet", files={"rows.npy": file.getvalue()})
     assert [line.split()[0] for line in done.out.splitlines()] == ["2.000000000", "3.000000000"]
+
+
+def test_names_that_are_not_ascii_are_written_and_read(use: Use) -> None:
+    made = loaded(use("convert", "--in", "csv", "-f", "npy", data="x,y,z,höhe\n1,2,3,4\n".encode()))
+    assert made.dtype.names == ("x", "y", "z", "höhe")
+    assert use("convert", "-f", "csv", data=npy(made)).out.startswith("x,y,z,höhe\n")

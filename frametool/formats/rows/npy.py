@@ -30,6 +30,7 @@ MOST_HEADER = 1 << 20
 MOST_COLUMNS, MOST_BYTES = 1 << 16, 1 << 24  # of a row
 LONGEST_TEXT = 64  # characters of a new name; numpy has fixed-size texts
 ALIGNED = 64  # bytes, as numpy pads its headers
+UTF8 = b"\x03"  # version of headers with names that are not ASCII
 
 
 def read_header(file: InputFile) -> tuple[Kind, tuple[int, ...], bool]:
@@ -37,7 +38,8 @@ def read_header(file: InputFile) -> tuple[Kind, tuple[int, ...], bool]:
     head = file.stream.read(len(MAGIC) + 4)
     if not head.startswith(MAGIC):
         raise FormatError("no NPY file: it does not begin with \\x93NUMPY", source=file.name)
-    is_long = head[len(MAGIC) : len(MAGIC) + 1] > b"\x01"
+    version = head[len(MAGIC) : len(MAGIC) + 1]
+    is_long = version > b"\x01"
     head += file.stream.read(2 * is_long)
     size = int.from_bytes(head[len(MAGIC) + 2 :], "little")
     if size > MOST_HEADER:
@@ -45,6 +47,8 @@ def read_header(file: InputFile) -> tuple[Kind, tuple[int, ...], bool]:
     read = npy.read_array_header_2_0 if is_long else npy.read_array_header_1_0
     with column_file.translated(file.name, "the header cannot be read: {}"):
         shape, by_columns, kind = read(BytesIO(head[len(MAGIC) + 2 :] + file.stream.read(size)), MOST_HEADER)
+        if version == UTF8 and kind.names is not None:
+            kind.names = tuple(name.encode("latin-1").decode() for name in kind.names)
     if min(shape, default=0) < 0:
         raise FormatError(f"the header has the shape {shape}", source=file.name)
     if kind.hasobject:
@@ -107,12 +111,12 @@ def _writer(
     def head(rows: int) -> bytes:
         """Return the header, padded as numpy does."""
         descr = npy.dtype_to_descr(element)
-        text = f"{{'descr': {descr!r}, 'fortran_order': False, 'shape': {(rows, *row_shape)!r}, }}"
-        long = len(text) + ALIGNED > 0xFFFF
-        before = len(MAGIC) + 2 + (4 if long else 2)
-        text += " " * (-(before + len(text) + 1) % ALIGNED) + "\n"
-        version = b"\x02\x00" if long else b"\x01\x00"
-        return MAGIC + version + struct.pack("<I" if long else "<H", len(text)) + text.encode("latin-1")
+        text = f"{{'descr': {descr!r}, 'fortran_order': False, 'shape': {(rows, *row_shape)!r}, }}".encode()
+        version = UTF8 if not text.isascii() else b"\x02" if len(text) + ALIGNED > 0xFFFF else b"\x01"
+        length = "<H" if version == b"\x01" else "<I"
+        before = len(MAGIC) + 2 + struct.calcsize(length)
+        text += b" " * (-(before + len(text) + 1) % ALIGNED) + b"\n"
+        return MAGIC + version + b"\0" + struct.pack(length, len(text)) + text
 
     return column_file.CountedWriter(partial(column_file.encode_records, columns, record), head, count)
 
