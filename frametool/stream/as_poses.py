@@ -19,7 +19,7 @@ from frametool.grammar.edges import Diagnostics, Options, Topics, stop
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.stream.column_stream import ColumnRows, move_along
 from frametool.stream.evaluate import Plan, Run, State
-from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote, notes_of
+from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote
 from frametool.stream.row_layout import POINT, POSE, Shape, Target
 from frametool.stream.row_poses import RowPoses, kept
 from frametool.stream.rows import Block, spans_of
@@ -239,9 +239,9 @@ class FormatConverter:
             pairs = [rename(*(row.names or (None, None))) for row in (written if own else written[:1])]
             parents, names = zip(*pairs, strict=True) if pairs else ((None,), (None,))
             stamps = None if own else block.stamps[0][done.rows]
-            poses = RowPoses(done.results, self._held(stamps, fmt), lines, parents, names, extras)
+            poses = RowPoses(done.results[done.rows], self._held(stamps, fmt), lines, parents, names, extras)
             found = sorted(faults + done.faults())
-            yield poses, Outcome(b"", found, len(each.rows) + len(faults), 0, notes=notes_of(done, block))
+            yield poses, Outcome(b"", found, len(each.rows) + len(faults), 0, notes=sorted(done.notes))
             faults.clear()
 
 

@@ -125,11 +125,11 @@ class ColumnRows(PlannedRows):
     def of_batch(self, batch: Batch) -> RowResults:
         """Return the results of a batch, and leave what is wrong with other rows in `faults`."""
         values, absent, bad = self._read(batch)
-        names, strays = self.naming.of_rows(batch.size, lambda place: coded_texts(batch.texts(place)))
+        frames, names, strays = self.naming.of_rows(batch.size, lambda place: coded_texts(batch.texts(place)))
         stamps, late = self._stamps(batch)
         block = Block(
             values, (), np.arange(batch.size), int, names=names, stamps=stamps, bad={**late, **strays, **bad},
-            gone=self._without_pose(absent),
+            gone=self._without_pose(absent), frames=[frames],
         )  # fmt: skip
         run = self.ran(block)
         self._round(run)
@@ -224,7 +224,7 @@ class ColumnRows(PlannedRows):
             with np.errstate(over="ignore"):
                 beyond = ~np.isfinite(run.results[:, number].astype(kind))
             if beyond.any():
-                run.refuse(run.rows[beyond].tolist(), f"the result is too large for {kind}")
+                run.refuse(beyond, f"the result is too large for {kind}")
 
 
 def _either(first: Flags | None, second: Flags | None) -> Flags | None:

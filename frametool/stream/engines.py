@@ -10,8 +10,7 @@ from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.formats.rows.arrow import in_one, is_floating, kind_of, nulls_of, require_pyarrow, stamps_of
 from frametool.geometry import arrays, quaternion, rigid
 from frametool.geometry.transform import Transform
-from frametool.stream.row_layout import POINT, POSE, VECTOR
-from frametool.stream.stamp_columns import NOWHERE
+from frametool.stream.row_layout import NOWHERE, POINT, POSE, VECTOR
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

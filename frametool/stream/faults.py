@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import starmap
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, FrametoolError, UnknownFrame, shown, warn
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
-
-    from frametool.stream.evaluate import Run
-    from frametool.stream.rows import Block
 
 STOP, SKIP, NULL = "stop", "skip", "null"
 ON_ERROR = (STOP, SKIP, NULL)
@@ -167,18 +163,6 @@ class BadRows:
             return fault.short
         self._has_listed = self._has_listed or bool(fault.short)
         return fault.reason
-
-
-def notes_of(run: Run, block: Block) -> list[RowNote]:
-    """Return what is worth telling about the rows of a block, by line."""
-    from frametool.geometry.representations import UPPER_ROWS
-    from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
-
-    notes = [*run.rounded, *starmap(run.note_of_degrees, run.doubted[:1])]
-    notes += [RowNote.of_lost_name(block.line_of(row), name) for row, name in block.names.lost]
-    if run.plan.shapes and run.plan.shapes[0].notation is UPPER_ROWS and run.off > PROJECTED_IN_SILENCE:
-        notes.append(RowNote(block.line_of(0), "projected", projection(run.off)))
-    return sorted(notes)
 
 
 class Outcome(NamedTuple):

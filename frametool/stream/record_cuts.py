@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import accumulate, chain, count
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from frametool.stream.record_text import RecordText, attempt, column_in
 from frametool.stream.rows import Block
 from frametool.stream.splice import quoted_name
 from frametool.stream.splitter import DOCUMENTS, LINES, Part
+from frametool.stream.stamp_columns import read_extra
 from frametool.stream.template import Template
 from frametool.text.cells import without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
@@ -199,8 +200,8 @@ class RecordCutter:
         return template
 
 
-def block_of(cut: Cut, data: Bytes, text: bytes) -> Block:
-    """Describe the records of one template as rows."""
+def block_of(cut: Cut, data: Bytes, text: bytes, request: Request) -> Block:
+    """Describe the records of one template as rows; request: that of their plan."""
     template = cut.template
     starts, ends = cut.starts + MARGIN, cut.ends + MARGIN
     parts = [Spans(data, starts[:, index], ends[:, index]) for index in range(starts.shape[1])]
@@ -214,13 +215,19 @@ def block_of(cut: Cut, data: Bytes, text: bytes) -> Block:
         start = int(starts[row, template.numbers[number]]) - MARGIN
         return text.count(b"\n", 0, start), str(column_in(text, start))
 
-    stamps = [tuple(without_quotes(parts[index]) for index in each) for each in template.stamps]
-    frames = [names_of(cut, at, text) for at in range(len(template.entries))]
-    sources = [[parent for parent, _ in each] for each in frames]
+    stamps, bad = list[Any](), dict[int, tuple[str, str]]()
+    column = request.timed.column if request.timed else request.extra_column or ""
+    for each in template.stamps:
+        found, late = read_extra([without_quotes(parts[index]) for index in each], request, column)
+        stamps.append(found)
+        bad = {**late, **bad}
+    named = [names_of(cut, at, text) for at in range(len(template.entries))]
+    frames = [[parent for parent, _ in each] for each in named]
     renamed = [piece for piece in template.pieces if isinstance(piece, Renamed)]
-    parts += [_renamed(template, piece, frames, len(starts)) for piece in renamed]
+    parts += [_renamed(template, piece, named, len(starts)) for piece in renamed]
     numbers = _numbers(template, data, starts, ends)
-    return Block(numbers, parts, cut.starts[:, -1], line_of, stamps=stamps, sources=sources, place_of=place_of)
+    places = cut.starts[:, -1]
+    return Block(numbers, parts, places, line_of, stamps=stamps, bad=bad, place_of=place_of, frames=frames)
 
 
 def names_of(cut: Cut, at: int, text: bytes) -> list[Names]:

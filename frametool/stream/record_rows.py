@@ -164,11 +164,12 @@ class RecordRows:
         if is_new:
             self._plans[template] = self._plan(template)
         plan, marked = self._plans[template]
-        run = Run(plan, block_of(cut, data, text), self.state)
+        run = Run(plan, block_of(cut, data, text, plan.request), self.state)
         tells = template.notes or template.own_notes or any(map(self.request.operation.carried, template.shapes))
-        left = {*([0] if is_new and tells else []), *(row for row, _, _ in run.doubted[:1] if not reported[DEGREES])}
+        left = {0} if is_new and tells else set()
+        left |= run.doubted if not reported[DEGREES] else set()
         left |= {*run.mended[:1]} if not reported[ROUNDED] else set()
-        left |= {*run.rows[run.locked != 0].tolist()} if marked else {*run.rows.tolist()}
+        left |= {*run.rows[run.locked[run.rows] != 0].tolist()} if marked else {*run.rows.tolist()}
         if self.style.format == "yaml":  # in which a null has lines of its own
             left |= {row for at, node in template.leaves if not node.quote for row in _nulls(cut, at, data)}
         stamps = []
@@ -187,7 +188,7 @@ class RecordRows:
             parents, names = ([pair[role] for pair in becomes] for role in (0, 1))
             times = stamps[at]
             batch = RecordBatch(
-                each, own, data, own.starts[:, 0] + at, run.results[good, first:last], parents, names,
+                each, own, data, own.starts[:, 0] + at, run.results[rows, first:last], parents, names,
                 None if times is None else times[rows],
             )  # fmt: skip
             batches.append(batch)

@@ -242,7 +242,8 @@ class RecordBlocks:
         _, state = self._bulk
         data, runs = framed(text), []
         for cut in cuts:
-            run = Run(plan_of(cut.template, self.request, yaml=self.fmt == "yaml"), block_of(cut, data, text), state)
+            plan = plan_of(cut.template, self.request, yaml=self.fmt == "yaml")
+            run = Run(plan, block_of(cut, data, text, plan.request), state)
             runs.append(run)
             for at, row in enumerate(run.reasons):
                 fault = Fault.of(run.block.line_of(row), *run.reasons[row])
@@ -250,7 +251,7 @@ class RecordBlocks:
                 line = text.count(b"\n", 0, part.start) if at < MOST_EXACT else 0
                 made = attempt(text, part, self.fmt, self.request, self.source, line) if at < MOST_EXACT else fault
                 self._alone(text, part, made if isinstance(made, Fault) else fault, line, found)
-            found.notes += [run.note_of_degrees(*each) for each in run.doubted[:1]] + run.rounded
+            found.notes += run.notes
             own = [*cut.template.notes, *cut.template.of_places]
             found.notes += [each._replace(line=run.block.line_of(0)) for each in own if len(cut.starts)]
         return runs

@@ -37,6 +37,7 @@ MOVERS: dict[str, Callable[..., Components]] = {  # by a pose, whose seven numbe
     ACCEL: lambda _x, _y, _z, *n: (*quaternion.rotate(*n[:7]), *quaternion.rotate(*n[:4], *n[7:])),
 }
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
+NOWHERE = (0.0, 0.0, 0.0, *IDENTITY)
 TURN = 6.283185307179586
 TO_DEGREES = 180.0 / 3.141592653589793
 AS_READ = "lat lon alt as read"  # of a point of ecef: of its row, for what is written of them again

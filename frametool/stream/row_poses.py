@@ -17,8 +17,7 @@ from frametool.documents.source import Verbatim
 from frametool.errors import ValueInvalid
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.result import NoResult, Result, with_entries
-from frametool.stream.row_layout import AS_READ, PARTS
-from frametool.stream.stamp_columns import NOWHERE
+from frametool.stream.row_layout import AS_READ, NOWHERE, PARTS
 from frametool.text.cells import without_quotes
 from frametool.text.spans import Spans
 from frametool.text.write import rounded_to_single, shortest_spans

@@ -31,16 +31,14 @@ if TYPE_CHECKING:
 class BlockNames(NamedTuple):
     """The names of a block's rows.
 
-    frames: the one each row is expressed in, or for look-ups the two, parted by NUL
     pairs, results: the parents and names that there are, and those of their results; of_row: (n,) those of a row
-    lost: the first row whose result cannot name a frame, and that frame
+    lost: the first row whose result cannot name a frame: that frame
     """
 
-    frames: Sequence[str | None] = ()
     pairs: Sequence[tuple[str, str]] = (("", ""),)
     results: Sequence[tuple[str, str]] = (("", ""),)
     of_row: Ints | None = None
-    lost: Sequence[tuple[int, str]] = ()
+    lost: Mapping[int, str] = MappingProxyType({})
 
     def texts(self, role: int, rows: Ints) -> list[str | None]:
         """Return the parents (0) or names (1) of the results of rows, or one for all."""
@@ -58,10 +56,10 @@ class Block(NamedTuple):
     unchanged: place and text of what passes as it is
     broken: place and fault of rows that no number can be read from
     names: those of the rows, and of their results
-    stamps: for each shape the spans (n,) of its stamp, one, or seconds and nanoseconds (none where it has none), or the
-        nanoseconds; of rows that are gathered their weights or labels
+    stamps: for each shape (or one for all) the nanoseconds, None where it has none; of gathered rows weights or labels
     bad: rows that are bad by what is no number: column and reason
-    sources: for each shape the name of the frame each row is expressed in, or one for all
+    frames: for each shape (or one for all) the name of the frame each row is expressed in, or one for all rows; for
+        look-ups the two names, parted by NUL
     place_of: line, from 0, and column, from 1, of one of a row's numbers, where columns have no names
     gone: rows that have no numbers on purpose, and no result
     """
@@ -73,10 +71,10 @@ class Block(NamedTuple):
     unchanged: Sequence[tuple[int, bytes]] = ()
     broken: Sequence[tuple[int, Fault]] = ()
     names: BlockNames = BlockNames()
-    stamps: Sequence[tuple[Spans, ...] | NDArray[Any]] = ()
+    stamps: Sequence[Any] = ()
     bad: Mapping[int, tuple[str, FrametoolError | str]] = MappingProxyType({})
     place_of: Callable[[int, int], tuple[int, str]] | None = None
-    sources: Sequence[Sequence[str | None]] = ()
+    frames: Sequence[Sequence[str | None]] = ((None,),)
     gone: Ints | None = None
 
 
@@ -88,17 +86,24 @@ class Coded(NamedTuple):
 
     def numbers(self, read: Callable[[str], float]) -> tuple[Floats, dict[int, str]]:
         """Read the number that each encodes, nan if none, and why a row has none."""
-        known, reasons = np.full(len(self.texts), np.nan), dict[int, str]()
-        for at, text in enumerate(self.texts):
-            try:
-                known[at] = read(text)
-            except ValueInvalid as error:
-                reasons |= dict.fromkeys(np.flatnonzero(self.codes == at).tolist(), str(error))
-        return known[self.codes], reasons
+        known = np.full(len(self.texts), np.nan)
+        reasons = read_each(known, range(len(known)), lambda at: read(self.texts[at]))
+        return known[self.codes], {row: reasons[at] for row, at in enumerate(self.codes.tolist()) if at in reasons}
 
     def each(self) -> list[str]:
         """Return the text of each row."""
         return [self.texts[code] for code in self.codes.tolist()]
+
+
+def read_each(values: NDArray[Any], places: Iterable[int], read: Callable[[int], float]) -> dict[int, str]:
+    """Set the values at some places to what is read there, one by one; return why some have none."""
+    reasons = {}
+    for place in places:
+        try:
+            values[place] = read(place)
+        except (ValueInvalid, OverflowError) as error:
+            reasons[place] = str(error)
+    return reasons
 
 
 def coded(cells: Spans) -> Coded:
@@ -136,24 +141,20 @@ def _is_constant(column: Spans) -> bool:
     return all(bool((column.data[column.starts + offset] == byte).all()) for offset, byte in enumerate(first))
 
 
-def number_spans(values: Floats, precision: int | None, separators: bytes, *, yaml: bool = False) -> Spans:
-    """Write floats as fixed decimals or as the shortest text that reads back; YAML wants a point before an exponent."""
+def number_spans(
+    values: Floats, precision: int | None, separators: bytes, *, yaml: bool = False, null: bytes = b"nan"
+) -> Spans:
+    """Write floats as fixed decimals or as the shortest text that reads back; YAML wants a point before an exponent.
+
+    nan is an empty cell, where `null` is that.
+    """
+    if not null and (gaps := np.isnan(values)).any():
+        spans = number_spans(np.where(gaps, 0.0, values), precision, separators)
+        return spans._replace(starts=np.where(gaps, spans.ends - 1, spans.starts))
     if precision is not None:
         return fixed_spans(values, precision, separators)
     spans = shortest_spans(values, separators)
     return _with_points(spans, values, separators) if yaml else spans
-
-
-def numbers_or_null(
-    pieces: Sequence[Piece], null: bytes, values: Floats, precision: int | None, separators: bytes, *, yaml: bool
-) -> Spans:
-    """Write the floats that pieces show; nan is an empty cell, where that stands for none."""
-    count = max((piece.last for piece in pieces if isinstance(piece, Out)), default=0)
-    values, separators, gaps = values[:, :count], separators[:count], np.isnan(values[:, :count])
-    if null or not gaps.any():
-        return number_spans(values, precision, separators, yaml=yaml)
-    spans = number_spans(np.where(gaps, 0.0, values), precision, separators)
-    return spans._replace(starts=np.where(gaps, spans.ends - 1, spans.starts))
 
 
 def _with_points(spans: Spans, values: Floats, separators: bytes) -> Spans:
@@ -173,12 +174,13 @@ def _with_points(spans: Spans, values: Floats, separators: bytes) -> Spans:
     return Spans(np.concatenate([spans.data, added.data]), starts, ends)
 
 
-def separators(pieces: Iterable[Piece], count: int) -> bytes:
-    """Return the character that follows each number of the result."""
-    after = bytearray(b"," * count)
+def separators(pieces: Iterable[Piece]) -> bytes:
+    """Return the character that follows each number of the result that pieces show."""
+    after = bytearray()
     for piece in pieces:
-        if isinstance(piece, Out) and piece.between:
-            after[piece.first : piece.last] = piece.between[:1] * (piece.last - piece.first)
+        if isinstance(piece, Out):
+            after += b"," * (piece.last - len(after))
+            after[piece.first : piece.last] = (piece.between[:1] or b",") * (piece.last - piece.first)
     return bytes(after)
 
 

@@ -6,23 +6,27 @@ Stamps are read in bulk, decimal seconds or nanoseconds to integer nanoseconds, 
 from __future__ import annotations
 
 from itertools import zip_longest
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frametool.errors import FrametoolError, ValueInvalid
+from frametool.errors import FrametoolError
 from frametool.frames.stamps import BILLION, nanoseconds_each, tell_size
-from frametool.stream.row_layout import IDENTITY
-from frametool.stream.rows import numbered
+from frametool.grammar.names import in_nanoseconds
+from frametool.stream.row_layout import NOWHERE
+from frametool.stream.row_poses import NO_STAMP, texts_of
+from frametool.stream.rows import numbered, read_each
 from frametool.stream.stamp_source import read_header_stamp, read_stamp
 from frametool.text.digits import ZEROS, first_point, not_digits, read_eight_digits
-from frametool.text.parse import LOWEST, trimmed
+from frametool.text.numbers import parse_number
+from frametool.text.parse import LOWEST, parse_floats, trimmed
 from frametool.text.spans import windows
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.geometry.types import Rigid
+    from frametool.stream.request import Request
     from frametool.stream.stamp_source import Timed
     from frametool.text.spans import Bytes, Flags, Floats, Ints, Spans, Words
 
@@ -36,7 +40,27 @@ _MOST_UPPER = (1 << 63) // 10**16
 _BELOW_NS = np.uint64(10**7)
 
 
-def read_stamps(cells: tuple[Spans, ...], *, in_ns: int) -> tuple[Ints, dict[int, str]]:
+def read_extra(cells: Sequence[Spans], request: Request, name: str) -> tuple[Any, dict[int, tuple[str, str]]]:
+    """Read the stamps of rows, or the weights or labels of those that are gathered; give also which rows have none.
+
+    cells: as for `read_stamps`, or () for none; name: that of their column or key
+    """
+    if not cells:
+        return None, {}
+    values: Any
+    if not request.weighs:
+        values, reasons = read_stamps(cells, in_ns=in_nanoseconds(name) if len(cells) == 1 else 0)
+        values[[*reasons]] = NO_STAMP
+    elif request.gathered is not None and request.gathered.labelled:
+        return np.array(texts_of(cells[0]), object), {}
+    else:
+        values, bad = parse_floats(cells[0])
+        texts = {row: cells[0].text(row).decode("utf-8", "replace").strip(" \t\"'") for row in bad.tolist()}
+        reasons = read_each(values, texts, lambda row: parse_number(texts[row]))
+    return values, {row: (name, reason) for row, reason in reasons.items()}
+
+
+def read_stamps(cells: Sequence[Spans], *, in_ns: int) -> tuple[Ints, dict[int, str]]:
     """Read one column (n,) as nanoseconds, or two of whole seconds and nanoseconds.
 
     in_ns: how many nanoseconds a whole number of one column is; 0 are decimal seconds, and what ends in `ns` is some
@@ -46,14 +70,13 @@ def read_stamps(cells: tuple[Spans, ...], *, in_ns: int) -> tuple[Ints, dict[int
     stamps, sure = parsed[0]
     if len(cells) == 2:
         stamps, sure = stamps * BILLION + parsed[1][0], sure & parsed[1][1] & (stamps < _MOST_SECONDS)
-    reasons = {}
-    for row in np.flatnonzero(~sure).tolist():
+
+
+    def read(row: int) -> int:
         texts = [each.text(row).decode("utf-8", "replace") for each in cells]
-        try:
-            stamps[row] = read_header_stamp(*texts) if len(texts) == 2 else read_stamp(texts[0], in_ns=in_ns)
-        except (ValueInvalid, OverflowError) as error:
-            reasons[row] = str(error)
-    return stamps, reasons
+        return read_header_stamp(*texts) if len(texts) == 2 else read_stamp(texts[0], in_ns=in_ns)
+
+    return stamps, read_each(stamps, np.flatnonzero(~sure).tolist(), read)
 
 
 def _parse_plain(data: Bytes, starts: Ints, ends: Ints, *, in_ns: int) -> tuple[Ints, Flags]:
@@ -106,9 +129,6 @@ def _fraction(data: Bytes, starts: Ints, length: Ints) -> tuple[Ints, Flags]:
     rest = read_eight_digits(second)
     nanoseconds = read_eight_digits(first) * np.uint64(10) + rest // _BELOW_NS
     return nanoseconds.view(np.int64), sure & (rest % _BELOW_NS == 0) & (length <= 16)
-
-
-NOWHERE = (0.0, 0.0, 0.0, *IDENTITY)
 
 
 def by_frame(edge_of: Callable[..., Rigid], frames: Sequence[str | None], blame: Blame, column: str = "") -> Rigid:

@@ -22,7 +22,7 @@ from frametool.stream.faults import Fault
 from frametool.stream.header import Columns, PoseColumns, has_pose_column
 from frametool.stream.layout import ADDED, NAMED, quoted
 from frametool.stream.rows import Block, BlockNames, Coded, coded, spans_of
-from frametool.stream.stamp_columns import read_stamps
+from frametool.stream.stamp_columns import read_extra, read_stamps
 from frametool.stream.stamp_source import replaced, stamp_text
 from frametool.text.cells import split_blank, split_delimited, torn_record, without_quotes
 from frametool.text.spans import MARGIN, Spans
@@ -46,14 +46,11 @@ COUNTER = "frame"  # such a column often counts pictures
 class Naming:
     """What a run does with the names in a table; remembers the frame of the rows before."""
 
-    def __init__(self, table: Table, layout: Layout, request: Request) -> None:
-        """Take from the request what it does to names."""
+    def __init__(self, table: Table, layout: Layout, request: Request, shape: Shape) -> None:
+        """Take from the request what it does to names; shape: what a row is."""
         self.layout = layout
-        self.places: tuple[int | None, int | None] = (None, None)
-        if request.poses and layout.frames:
-            self.places = layout.frames[0], layout.name
-        elif request.poses:
-            self.places = None, layout.name
+        self.earth = EARTH_FRAMES[0] if shape.place is not None else None
+        self.places = (layout.frames[0] if layout.frames else None, layout.name) if request.poses else (None, None)
         self.column = next((table.name(place) for place in self.places if place is not None), "")
         may_count = layout.frames and table.name(layout.frames[0]) == COUNTER and COUNTER not in request.frames
         self.counts = request.counts if may_count else None
@@ -61,52 +58,47 @@ class Naming:
         self.consecutive = request.operation.looks_back
         self.before: str | None = None
 
-    def of_rows(self, size: int, column: Callable[[int], Coded]) -> tuple[BlockNames, Bad]:
-        """Read the names of so many rows and name the results; return also the rows whose names do not fit."""
-        if self.places == (None, None):
-            if not (size and self.layout.frames):
-                return BlockNames(), {}
+    def of_rows(self, size: int, column: Callable[[int], Coded]) -> tuple[Sequence[str | None], BlockNames, Bad]:
+        """Read the names of so many rows: return their frames, the names of the results, and the rows that do not fit.
+
+        column: returns the texts of a column
+        """
+        if self.places == (None, None) and size and self.layout.frames:
             texts = [each.each() for each in map(column, self.layout.frames)]
-            return BlockNames(["\0".join(names) for names in zip(*texts, strict=True)]), {}
+            return ["\0".join(names) for names in zip(*texts, strict=True)], BlockNames(), {}
+        if self.places == (None, None) or not size:
+            return [self.earth], BlockNames(), {}
         none = Coded([""], np.zeros(size, np.int64))
-        parents, names = (column(place) if size and place is not None else none for place in self.places)
+        parents, names = (none if place is None else column(place) for place in self.places)
         count = len(names.texts)
         found, of_row = np.unique(parents.codes * count + names.codes, return_inverse=True)
         pairs = [(parents.texts[code // count], names.texts[code % count]) for code in found.tolist()]
-        results = [self._result(*pair) for pair in pairs]
-        named = [pair if isinstance(each, FrametoolError) else each for pair, each in zip(pairs, results, strict=True)]
-        bad: Bad = {
-            int(row): (self.column, each)
-            for at, each in enumerate(results) if isinstance(each, FrametoolError)
-            for row in np.flatnonzero(of_row == at)
-        }  # fmt: skip
-        lost = {at: frame for at, each in enumerate(zip(pairs, named, strict=True)) if (frame := self._lost(*each))}
-        first = np.flatnonzero(np.isin(of_row, [*lost]))[:1].tolist() if lost else ()
-        if self.consecutive:
-            bad |= self._breaks(parents.each())
+        results, lost = list(pairs), dict[int, str]()
+        bad: Bad = {}
+        for at, pair in enumerate(pairs):
+            try:
+                results[at] = self._result(*pair)
+            except FrametoolError as error:
+                bad |= dict.fromkeys(np.flatnonzero(of_row == at).tolist(), (self.column, error))
+            if frame := self._lost(pair, results[at]):
+                lost[int((of_row == at).argmax())] = frame
+        for row, parent in enumerate(parents.each() if self.consecutive else ()):
+            self.before = parent if self.before is None else self.before
+            if parent != self.before:
+                bad[row] = self.column, f"given in another frame than {self.before!r}, as the rows before are"
         known = [None if not text or self._is_counter(text) else text for text in parents.texts]
-        frames = [known[code] for code in parents.codes.tolist()]
-        return BlockNames(frames, pairs, named, of_row, [(row, lost[of_row[row]]) for row in first]), bad
+        frames = [self.earth] if self.earth else [known[code] for code in parents.codes.tolist()]
+        return frames, BlockNames(pairs, results, of_row, dict(sorted(lost.items())[:1])), bad
 
     def _is_counter(self, name: str) -> bool:
         return self.counts is not None and self.counts(name)
 
-    def _breaks(self, parents: Sequence[str]) -> dict[int, tuple[str, str]]:
-        """Find the rows that are expressed in another frame than the first."""
-        if self.before is None and parents:
-            self.before = parents[0]
-        reason = f"given in another frame than {self.before!r}, as the rows before are"
-        return {row: (self.column, reason) for row, parent in enumerate(parents) if parent != self.before}
-
-    def _result(self, parent: str, name: str) -> Texts | FrametoolError:
+    def _result(self, parent: str, name: str) -> Texts:
         """Return the texts of a result's names; a counter stays, and what is not known is left empty."""
         if self.rename is None:
             return parent, name
         counter = self._is_counter(parent)
-        try:
-            new = self.rename(None if counter else parent or None, name or None)
-        except FrametoolError as error:
-            return error
+        new = self.rename(None if counter else parent or None, name or None)
         return parent if counter else new[0] or "", new[1] or ""
 
     def _lost(self, pair: Texts, result: Texts) -> str:
@@ -335,21 +327,25 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming) -> Block:
+def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming, request: Request) -> Block:
     """Find the rows of a block, their numbers, their names, and the stretches of text that pass."""
     places = layout.places
     is_run = places and places == tuple(range(places[0], places[0] + len(places)))  # then nothing is copied
-    columns = slice(places[0], places[-1] + 1) if is_run else list(places)
-    numbers = Spans(cells.data, cells.starts[:, columns], cells.ends[:, columns])
+    own = slice(places[0], places[-1] + 1) if is_run else list(places)
+    numbers = Spans(cells.data, cells.starts[:, own], cells.ends[:, own])
     if places and (cells.data == QUOTE).any():
         numbers = without_quotes(numbers)
-    names, bad = naming.of_rows(len(cells.rows), lambda place: coded(cells.column(place)))
+    frames, names, bad = naming.of_rows(len(cells.rows), lambda place: coded(cells.column(place)))
     parts = [
         naming.spans(cells, begin, names) if kind == NAMED else _stretch(cells, begin, end, kind, until)
         for begin, end, kind, until in layout.stretches
     ]
     times = [place for place in (layout.time, layout.below) if place is not None]
-    stamps = [tuple(without_quotes(cells.column(place)) for place in times)] if times else []
+    stamps = []
+    if times:
+        columns = [without_quotes(cells.column(place)) for place in times]
+        found, late = read_extra(columns, request, table.name(times[0]))
+        stamps, bad = [found], {**late, **bad}
     unchanged, broken = [], []
     lines_before = _line_counter(cells)
     if len(cells.rows) < len(cells.counts):
@@ -362,7 +358,7 @@ def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming) -> B
                 reason = f"expected {table.width} cells{named}, found {int(cells.counts[line])}"
                 broken.append((line, Fault(lines_before(line), "", reason, skipped=True)))
     lines = lambda row: lines_before(int(cells.rows[row]))  # noqa: E731
-    return Block(numbers, parts, cells.rows, lines, unchanged, broken, names, stamps, bad)
+    return Block(numbers, parts, cells.rows, lines, unchanged, broken, names, stamps, bad, frames=[frames])
 
 
 def at_other_times(table: Table, layout: Layout, time: int, text: bytes, offset_ns: int) -> bytes:

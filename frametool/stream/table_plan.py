@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, Misused, ValueInvalid, alternatives, shown
 from frametool.grammar.names import (
-    EARTH_FRAMES,
     NAME_KEYS,
     NORMALS,
     PARENT_COLUMNS,
@@ -99,7 +98,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     layout = layout._replace(time=time, below=below, name=name)
     return Plan(
         shapes, targets, request, tuple(table.name(place) for place in places), layout.pieces, layout.null, edge_of,
-        source=EARTH_FRAMES[0] if on_earth else "", frame_column=table.name(frames[0]) if len(frames) == 1 else "",
+        frame_column=table.name(frames[0]) if len(frames) == 1 else "",
         words=words, marked=marked,
     ), layout  # fmt: skip
 

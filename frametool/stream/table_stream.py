@@ -5,22 +5,21 @@ from __future__ import annotations
 from contextlib import suppress
 from itertools import chain
 from shlex import quote
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from frametool.errors import FormatError, FrametoolError, Misused, listing
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
-from frametool.grammar.names import NORMALS, in_nanoseconds, stamp_places
+from frametool.grammar.names import NORMALS, stamp_places
 from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import Fault, Outcome, RowNote, notes_of
+from frametool.stream.faults import Fault, Outcome, RowNote
 from frametool.stream.header import listed
 from frametool.stream.layout import New
 from frametool.stream.row_layout import POSE, Shape
-from frametool.stream.row_poses import NO_STAMP, RowPoses, taken
+from frametool.stream.row_poses import RowPoses, taken
 from frametool.stream.rows import written
-from frametool.stream.stamp_columns import read_stamps
 from frametool.stream.table import (
     BYTE_ORDER_MARK,
     UNCLOSED,
@@ -48,7 +47,7 @@ if TYPE_CHECKING:
     from frametool.stream.table import Table
     from frametool.text.cells import Cells
     from frametool.text.lines import ByteStream
-    from frametool.text.spans import Floats, Ints, Spans
+    from frametool.text.spans import Floats, Ints
 
 
 def run_table(
@@ -151,7 +150,7 @@ class PlannedRows:
         self.request, self.unasked = settle_stamps(table, request, source)
         self.plan, self.layout = plan_table(table, self.request, source)
         self.shape = self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
-        self.naming = Naming(table, self.layout, self.request.for_kind(self.shape.kind))
+        self.naming = Naming(table, self.layout, self.request.for_kind(self.shape.kind), self.shape)
         if request.gathered is not None:
             request.gathered.stamped |= stamp_places(table.names)[0] is not None
         self.state = State()
@@ -188,9 +187,8 @@ class PlannedRows:
 
     def notes_of(self, run: Run) -> list[RowNote]:
         """Return warnings about the rows of a block."""
-        notes = notes_of(run, run.block)
-        frames = {*run.block.names.frames} or {None}
-        if self.unasked is not None and run.count and moves_in_time(self.unasked, frames):
+        notes = list(run.notes)
+        if self.unasked is not None and run.count and moves_in_time(self.unasked, {*run.block.frames[0]}):
             remedy = f"give --time-column {quote(self.unasked.name)}, or --at TIME"
             ignored = f"column {self.unasked.name!r} is not looked at, rows move at the latest time; {remedy}"
             notes.append(RowNote(run.block.line_of(0), "latest", ignored))
@@ -226,13 +224,7 @@ class TableRows(PlannedRows):
         if self.request.offset_ns and self.layout.time is not None:
             body = at_other_times(self.table, self.layout, self.layout.time, body, self.request.offset_ns)
         cells = self.table.split(body)
-        block = table_block(self.table, self.layout, cells, self.naming)
-        if self.request.all_numbers and self.stamp_at is not None:
-            name = self.table.name(self.stamp_at)
-            stamps, reasons = read_stamps(cast("tuple[Spans, ...]", block.stamps[0]), in_ns=in_nanoseconds(name))
-            stamps[[*reasons]] = NO_STAMP
-            bad = {row: (name, reason) for row, reason in reasons.items()}
-            block = block._replace(stamps=[stamps], bad={**bad, **block.bad})
+        block = table_block(self.table, self.layout, cells, self.naming, self.request)
         run = self.ran(block)
         faults = run.faults()
         if torn is not None:

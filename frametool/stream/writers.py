@@ -200,7 +200,7 @@ class TextWriter:
             else:
                 pieces.append(In(len(parts)))
                 parts.append(self._field(piece, block, fmt.first))
-        after, is_yaml = separators(pieces, first), self.style.format == "yaml"
+        after, is_yaml = separators(pieces), self.style.format == "yaml"
         numbers = number_spans(np.ascontiguousarray(values), self.style.precision, after, yaml=is_yaml)
         text = join(assemble(pieces, parts, numbers, np.zeros(len(values), np.int64)))
         return text if self.count else fmt.head + text[len(fmt.between) :]
