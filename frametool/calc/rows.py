@@ -26,7 +26,7 @@ from frametool.grammar.readers import tell as tell_notes
 from frametool.grammar.result import Style
 from frametool.ros.messages import LISTS
 from frametool.stream.as_poses import FormatConverter
-from frametool.stream.request import Operation, Request
+from frametool.stream.request import Formula, Operation, Request
 from frametool.stream.row_layout import Target
 from frametool.stream.trajectories import gathered, stop_at_first
 
@@ -52,8 +52,8 @@ class Bound(NamedTuple):
     frames: frozenset[str | None]
 
 
-class RowExpressions:
-    """Lines whose results replace rows (one without a name) or are added to them (all named); a `Formula` of streams.
+class RowExpressions(Formula):
+    """Lines whose results replace rows (one without a name) or are added to them (all named).
 
     bindings: lines that only define names for the others
     """

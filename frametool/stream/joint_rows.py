@@ -22,27 +22,27 @@ from frametool.formats.robots.model import TURNING, JointValue
 from frametool.formats.table import FORMATS
 from frametool.ros import messages
 from frametool.stream.record_text import without_noise
+from frametool.stream.request import Formula
 from frametool.stream.row_layout import POSE
 from frametool.stream.splitter import Splitter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.formats.robots.joints import JointState
+    from frametool.formats.robots.joints import JointColumn, JointState
     from frametool.formats.robots.model import Joint, Robot
     from frametool.geometry.types import Components, Namespace, Number
 
 SLACK = 1e-9  # by which a value may lie beyond a limit
 
 
-class JointRows:
-    """The pose of a robot's frame for each row: a `Formula` of streams.
+class JointRows(Formula):
+    """The pose of a robot's frame for each row.
 
     base, tip: the pose is that of tip in base
     """
 
     reads_row = False
-    needs_time = False
     adds = False
 
     def __init__(self, robot: Robot, posture: JointState, base: str, tip: str) -> None:
@@ -57,8 +57,7 @@ class JointRows:
         if posture.moving:
             raise BadAnswer(f"--joints: {listing(posture.moving)} moves over time; stream that file with -i")
         self.constants = {name: posture.still[name] for name in posture.named}
-        self.columns: tuple[str, ...] = ()
-        self._read: tuple[tuple[str, bool, float], ...] = ()
+        self._read: Sequence[JointColumn] = ()
         self._beyond: set[str] = set()
 
     def bind(self, names: Sequence[str], source: str, *, fixed: frozenset[str] = frozenset()) -> None:
@@ -71,7 +70,7 @@ class JointRows:
             found = find_joint_columns(names, self.joints)
         except ValueInvalid as error:
             raise FormatError(str(error), source=source, line=1) from None
-        columns = [column for column in found if self.chain.uses(column.joint)]
+        self._read = columns = [column for column in found if self.chain.uses(column.joint)]
         known = {**self.constants, **{column.joint: None for column in columns}}
         if twice := next((column for column in columns if column.joint in fixed), None):
             problem = f"joint {shown(twice.joint)} has a column, {shown(names[twice.place])}, and a value by --joint"
@@ -80,15 +79,10 @@ class JointRows:
             others = [name for place, name in enumerate(names) if place not in {column.place for column in found}]
             raise Misused(_about_missing(missing, names, others), source=source, line=1)
         self.columns = tuple(names[column.place] for column in columns)
-        self._read = tuple((column.joint, column.degrees, column.per_metre) for column in columns)
 
     def kind(self, row: str) -> str:  # noqa: ARG002 - whatever a row is
         """Return that rows get a pose."""
         return POSE
-
-    def extras(self, row: str) -> tuple[str, ...]:  # noqa: ARG002
-        """Name no further numbers."""
-        return ()
 
     def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:  # noqa: ARG002
         """Return the frames of the pose."""
@@ -99,9 +93,9 @@ class JointRows:
     ) -> Components:
         """Return the pose for the cells of a block, or of one row."""
         values = dict(self.constants)
-        for (joint, degrees, per_metre), cell in zip(self._read, cells, strict=True):
-            values[joint] = JointValue(cell / per_metre if per_metre != 1.0 else cell, degrees)
-            self._look_at_limits(self.joints[joint], values[joint], xp)
+        for column, cell in zip(self._read, cells, strict=True):
+            values[column.joint] = value = JointValue(cell / column.per_metre, column.degrees)
+            self._look_at_limits(self.joints[column.joint], value, xp)
         return self.chain.pose(values, xp)
 
     def _look_at_limits(self, joint: Joint, value: Any, xp: Namespace) -> None:
@@ -124,24 +118,17 @@ def _about_missing(missing: Sequence[str], names: Sequence[str], others: Sequenc
     return f"no column for joint{plural} {listing(missing)}{near or ';'} {example}; columns: {columns}"
 
 
-def names_in(begin: bytes, fmt: str, source: str, *, header: bool = True) -> list[str]:
+def names_in(begin: bytes, fmt: str, source: str, wanted: str, *, header: bool = True) -> Sequence[str]:
     """Return the names of a table's columns, or the keys of the first record; of a JointState the joints it names.
 
-    begin: the first bytes of the stream, of one of the formats that are streamed.
-    Raises FormatError where nothing has a name.
+    begin: the first bytes of the stream, of one of the formats that are streamed; wanted: what a record has
+    Columns without names are called by their numbers from 1; keys within a mapping have its key and a dot before them.
     """
-    if "records" in FORMATS[fmt].reads:
-        return keys_in(begin, fmt, source, "a key for each joint, or JointState messages")
-    from frametool.stream.table import open_table
+    if "records" not in FORMATS[fmt].reads:
+        from frametool.stream.table import open_table
 
-    table, _ = open_table(begin, fmt, header=header, source=source)
-    if table.names is None:
-        raise FormatError("the columns have no names, so that none is a joint", source=source, line=1)
-    return list(table.names)
-
-
-def keys_in(begin: bytes, fmt: str, source: str, wanted: str) -> list[str]:
-    """Return the keys of the first record, those further in with dots; wanted: what a record has."""
+        table, _ = open_table(begin, fmt, header=header, source=source)
+        return table.names or tuple(map(str, range(1, table.width + 1)))
     part = next(iter(Splitter(fmt).parts(begin).parts), None)
     text = "" if part is None else begin[part.start : part.end].decode("utf-8", "replace")
     documents = parse_documents(without_noise(text) if fmt == "yaml" else text, source)
@@ -150,17 +137,12 @@ def keys_in(begin: bytes, fmt: str, source: str, wanted: str) -> list[str]:
     if type(value) is not dict:
         raise FormatError(f"expected a mapping with {wanted}", source=source, line=1)
     inner = value["msg"] if messages.is_envelope(value) else value
-    if messages.is_joint_state(inner):
-        return [joint for joint, *_ in messages.positions(inner)]
-    return list(_flat_keys(value))
+    return [joint for joint, *_ in messages.positions(inner)] if messages.is_joint_state(inner) else _flat_keys(value)
 
 
-def _flat_keys(value: dict[str, Any], prefix: str = "") -> dict[str, None]:
-    """Return the keys of numbers, in order."""
-    found: dict[str, None] = {}
+def _flat_keys(value: dict[str, Any], prefix: str = "") -> list[str]:
+    """Return the keys of what is neither mapping nor empty, in order."""
+    found: list[str] = []
     for key, each in value.items():
-        if type(each) is dict:
-            found |= _flat_keys(each, f"{prefix}{key}.")
-        else:
-            found[prefix + key] = None
+        found += _flat_keys(each, f"{prefix}{key}.") if type(each) is dict else [prefix + key]
     return found

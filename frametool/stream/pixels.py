@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion, rigid
 from frametool.stream.layout import Word
-from frametool.stream.request import Shown
+from frametool.stream.request import Formula, Shown
 from frametool.stream.row_layout import POINT, POSE
 
 if TYPE_CHECKING:
@@ -30,13 +30,8 @@ RAY = tuple(f"{part}_{axis}" for part in ("origin", "ray") for axis in "xyz")
 OWN = (0.0,) * 7  # a row stays as it is: its own pose is not replaced
 
 
-class Seen:
+class Seen(Formula):
     """What both ways share: rows stay, no frame changes, and what becomes of each is counted."""
-
-    columns: tuple[str, ...] = ()
-    reads_row = True
-    needs_time = False
-    adds = True
 
     def __init__(self, camera: Camera, what: str, first: float) -> None:
         """Begin without rows.
@@ -47,14 +42,6 @@ class Seen:
         self.what = what
         self.first = first
         self.counts: Counter[str] = Counter()
-
-    def kind(self, row: str) -> str:  # noqa: ARG002 - whatever a row is
-        """Return that a row becomes nothing else."""
-        return ""
-
-    def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:  # noqa: ARG002
-        """Return the frames of a row, which stay."""
-        return parent, name
 
     @property
     def lost(self) -> int:

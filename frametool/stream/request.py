@@ -5,7 +5,7 @@ One `Operation` serves floats and arrays alike.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion, rigid
@@ -32,41 +32,36 @@ START, PREVIOUS = "start", "previous"  # rows before that a row is compared with
 PAIR = "pair"  # the two poses of a row
 
 
-class Formula(Protocol):
+class Formula:
     """An expression over rows: what it reads of each, what kind of thing it makes of it, and its numbers.
 
     The kind of a row is that of its shape, "" where it holds neither point nor pose.
+    columns: the columns, or keys, whose numbers it reads; reads_row: it reads the row's own point or pose
+    needs_time: it reads the row's own time; adds: rows keep their columns and results are added
     """
 
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Name the columns, or keys, whose numbers it reads."""
+    columns: tuple[str, ...] = ()
+    reads_row = True
+    needs_time = False
+    adds = True
 
-    @property
-    def reads_row(self) -> bool:
-        """Return True if it reads the row's own point or pose."""
-
-    @property
-    def needs_time(self) -> bool:
-        """Return True if it reads the row's own time."""
-
-    @property
-    def adds(self) -> bool:
-        """Return True if rows keep their columns and results are added."""
-
-    def kind(self, row: str) -> str:
+    def kind(self, row: str) -> str:  # noqa: ARG002 - by default all rows get numbers alone
         """Return whether a row becomes a pose, a point or a vector; "" for numbers alone, which are `extras`."""
+        return ""
 
-    def extras(self, row: str) -> tuple[str, ...]:
+    def extras(self, row: str) -> tuple[str, ...]:  # noqa: ARG002 - none by default
         """Name the numbers that come with a pose or point."""
+        return ()
 
-    def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:
+    def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:  # noqa: ARG002
         """Return the frames of the result of a row with these; raise FrametoolError where they do not fit."""
+        return parent, name
 
     def result(
         self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace
     ) -> Components:
         """Return the components of the result and then the extras; of floats raises FrametoolError where none are."""
+        raise NotImplementedError
 
 
 class Shown(NamedTuple):

@@ -139,7 +139,7 @@ def test_joints_without_a_column_are_told_by_options(run: Run) -> None:
         (("-j", "ellbow=1"), table(), 2, "no joint 'ellbow'; did you mean 'elbow'"),
         ((), table(names=(*JOINTS[:3], "wrist_roll_mm")), 1, "stdin:1: column 'wrist_roll_mm': joint 'wrist_roll' is continuous"),
         ((), "1,2,3,4\n", 1, "no names"),
-        (("--no-header",), "1,2,3,4\n", 1, "the columns have no names"),
+        (("--no-header",), "1,2,3,4\n", 2, "; columns: 1, 2, 3, 4"),
         ((), "", 1, "stdin: nothing in it"),
         (("-j", "elbow=1"), "", 2, f"for one posture, frametool lookup {ARM} arm_base tool -j elbow=1;"),
         ((), "[1, 2]\n", 1, "expected a mapping with a key for each joint"),

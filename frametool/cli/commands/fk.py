@@ -59,7 +59,7 @@ def _added(stream: Stream, output: Output, rows: JointRows, file: FrameFile) -> 
     begin = stream.opened().peek()
     fmt = stream.chosen_format() or detect(begin, *STREAMED, name=stream.path or "")
     refuse(holds_arrays(fmt), f"rows of joints are a table of text, records or messages, not {fmt}")
-    names = names_in(begin, fmt, name, header=inputs.header)
+    names = names_in(begin, fmt, name, "a key for each joint, or JointState messages", header=inputs.header)
     rows.bind(names, name, fixed=frozenset(file.answers.joints))
     file.tally.assumed = ""  # rows say where each joint on the way is
     state([file])

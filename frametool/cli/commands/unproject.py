@@ -15,9 +15,8 @@ from frametool.cli.trees import FRAME, frame_name
 from frametool.documents.source import Source
 from frametool.errors import FormatError, listing
 from frametool.formats.detect import detect
-from frametool.formats.table import FORMATS
 from frametool.geometry.rigid import EXACT
-from frametool.stream.joint_rows import keys_in
+from frametool.stream.joint_rows import names_in
 from frametool.text.numbers import parse_length, parse_number
 
 if TYPE_CHECKING:
@@ -109,17 +108,12 @@ def _records(arguments: Sequence[str]) -> Iterator[Source]:
 def _names(task: CameraTask, records: Sequence[Source]) -> Sequence[str]:
     """Return the names of the columns of the stream, or its keys; those of the first record where there are some."""
     if records:
-        return keys_in(records[0].text.encode(), "yaml", records[0].name, WANTED)
+        return names_in(records[0].text.encode(), "yaml", records[0].name, WANTED)
     stream = task.stream
     stream.read_clouds_as_rows()
     begin = stream.opened().peek()
     fmt = stream.within or stream.chosen_format() or detect(begin, *STREAMED, name=stream.name, otherwise="columns")
-    if "records" in FORMATS[fmt].reads:
-        return keys_in(begin, fmt, stream.name, WANTED)
-    from frametool.stream.table import open_table
-
-    table, _ = open_table(begin, fmt, header=stream.inputs.header, source=stream.name)
-    return table.names or tuple(map(str, range(1, table.width + 1)))
+    return names_in(begin, fmt, stream.name, WANTED, header=stream.inputs.header)
 
 
 def _columns(inputs: Inputs, names: Sequence[str], source: str) -> Sequence[str]:
