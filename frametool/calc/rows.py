@@ -18,17 +18,16 @@ from frametool.documents.source import opened
 from frametool.errors import FormatError, FrametoolError
 from frametool.geometry.floats import RADIAN as DEGREES
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Answers
 from frametool.grammar.names import may_be_on_earth
 from frametool.grammar.pose import COVARIANCE_KEYS
 from frametool.grammar.readers import Misfit
 from frametool.grammar.readers import tell as tell_notes
-from frametool.grammar.result import Style
 from frametool.ros.messages import LISTS
 from frametool.stream.as_poses import FormatConverter
+from frametool.stream.faults import BadRows
 from frametool.stream.request import Formula, Operation, Request
 from frametool.stream.row_layout import Target
-from frametool.stream.trajectories import gathered, stop_at_first
+from frametool.stream.trajectories import gathered
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,6 +36,7 @@ if TYPE_CHECKING:
     from frametool.calc.parser import Line
     from frametool.documents.source import Source
     from frametool.geometry.types import Components, Namespace, Number
+    from frametool.grammar.result import Style
 
 RESULT = "result"  # the column of a number without a name
 NAMES: dict[str, Sequence[str]] = {ANGLES: ("roll", "pitch", "yaw"), **dict(PLACED.values())}
@@ -178,9 +178,8 @@ def _row_type(row: str, parent: str | None, name: str | None) -> Type:
 def poses_of_table(path: str, fmt: str, *, normalize: bool, degrees: bool) -> Term:
     """Return the poses or points of a table as a list; raises FormatError at the first bad row."""
     request = Request(Operation(moves=True), normalize=normalize, degrees=degrees)
-    converter = FormatConverter(fmt, request, Style("json"), path, Answers())
     with opened(path) as stream:
-        rows = gathered(converter, stream, stop_at_first(path)).numbers.tolist()
+        rows = gathered(FormatConverter(fmt, request, path), stream, BadRows(path)).numbers.tolist()
     is_turned = len(rows[0]) > len(AXES)
     nowhere = [0.0] * (7 - len(rows[0])) if is_turned else []
     type_ = Type(POSE if is_turned else POINT)

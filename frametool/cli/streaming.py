@@ -145,7 +145,7 @@ class Stream:
 
         bad, row = self.policy(self.name, "row"), 1
         request = Request(on_error=self.inputs.on_error, by_default=True)
-        for made in FormatConverter(fmt, request, Style("csv", ()), self.name, answers()).outcomes(opened):
+        for made in FormatConverter(fmt, request, self.name, Style("csv", ()), answers()).outcomes(opened):
             bad.take([fault._replace(line=fault.line + row) for fault in made.faults])
             row += made.lines
             if made.text:
@@ -304,7 +304,7 @@ class Stream:
         target = output.chosen or _kept(fmt, output)
         refuse(target not in FORMATS, f"--format {target} is for single results and records, not for a stream of {fmt}")
         request = request._replace(by_default=not output.notations)
-        converted = FormatConverter(fmt, request, output.style.changed(format=target), self.name, answers())
+        converted = FormatConverter(fmt, request, self.name, output.style.changed(format=target), answers())
         outcomes = converted.outcomes(stream, header=self.inputs.header)
         return outcomes, lambda: converted.tally.assumed
 

@@ -6,7 +6,7 @@ rows or listed poses -> the operation -> blocks of poses -> the text of the othe
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, BinaryIO, TypeAlias, cast
 
 import numpy as np
 
@@ -14,36 +14,36 @@ from frametool.documents.source import InputFile
 from frametool.errors import FormatError, Misused, ValueInvalid, warn
 from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, describe, rows_of
 from frametool.formats.table import FORMATS, is_recording, is_trajectory
+from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Diagnostics, Options, Topics, stop
+from frametool.grammar.edges import Answers, Diagnostics, Options, Topics, stop
 from frametool.grammar.names import EARTH_FRAMES
-from frametool.stream.column_stream import ColumnRows, move_along
+from frametool.grammar.result import Style
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote
 from frametool.stream.row_layout import POINT, POSE, Shape, Target
 from frametool.stream.row_poses import RowPoses, kept
 from frametool.stream.rows import Block, spans_of
 from frametool.stream.table import rename_of
-from frametool.stream.table_stream import TableRows, begin_table, stamps_for
+from frametool.stream.table_stream import TableRows, begin_table
 from frametool.stream.writers import LEARNED, TextWriter
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Sequence
-    from io import BufferedReader
 
-    from frametool.formats.rows.pose_lists import PoseBlock
     from frametool.formats.table import Poses
-    from frametool.grammar.edges import Answers
-    from frametool.grammar.result import Style
     from frametool.stream.array_writer import ArrayWriter
     from frametool.stream.recording_writer import RecordingWriter
     from frametool.stream.request import Request
     from frametool.stream.table_stream import PlannedRows
+    from frametool.text.lines import ByteStream
+    from frametool.text.spans import Ints
 
     Step: TypeAlias = tuple[RowPoses, Outcome]  # what a block became, and what is reported about it
     BlockWriter: TypeAlias = "TextWriter | ArrayWriter | RecordingWriter"
 
 QUATERNION = notation("quaternion")
+AS_VALUES = Style("json")  # of results that are not written
 
 
 def writer_for(style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> BlockWriter:
@@ -64,9 +64,17 @@ def writer_for(style: Style, kind: str = POSE, extras: Sequence[str] = (), *, pl
 
 
 class FormatConverter:
-    """Convert a stream of poses or points to another format, block by block."""
+    """Convert a stream of poses or points to another format, block by block.
 
-    def __init__(self, fmt: str, request: Request, style: Style, source: str, answers: Answers) -> None:
+    rows: those of a table, or of columns of numbers, once steps have begun
+    tally: what was assumed about a trajectory
+    """
+
+    rows: PlannedRows
+
+    def __init__(
+        self, fmt: str, request: Request, source: str, style: Style = AS_VALUES, answers: Answers = Answers()  # noqa: B008
+    ) -> None:
         """Take what is asked for; raises Misused for what only a table can hold."""
         if request.keep or (request.prefix and request.operation.formula is None):
             raise Misused("--keep and --prefix are for tables that stay in their form")
@@ -75,17 +83,14 @@ class FormatConverter:
         self.answers = answers
         self.tally = Diagnostics()
         self.is_table = FORMATS[fmt].is_table
-        self.module: Any = None if self.is_table else import_module(FORMATS[fmt].reader)
         self.style = style.changed()
         self.request = request._replace(all_numbers=True, notations=(QUATERNION,), keep_sign=True, place=None)
         self.looks_up_places = request.place is not None and not request.poses  # whose TARGET each row was checked for
-        self.stamps = StampFile(answers.stamps) if answers.stamps else None
         self.to_arrays, self.has_points = ("arrays" in (writes := FORMATS[style.format].writes)), "points" in writes
         if request.on_error == NULL and not (self.is_table and (self.to_arrays or style.format in LEARNED)):
             raise Misused(f"--on-error null: {style.format} of {fmt} cannot hold a row without a result; give skip")
-        self.without = 0  # rows of an array that stand for no point or pose, and have no place in a text
 
-    def outcomes(self, stream: BufferedReader, *, header: bool = True) -> Generator[Outcome]:
+    def outcomes(self, stream: ByteStream, *, header: bool = True) -> Generator[Outcome]:
         """Yield the text of the results, block by block, and what comes behind the last."""
         writer: BlockWriter | None = None
         for made, outcome in self.steps(stream, header=header):
@@ -106,8 +111,8 @@ class FormatConverter:
         for finding in self.tally.findings():
             warn(f"{self.source}:{finding.line}: {finding.message}")
 
-    def steps(self, stream: BufferedReader, *, header: bool = True) -> Iterator[Step]:
-        """Yield the results of one block after the other."""
+    def steps(self, stream: ByteStream, *, header: bool = True) -> Iterator[Step]:
+        """Yield the results of one block after the other; of rows first a block without any."""
         if self.is_table:
             return self._rows(stream, header=header)
         return self._columns(stream) if "arrays" in FORMATS[self.fmt].reads else self._listed(stream)
@@ -130,132 +135,133 @@ class FormatConverter:
         from frametool.stream.earth_columns import zone_notes
 
         x, y, z = (np.ascontiguousarray(poses.numbers[there, at]) for at in range(3))
-        numbers = place.numbers(x, y, z)
-        return zone_notes(place, numbers, lambda row: int(poses.lines[there[row]]))
+        return zone_notes(place, place.numbers(x, y, z), lambda row: int(poses.lines[there[row]]))
 
-    def _settle(self, rows: PlannedRows, line: int = 0) -> None:
+    def _begin(self, rows: PlannedRows, line: int = 0) -> None:
         """Decide what rows become: without a rotation points, where nobody asked for one; raises FormatError."""
-        shape, plan = rows.shape, rows.plan
-        self.placed = plan.targets[0].unit is not None
+        self.rows, shape, (target, *_) = rows, rows.shape, rows.plan.targets
+        self.placed = target.unit is not None
         is_bare = shape.kind == POSE and shape.notation is None and bool(self.request.poses)
-        has_none = is_bare and not plan.targets[0].notations
+        has_none = is_bare and not target.notations
         if (is_bare and self.request.keeps_position and not has_none) or (has_none and not self.has_points):
-            message = f"no rotation among the columns {rows.columns}: {self.style.format} is written of poses"
+            message = f"no rotation among the columns {rows.columns}: poses are wanted"
             raise FormatError(message, source=self.source, line=line)
         self.shape = shape._replace(kind=POINT) if has_none else shape
 
     # --- rows of tables, and of columns of numbers ---
 
-    def _rows(self, stream: BufferedReader, *, header: bool) -> Iterator[Step]:
-        """Yield the rows of a table."""
-        fmt, request = FORMATS[self.fmt].poses, self.request
-        begun = begin_table(stream, self.fmt, request, source=self.source, header=header)
-        rows = TableRows(begun.table, request, self.source)
-        self._settle(rows, line=1)
-        count = 0
+    def _rows(self, stream: ByteStream, *, header: bool) -> Iterator[Step]:
+        """Yield the rows of a table, with the stamps of a file, their own, or their numbers as seconds."""
+        fmt = FORMATS[self.fmt].poses
+        file = StampFile(self.answers.stamps) if self.answers.stamps else None
+        begun = begin_table(stream, self.fmt, self.request, source=self.source, header=header)
+        rows = TableRows(begun.table, self.request, self.source)
+        self._begin(rows, line=1)
         none = RowPoses(np.empty((0, 7)), None, np.empty(0, np.int64), [None], [None], {})
         yield none, Outcome(b"", lines=begun.lines, size=begun.taken)
+        count = 0
         for block, _, outcome in rows.blocks(begun):
-            poses = self._with_place(block, rows)
+            before, count = count, count + len(block.numbers)
+            poses = self._with_place(block)
             if self.looks_up_places:
                 poses = poses._replace(parents=EARTH_FRAMES[:1])
-            stamps = stamps_for(poses, self.stamps, fmt, count)
-            poses = poses._replace(stamps_ns=self._held(stamps, fmt) if fmt.counted else stamps)
-            count += len(poses.numbers)
-            yield poses, outcome
-        if self.stamps:
-            self.stamps.finish(count, self.source)
+            if file:
+                poses = poses._replace(stamps_ns=np.array([*map(file.at, range(before, count))], np.int64))
+            elif fmt.counted and poses.stamps_ns is None:
+                poses = poses._replace(stamps_ns=np.arange(before, count) * BILLION)
+            yield poses._replace(stamps_ns=self._held(poses.stamps_ns, fmt)), outcome
+        if file:
+            file.finish(count, self.source)
         if is_trajectory(self.fmt):
             describe(Options(self.tally, Topics(), answers=self.answers), fmt, count, named=False)
 
-    def _held(self, stamps_ns: Any, fmt: Poses) -> Any:
+    def _held(self, stamps_ns: Ints | None, fmt: Poses) -> Ints | None:
         """Return stamps, unless they only count and the other format has no place for them: they are not lost then."""
-        rows = rows_of(self.style.format)
-        counts = bool(fmt.counted) and self.stamps is None
-        has_room = not is_recording(self.style.format) and "stamps" in getattr(rows, "holds", ("stamps",))
-        return stamps_ns if has_room or not counts else None
+        counts = bool(fmt.counted) and not self.answers.stamps
+        holds = getattr(rows_of(self.style.format), "holds", ("stamps",))
+        return None if counts and (is_recording(self.style.format) or "stamps" not in holds) else stamps_ns
 
-    def _columns(self, stream: BufferedReader) -> Iterator[Step]:
-        """Yield the rows of columns of numbers."""
-        file = InputFile(self.source if self.source != "stdin" else "-", stream)
-        file.format = self.fmt
-        opened = self.module.open_columns(file, Options(self.tally, Topics(), answers=self.answers))
+    def _columns(self, stream: ByteStream) -> Iterator[Step]:
+        """Yield the rows of columns of numbers; those that stand for no point have no place in a text."""
+        from frametool.stream.column_stream import ColumnRows, move_along
+
+        opened = import_module(FORMATS[self.fmt].reader).open_columns(*self._opened(stream))
         rows = ColumnRows(opened, self.request, self.source)
         move_along(opened, self.request)
-        self._settle(rows)
+        self._begin(rows)
         yield rows.poses(opened.nothing()), Outcome(b"")
+        left_out = 0
         for batch in opened.batches():
-            poses = self._with_place(rows.poses(batch), rows)
+            poses = self._with_place(rows.poses(batch))
             if not self.to_arrays and self.request.on_error != NULL:
                 there = np.flatnonzero(~np.isnan(poses.numbers[:, 0]))
-                self.without += len(poses.numbers) - len(there)
+                left_out += len(poses.numbers) - len(there)
                 poses = kept(poses, there)
             yield poses, rows.outcome(batch)
-        if self.without:
-            count = f"{self.without} {'row' if self.without == 1 else 'rows'}"
+        if left_out:
+            count = f"{left_out} {'row' if left_out == 1 else 'rows'}"
             warn(f"{self.source}: {count} without numbers left out: {self.style.format} has no place for them")
 
-    def _with_place(self, poses: RowPoses, rows: PlannedRows) -> RowPoses:
+    def _opened(self, stream: ByteStream) -> tuple[InputFile, Options]:
+        """Return the stream as a file, and how it is read."""
+        file = InputFile("-" if self.source == "stdin" else self.source, cast("BinaryIO", stream))
+        file.format = self.fmt
+        return file, Options(self.tally, Topics(), normalize=self.request.normalize, answers=self.answers)
+
+    def _with_place(self, poses: RowPoses) -> RowPoses:
         """Add to points of the Earth their lat, lon and alt as they were read, where these are written again."""
-        operation = self.request.operation
+        operation, inputs = self.request.operation, self.rows.inputs
         if not (is_recording(self.style.format) or self.style.place) or not operation.keeps_frames:
             return poses
-        rows.inputs[:, np.isnan(poses.numbers[:, 0])] = np.nan
-        read = operation.place_as_read(self.shape, lambda size: [*rows.inputs[:size]])
+        inputs[:, np.isnan(poses.numbers[:, 0])] = np.nan
+        read = operation.place_as_read(self.shape, lambda size: [*inputs[:size]])
         return poses._replace(read=np.column_stack(read)) if read else poses
 
     # --- formats that list poses ---
 
-    def _listed(self, stream: BufferedReader) -> Iterator[Step]:
+    def _listed(self, stream: ByteStream) -> Iterator[Step]:
         """Yield the poses of a format whose lines are no table."""
-        file = InputFile(self.source if self.source != "stdin" else "-", stream)
-        faults: list[Fault] = []
-        report = stop
-        if self.request.on_error != STOP:
-            report = lambda error: faults.append(Fault(max(error.line, 1) - 1, "", error.message))  # noqa: E731
-        options = Options(self.tally, Topics(), report, normalize=self.request.normalize, answers=self.answers)
-        file.format = self.fmt
-        fmt: Poses = self.module.form_of(file, options)
-        request = self.request
+        module, request = import_module(FORMATS[self.fmt].reader), self.request
         if request.frames:
             raise ValueInvalid("poses do not say their frame; name SOURCE")
         if request.poses > 1:
             raise FormatError(f"{self.fmt} lists one pose after the other; two a row are wanted", source=self.source)
-        self.placed, self.shape = True, Shape(POSE, 1.0, QUATERNION)
-        plan = _plan(request)
-        state = State()
+        faults: list[Fault] = []
+        report = stop
+        if request.on_error != STOP:
+            report = lambda error: faults.append(Fault(max(error.line, 1) - 1, "", error.message))  # noqa: E731
+        file, options = self._opened(stream)
+        fmt: Poses = module.form_of(file, options)
+        self.placed, self.shape, plan, state = True, Shape(POSE, 1.0, QUATERNION), _plan_listed(request), State()
         rename = rename_of(request) or (lambda parent, name: (parent, name))
-        for each in self.module.blocks(file, options, named=False):
-            block = _block(each._replace(stamps_ns=each.stamps_ns + request.offset_ns))
+        for each in module.blocks(file, options._replace(report=report), named=False):
+            lines = [row.line - 1 for row in each.rows]
+            stamps = [each.stamps_ns + request.offset_ns]
+            block = Block(np.array(each.poses).T.copy(), (), np.arange(len(lines)), lines.__getitem__, stamps=stamps)
             done = Run(plan, block, state)
-            good = done.rows.tolist()
-            written = [each.rows[row] for row in good]
-            images = [row.image for row in written]
-            extras = {IMAGE: spans_of([image.encode() for image in images])} if any(images) else {}
+            written = [each.rows[row] for row in done.rows.tolist()]
+            extras = {}
+            if any(row.image for row in written):
+                extras[IMAGE] = spans_of([row.image.encode() for row in written])
             if self.fmt == self.style.format:
                 extras[NUMBER] = spans_of([b"%d" % row.number for row in written])
-            lines = np.array([row.line for row in written], np.int64)
             own = any(row.names for row in written)
             pairs = [rename(*(row.names or (None, None))) for row in (written if own else written[:1])]
             parents, names = zip(*pairs, strict=True) if pairs else ((None,), (None,))
-            stamps = None if own else block.stamps[0][done.rows]
-            poses = RowPoses(done.results[done.rows], self._held(stamps, fmt), lines, parents, names, extras)
-            found = sorted(faults + done.faults())
-            yield poses, Outcome(b"", found, len(each.rows) + len(faults), 0, notes=sorted(done.notes))
+            times = None if own else self._held(stamps[0][done.rows], fmt)
+            places = np.array(lines, np.int64)[done.rows] + 1
+            poses = RowPoses(done.results[done.rows], times, places, parents, names, extras)
+            found, count = sorted(faults + done.faults()), len(lines) + len(faults)
+            yield poses, Outcome(b"", found, count, notes=sorted(done.notes))
             faults.clear()
 
 
-def _plan(request: Request) -> Plan:
-    """Plan poses that are no text."""
-    shape = Shape(POSE, 1.0, QUATERNION)
-    target = Target(1.0, ((QUATERNION, False),), keep_sign=True)
-    edge = request.pose_from_frame if request.operation.moves and request.timed is not None else None
-    timed = request.timed if request.timed is not None and request.timed.name else None
+def _plan_listed(request: Request) -> Plan:
+    """Plan poses that are no text: the components of each."""
+    timed = request.timed
+    edge = request.pose_from_frame if request.operation.moves and timed else None
+    timed = timed if timed and timed.name else None
     request = request._replace(timed=timed, extra_column=None, unwrap=False)
-    return Plan((shape,), (target,), request, ("x", "y", "z", "qx", "qy", "qz", "qw"), edge_of=edge)
-
-
-def _block(poses: PoseBlock) -> Block:
-    """Make a block of rows of poses."""
-    numbers, rows = np.array(poses.poses).T.copy(), poses.rows
-    return Block(numbers, (), np.arange(len(rows)), lambda row: rows[row].line - 1, stamps=[poses.stamps_ns])
+    target = Target(1.0, ((QUATERNION, False),), keep_sign=True)
+    names = "x", "y", "z", *QUATERNION.columns
+    return Plan((Shape(POSE, 1.0, QUATERNION),), (target,), request, names, edge_of=edge)

@@ -119,8 +119,8 @@ class BadRows:
     """
 
     def __init__(
-        self, source: str, on_error: str = STOP, *, most: int = MOST, tell: Callable[[FrametoolError], None],
-        counted: str = "line",
+        self, source: str, on_error: str = STOP, *, most: int = MOST, counted: str = "line",
+        tell: Callable[[FrametoolError], None] = lambda error: warn(str(error)),
     ) -> None:  # fmt: skip
         """Create an empty count."""
         self.source = source

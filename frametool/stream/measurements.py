@@ -25,6 +25,7 @@ from frametool.grammar.covariance import AXES, columns, is_sigma
 from frametool.grammar.names import NAME_KEYS, STAMP_KEYS
 from frametool.grammar.pose import COVARIANCE_KEYS, Pose, inverted, read_angle_unit
 from frametool.grammar.readers import Misfit, Reading, kind, tell, within
+from frametool.stream.faults import BadRows
 from frametool.stream.record import INNER, KNOWN, find_records, value_at
 from frametool.stream.record_values import pose_of, stamp_of
 from frametool.stream.request import COMBINED, Operation, Request
@@ -190,39 +191,38 @@ def _of_edges(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
 
 def _of_table(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
     """Yield the rows of a table."""
-    from frametool.geometry.representations import notation
+    from frametool.stream.as_poses import FormatConverter
     from frametool.stream.row_poses import results_of
-    from frametool.stream.table_stream import TableRows, begin_table
 
-    quaternion = (notation("quaternion"),)
-    request = request._replace(operation=MOVED, notations=quaternion, keep_sign=True, all_numbers=True)
-    begun = begin_table(cast("ByteStream", file.stream), file.format, request, source=file.name)
-    rows = TableRows(begun.table, request, file.name)
-    if rows.shape.notation is None and rows.shape.unit is None:
-        raise FormatError(f"no pose among the columns {rows.columns}; {LIKE}", source=file.name, line=1)
-    if rows.shape.notation is None:
-        warn(f"{file.name}:1: no rotation among the columns {rows.columns}: each is taken for 0")
-    bare = file.tally.names.bare
-    has_place = rows.shape.whole or rows.shape.unit is not None
-    for block, line, outcome in rows.blocks(begun):
-        for below, column, reason, *_ in outcome.faults:
-            raise FormatError(f"{column}{': ' * bool(column)}{reason}", source=file.name, line=line + below)
-        results = results_of(block, columns() if rows.shape.covariance else (), placed=has_place)
-        for at, result, inputs in zip(block.lines.tolist(), results, rows.inputs.T.tolist(), strict=True):
+    converter = FormatConverter(file.format, request._replace(operation=MOVED), file.name)
+    bare, line = file.tally.names.bare, 0
+    for block, outcome in converter.steps(cast("ByteStream", file.stream)):
+        rows, shape = converter.rows, converter.rows.shape
+        has_place = shape.whole or shape.unit is not None
+        if not line and shape.notation is None and not has_place:
+            raise FormatError(f"no pose among the columns {rows.columns}; {LIKE}", source=file.name, line=1)
+        if not line and shape.notation is None:
+            warn(f"{file.name}:1: no rotation among the columns {rows.columns}: each is taken for 0")
+        line = line or 1
+        BadRows(file.name).take(fault._replace(line=line + fault.line) for fault in outcome.faults)
+        results = results_of(block, columns() if shape.covariance else (), placed=has_place)
+        inputs = rows.inputs.T.tolist() if results else []
+        for at, result, own in zip((block.lines + line).tolist(), results, inputs, strict=True):
             pose, cells = result.pose, result.extras
             try:
                 child = _one_child(pose.name, cells.get("name"))
             except ValueInvalid as error:
-                raise FormatError(str(error), source=file.name, line=line + at) from None
+                raise FormatError(str(error), source=file.name, line=at) from None
             if (flag := cells.get("inverse")) not in (None, "true", "false"):
                 message = f"inverse must be true or false, found {shown(str(flag))}"
-                raise FormatError(message, source=file.name, line=line + at)
-            inverse = flag == "true"
+                raise FormatError(message, source=file.name, line=at)
             pose = pose._replace(covariance=cells.get("covariance"))
-            made = _made(inverted(pose) if inverse else pose, bare(pose.parent or ""), bare(child), cells.get("id"))
-            written = None if inverse else _written(rows.shape, inputs)
-            yield MeasuredRow(made._replace(written=written), line + at, cells.get("stamp_ns"))
-    file.tally.rough += [1] * rows.mended
+            pose = inverted(pose) if flag == "true" else pose
+            made = _made(pose, bare(pose.parent or ""), bare(child), cells.get("id"))
+            written = None if flag == "true" else _written(shape, own)
+            yield MeasuredRow(made._replace(written=written), at, cells.get("stamp_ns"))
+        line += outcome.lines
+    file.tally.rough += [1] * converter.rows.mended
     file.tell()
 
 

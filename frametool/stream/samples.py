@@ -8,7 +8,7 @@ id,x,y,z,weight                                                        points, i
 
 from __future__ import annotations
 
-from io import BufferedReader, BytesIO
+from io import BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
@@ -23,24 +23,25 @@ from frametool.geometry.transform import Transform
 from frametool.grammar.edges import Answers
 from frametool.grammar.pose import inverted, read_pose
 from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, tell, within
-from frametool.grammar.result import Style
 from frametool.stream.as_poses import FormatConverter
+from frametool.stream.faults import BadRows
 from frametool.stream.header import listed
 from frametool.stream.record import value_at
 from frametool.stream.record_values import pose_of, read_text
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_poses import plain_cells
 from frametool.stream.table import open_table
-from frametool.stream.trajectories import TREE, gathered, stop_at_first
+from frametool.stream.trajectories import TREE, gathered
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from frametool.geometry.types import Array
+    from frametool.grammar.edges import Answers
     from frametool.grammar.pose import Pose
     from frametool.grammar.readers import Path
-    from frametool.stream.faults import BadRows
+    from frametool.text.lines import ByteStream
 
 ROBOT = "robot"
 PARTNERS = {"gripper": ("target",), "effector_wrt_world": ("object_wrt_sensor",), ROBOT: ("tracking", "optical")}
@@ -124,8 +125,7 @@ def _of_table(file: InputFile, fmt: str, columns: Sequence[str], *, normalize: b
     sides, placed, places = list[Transform](), False, list[str]()
     for each in columns:
         request = Request(Operation(moves=True), columns=(each,), normalize=normalize)
-        converter = FormatConverter(fmt, request, Style("json"), file.name, Answers())
-        poses = gathered(converter, BufferedReader(BytesIO(text)), stop_at_first(file.name))
+        poses = gathered(FormatConverter(fmt, request, file.name), BytesIO(text), BadRows(file.name))
         numbers = poses.numbers
         if numbers.shape[1] not in (4, 7):
             raise FormatError(f"no rotation among the columns {each}", source=file.name, line=1)
@@ -231,8 +231,8 @@ def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows) -> Point
     """Gather the points of a table, or of columns of numbers."""
     if {"rows", "arrays"}.isdisjoint(FORMATS[fmt].reads):
         raise FormatError(f"no points in it: {FORMATS[fmt].summary}", source=file.name)
-    converter = FormatConverter(fmt, Request(Operation(moves=True)), Style("json"), file.name, answers)
-    poses = gathered(converter, cast("BufferedReader", file.stream), bad, (*IDS, WEIGHT))
+    converter = FormatConverter(fmt, Request(Operation(moves=True)), file.name, answers=answers)
+    poses = gathered(converter, cast("ByteStream", file.stream), bad, (*IDS, WEIGHT))
     if poses.numbers.shape[1] < 3 or not converter.placed:
         raise FormatError("no positions in it: rotations alone are no points", source=file.name)
     extra: dict[str, list[Any]] = dict.fromkeys((*IDS, WEIGHT), [None] * len(poses.numbers))

@@ -12,22 +12,22 @@ from typing import TYPE_CHECKING, cast
 
 from frametool.documents.source import not_text
 from frametool.errors import FormatError
-from frametool.formats.rows.pose_rows import StampFile, describe
+from frametool.formats.rows.pose_rows import describe
 from frametool.formats.table import FORMATS
-from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge, Samples
+from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRow, Fault
 from frametool.stream.request import Request
-from frametool.stream.table_stream import TableRows, begin_table, stamps_for
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
     from frametool.formats.table import Poses
     from frametool.geometry.types import Components
     from frametool.grammar.edges import Options
     from frametool.stream.row_poses import RowPoses
+    from frametool.stream.table_stream import PlannedRows
     from frametool.text.lines import ByteStream
 
 
@@ -39,29 +39,29 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
     fmt = FORMATS[file.format].poses
     if what := not_text(file.head()):
         raise FormatError(what, source=file.name)
-    quaternion = (notation("quaternion"),)
-    request = Request(normalize=options.normalize, notations=quaternion, keep_sign=True, all_numbers=True)
-    begun = begin_table(cast("ByteStream", file.stream), file.format, request, source=file.name)
-    rows = TableRows(begun.table, request, file.name)
-    _check(rows, fmt, file, options)
-    stamps = StampFile(options.answers.stamps) if options.answers.stamps else None
-    count = 0
-    for block, line, outcome in rows.blocks(begun):
+    converter = FormatConverter(file.format, Request(normalize=options.normalize), file.name, answers=options.answers)
+    line = count = 0
+    for block, outcome in converter.steps(cast("ByteStream", file.stream)):
+        if not line:
+            _check(converter.rows, fmt, file, options)
+            line = 1
         for fault in outcome.faults:
             options.report(BadRow(fault._replace(line=line + fault.line), fault.reason, source=file.name))
-        for row, role in _nameless(block, rows.roles).items():
-            column = rows.table.name(rows.naming.places[role] or 0)
+        for row, column in _nameless(block, converter.rows).items():
             fault = Fault(line + int(block.lines[row]), column, "no name of a frame")
             options.report(BadRow(fault, fault.reason, source=file.name))
-        times = stamps_for(block, stamps, fmt, count)
-        yield from _pieces(block, None if times is None else times.tolist(), line, fmt, options)
-        count += len(block.numbers)
-    if stamps:
-        stamps.finish(count, file.name)
-    _tell(rows, fmt, options, count)
+        yield from _pieces(block, line, fmt, options)
+        line, count = line + outcome.lines, count + len(block.numbers)
+    rows = converter.rows
+    if len(rows.roles) < 2:
+        describe(options, fmt, count)
+    if fmt.rotation == "matrix":
+        options.tally.projected = rows.off
+    else:
+        options.tally.rough += [1] * rows.mended
 
 
-def _check(rows: TableRows, fmt: Poses, file: InputFile, options: Options) -> None:
+def _check(rows: PlannedRows, fmt: Poses, file: InputFile, options: Options) -> None:
     """Refuse a table that is no poses, or poses without time and names."""
     if rows.shape.notation is None:
         message = f"no rotation among the columns {rows.columns}: points are no frames"
@@ -72,19 +72,23 @@ def _check(rows: TableRows, fmt: Poses, file: InputFile, options: Options) -> No
         raise FormatError(f"no column {lacking} nor stamp among {rows.columns}; {wanted}", source=file.name, line=1)
 
 
-def _nameless(block: RowPoses, roles: Sequence[int]) -> dict[int, int]:
-    """Return the rows in which the cell of the parent (0) or of the name (1) is empty, and which of the two is."""
-    named = [(role, block.for_each((block.parents, block.names)[role])) for role in roles]
-    return {row: role for role, names in named if not all(names) for row, name in enumerate(names) if not name}
+def _nameless(block: RowPoses, rows: PlannedRows) -> dict[int, str]:
+    """Return the rows in which the cell of the parent (0) or of the name (1) is empty, and the name of its column."""
+    found: dict[int, str] = {}
+    for role in rows.roles:
+        names = block.for_each((block.parents, block.names)[role])
+        if not all(names):
+            column = rows.table.name(rows.naming.places[role] or 0)
+            found |= {row: column for row, name in enumerate(names) if not name}
+    return found
 
 
-def _pieces(
-    block: RowPoses, times: Sequence[int] | None, line: int, fmt: Poses, options: Options
-) -> Iterator[Edge | Samples]:
+def _pieces(block: RowPoses, line: int, fmt: Poses, options: Options) -> Iterator[Edge | Samples]:
     """Yield the poses of a block: as samples of one frame after the other, or as edges that are static."""
     columns: Components = tuple(block.numbers.T)
     if len(columns) == len("xyzw"):
         columns = (*[columns[0] * 0.0] * 3, *columns)
+    times = None if block.stamps_ns is None else block.stamps_ns.tolist()
     poses = list(zip(*(column.tolist() for column in columns), strict=True))
     lines = (block.lines + line).tolist()
     world, body = options.answers.names(*fmt.frames)
@@ -99,13 +103,3 @@ def _pieces(
         else:
             yield from (Edge(parent, name, poses[at], None, lines[at]) for at in some)
     options.tally.axes |= dict.fromkeys(names, options.answers.camera_axes or fmt.axes)
-
-
-def _tell(rows: TableRows, fmt: Poses, options: Options, count: int) -> None:
-    """Keep what is worth telling: what was taken for granted, rotations that were not quite."""
-    if len(rows.roles) < 2:
-        describe(options, fmt, count)
-    if fmt.rotation == "matrix":
-        options.tally.projected = rows.off
-    else:
-        options.tally.rough += [1] * rows.mended

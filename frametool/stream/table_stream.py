@@ -11,7 +11,6 @@ import numpy as np
 
 from frametool.errors import FormatError, FrametoolError, Misused, listing
 from frametool.formats.table import FORMATS
-from frametool.frames.stamps import BILLION
 from frametool.grammar.names import NORMALS, stamp_places
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import Fault, Outcome, RowNote
@@ -38,8 +37,6 @@ from frametool.text.lines import read_blocks, whole_lines
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence
 
-    from frametool.formats.rows.pose_rows import StampFile
-    from frametool.formats.table import Poses
     from frametool.stream.layout import Layout
     from frametool.stream.request import Request
     from frametool.stream.rows import Block
@@ -243,15 +240,6 @@ class TableRows(PlannedRows):
                 lines = np.array([*map(run.block.line_of, rows.tolist())], np.int64)
             yield self.poses_of(run, rows, numbers, cells.column, lines), line, outcome
             line += outcome.lines
-
-
-def stamps_for(block: RowPoses, file: StampFile | None, fmt: Poses, before: int) -> Ints | None:
-    """Return the stamps of poses behind some: those of a file, their own, or their numbers as seconds."""
-    size = len(block.numbers)
-    if file:
-        return np.array([file.at(before + at) for at in range(size)], np.int64)
-    counts = block.stamps_ns is None and fmt.counted
-    return np.arange(before, before + size, dtype=np.int64) * BILLION if counts else block.stamps_ns
 
 
 def moves_in_time(timed: Timed, frames: set[str | None]) -> bool:

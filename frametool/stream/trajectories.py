@@ -38,7 +38,6 @@ from frametool.text.cells import without_quotes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
-    from io import BufferedReader
     from os import PathLike
 
     from frametool.frames.buffer import TransformBuffer
@@ -68,18 +67,13 @@ def load_trajectory(
     return read_trajectory(str(path), fmt=format or "", topics=[topic] if topic else [], answers=known)
 
 
-def stop_at_first(name: str) -> BadRows:
-    """Raise the first bad row of a file."""
-    return BadRows(name, tell=lambda error: warn(str(error)))
-
-
 def read_trajectory(
     text: str,
     *,
     fmt: str = "",
     topics: Sequence[str] = (),
     answers: Answers = Answers(),  # noqa: B008 - it is frozen
-    policy: Callable[[str], BadRows] = stop_at_first,
+    policy: Callable[[str], BadRows] = BadRows,
     normalize: bool = False,
 ) -> Trajectory:
     """Read what an argument names; otherwise as `load_trajectory`.
@@ -210,7 +204,7 @@ def _stamps_of_tree(path: str, topics: Sequence[str] = (), *, fmt: str | None = 
     return sorted(found)
 
 
-def gathered(converter: FormatConverter, stream: BufferedReader, bad: BadRows, columns: Sequence[str] = ()) -> RowPoses:
+def gathered(converter: FormatConverter, stream: ByteStream, bad: BadRows, columns: Sequence[str] = ()) -> RowPoses:
     """Return all results of a stream as one block with their lines from 1, and some of its other columns as values.
 
     Bad rows go to `bad`.  Raises FormatError if no row is left.
@@ -254,8 +248,8 @@ def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows, asked: R
     counts = row is not None and bool(row.counted)
     own = answers if counts or fmt == "csv" else answers._replace(stamps="")
     request = asked._replace(operation=Operation(moves=True), rename=lambda parent, name: (parent, name))
-    converter = FormatConverter(fmt, request, Style("tum"), file.name, own)
-    poses = gathered(converter, cast("BufferedReader", file.stream), bad)
+    converter = FormatConverter(fmt, request, file.name, Style("tum"), own)
+    poses = gathered(converter, cast("ByteStream", file.stream), bad)
     named = {*zip(poses.parents, poses.names, strict=True)}
     if len(named) > 1:
         some = ", ".join(f"{parent}:{name}" for parent, name in sorted(named, key=str)[:3])

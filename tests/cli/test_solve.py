@@ -240,7 +240,7 @@ BAD: tuple[tuple[str, dict[str, str], int, str], ...] = (
     ("m.yaml", {"m.yaml": "measurements: 5\n"}, 1, "m.yaml:1:15: expected a list of measurements, found '5'"),
     ("m.yaml", {"m.yaml": ""}, 1, "m.yaml: no measurements in it"),
     ("m.csv", {"m.csv": "x\n1\n2\n"}, 1, "m.csv:1: no columns of a point or pose among: x"),
-    ("m.csv", {"m.csv": "parent,child,x,y,z,qx,qy,qz,qw\na,b,nan,0,0,0,0,0,1\n"}, 1, "m.csv:2: x: 'nan' is not finite"),
+    ("m.csv", {"m.csv": "parent,child,x,y,z,qx,qy,qz,qw\na,b,nan,0,0,0,0,0,1\n"}, 1, "m.csv:2:x: 'nan' is not finite"),
     ("m.yaml", {"m.yaml": ROW.format("xyz: [1, 0]")}, 1, "m.yaml:2:32: expected 3 numbers (x y z), found 2"),
     ("m.yaml", {"m.yaml": ROW.format("xyz: [1, 0, 0]").replace("child: b", "child: a")}, 1, "m.yaml:2: 'a' is measured from itself"),
     ("m.yaml", {"m.yaml": ROW.format("xyz: [1, 0, 0], sigma: {xyz: 0, rpy: 0.1}")}, 1, "--fix"),

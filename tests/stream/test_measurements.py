@@ -175,7 +175,7 @@ def test_what_is_no_measurement_is_refused_in_one_line_with_its_place(read: Read
 
 
 TABLES = {
-    "a,b,1,2,3,x": "m.csv:2: yaw: 'x' is not a number",
+    "a,b,1,2,3,x": "m.csv:2:yaw: 'x' is not a number",
     ",b,1,2,3,1": f"m.csv:2: missing parent; {LIKE}",
     "a,,1,2,3,1": f"m.csv:2: missing child; {LIKE}",
     "a,a,1,2,3,1": "m.csv:2: 'a' is measured from itself",
@@ -195,7 +195,7 @@ def test_rows_of_tables_are_refused_with_their_line(read: Read, rows: str) -> No
     ("columns", "row", "message"),
     [
         ("sigma_xyz", "0.1", f"m.csv:2: sigma of one half only, none of rpy: {ONE_HALF}"),
-        ("sigma_xyz,sigma_rpy", "-0.1,0.1", "m.csv:2: sigma_xyz: sigma is negative: -0.1"),
+        ("sigma_xyz,sigma_rpy", "-0.1,0.1", "m.csv:2:sigma_xyz: sigma is negative: -0.1"),
         ("sigma_xyz,sigma_x", "0.1,0.1", "m.csv:1: column 'sigma_x': the sigma of x is there already; keep one"),
         ("name", "d", "m.csv:2: child says 'b' and name says 'd'; keep one"),
         ("inverse", "maybe", "m.csv:2: inverse must be true or false, found 'maybe'"),
