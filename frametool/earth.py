@@ -29,11 +29,8 @@ __all__ = ["earth_pose", "ecef_from_lla", "lla_from_ecef", "lla_from_utm", "utm_
 def ecef_from_lla(lat: Numbers, lon: Numbers, alt: Numbers = 0.0) -> Any:
     """Return x, y, z in metres: three floats for one position, an array (..., 3) for many."""
     argument = _columns(lat=lat, lon=lon, alt=alt)
-    if validation.single(argument):
-        return validation.checked(earth.ecef, 3, argument, "place", earth.check_lla)
-    from frametool.geometry import arrays
-
-    return arrays.rows(validation.watched(earth.ecef, 3, argument, "place", earth.check_lla), (3,), argument, arrays)
+    found = validation.checked(earth.ecef, 3, argument, "place", earth.check_lla)
+    return found if validation.single(found) else validation.stacked(found)
 
 
 def lla_from_ecef(xyz: Numbers) -> Any:

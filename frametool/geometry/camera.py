@@ -472,7 +472,7 @@ class Camera:
 
         The depth is z in optical axes.  Pixels are NaN behind the camera and where the model is not valid.
         """
-        *pixels, depth = self.pixels_of(*_columns(points, 3, "points"))
+        *pixels, depth = self.pixels_of(*validation.columns(points, 3, "points", or_nan=True))
         return validation.stacked((*pixels,)), depth
 
     def unproject(self, pixels: Numbers, depth: Numbers | None = None, range: Numbers | None = None) -> Array:  # noqa: A002
@@ -480,7 +480,7 @@ class Camera:
 
         depth: z in optical axes; range: the distance from the camera.  NaN where there is no direction.
         """
-        u, v = _columns(pixels, 2, "pixels")
+        u, v = validation.columns(pixels, 2, "pixels", or_nan=True)
         distances = (("depth", depth), ("range", range))
         far = {name: validation.as_numbers(each, name) for name, each in distances if each is not None}
         if len(far) > 1:
@@ -489,7 +489,7 @@ class Camera:
 
     def on_plane(self, pixels: Numbers, plane_from_camera: Transform, height: float = 0.0) -> Array:
         """Return where the rays of pixels (.., 2) meet z = height of a frame: points (.., 3) in it, else NaN."""
-        u, v = _columns(pixels, 2, "pixels")
+        u, v = validation.columns(pixels, 2, "pixels", or_nan=True)
         return validation.stacked(self.plane_points_of(u, v, plane_from_camera.components, float(height)))
 
     def undistort(self, pixels: Numbers, into: Camera | None = None) -> Array:
@@ -497,12 +497,12 @@ class Camera:
 
         into: another camera, such as `camera.rectified()`
         """
-        u, v = _columns(pixels, 2, "pixels")
+        u, v = validation.columns(pixels, 2, "pixels", or_nan=True)
         return validation.stacked(self.undistorted_of(u, v, into))
 
     def in_image(self, pixels: Numbers) -> Any:
         """Return True for pixels (.., 2) inside the image."""
-        return self.is_in_image(*_columns(pixels, 2, "pixels"))
+        return self.is_in_image(*validation.columns(pixels, 2, "pixels", or_nan=True))
 
     # --- kernels ---
 
@@ -542,14 +542,6 @@ class Camera:
         scale = (height - oz) / _divisor(z, xp)
         scale = xp.where(scale > 0.0, scale, nan)
         return ox + scale * x, oy + scale * y, 0.0 * scale + height
-
-
-def _columns(value: Numbers, width: int, name: str) -> tuple[Any, ...]:
-    """Split (.., width) numbers: floats of one item, or columns; values that are not finite are accepted."""
-    array = validation.as_numbers(value, name)
-    if array.ndim == 0 or array.shape[-1] != width:
-        raise ValueInvalid(f"{name}: expected shape (..., {width}), got {array.shape}")
-    return tuple(array.astype(float).tolist()) if array.ndim == 1 else tuple(array[..., at] for at in range(width))
 
 
 def _numbers(value: Any, what: str, *counts: int) -> tuple[float, ...]:

@@ -39,6 +39,13 @@ class Batched:
         made._components = components  # noqa: SLF001 - its own class
         return made
 
+    @classmethod
+    def _components_of(cls, value: object, name: str = "other") -> Components:
+        """Return the components of a value of this type; raise ValueInvalid for anything else."""
+        if isinstance(value, cls):
+            return value._components  # noqa: SLF001 - its own class
+        raise ValueInvalid(f"{name}: expected a {cls.__name__}, got {type(value).__name__}")
+
     @property
     def shape(self) -> tuple[int, ...]:
         """The shape of the batch; () for one item."""
@@ -59,6 +66,12 @@ class Batched:
     def __iter__(self) -> Iterator[Self]:
         """Iterate over the first axis."""
         return (self[index] for index in range(len(self)))
+
+    def _repr_html_(self) -> str | None:
+        """Show it in a notebook as a terminal does."""
+        import frametool
+
+        return frametool.html_of(self)
 
 
 class Rotation(Batched):
@@ -269,7 +282,7 @@ class Rotation(Batched):
 
     def distance(self, other: Rotation) -> Any:
         """Return the angle in [0, pi] radians of the rotation between two."""
-        return validation.number(quaternion.distance, (*self._components, *require(other, "other").components))
+        return validation.number(quaternion.distance, (*self._components, *self._components_of(other)))
 
     def is_close(self, other: Rotation, *, angle: float = NEAR) -> Any:
         """Return True for each element whose rotations differ by at most an angle in radians; q and -q are the same."""
@@ -280,7 +293,7 @@ class Rotation(Batched):
 
         fraction: a number, or an array that broadcasts with the rotations.
         """
-        parts = (*self._components, *require(other, "other").components, validation.scalars(fraction, "fraction"))
+        parts = (*self._components, *self._components_of(other), validation.scalars(fraction, "fraction"))
         return self.of(*validation.run(quaternion.slerp, 4, parts))
 
     def mean(self, weights: Numbers | None = None) -> Rotation:
@@ -291,21 +304,8 @@ class Rotation(Batched):
         found = validation.mean_quaternion(tuple(part.reshape(-1) for part in self._components), mass)
         return Rotation.of(*found).canonical()
 
-    def _repr_html_(self) -> str | None:
-        """Show it in a notebook as a terminal does."""
-        import frametool
-
-        return frametool.html_of(self)
-
     def __repr__(self) -> str:
         """Show one rotation's quaternion, or the shape of many."""
         if self.shape:
             return f"<Rotation of shape {self.shape}>"
         return f"Rotation([{', '.join(map(repr, self._components))}])"
-
-
-def require(value: object, name: str) -> Rotation:
-    """Return a rotation; raise ValueInvalid for anything else."""
-    if isinstance(value, Rotation):
-        return value
-    raise ValueInvalid(f"{name}: expected a Rotation, got {type(value).__name__}")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import rigid, validation
-from frametool.geometry.rotation import NEAR, Batched, Rotation, require
+from frametool.geometry.rotation import NEAR, Batched, Rotation
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -74,8 +74,8 @@ class Transform(Batched):
             raise ValueInvalid(f"from_parts takes one rotation, not {' and '.join(rotation)}")
         (name, inputs), *_ = [*rotation.items(), ("rotation", Rotation.identity())]
         turn = inputs if name == "rotation" else Rotation.from_notation(name, inputs, normalize=normalize)
-        shift = validation.columns(xyz, 3, "xyz")
-        return cls.of(*validation.joined(shift, require(turn, "rotation").components, "xyz"))
+        shift, parts = validation.columns(xyz, 3, "xyz"), Rotation._components_of(turn, "rotation")  # noqa: SLF001
+        return cls.of(*validation.joined(shift, parts, "xyz"))
 
     @classmethod
     def from_arrays(cls, xyz: Numbers, xyzw: Numbers, *, normalize: bool = False) -> Transform:
@@ -150,7 +150,7 @@ class Transform(Batched):
     def relative(self, other: Transform) -> Transform:
         """Return the pose of the other in this one: self.inverse() @ other, accurate also for close poses."""
         return self.of(
-            *validation.run(rigid.relative, 7, (*self._components, *_components_of(other)), functions=False)
+            *validation.run(rigid.relative, 7, (*self._components, *self._components_of(other)), functions=False)
         )
 
     def apply(self, points: Numbers, *, out: Array | None = None) -> Array:
@@ -177,12 +177,12 @@ class Transform(Batched):
 
         fraction: a number, or an array that broadcasts with the transforms.
         """
-        parts = (*self._components, *_components_of(other), validation.scalars(fraction, "fraction"))
+        parts = (*self._components, *self._components_of(other), validation.scalars(fraction, "fraction"))
         return self.of(*validation.run(rigid.interpolate, 7, parts))
 
     def distance(self, other: Transform) -> tuple[Any, Any]:
         """Return the distance in metres and the angle in radians between two."""
-        metres, radians = validation.run(rigid.distance, 2, (*self._components, *_components_of(other)))
+        metres, radians = validation.run(rigid.distance, 2, (*self._components, *self._components_of(other)))
         return metres, radians
 
     def is_close(self, other: Transform, *, angle: float = NEAR, distance: float = NEAR_BY) -> Any:
@@ -203,22 +203,9 @@ class Transform(Batched):
         shift = (float((part * mass).sum() / mass.sum()) for part in self._components[:3])
         return Transform.of(*shift, *self.rotation.mean(weights).components)
 
-    def _repr_html_(self) -> str | None:
-        """Show it in a notebook as a terminal does."""
-        import frametool
-
-        return frametool.html_of(self)
-
     def __repr__(self) -> str:
         """Show one transform's numbers, or the shape of many."""
         if self.shape:
             return f"<Transform of shape {self.shape}>"
         shown = [repr(part) for part in self._components]
         return f"Transform.from_parts(xyz=[{', '.join(shown[:3])}], xyzw=[{', '.join(shown[3:])}])"
-
-
-def _components_of(other: object) -> Rigid:
-    """Return the components of a transform; raise ValueInvalid for anything else."""
-    if isinstance(other, Transform):
-        return other.components
-    raise ValueInvalid(f"other: expected a Transform, got {type(other).__name__}")

@@ -22,32 +22,27 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Array, Components, Kernel, Numbers
 
 
-
-
 def single(components: Components) -> bool:
     """Return True if components are the floats of one item."""
     return all(type(part) is float for part in components)
 
 
-def batch_shape(parts: Components) -> tuple[int, ...]:
-    """Return the shape of components of equal shape; () for one item."""
-    return getattr(parts[-1], "shape", ())
-
-
-def columns(value: Any, width: int, name: str) -> Components:
-    """Split `(..., width)` numbers into columns; those of one item become floats and are checked to be finite.
+def columns(value: Any, width: int, name: str, *, or_nan: bool = False) -> Components:
+    """Split `(..., width)` numbers into columns; those of one item become floats, checked to be finite unless `or_nan`.
 
     Raises:
         ValueInvalid: another shape, not numbers, or one item that is not finite.
     """
     if isinstance(value, (list, tuple)) and len(value) == width and all(type(part) in (float, int) for part in value):
-        return finite(tuple(map(float, value)), name)
-    array = as_numbers(value, name)
-    if array.ndim == 0 or array.shape[-1] != width:
-        raise ValueInvalid(f"{name}: expected shape (..., {width}), got {array.shape}")
-    if array.ndim == 1:
-        return finite(tuple(map(float, array.tolist())), name)
-    return tuple(array[..., index] for index in range(width))
+        parts = tuple(map(float, value))
+    else:
+        array = as_numbers(value, name)
+        if array.ndim == 0 or array.shape[-1] != width:
+            raise ValueInvalid(f"{name}: expected shape (..., {width}), got {array.shape}")
+        if array.ndim > 1:
+            return tuple(array[..., index] for index in range(width))
+        parts = tuple(map(float, array.tolist()))
+    return parts if or_nan else finite(parts, name)
 
 
 def matrices(value: Numbers, size: int, name: str) -> Components:
@@ -161,31 +156,19 @@ def checked(kernel: Kernel, count: int, inputs: Components, name: str, check: Ca
     if single(inputs):
         check(*inputs)
         return kernel(*inputs, floats)
-    from frametool.geometry import arrays
-
-    return arrays.run(watched(kernel, count, inputs, name, check), count, inputs, arrays)
-
-
-def watched(kernel: Kernel, count: int, inputs: Components, name: str, check: Callable[..., object]) -> Kernel:
-    """Return the kernel for arrays in which `check` reports the first row that fails."""
-    from frametool.geometry import arrays
-
-    return arrays.guarded(kernel, lambda: _recheck(kernel, count, inputs, name, check))
-
-
-def _recheck(kernel: Kernel, count: int, inputs: Components, name: str, check: Callable[..., object]) -> None:
-    """Find the first row for which a kernel failed and report the reason."""
     import numpy as np
 
     from frametool.geometry import arrays
 
-    all_finite(inputs, name)
-    bad = ~np.logical_and.reduce([np.isfinite(part) for part in arrays.run(kernel, count, inputs, arrays)])
-    if bad.any():
+    def refuse() -> None:
+        all_finite(inputs, name)
+        bad = ~np.logical_and.reduce([np.isfinite(part) for part in arrays.run(kernel, count, inputs, arrays)])
         try:
             check(*first_row(inputs, bad))
         except ValueInvalid as error:
             raise ValueInvalid(f"{at_first(name, bad)}: {error}") from None
+
+    return arrays.run(arrays.guarded(kernel, refuse), count, inputs, arrays)
 
 
 def run(kernel: Kernel, count: int, inputs: Components, *, functions: bool = True) -> Components:
