@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from frametool.errors import BadTopology, LookupFailed
 from frametool.geometry import rigid
@@ -12,16 +13,6 @@ from frametool.geometry.rigid import IDENTITY
 if TYPE_CHECKING:
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
-
-
-class SeenPose(NamedTuple):
-    """The pose of a frame in another one.
-
-    reach: the largest coordinate on the path, in metres; rounding is proportional to it
-    """
-
-    components: Rigid
-    reach: float
 
 
 class Snapshot:
@@ -77,44 +68,24 @@ class Snapshot:
             found += (child for child in self._children.get(frame, ()) if child != start)
         return found
 
-    def seen_from(self, start: str) -> dict[str, SeenPose]:
+    def seen_from(self, start: str) -> dict[str, Rigid]:
         """Return the pose in `start` of every frame connected to it.
 
         For the latest time, moving frames are looked up one by one: each at the time common to the edges of its path.
         """
+        found: dict[str, Rigid] = {start: IDENTITY}
         if self.at_ns is None and self.tree.moves:
-            return self._looked_up(start)
-        found = {start: SeenPose(IDENTITY, 0.0)}
+            for frame in self.tree.frames:
+                with suppress(LookupFailed, BadTopology):
+                    found[frame] = self.tree.lookup_components(start, frame)
+            return found
         pending = [start]
         for frame in pending:  # it grows during the loop
-            if frame in self.edges and (parent := self.edges[frame][0]) not in found:
-                found[parent] = _further(found[frame], rigid.inverse(*self.edges[frame][1]))
-                pending.append(parent)
-            for child in self._children.get(frame, ()):
-                if child not in found:
-                    found[child] = _further(found[frame], self.edges[child][1])
-                    pending.append(child)
+            steps = {child: self.edges[child][1] for child in self._children.get(frame, ())}
+            if frame in self.edges:
+                parent, pose = self.edges[frame]
+                steps = {parent: rigid.inverse(*pose)} | steps
+            for other in [each for each in steps if each not in found]:
+                found[other] = rigid.compose(*found[frame], *steps[other])
+                pending.append(other)
         return found
-
-    def _looked_up(self, start: str) -> dict[str, SeenPose]:
-        """Look up every frame that is connected and has a common time."""
-        found = {}
-        for frame in self.tree.frames:
-            try:
-                pose = self.tree.lookup_components(start, frame)
-                way = self.tree.way(start, frame)
-            except (LookupFailed, BadTopology):
-                continue
-            found[frame] = SeenPose(pose, max(map(_size, [pose, *(track.components for track in way)])))
-        return found
-
-
-def _further(seen: SeenPose, step: Rigid) -> SeenPose:
-    """Return the pose after one more edge."""
-    pose = rigid.compose(*seen.components, *step)
-    return SeenPose(pose, max(seen.reach, _size(step), _size(pose)))
-
-
-def _size(pose: Rigid) -> float:
-    x, y, z = map(abs, pose[:3])
-    return float(max(x, y, z))

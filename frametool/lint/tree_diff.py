@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from frametool.geometry.camera import Camera
     from frametool.geometry.types import Rigid
 
-ROUNDING = 2.0**-46  # of the largest number on a path: the maximum error of a product of some dozens of poses
+ROUNDING = 2.0**-46  # of the largest position: the maximum error of a product of some dozens of poses
 
 # kind -> description, in the order in which differences are listed; each of them makes two trees different
 KINDS = {
@@ -82,12 +82,16 @@ def parse_tolerance(text: str, otherwise: Tolerance = Tolerance()) -> Tolerance:
 
 
 class Apart(NamedTuple):
-    """The distance of two poses, in metres and radians, and how much of it may be rounding."""
+    """The distance of two poses, in metres and radians, and how many metres of it may be rounding; 0 in one edge."""
 
     metres: float
     radians: float
     rounding: float = 0.0
-    turn_rounding: float = 0.0
+
+    @property
+    def turn_rounding(self) -> float:
+        """Return how much of the angle may be rounding."""
+        return ROUNDING if self.rounding else 0.0
 
     @property
     def millimetres(self) -> float:
@@ -233,11 +237,11 @@ class _Pair:
 
     def _see_from(self, start: str) -> None:
         in_a, in_b = self.a.seen_from(start), self.b.seen_from(start)
+        reach = max((abs(part) for seen in (in_a, in_b) for pose in seen.values() for part in pose[:3]), default=0.0)
         for frame in self.common:
             if frame != start and frame in in_a and frame in in_b and frame not in self.seen:
-                rounding = ROUNDING * max(in_a[frame].reach, in_b[frame].reach)
-                apart = _apart(in_a[frame].components, in_b[frame].components)
-                self.seen[frame] = start, apart._replace(rounding=rounding, turn_rounding=ROUNDING)
+                apart = _apart(in_a[frame], in_b[frame])
+                self.seen[frame] = start, apart._replace(rounding=ROUNDING * max(reach, 1.0))
 
     # --- differences ---
 

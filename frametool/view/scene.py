@@ -163,7 +163,7 @@ class FrameScene:
             seen = {self.fixed: seen[self.fixed]}
         if any(track.varies for track in self.tracks.values()):  # only changing parents can upset the order
             names, _ = _in_order(self.tree, {name: self.parent(name) for name in names})
-        return {name: seen[name].components for name in names if name in seen and self._is_chosen(name)}
+        return {name: seen[name] for name in names if name in seen and self._is_chosen(name)}
 
     def _is_chosen(self, name: str) -> bool:
         return self.chosen is None or name in self.chosen
