@@ -28,7 +28,6 @@ COLUMN_WORDS = {
 NORMALS: tuple[tuple[str, ...], ...] = (("normal_x", "normal_y", "normal_z"), ("nx", "ny", "nz"))
 # velocities and rates of bodies; names such as velocity_x, twist.linear.x resemble a second position and are refused
 RATES = r"(?i)((?:body[_.])?[vw])[xyz]([ _\[(].*)?"
-NORMAL_NAMES = frozenset(sum(NORMALS, ()))
 STAMP_KEYS = ("stamp_ns", "stamp", "timestamp", "time", "t")
 NANOSECONDS = ("%time", "field.header.stamp")  # names that `rostopic echo -p` writes
 # compiled at first use, not at start-up
@@ -44,8 +43,8 @@ PLACE_KEYS = frozenset((
 FIX = "position_covariance"  # of a NavSatFix, along local east, north, up
 EARTH_FRAMES = representations.EARTH_FRAMES
 # positions whose keys and columns are simply their names and numbers; the others have readers of their own
-FLAT = {key: row.names for key, row in representations.POSITIONS.items() if not row.kernels.startswith("frametool")}
-FLAT_NAMES = frozenset[str]().union(*FLAT.values())
+FLAT = {key: row.names for key, row in representations.POSITIONS.items() if key not in ("lla", "ecef", "utm")}
+FLAT_KEYS = frozenset(names[0] for names in FLAT.values())  # which no other data have
 
 
 def is_rate(key: str) -> bool:
@@ -99,7 +98,7 @@ def _is_known(name: str) -> bool:
 
 def may_be_on_earth(name: str) -> bool:
     """Return True if a key or column may be a position on the Earth: a latitude, ECEF, UTM, north."""
-    return re.search(_EARTH, name) is not None or name in FLAT_NAMES
+    return re.search(_EARTH, name) is not None or name in FLAT_KEYS
 
 
 def may_be_uncertain(name: str) -> bool:

@@ -19,7 +19,7 @@ from frametool.geometry import floats, placed, quaternion
 from frametool.geometry.place import ECEF, ENU, GRID, GRIDDED, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place, Spot
 from frametool.geometry.representations import HEADING, POSITIONS
 from frametool.geometry.transverse_mercator import NORTH, SOUTH, ZONES, standard_zone, utm, zone_number
-from frametool.grammar.names import EARTH_FRAMES, FLAT, FLAT_NAMES
+from frametool.grammar.names import EARTH_FRAMES, FLAT
 from frametool.grammar.readers import Misfit, Reading, kind, read_number, read_numbers, within
 from frametool.grammar.rotation_spelling import AXES_KEY
 from frametool.text.numbers import parse_angle, parse_number
@@ -38,7 +38,7 @@ SEA_LEVEL = ("msl", "ele", "elevation", "orthometric")
 GEOID = {"undulation": "undulation", "geoid_separation": "undulation"}
 FIELDS = SAME | GEOID | dict.fromkeys(SEA_LEVEL, "msl") | {"utm_zone": ZONE}
 LLA_KEYS = frozenset((*SAME, "lat_rad", "lon_rad", *SEA_LEVEL, *GEOID))
-LOCAL_KEYS = frozenset(("east", "north", "up", "down"))
+FLAT_NAMES = frozenset[str]().union(*FLAT.values())
 UTM_KEYS = frozenset((UTM, "easting", "northing", ZONE, "utm_zone"))
 HEADINGS = {"heading_deg": True, "heading_rad": False}
 NOT_READ = {  # key or column -> what to write instead
@@ -47,7 +47,7 @@ NOT_READ = {  # key or column -> what to write instead
     LLA: "lla does not say which number is lat; write {lat: .., lon: .., alt: ..}",
     "mgrs": "MGRS is not read; convert it to lat, lon first (GeoConvert, or python's mgrs)",
 }
-EARTH_KEYS = LLA_KEYS | LOCAL_KEYS | UTM_KEYS | NOT_READ.keys() | {*GRIDDED} | {ECEF, AT, *HEADINGS} | FLAT_NAMES
+EARTH_KEYS = LLA_KEYS | UTM_KEYS | NOT_READ.keys() | {*GRIDDED} | {ECEF, AT, *HEADINGS} | FLAT_NAMES
 NO_ALT = "no alt: 0 is taken, on the ellipsoid"
 LEVEL = 1e-9  # below this length the horizontal part has no direction
 NEAR = 0.01  # metres: the largest distance between two positions of one entry
@@ -119,12 +119,13 @@ def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
         found.append(_utm({key: own[key] for key in own if key in UTM_KEYS or SAME.get(key) == "alt"}, reading))
     if any(key in own for key in ("lat", "latitude", "lat_rad")):
         found.append(_lla(own, reading))
-    if LOCAL_KEYS.intersection(own):
-        found.append(_local(own, reading))
     for name, fields in FLAT.items():
         if {*fields} <= own.keys():
+            axes, origin = (name, reading.earth and reading.earth.origin) if name in LOCAL else ("", None)
+            if axes and origin is None:
+                raise Misfit("east, north and up need --origin {lat: .., lon: ..}, or place the frame with at:")
             numbers = tuple(within((field,), read_number, own[field]) for field in fields)
-            found.append(Spot(Place(name, fields), numbers))
+            found.append(Spot(Place(name, fields, axes, None, origin), numbers))
     for spot in found:
         within((next(iter(own)),), spot.place.check, spot.numbers)
     for other in found[1:]:
@@ -136,7 +137,7 @@ def read_at(value: Any, reading: Reading) -> Spot:
     """Read the value of `at:`: lat lon alt, utm or ecef, and nothing else."""
     if type(value) is not dict:
         raise Misfit(f"expected a place like {{lat: 48.1, lon: 11.5, alt: 520}}, found {kind(value)}")
-    if unknown := [key for key in value if key not in EARTH_KEYS or key in (AT, *HEADINGS, *LOCAL_KEYS)]:
+    if unknown := [key for key in value if key not in EARTH_KEYS or key in (AT, *HEADINGS, *FLAT_NAMES)]:
         what = f"unknown key {shown(unknown[0])} of a place; it has lat lon alt, utm or ecef"
         raise Misfit(what, (unknown[0],), key=True)
     found = _spots(value, reading)
@@ -240,21 +241,6 @@ def _zone(value: Any) -> float:
         raise Misfit(f"expected a zone like 32N, found {kind(value)}")
     return zone_number(value)
 
-
-
-def _local(own: dict[str, Any], reading: Reading) -> Spot:
-    """Read east, north, up or north, east, down of the origin."""
-    name = NED if "down" in own else ENU
-    if "up" in own and "down" in own:
-        raise Misfit("up and down are both there; keep one")
-    missing = [key for key in POSITIONS[name].names if key not in own]
-    if missing:
-        raise Misfit(f"missing {' and '.join(missing)}; write east, north, up or north, east, down")
-    origin = reading.earth.origin if reading.earth else None
-    if origin is None:
-        raise Misfit("east, north and up need an origin: --origin {lat: .., lon: ..}, or place the frame with at:")
-    numbers = tuple(within((key,), read_number, own[key]) for key in POSITIONS[name].names)
-    return Spot(Place(name, POSITIONS[name].names, name, None, origin), numbers)
 
 
 def _position(spot: Spot) -> tuple[float, float, float]:

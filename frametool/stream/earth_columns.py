@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 ECEF_COLUMNS = POSITIONS[ECEF].columns
 STATUS, DATUM, EPSG, PARENT = "status", "datum", "epsg", "parent"
-OTHERS = (*SEA_LEVEL, "easting", "northing", "east", "north", "up", "down", *ECEF_COLUMNS, ZONE, "heading", AXES,
+OTHERS = (*SEA_LEVEL, "easting", "northing", *ECEF_COLUMNS, ZONE, "heading", AXES,
           STATUS, DATUM, EPSG, PARENT)  # fmt: skip
 FIELDS = SAME | GEOID | {"utm_zone": ZONE} | {name: name for names in (OTHERS, *FLAT.values()) for name in names}
 PATTERN = re.compile(
@@ -102,7 +102,7 @@ def _position(
     """Return the columns of a position of one kind, if they are there."""
     if kind in LOCAL and earth.origin is None:
         return None  # east and north are other data
-    if kind == ECEF or kind in LOCAL or kind in FLAT:
+    if kind == ECEF or kind in FLAT:
         names = ECEF_COLUMNS if kind == ECEF else POSITIONS[kind].names
         axes = zip("xyz" if kind == ECEF else names, names, strict=True)
         there = [(axis, spots[name]) for axis, name in axes if name in spots]

@@ -16,7 +16,7 @@ from frametool.geometry import uncertainty
 from frametool.geometry.place import ENU, LLA, UNSAID, Place
 from frametool.geometry.representations import notation
 from frametool.grammar.covariance import check, entries_of
-from frametool.grammar.names import EARTH_FRAMES, FIX, FLAT_NAMES
+from frametool.grammar.names import EARTH_FRAMES, FIX, FLAT_KEYS
 from frametool.grammar.place import AT, EARTH_KEYS, SAME, check_parent, placed_by, without_place
 from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose
 from frametool.grammar.readers import Misfit, NotARotation, Reading, within
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 FIX_TYPE, NO_FIX = "position_covariance_type", "-1"
 STAYS = ("{} stay data: x, y, z are the position; to read the place, leave these out")
-WHOLE = ("lat", "latitude", "lat_rad", AT, "ecef", "utm", "easting", "east", "north", *FLAT_NAMES)
+WHOLE = ("lat", "latitude", "lat_rad", AT, "ecef", "utm", "easting", *FLAT_KEYS)
 
 
 def is_on_earth(value: dict[str, Any]) -> bool:
