@@ -12,7 +12,7 @@ from frametool.frames.stamps import BILLION
 from frametool.grammar.edges import stop
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from frametool.formats.load import FrameFile
     from frametool.grammar.edges import Report
@@ -90,29 +90,26 @@ def clocks_differ(entries: Sequence[dict[str, Any]]) -> bool:
     return any(abs(entry["delay_max_s"] or 0.0) > YEAR_S for entry in entries)
 
 
+# of the values of its edges, that of a chain
+OF_CHAIN: dict[str, Callable[..., Any]] = {
+    "count": sum, "rate_hz": min, "gap_s": max, "delay_max_s": max, "jumps": sum, "backward": sum, "parent_changes": sum,
+}  # fmt: skip
+
+
 def chain_entry(target: str, source: str, logs: Sequence[EdgeLog]) -> dict[str, Any]:
     """Describe the edges between two frames together: their common interval, and their worst values."""
     spans = [log.span for log in logs if log.moves]
-    first = max((begin for begin, _ in spans), default=None)
-    last = min((end for _, end in spans), default=None)
+    first, last = (max(begin for begin, _ in spans), min(end for _, end in spans)) if spans else (None, None)
     entries = [edge_entry(log) for log in logs]
-    rates, gaps, delays = (
-        [entry[key] for entry in entries if entry[key] is not None] for key in ("rate_hz", "gap_s", "delay_max_s")
-    )
-    return dict.fromkeys(entries[0]) | {
+    known = {key: [entry[key] for entry in entries if entry[key] is not None] for key in OF_CHAIN}
+    worst = {key: OF_CHAIN[key](values) for key, values in known.items() if values}
+    return dict.fromkeys(entries[0]) | worst | {
         "kind": "chain",
         "parent": target,
         "child": source,
-        "count": sum(log.count for log in logs),
-        "rate_hz": min(rates, default=None),
         "first_ns": first,
         "last_ns": last,
-        "gap_s": max(gaps, default=None),
-        "delay_max_s": max(delays, default=None),
-        "jumps": sum(entry["jumps"] for entry in entries),
-        "backward": sum(entry["backward"] for entry in entries),
         "parents": " <- ".join(frames_on(target, source, logs)),
-        "parent_changes": sum(log.changes for log in logs),
         "topics": "",
         "overlap": None if first is None or last is None else first <= last,
     }

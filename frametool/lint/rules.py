@@ -200,7 +200,6 @@ class Child:
         self.static: Statement | None = None
         self.changes: list[Statement] = []
         self.stamps: dict[int, tuple[int, int]] = {}  # stamp -> hash of the sample, its line
-        self.other_parent: Statement | None = None
         self.other_pose: Statement | None = None
         self.again: list[Statement] = []
         self.clashes: list[Statement] = []
@@ -220,7 +219,6 @@ class Child:
         if seen.parent != self.newest.parent:
             self.changes.append(seen)
             self.since = (number, seen)
-            self.other_parent = self.other_parent or seen
         elif seen.components != self.newest.components:
             self.other_pose = self.other_pose or seen
         self.newest = seen
@@ -258,7 +256,8 @@ def _child(child: Child) -> Iterator[Finding]:
     elif moves:
         yield from _moving(child, frame)
         yield from _steps(child)
-    elif other := child.other_parent:
+    elif child.changes:
+        other = child.changes[0]
         yield other.broken(topology.two_parents(first.child, first.parent, other.parent, (_at(first), _at(other))))
     elif other := child.other_pose:
         yield other.broken(topology.two_poses(first.child, first.parent), f": {_at(first)} and {_at(other)}")
