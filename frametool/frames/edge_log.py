@@ -14,12 +14,12 @@ from frametool.errors import UnknownFrame
 from frametool.frames.path import seconds
 from frametool.frames.stamps import BILLION
 from frametool.frames.topology import edges_between
-from frametool.geometry import floats, rigid
+from frametool.geometry import rigid
 
 if TYPE_CHECKING:
     from frametool.frames.lookups import Frames
     from frametool.frames.track import MovingTrack, Track
-    from frametool.geometry.types import Rigid
+    from frametool.geometry.types import Array, Indices, Rigid
 
 JUMP_FACTOR = 10.0  # a jump is a step of at least this many median steps of its edge ..
 JUMP_METRES, JUMP_RADIANS = 0.1, 0.2  # .. and longer than noise and low rates explain
@@ -96,34 +96,19 @@ class EdgeLog:
         """Return the steps between stamps in order of time, once all are in; the last of equal stamps counts."""
         last = {stamp: at for at, stamp in enumerate(self._stamps)}
         order = [last[stamp] for stamp in sorted(last)]
-        found: list[SampleStep] = []
-        for number, (before, at) in enumerate(pairwise(order)):
-            metres, radians = self._apart(before, at)
-            back = number > 0 and self._is_return(order[number - 1], at, found[-1], (metres, radians))
-            pause = self._stamps[at] - self._stamps[before]
-            found.append(SampleStep(self._stamps[at], self._lines[at], metres, radians, pause, back))
-        return found
+        if len(order) < 2:
+            return []
+        import numpy as np
 
-    def _apart(self, before: int, at: int) -> tuple[float, float]:
-        """Return metres and radians between two samples; 0 between different parents."""
-        if self._under[before] != self._under[at]:
-            return 0.0, 0.0
-        metres, radians = rigid.distance(*self._pose(before), *self._pose(at), xp=floats)
-        return metres, radians
-
-    def _pose(self, at: int) -> Rigid:
-        """Return the components of a sample."""
-        tx, ty, tz, x, y, z, w = self._poses[7 * at : 7 * at + 7]
-        return tx, ty, tz, x, y, z, w
-
-    def _is_return(self, begin: int, end: int, there: SampleStep, back: tuple[float, float]) -> bool:
-        """Return True if two successive steps lead far away and back again."""
-        far = there.metres, there.radians
-        least = JUMP_METRES, JUMP_RADIANS
-        return any(
-            min(far[kind], back[kind]) > least[kind] and self._apart(begin, end)[kind] < RETURN_FACTOR * far[kind]
-            for kind in (0, 1)
-        )
+        poses, under = np.array(self._poses).reshape(-1, 7)[order].T, np.array(self._under)[order]
+        far, over_two = _apart(poses, under, 1), _apart(poses, under, 2)
+        least = np.array([[JUMP_METRES], [JUMP_RADIANS]])
+        back = (np.minimum(far[:, :-1], far[:, 1:]) > least) & (over_two < RETURN_FACTOR * far[:, :-1])
+        pauses = [self._stamps[at] - self._stamps[before] for before, at in pairwise(order)]
+        stamps, lines = ([column[at] for at in order[1:]] for column in (self._stamps, self._lines))
+        metres, radians = far.tolist()
+        returns = np.append(False, back.any(0)).tolist()
+        return [*map(SampleStep, stamps, lines, metres, radians, pauses, returns)]
 
     @property
     def moves(self) -> bool:
@@ -156,6 +141,16 @@ class EdgeLog:
         """Return the steps back if an edge oscillates all the time, as with two publishers that disagree."""
         back = [step for step in self.steps if step.returns]
         return back if len(back) >= max(LEAST_RETURNS, len(self.steps) / 3) else []
+
+
+def _apart(poses: Array, under: Indices, by: int) -> Array:
+    """Return metres and radians between poses in rows and those so many further on; 0 between different parents."""
+    import numpy as np
+
+    from frametool.geometry import arrays
+
+    found = rigid.distance(*poses[:, :-by], *poses[:, by:], arrays)  # type: ignore[call-arg]
+    return np.where(under[:-by] == under[by:], found, 0.0)
 
 
 def _median(values: list[float]) -> float:

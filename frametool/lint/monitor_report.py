@@ -92,7 +92,8 @@ def clocks_differ(entries: Sequence[dict[str, Any]]) -> bool:
 
 # of the values of its edges, that of a chain
 OF_CHAIN: dict[str, Callable[..., Any]] = {
-    "count": sum, "rate_hz": min, "gap_s": max, "delay_max_s": max, "jumps": sum, "backward": sum, "parent_changes": sum,
+    "count": sum, "rate_hz": min, "gap_s": max, "delay_max_s": max, "jumps": sum, "backward": sum,
+    "parent_changes": sum,
 }  # fmt: skip
 
 

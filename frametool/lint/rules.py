@@ -257,8 +257,8 @@ def _child(child: Child) -> Iterator[Finding]:
         yield from _moving(child, frame)
         yield from _steps(child)
     elif child.changes:
-        other = child.changes[0]
-        yield other.broken(topology.two_parents(first.child, first.parent, other.parent, (_at(first), _at(other))))
+        second = child.changes[0]
+        yield second.broken(topology.two_parents(first.child, first.parent, second.parent, (_at(first), _at(second))))
     elif other := child.other_pose:
         yield other.broken(topology.two_poses(first.child, first.parent), f": {_at(first)} and {_at(other)}")
 
