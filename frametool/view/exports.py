@@ -15,7 +15,7 @@ import json
 import math
 import struct
 from base64 import b64encode
-from itertools import chain
+from itertools import chain, product
 from json import dumps
 from operator import mul
 from typing import TYPE_CHECKING, Any
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 THICK = 0.02  # half the width of a bar, where its length is 1
 COLOURS = ((217, 45, 32, 255), (18, 135, 61, 255), (26, 95, 208, 255))
-SIDES = ((0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6))  # of a box, outwards
+SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))  # of a box, outwards
 Z_UP = (-0.7071067811865476, 0.0, 0.0, 0.7071067811865476)
 COMPONENTS = {"f": 5126, "H": 5123, "B": 5121}
 VERTICES, INDICES = 34962, 34963
@@ -74,10 +74,11 @@ def write_glb(scene: FrameScene) -> bytes:
     flat = Projection(scene, SIZE)
     part = BinaryPart()
     _add_axes(part)
-    nodes, index = _nodes(scene, flat.poses, flat.axis)
+    index = {name: 1 + 2 * number for number, name in enumerate(flat.poses)}
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": f"frametool {__version__}"}, "extensionsUsed": ["KHR_materials_unlit"],
-        "scene": 0, "scenes": [{"nodes": [0]}], "nodes": nodes, "meshes": [MESH], "materials": [MATERIAL],
+        "scene": 0, "scenes": [{"nodes": [0]}], "nodes": _nodes(scene, flat, index), "meshes": [MESH],
+        "materials": [MATERIAL],
     }  # fmt: skip
     if animation := _animation(scene, index, part):
         document["animations"] = [animation]
@@ -90,34 +91,27 @@ def write_glb(scene: FrameScene) -> bytes:
 
 def _add_axes(part: BinaryPart) -> None:
     """Add three bars of length 1 along x, y, z: positions, colours, triangles."""
-    places: list[list[float]] = []
-    corners: list[tuple[int]] = []
-    for axis in range(3):
-        first = len(places)
-        for corner in range(8):
-            place = [THICK if corner >> side & 1 else -THICK for side in range(3)]
-            place[axis] = 1.0 if corner >> axis & 1 else -THICK
-            places.append(place)
-        for a, b, c, d in SIDES:
-            corners += [(first + corner,) for corner in (a, b, c, a, c, d)]
+    bars = [[(-THICK, 1.0 if side == axis else THICK) for side in range(3)] for axis in range(3)]
+    corners = [(8 * bar + corner,) for bar in range(3) for a, b, c, d in SIDES for corner in (a, b, c, a, c, d)]
+    places = [place for bar in bars for place in product(*bar)]
     part.add("f", places, target=VERTICES, min=[single(-THICK)] * 3, max=[1.0] * 3)
     part.add("B", [colour for colour in COLOURS for _ in range(8)], target=VERTICES, normalized=True)
     part.add("H", corners, target=INDICES)
 
 
-def _nodes(scene: FrameScene, poses: dict[str, Rigid], axis: float) -> tuple[list[dict[str, Any]], dict[str, int]]:
-    """Return the nodes and the index of each frame's; a frame without a drawn parent is placed in `fixed`."""
+def _nodes(scene: FrameScene, flat: Projection, index: dict[str, int]) -> list[dict[str, Any]]:
+    """Return the nodes: of each frame and its axes; a frame without a drawn parent is placed in `fixed`."""
     nodes: list[dict[str, Any]] = [{"name": "z up", "rotation": Z_UP, "children": []}]
-    index: dict[str, int] = {}
-    for name, pose in poses.items():
+    for name, node in index.items():
+        nodes.append({"name": name, "children": [node + 1]})
+        nodes.append({"name": f"{name} axes", "mesh": 0, "scale": [flat.axis] * 3})
+    for name, pose in flat.poses.items():
         parent, track = scene.parent(name), scene.tree.track(name)
         edge = None if track is None else track.at(scene.at_ns or 0)
         above, place = (index[parent], edge) if parent in index and edge is not None else (0, pose)
-        index[name] = len(nodes)
         nodes[above]["children"].append(index[name])
-        nodes.append({"name": name, "translation": place[:3], "rotation": place[3:], "children": [len(nodes) + 1]})
-        nodes.append({"name": f"{name} axes", "mesh": 0, "scale": [axis] * 3})
-    return nodes, index
+        nodes[index[name]] |= {"translation": place[:3], "rotation": place[3:]}
+    return nodes
 
 
 def _animation(scene: FrameScene, index: dict[str, int], part: BinaryPart) -> dict[str, Any] | None:
@@ -174,8 +168,7 @@ def write_page(
     if solids:
         head |= _drawn_solids(scene, solids)
     if other is not None:
-        here = {name: number for number, name in enumerate(scene.names)}
-        poses = {here[name]: pose for name, pose in other.poses().items() if name in here}
+        poses = {scene.index[name]: pose for name, pose in other.poses().items() if name in scene.index}
         head["overlay"] = {"title": other_title, "poses": poses}
     if len(blob) > PACKED:
         blob, head["packed"] = compress(blob), True
@@ -186,7 +179,8 @@ def write_page(
 
 def _shown(scene: FrameScene, eye: tuple[float, float] | None) -> dict[str, Any]:
     """Return the initial view of the page."""
-    only = None if scene.chosen is None or scene.path_only else [name for name in scene.names if name in scene.chosen]
+    is_part = not scene.path_only and len(scene.chosen) < len(scene.names)
+    only = [name for name in scene.names if name in scene.chosen] if is_part else None
     time = None if scene.at_ns is None else format_stamp(scene.at_ns)
     shown = {"fixed": scene.fixed, "path": scene.path_only, "target": scene.target, "source": scene.source}
     return shown | {"t": time, "only": only, "view": eye}
@@ -194,7 +188,7 @@ def _shown(scene: FrameScene, eye: tuple[float, float] | None) -> dict[str, Any]
 
 def _data(scene: FrameScene) -> tuple[dict[str, Any], bytes]:
     """Return names and parents, and the static poses, followed by the stamps and poses of each track, as bytes."""
-    index = {name: number for number, name in enumerate(scene.names)}
+    index = scene.index
     static = [None if name in scene.tracks else scene.tree.track(name) for name in scene.names]
     blob = bytearray(_packed("d", chain.from_iterable(track.components if track else IDENTITY for track in static)))
     tracks: list[dict[str, Any]] = []
@@ -214,31 +208,34 @@ def _packed(letter: str, numbers: Iterable[float]) -> bytes:
     return struct.pack(f"<{len(found)}{letter}", *found)
 
 
+SLIDER_KEYS = ("name", "kind", "axis", "anchor", "rest", "lower", "upper")
+LINK_KEYS = ("origin", "after", "inverted")
+
+
 def joint_sliders(scene: FrameScene) -> dict[str, list[dict[str, Any]]]:
     """Return the revolute and prismatic joints with a constant value, and the links that they move, for the page."""
-    index = {name: number for number, name in enumerate(scene.names)}
-    joints: list[dict[str, Any]] = []
+    joints: list[Any] = []
+    sliders: list[dict[str, Any]] = []
     moved: list[dict[str, Any]] = []
     for values, links, _ in scene.tree.robots:
         for link in links:
             known = [values.get(joint.name) for joint in link.joints]
-            if not known or link.child not in index or not all(isinstance(value, JointValue) for value in known):
+            if not known or link.child not in scene.index or not all(isinstance(each, JointValue) for each in known):
                 continue
             numbers = [*range(len(joints), len(joints) + len(known))]
-            placed = {key: getattr(link, key) for key in LINK_KEYS}
-            moved.append({"frame": index[link.child], "joints": numbers} | placed)
-            for joint, value in zip(link.joints, known, strict=True):
-                joints.append({key: getattr(joint, key) for key in SLIDER_KEYS} | {"value": float(value.plain)})
-    places = {joint["name"]: number for number, joint in enumerate(joints)}
-    for joint in joints:
-        mimic = joint.pop("mimic")
-        if mimic is not None and mimic.joint in places:
-            joint["mimic"] = [places[mimic.joint], mimic.multiplier, mimic.offset]
-    return {"joints": joints, "links": moved}
+            moved.append({"frame": scene.index[link.child], "joints": numbers} | _picked(link, LINK_KEYS))
+            joints += link.joints
+            sliders += ({"value": float(value.plain)} | _picked(joint, SLIDER_KEYS)
+                        for joint, value in zip(link.joints, known, strict=True))  # fmt: skip
+    places = {joint.name: number for number, joint in enumerate(joints)}
+    for joint, slider in zip(joints, sliders, strict=True):
+        if joint.mimic is not None and joint.mimic.joint in places:
+            slider["mimic"] = [places[joint.mimic.joint], joint.mimic.multiplier, joint.mimic.offset]
+    return {"joints": sliders, "links": moved}
 
 
-SLIDER_KEYS = ("name", "kind", "axis", "anchor", "rest", "lower", "upper", "mimic")
-LINK_KEYS = ("origin", "after", "inverted")
+def _picked(value: Any, keys: Iterable[str]) -> dict[str, Any]:
+    return {key: getattr(value, key) for key in keys}
 
 
 MESH_PART = 0.35  # of the usual distance between frames is the least edge of a box
@@ -246,7 +243,6 @@ MESH_PART = 0.35  # of the usual distance between frames is the least edge of a 
 
 def _drawn_solids(scene: FrameScene, solids: Sequence[Solid]) -> dict[str, Any]:
     """Return the solids of known frames; a mesh becomes a box around the child frames of its frame."""
-    index = {name: number for number, name in enumerate(scene.names)}
     ends = {name: [IDENTITY[:3]] for name in scene.names}  # of the links that begin at a frame
     for track in scene.tree.tracks():
         ends[track.parent].append(track.components[:3])
@@ -254,12 +250,13 @@ def _drawn_solids(scene: FrameScene, solids: Sequence[Solid]) -> dict[str, Any]:
     least = MESH_PART * (lengths[len(lengths) // 2] if lengths else 1.0)
     found = []
     for each in solids:
-        drawn = each
-        if each.frame in index:
-            if each.kind == "mesh":
-                low, high = ([of(column) for column in zip(*ends[each.frame], strict=True)] for of in (min, max))
-                x, y, z = ((a + b) / 2.0 for a, b in zip(low, high, strict=True))
-                size = tuple(max(b - a, least) for a, b in zip(low, high, strict=True))
-                drawn = each._replace(kind="box", size=size, pose=(x, y, z, *IDENTITY[3:]))
-            found.append(drawn._asdict() | {"frame": index[each.frame]})
+        if each.frame not in ends:
+            continue
+        shape = {}
+        if each.kind == "mesh":
+            extents = [(min(column), max(column)) for column in zip(*ends[each.frame], strict=True)]
+            centre = [(low + high) / 2.0 for low, high in extents]
+            size = [max(high - low, least) for low, high in extents]
+            shape = {"kind": "box", "size": size, "pose": [*centre, *IDENTITY[3:]]}
+        found.append(each._asdict() | shape | {"frame": scene.index[each.frame]})
     return {"solids": found, "meshes": sum(each.kind == "mesh" for each in solids)}

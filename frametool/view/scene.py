@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from functools import cached_property
 from itertools import chain, pairwise, product
 from math import isfinite
@@ -20,7 +21,7 @@ from frametool.geometry import earth as wgs84
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.place import ECEF as EARTH
 from frametool.geometry.place import ENU
-from frametool.text.numbers import parse_angle
+from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -89,12 +90,12 @@ class FrameScene:
     """The frames of a tree to draw.
 
     tree: what they come from
-    names: every frame, parents before children by the first parents
+    names: every frame, parents before children by the first parents; index: their numbers
     tracks: of the frames that move, by name
     fixed: the frame that everything is drawn in
     at_ns: the time; None where nothing moves
     target, source: the two frames whose transform is asked for, if any
-    chosen: the frames that are drawn; None for all
+    chosen: the frames that are drawn
     path_only: whether only those between target and source are drawn
     """
 
@@ -119,12 +120,14 @@ class FrameScene:
         tree.require(*filter(None, (fixed, below, target, source)))
         self.tree = tree
         self.tracks: dict[str, MovingTrack] = {track.child: track for track in tree.tracks() if not track.is_static}
-        self.names, self._roots = _in_order(tree, {name: _first_parent(tree, name) for name in tree.frames})
+        self.names = _in_order(tree)
+        self.index = {name: number for number, name in enumerate(self.names)}
         self.target, self.source, self.path_only = target, source, path_only
         if self.tracks and at_ns is None:
             at_ns = max(track.first_ns for track in self.tracks.values())
         self.at_ns = at_ns if self.tracks else None
-        self.fixed = fixed or target or below or max(self._roots, key=lambda root: self._roots[root])
+        roots = Counter(Snapshot(tree).roots.values())
+        self.fixed = fixed or target or below or max(roots, key=roots.__getitem__)
         self.chosen = self._choice(below, only)
 
     @property
@@ -135,10 +138,8 @@ class FrameScene:
             max((track.last_ns for track in self.tracks.values()), default=0),
         )
 
-    def _choice(self, below: str | None, only: str | None) -> set[str] | None:
+    def _choice(self, below: str | None, only: str | None) -> set[str]:
         """Return the names to draw."""
-        if below is None and only is None and not self.path_only and self.ground is None:
-            return None
         chosen = {name for name in self.names if self.ground is None or name != self.ground.name}
         if below is not None:
             chosen &= {*Snapshot(self.tree, self.at_ns).below(below)}
@@ -156,17 +157,12 @@ class FrameScene:
         return self.tree.parent(name, self.at_ns)
 
     def poses(self) -> dict[str, Rigid]:
-        """Return the pose in `fixed` of every chosen frame that is connected to it at the time, parents first."""
-        now, names = Snapshot(self.tree, self.at_ns), self.names
+        """Return the pose in `fixed` of every chosen frame that is connected to it at the time."""
+        now = Snapshot(self.tree, self.at_ns)
         seen = now.seen_from(self.fixed)
         if now.roots[self.fixed] in now.without_data:
             seen = {self.fixed: seen[self.fixed]}
-        if any(track.varies for track in self.tracks.values()):  # only changing parents can upset the order
-            names, _ = _in_order(self.tree, {name: self.parent(name) for name in names})
-        return {name: seen[name] for name in names if name in seen and self._is_chosen(name)}
-
-    def _is_chosen(self, name: str) -> bool:
-        return self.chosen is None or name in self.chosen
+        return {name: seen[name] for name in self.names if name in seen and name in self.chosen}
 
     @cached_property
     def trails(self) -> dict[str, list[list[Point]]]:
@@ -174,7 +170,7 @@ class FrameScene:
 
         It is cut into stretches where its parent changes or data are missing.
         """
-        chosen = {name: self._stretches(name) for name in self.tracks if self._is_chosen(name)}
+        chosen = {name: self._stretches(name) for name in self.tracks if name in self.chosen}
         return {name: stretches for name, stretches in chosen.items() if stretches}
 
     def _stretches(self, name: str) -> list[list[Point]]:
@@ -213,27 +209,18 @@ def can_be_drawn(point: Sequence[float]) -> bool:
     return all(abs(value) < FURTHEST for value in point)
 
 
-def _first_parent(tree: Frames, name: str) -> str | None:
-    track = tree.track(name)
-    if track is None or track.is_static:
-        return tree.parent(name)
-    return track.parent_near(track.first_ns)
-
-
-def _in_order(tree: Frames, parents: dict[str, str | None]) -> tuple[list[str], dict[str, int]]:
-    """Return the frames in depth-first order, and the number below each root."""
+def _in_order(tree: Frames) -> list[str]:
+    """Return the frames in depth-first order, by the first parents."""
     children: dict[str | None, list[str]] = {}
-    for name, parent in parents.items():
-        children.setdefault(parent if parent in parents else None, []).append(name)
+    for name in tree.frames:
+        track = tree.track(name)
+        children.setdefault(None if track is None else next(track.walk())[1], []).append(name)
     order: list[str] = []
-    sizes = {}
-    for root in children.get(None, []):
-        before, waiting = len(order), [root]
-        while waiting:
-            order.append(waiting.pop())
-            waiting += reversed(children.get(order[-1], []))
-        sizes[root] = len(order) - before
-    return order or list(tree.frames), sizes or {tree.frames[0]: 1}
+    waiting = children.get(None, [])[::-1]
+    while waiting:
+        order.append(waiting.pop())
+        waiting += reversed(children.get(order[-1], []))
+    return [*dict.fromkeys([*order, *tree.frames])]  # those in a cycle of first parents last
 
 
 SLANTED = (-0.9, 0.5)
@@ -256,8 +243,7 @@ def parse_eye(text: str) -> tuple[float, float]:
     cells = text.split(",")
     if len(cells) != 2:
         raise ValueInvalid(f"expected {', '.join(EYES)} or AZ,EL in degrees, found {shown(text)}")
-    angles = map(parse_angle, map(str.strip, cells))
-    azimuth, elevation = (angle if unit == "rad" else math.radians(math.fmod(angle, 360.0)) for angle, unit in angles)
+    azimuth, elevation = (math.radians(math.fmod(parse_number(cell.strip()), 360.0)) for cell in cells)
     if abs(elevation) > math.pi / 2.0:
         raise ValueInvalid(f"the elevation must be -90 .. 90 degrees, found {shown(cells[1])}")
     return azimuth, elevation
@@ -371,9 +357,9 @@ class Projection:
         across = self.size.width / 2.0 + (right - self.middle[0]) * self.scale
         return Flat(across, self.size.height / 2.0 - (up - self.middle[1]) * self.scale, toward)
 
-    def tips(self, name: str, part: float = 1.0) -> list[Flat]:
-        """Return the tips of the axes x, y, z of a frame, or points at a part of their length."""
-        return [self.at(tip) for tip in axis_tips(self.poses[name], part * self.axis)]
+    def tips(self, name: str) -> list[Flat]:
+        """Return the tips of the axes x, y, z of a frame."""
+        return [self.at(tip) for tip in axis_tips(self.poses[name], self.axis)]
 
     def nearest_last(self) -> list[str]:
         """Return the frames from the farthest to the nearest."""
