@@ -307,7 +307,7 @@ class Output:
                 say(f"note: {loses}")
             self.text(self._module("").write_tree(tree, self.style))
             return
-        from frametool.view.report_text import TREE_MARKS, write_tree
+        from frametool.view.reports import TREE_MARKS, write_tree
 
         text, self.marks = write_tree(tree, self.style), TREE_MARKS
         self.style.screen = self.path is None and (color == "always" or (color == "auto" and self.style.screen))
@@ -337,7 +337,7 @@ class Output:
         if self.style.format != "text":
             self.text(self._module("").write_points(entries, self.style))
             return
-        from frametool.view.report_text import trouble, write_report
+        from frametool.view.reports import trouble, write_report
 
         self.marks = trouble(entries)
         self.text(write_report(entries))

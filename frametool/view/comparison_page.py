@@ -13,7 +13,6 @@ import numpy as np
 from frametool import __version__
 from frametool.documents.json import dump
 from frametool.errors import printable
-from frametool.view.fit_text import write_comparison, write_table
 from frametool.view.pictures import (
     SERIES,
     Chart,
@@ -29,6 +28,7 @@ from frametool.view.pictures import (
     write_html,
     write_svg,
 )
+from frametool.view.reports import write_comparison, write_table
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -179,18 +179,23 @@ def _sigmas(key: str, value: Any) -> list[str]:
     if key != "covariance" or not isinstance(value, list) or len(value) not in (36, 9):
         return []
     try:
-        variances = [float(entry) for entry in value[:: round(len(value) ** 0.5) + 1]]
+        numbers = [*map(float, value)]
     except (TypeError, ValueError):
         return []
-    if variances[0] == -1.0:
+    if numbers[0] == -1.0:
         return ["unknown"]  # as ROS has it
-    roots = [math.sqrt(max(each, 0.0)) for each in variances]
+    roots = sigmas_of(numbers)
     return [*map(_length, roots[:3]), *map(_angle, roots[3:])]
+
+
+def sigmas_of(covariance: Sequence[float]) -> list[float]:
+    """Return the roots of the diagonal of a covariance: of a pose, or of a point."""
+    return [math.sqrt(max(entry, 0.0)) for entry in covariance[:: math.isqrt(len(covariance)) + 1]]
 
 
 def largest_sigmas(entries: Sequence[float]) -> str:
     """Return how uncertain a pose is along its worst axis, and about its worst: `±10 mm 1.0 deg`."""
-    roots = [math.sqrt(max(entry, 0.0)) for entry in entries[::7]]
+    roots = sigmas_of(entries)
     return f"±{_length(max(roots[:3]))} {_angle(max(roots[3:]))}"
 
 

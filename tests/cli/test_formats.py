@@ -13,7 +13,7 @@ import yaml
 import frametool
 from frametool.formats.table import FORMATS, Format
 from frametool.grammar.edges import Answers
-from frametool.view.report_text import option_of
+from frametool.view.reports import option_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -68,7 +68,7 @@ def test_yaml_and_csv_say_the_same_as_json(run: Run) -> None:
 def test_one_form_is_told_in_full_within_80_columns(run: Run, name: str) -> None:
     found = run("formats", name)
     assert (found.status, found.err) == (0, "")
-    assert found.out.startswith(f"{name}: {FORMATS[name].summary}"[:80])
+    assert words(found.out).startswith(words(f"{name} {FORMATS[name].summary}"))
     assert max(map(len, found.out.splitlines())) <= 80
     assert all(suffix in found.out for suffix in FORMATS[name].suffixes)
 
@@ -86,8 +86,8 @@ def test_a_row_with_all_there_can_be_is_told(run: Run, monkeypatch: pytest.Monke
                  required_options=("direction", "frames"), magic=(("xml", "toy"), ("line", r"toy \d")))  # fmt: skip
     monkeypatch.setitem(FORMATS, "a-toy-with-a-long-name", row)
     told = words(run("formats", "a-toy-with-a-long-name").out)
-    assert "means toy<-child, feet" in told
-    assert "asks for --direction parent-from-child|child-from-parent, --frames" in told
+    assert "a toy (.toy) read as tree toy<-child, feet" in told
+    assert "asks for --direction parent-from-child|child-from-parent asks for --frames" in told
     assert "known by xml toy, line" in told
     assert "a-toy-with-a-long-name a toy (.toy) read as tree toy<-child, feet asks for --direction" in words(run("formats").out)
 

@@ -6,7 +6,7 @@ import re
 from textwrap import indent
 
 from frametool.formats.table import FORMATS, Format
-from frametool.view.report_text import example_of, option_of
+from frametool.view.reports import example_of, option_of
 from site_pages.cookbook import asked_about, example_files, form_of
 from site_pages.markup import Page, Section, bullets, fenced, inline, links, see_also
 

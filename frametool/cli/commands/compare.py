@@ -75,7 +75,7 @@ def command(inputs: Inputs) -> int:
     try:
         found, skipped = comparisons(inputs.ref, est, inputs)
         from frametool.fit.numbers import numbers
-        from frametool.view.fit_text import write_explanation
+        from frametool.view.reports import write_explanation
 
         every = [numbers(each) for each in found]
         asked = [(each, limit) for each in every for limit in limits or ()]
@@ -108,7 +108,7 @@ def _write_report(found: Sequence[Comparison], path: str, *, force: bool) -> Non
 def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], rows: str | None) -> None:
     """Write rows, a table, or each comparison by itself."""
     from frametool.fit.numbers import rows as rows_of
-    from frametool.view.fit_text import write_comparison, write_table
+    from frametool.view.reports import write_comparison, write_table
 
     fmt = output.style.format
     if rows:

@@ -61,7 +61,7 @@ def command(inputs: Inputs) -> int:
     if output.style.format == "github":
         output.text(_annotations(comparison, (of_one, of_other)))
     elif output.style.format == "text":
-        from frametool.view.report_text import write_diff
+        from frametool.view.reports import write_diff
 
         output.text(write_diff(differences))
     else:

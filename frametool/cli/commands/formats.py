@@ -7,7 +7,7 @@ from frametool.cli.options import FormatName, list_options
 from frametool.cli.output import Output
 from frametool.cli.sink import show
 from frametool.formats.table import FORMATS
-from frametool.view.report_text import format_entry, write_format, write_formats
+from frametool.view.reports import format_entry, write_format, write_formats
 
 
 @command_named("formats")

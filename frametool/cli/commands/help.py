@@ -237,7 +237,7 @@ def command(ctx: click.Context, inputs: Inputs) -> None:
 
 def _json(ctx: click.Context, name: str, named: click.Command | None) -> str:
     from frametool.documents.json import dump
-    from frametool.view.report_text import format_entry
+    from frametool.view.reports import format_entry
 
     if name and not named:
         hint = any_near(name, COMMANDS, "`frametool help` lists all")

@@ -26,7 +26,7 @@ from frametool.cli.trees import answers, load_tree, opened, state
 from frametool.errors import ValueInvalid, alternatives, first_of, shown, warn
 from frametool.geometry.rigid import IDENTITY
 from frametool.stream.faults import STOP, BadRows
-from frametool.view.fit_text import Solution, SolvedFrame, SolvedRow
+from frametool.view.reports import Solution, SolvedFrame, SolvedRow
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
@@ -271,7 +271,7 @@ def command(inputs: Inputs) -> None:
         raise ValueInvalid(f"{output.style.format} has no place for a scale; write json, yaml or csv")
     solve = solved_hand_eye if hand_eye else solved_points if points else solved_tree
     found = solve(inputs, files, robust=not inputs.no_robust)
-    from frametool.view.fit_text import write_left_out, write_solution
+    from frametool.view.reports import write_left_out, write_solution
 
     if said := (write_left_out if inputs.quiet else write_solution)(found):
         tell(said.rstrip("\n"))
@@ -312,7 +312,7 @@ def _write(output: Output, found: Solution, *, on_hand: bool) -> None:
 
 def _write_report(found: Solution, path: str, *, force: bool) -> None:
     """Write the numbers of the fit as one document, or those of its rows as a table."""
-    from frametool.view.fit_text import report, row_report
+    from frametool.view.reports import report, row_report
 
     if suffix_of(path) == ".csv":
         from frametool.formats.rows.csv import write_points
