@@ -13,25 +13,12 @@ import numpy as np
 from frametool import __version__
 from frametool.documents.json import dump
 from frametool.errors import printable
-from frametool.view.pictures import (
-    SERIES,
-    Chart,
-    ChartLine,
-    Picture,
-    box,
-    dot,
-    filled,
-    line,
-    shade_of,
-    svg_element,
-    words,
-    write_html,
-    write_svg,
-)
+from frametool.view import pictures
+from frametool.view.pictures import Chart, ChartLine, Picture
 from frametool.view.reports import write_comparison, write_table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.fit.comparison import Comparison
     from frametool.view.pictures import Shape
@@ -42,6 +29,7 @@ ROW = 38.0  # pixels of an estimate's box and its name
 STRETCHES, FEWEST = 200, 20  # of all paths together, and of one at least, each drawn by its extremes
 LEVELS, BINS = 12, 30  # of error: colours along a path, columns of a histogram
 ERROR_STOPS = ((47, 108, 216), (190, 90, 190), (235, 94, 20))  # seen on white paper and on dark
+SHADES = [pictures.shade_of(level / (LEVELS - 1), ERROR_STOPS) for level in range(LEVELS)]
 LEAST_LENGTHS = 3
 STILL = 1e-6  # metres: below, a path is a point
 FAR = 1e3  # times its size is a path away from 0 where the numbers along its axes are shortened
@@ -68,27 +56,29 @@ def write_report(found: Sequence[Comparison], fmt: str, command: str) -> str:
     unit = "pair" if found[0].pairs.ref.stamps_ns is None else "s"
     paths, seen = _map(curves)
     charts = _over_time(curves, "pair" if unit == "pair" else "time (s)")
-    errors = _figure(charts[-1].area[1] + HIGH - TOP, [shape for chart in charts for shape in chart.drawn()])
-    figures = [{"distribution": _distribution(curves)}, _by_length(curves, numbers)][:: 1 if len(curves) == 1 else -1]
-    columns = ({"path": _path(curves, paths, seen), **figures[0]}, {"errors": errors, **figures[1]})
-    what = curves[0].name if len(curves) == 1 else f"{len(curves)} estimates"
-    title = f"{what} against {printable(found[0].names[0])}"
+    left = {"path": _path(curves, paths, seen)}
+    right = {"errors": _figure(charts[-1].area[1] + HIGH - TOP, [shape for each in charts for shape in each.drawn()])}
+    is_one = len(curves) == 1
+    (left if is_one else right)["distribution"] = _histogram(curves[0]) if is_one else _boxes(curves)
+    if lengths := _by_length(curves, numbers):
+        (right if is_one else left)["lengths"] = lengths
+    title = f"{curves[0].name if is_one else f'{len(curves)} estimates'} against {printable(found[0].names[0])}"
     if fmt == "svg":
-        return _side_by_side(f"{title}: ate {numbers[0]['ate']['m']['rmse']:.4g} m", columns)
-    drawn = "".join(
-        f"<div>{''.join(f'<figure id={name}>{svg_element(each)}</figure>' for name, each in column.items())}</div>\n"
-        for column in columns
-    )
+        return _side_by_side(f"{title}: ate {numbers[0]['ate']['m']['rmse']:.4g} m", (left, right))
+    drawn = ""
+    for column in (left, right):
+        figures = (f"<figure id={name}>{pictures.svg_element(each)}</figure>" for name, each in column.items())
+        drawn += f"<div>{''.join(figures)}</div>\n"
     hints = dict.fromkeys(hint for each in numbers for hint in each["hints"])
-    text = "\n".join([*([write_table(numbers)] if len(numbers) > 1 else []), *map(write_comparison, numbers)])
-    body = filled(
+    text = "\n".join([*([] if is_one else [write_table(numbers)]), *map(write_comparison, numbers)])
+    body = pictures.filled(
         "report.html", title=escape(title), made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC, frametool {__version__}",
         command=escape(printable(command)), hints="".join(f"<p class=hint>{escape(hint)}</p>" for hint in hints),
         text=escape(text), figures=drawn,
     )  # fmt: skip
     samples = {"unit": unit, "curves": [_samples(each, paths, seen, charts[0]) for each in curves]}
     held = {"numbers": f"[{', '.join(map(dump, numbers))}]", "samples": json.dumps(samples)}
-    return write_html(title, body, script="tables.js report.js", data=held)
+    return pictures.write_html(title, body, script="tables.js report.js", data=held)
 
 
 def _curve(found: Comparison, at: int, count: int) -> Curve:
@@ -97,7 +87,7 @@ def _curve(found: Comparison, at: int, count: int) -> Curve:
     every = [ate.m, ate.rad, *((ate.along, ate.across, ate.up) if count == 1 else ())]
     stretches = max(STRETCHES // count, FEWEST)
     chosen = np.unique(np.concatenate([_extremes(each, stretches) for each in every if each is not None]))
-    colour = "trail" if count == 1 else [*SERIES][at % len(SERIES)]
+    colour = "trail" if count == 1 else [*pictures.SERIES][at % len(pictures.SERIES)]
     return Curve(found, printable(found.names[1]), colour, chosen, times[chosen].tolist())
 
 
@@ -136,30 +126,27 @@ def _path(curves: Sequence[Curve], chart: Chart, seen: Any) -> Picture:
     """Draw the paths; a single estimate is coloured by its error."""
     first = curves[0]
     lines = [ChartLine("reference", "soft", seen(first.found.pairs.ref.xyz[first.chosen]), 2.0, (5.0, 4.0))]
-    shapes: list[Shape] = []
+    shapes = [pictures.dot(*chart.place(*seen(first.found.moved.xyz[:1])[0]), 4.0, "ink", "start")]
     if len(curves) == 1:
-        lines.append(ChartLine("estimate, by error", shade_of(0.5, ERROR_STOPS), []))
-        shapes = _coloured(first, [chart.place(*point) for point in seen(first.found.moved.xyz[first.chosen])], chart)
+        lines += [ChartLine("estimate, by error", SHADES[LEVELS // 2], []), *_coloured(first, seen)]
+        low, text = chart.area[1] + chart.area[3] + 25.0, f"error 0 .. {first.found.ate.m.max():.3g} m"
+        shapes += (pictures.box(LEFT + at * 7.0, low, 7.5, 9.0, shade) for at, shade in enumerate(SHADES))
+        shapes.append(pictures.words(LEFT + LEVELS * 7.0 + 8.0, low + 4.5, text, "soft", size=11.0))
     else:
         lines += [ChartLine(each.name, each.colour, seen(each.found.moved.xyz[each.chosen])) for each in curves]
     chart.lines = lines
-    start = dot(*chart.place(*seen(first.found.moved.xyz[:1])[0]), 4.0, "ink", "start")
-    return _figure(chart.area[3], [*chart.drawn(), *shapes, start])
+    return _figure(chart.area[3], [*chart.drawn(), *shapes])
 
 
-def _coloured(curve: Curve, placed: Sequence[tuple[float, float]], chart: Chart) -> list[Shape]:
-    """Draw a path coloured by error, with the colour scale."""
-    errors, low = curve.found.ate.m, chart.area[1] + chart.area[3] + 25.0
-    worst = float(errors.max())
-    levels = np.minimum((errors[curve.chosen] / (worst or 1.0) * LEVELS).astype(int), LEVELS - 1).tolist()
-    shades = [shade_of(level / (LEVELS - 1), ERROR_STOPS) for level in range(LEVELS)]
-    shapes = [words(LEFT + LEVELS * 7.0 + 8.0, low + 4.5, f"error 0 .. {worst:.3g} m", "soft", size=11.0)]
+def _coloured(curve: Curve, seen: Any) -> Iterator[ChartLine]:
+    """Yield the parts of a path, each in the colour of its error."""
+    points, errors = seen(curve.found.moved.xyz[curve.chosen]), curve.found.ate.m
+    levels = np.minimum((errors[curve.chosen] / (errors.max() or 1.0) * LEVELS).astype(int), LEVELS - 1).tolist()
     begin = 0
     for level, run in groupby(levels[:-1]):
         end = begin + len([*run])
-        shapes.append(line(placed[begin : end + 1], shades[level], 2.0))
+        yield ChartLine("", SHADES[level], points[begin : end + 1], 2.0)
         begin = end
-    return shapes + [box(LEFT + at * 7.0, low, 7.5, 9.0, shade) for at, shade in enumerate(shades)]
 
 
 def _over_time(curves: Sequence[Curve], along: str) -> list[Chart]:
@@ -184,33 +171,35 @@ def _over_time(curves: Sequence[Curve], along: str) -> list[Chart]:
             for at, (name, drawn) in enumerate(kinds.items())]  # fmt: skip
 
 
-def _distribution(curves: Sequence[Curve]) -> Picture:
-    """Draw the distribution of the error: a histogram of one estimate, a box plot of several."""
-    errors = [each.found.ate.m for each in curves]
-    ends = (0.0, max(float(each.max()) for each in errors) or 1.0)
-    if len(curves) == 1:
-        counts, edges = np.histogram(errors[0], BINS, ends)
-        steps = [*zip(np.repeat(edges, 2)[1:-1].tolist(), np.repeat(counts, 2).tolist(), strict=True)]
-        lines = [ChartLine("", curves[0].colour, steps)]
-        return _figure(HIGH, [*Chart((LEFT, TOP, WIDE, HIGH), ("error in position (m)", "poses"), lines).drawn()])
+def _histogram(curve: Curve) -> Picture:
+    """Draw the distribution of the error of one estimate."""
+    counts, edges = np.histogram(curve.found.ate.m, BINS, (0.0, curve.found.ate.m.max() or 1.0))
+    steps = [*zip(np.repeat(edges, 2)[1:-1].tolist(), np.repeat(counts, 2).tolist(), strict=True)]
+    lines = [ChartLine("", curve.colour, steps)]
+    return _figure(HIGH, [*Chart((LEFT, TOP, WIDE, HIGH), ("error in position (m)", "poses"), lines).drawn()])
+
+
+def _boxes(curves: Sequence[Curve]) -> Picture:
+    """Draw the distribution of the error of several estimates."""
+    worst = max(float(each.found.ate.m.max()) for each in curves)
     names = ("error in position (m)", "boxes: half of the poses; lines: 5 to 95 %; dots: median, maximum")
-    chart = Chart((LEFT, TOP, WIDE, ROW * len(curves)), names, ends=(ends, (0.0, 1.0)))
+    chart = Chart((LEFT, TOP, WIDE, ROW * len(curves)), names, ends=((0.0, worst or 1.0), (0.0, 1.0)))
     chart.ticks[1] = []
     shapes = [*chart.drawn()]
-    for at, (each, values) in enumerate(zip(curves, errors, strict=True)):
+    for at, each in enumerate(curves):
         y, colour = TOP + (at + 0.66) * ROW, each.colour
-        marks = np.percentile(values, (5, 25, 50, 75, 95, 100)).tolist()
-        least, first, middle, third, most, worst = (chart.place(mark, 0.0)[0] for mark in marks)
+        marks = np.percentile(each.found.ate.m, (5, 25, 50, 75, 95, 100)).tolist()
+        least, first, middle, third, most, last = (chart.place(mark, 0.0)[0] for mark in marks)
         shapes += [
-            line([(least, y), (most, y)], colour, 1.5, title=each.name),
-            box(first, y - 7.0, third - first, 14.0, colour), dot(middle, y, 4.0, "paper"),
-            dot(worst, y, 3.0, colour), words(LEFT + 4.0, y - 17.0, each.name[:60], size=11.0),
+            pictures.line([(least, y), (most, y)], colour, 1.5, title=each.name),
+            pictures.box(first, y - 7.0, third - first, 14.0, colour), pictures.dot(middle, y, 4.0, "paper"),
+            pictures.dot(last, y, 3.0, colour), pictures.words(LEFT + 4.0, y - 17.0, each.name[:60], size=11.0),
         ]  # fmt: skip
     return _figure(chart.area[3], shapes)
 
 
-def _by_length(curves: Sequence[Curve], numbers: Sequence[dict[str, Any]]) -> dict[str, Picture]:
-    """Draw errors by length, of KITTI or else of the deltas in metres; nothing for fewer than LEAST_LENGTHS lengths."""
+def _by_length(curves: Sequence[Curve], numbers: Sequence[dict[str, Any]]) -> Picture | None:
+    """Draw errors by length, of KITTI or else of the deltas in metres; None for fewer than LEAST_LENGTHS lengths."""
     lines = []
     for curve, each in zip(curves, numbers, strict=True):
         points = [(row["length_m"], row["percent"]) for row in (each["kitti"] or {"lengths": []})["lengths"]]
@@ -218,9 +207,8 @@ def _by_length(curves: Sequence[Curve], numbers: Sequence[dict[str, Any]]) -> di
         lines.append(ChartLine("", curve.colour, sorted(points or deltas), dots=True))
     lines = [each for each in lines if len(each.points) >= LEAST_LENGTHS]
     if not lines:
-        return {}
-    chart = Chart((LEFT, TOP, WIDE, HIGH), ("length (m)", "relative error (%)"), lines)
-    return {"lengths": _figure(HIGH, [*chart.drawn()])}
+        return None
+    return _figure(HIGH, [*Chart((LEFT, TOP, WIDE, HIGH), ("length (m)", "relative error (%)"), lines).drawn()])
 
 
 def _samples(curve: Curve, paths: Chart, seen: Any, errors: Chart) -> dict[str, Any]:
@@ -242,8 +230,8 @@ def _side_by_side(title: str, columns: Sequence[dict[str, Picture]]) -> str:
     for number, column in enumerate(columns):
         top = 24.0
         for each in column.values():
-            drawn += svg_element(each, place=f' x="{number * each.width:g}" y="{top:g}"')
+            drawn += pictures.svg_element(each, place=f' x="{number * each.width:g}" y="{top:g}"')
             top += each.height
         bottom = max(bottom, top)
-    heading = words(LEFT, 20.0, title, weight="bold")
-    return write_svg(Picture(len(columns) * columns[0]["path"].width, bottom, [heading], title), drawn)
+    heading = pictures.words(LEFT, 20.0, title, weight="bold")
+    return pictures.write_svg(Picture(len(columns) * columns[0]["path"].width, bottom, [heading], title), drawn)

@@ -14,14 +14,7 @@ from frametool.geometry import floats, rigid
 from frametool.geometry.representations import ROTATIONS, ROWS, notation
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose import TIMES, Pose
-from frametool.grammar.result import (
-    ROUNDED_TO_ZERO,
-    Result,
-    is_locked,
-    placed,
-    rotation_entry,
-    rotation_numbers,
-)  # fmt: skip
+from frametool.grammar.result import ROUNDED_TO_ZERO, Result, is_locked, placed, rotation_entry, rotation_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

@@ -357,9 +357,12 @@ class Projection:
         across = self.size.width / 2.0 + (right - self.middle[0]) * self.scale
         return Flat(across, self.size.height / 2.0 - (up - self.middle[1]) * self.scale, toward)
 
-    def tips(self, name: str) -> list[Flat]:
-        """Return the tips of the axes x, y, z of a frame."""
-        return [self.at(tip) for tip in axis_tips(self.poses[name], self.axis)]
+    def tips(self, pose: Rigid) -> list[Flat]:
+        """Return the tips of the axes x, y, z of a pose."""
+        x, y, z, *rotation = pose
+        r11, r12, r13, r21, r22, r23, r31, r32, r33 = quaternion.to_matrix(*rotation)
+        columns = ((r11, r21, r31), (r12, r22, r32), (r13, r23, r33))
+        return [self.at((x + self.axis * dx, y + self.axis * dy, z + self.axis * dz)) for dx, dy, dz in columns]
 
     def nearest_last(self) -> list[str]:
         """Return the frames from the farthest to the nearest."""
@@ -367,7 +370,7 @@ class Projection:
 
     def axes(self, name: str) -> list[tuple[int, Flat]]:
         """Return the axes 0, 1, 2 of a frame with their tips, from the farthest to the nearest."""
-        return sorted(enumerate(self.tips(name)), key=lambda each: each[1].depth)
+        return sorted(enumerate(self.tips(self.poses[name])), key=lambda each: each[1].depth)
 
     def groups(self, near: float) -> list[tuple[Flat, list[str]]]:
         """Group the frames within some pixels of each other, nearest first."""
@@ -395,14 +398,6 @@ class Projection:
         across = [((k * step, near, 0.0), (k * step, far, 0.0), k == 0) for k in range(first[0], last[0] + 1)]
         along = [((left, k * step, 0.0), (right, k * step, 0.0), k == 0) for k in range(first[1], last[1] + 1)]
         return step, across + along
-
-
-def axis_tips(pose: Rigid, metres: float) -> list[Point]:
-    """Return the ends of the axes x, y, z of a pose, in metres."""
-    x, y, z, *rotation = pose
-    r11, r12, r13, r21, r22, r23, r31, r32, r33 = quaternion.to_matrix(*rotation)
-    columns = ((r11, r21, r31), (r12, r22, r32), (r13, r23, r33))
-    return [(x + metres * dx, y + metres * dy, z + metres * dz) for dx, dy, dz in columns]
 
 
 def nice(length: float) -> float:
@@ -447,7 +442,7 @@ class Labels:
         self._taken: set[tuple[float, float]] = {cell for box in blocked for cell in self._cells(box)}
         wide, high = self._size.cell
         self._taken |= {(x // wide, y // high) for x, y, _ in flat.origins.values()}
-        axes = ((flat.origins[name], tip) for name in flat.poses for tip in flat.tips(name))
+        axes = ((flat.origins[name], tip) for name in flat.poses for tip in flat.tips(flat.poses[name]))
         self._axes = {
             ((begin.x + part * (end.x - begin.x)) // wide, (begin.y + part * (end.y - begin.y)) // high)
             for begin, end in axes for part in (0.4, 0.7, 1.0)

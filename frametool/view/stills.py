@@ -13,25 +13,14 @@ from frametool.errors import cells, printable
 from frametool.frames.lookups import Frames
 from frametool.frames.stamps import format_stamp
 from frametool.view.pictures import Picture, dot, line, shade_of, words, write_svg
-from frametool.view.scene import (
-    SLANTED,
-    Flat,
-    FrameScene,
-    Labels,
-    Projection,
-    Size,
-    axis_tips,
-    nice,
-    text_width,
-    words_of,
-)
+from frametool.view.scene import SLANTED, FrameScene, Labels, Projection, Size, nice, text_width, words_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from frametool.geometry.types import Rigid
     from frametool.view.pictures import Shape
-    from frametool.view.scene import Label
+    from frametool.view.scene import Flat, Label
 
     Run = tuple[str, str]  # text and its style
     Spot = tuple[int, int]  # line and column
@@ -96,8 +85,8 @@ def _trail(frame: str, stretches: Sequence[Sequence[tuple[float, float]]]) -> It
 def _other(flat: Projection, name: str, pose: Rigid) -> Iterator[Shape]:
     """Draw a frame's pose in the other tree, and a line to it."""
     x, y, _ = flat.at(pose[:3])
-    for axis, tip in zip(AXES, axis_tips(pose, flat.axis), strict=True):
-        yield line([(x, y), flat.at(tip)[:2]], axis, 2.0, 0.4, title=name)
+    for axis, tip in zip(AXES, flat.tips(pose), strict=True):
+        yield line([(x, y), tip[:2]], axis, 2.0, 0.4, title=name)
     yield line([flat.origins[name][:2], (x, y)], "trail", 1.5)
 
 
