@@ -17,7 +17,7 @@ from frametool.errors import ValueInvalid, shown
 from frametool.frames.stamps import BILLION, format_stamp
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.recordings.read import Channel
     from frametool.text.spans import Floats, Ints
@@ -32,20 +32,22 @@ SECONDS_ROS2 = (-(1 << 31), (1 << 31) - 1)
 class Kind(NamedTuple):
     """One kind of message: its usual topic, its type, and the count of numbers per stamp.
 
+    each: of a list, the type of its items
     stays: it is latched, so that late subscribers get it too
     """
 
     topic: str
     type: str
     numbers: int
+    each: str = ""
     stays: bool = False
 
 
 KINDS = {
-    "tf_static": Kind("/tf_static", "tf2_msgs/msg/TFMessage", 7, stays=True),
-    "tf": Kind("/tf", "tf2_msgs/msg/TFMessage", 7),
+    "tf_static": Kind("/tf_static", "tf2_msgs/msg/TFMessage", 7, "geometry_msgs/msg/TransformStamped", stays=True),
+    "tf": Kind("/tf", "tf2_msgs/msg/TFMessage", 7, "geometry_msgs/msg/TransformStamped"),
     "pose": Kind("/pose", "geometry_msgs/msg/PoseStamped", 7),
-    "path": Kind("/path", "nav_msgs/msg/Path", 7),
+    "path": Kind("/path", "nav_msgs/msg/Path", 7, "geometry_msgs/msg/PoseStamped"),
     "point": Kind("/point", "geometry_msgs/msg/PointStamped", 3),
     "fix": Kind("/fix", "sensor_msgs/msg/NavSatFix", 3),
 }
@@ -99,52 +101,38 @@ _PROBE_NS = 1532698752_187654321
 
 
 def serialised(kind: Kind, fmt: str, samples: Iterable[Sample]) -> bytes:
-    """Return one message of some transforms or poses; raises ValueInvalid for names that are not text."""
+    """Return one message of some transforms, poses or points; raises ValueInvalid for names that are not text."""
     store = typestore(ros1=fmt == BAG1)
-    stamps_ns, frames, numbers = zip(*samples, strict=True)
-    stamps = [divmod(stamp, BILLION) for stamp in stamps_ns]
-    stamps = [((second + (1 << 31)) % (1 << 32) - (1 << 31), part) for second, part in stamps]  # of ROS 1, as int32
-    message = _message(store.types, kind, frames, stamps, numbers)
+    whole = [_leaves(kind, *sample) for sample in samples]
+    leaves = whole[0]
+    if kind.each:
+        stamp_and_frame = whole[-1][:3] if kind == KINDS["path"] else []
+        leaves = [*stamp_and_frame, [_built(store, kind.each, iter(each)) for each in whole]]
+    message = _built(store, kind.type, iter(leaves))
     try:
         return bytes((store.serialize_ros1 if fmt == BAG1 else store.serialize_cdr)(message, kind.type))
     except UnicodeEncodeError as error:
         raise ValueInvalid(f"{shown(error.object)} is not a name that can be written") from None
 
 
-def _message(
-    types: Any, kind: Kind, frames: Sequence[tuple[str, str]], stamps: Sequence[tuple[int, int]],
-    numbers: Sequence[Sequence[float]],
-) -> Any:  # fmt: skip
-    """Return one message of the library's types; stamps are seconds and nanoseconds."""
+def _leaves(kind: Kind, stamp_ns: int, frames: tuple[str, str], numbers: Sequence[float]) -> list[Any]:
+    """Return the contents of a stamped message in the order of its definition."""
+    second, part = divmod(stamp_ns, BILLION)
+    stamp = (second + (1 << 31)) % (1 << 32) - (1 << 31), part  # rosbags takes seconds of ROS 1 as int32
+    if kind.type == KINDS["fix"].type:  # by GPS, of unknown covariance
+        return [*stamp, frames[0], 0, 1, *numbers, np.zeros(9), 0]
+    return [*stamp, *frames[: 1 + (kind.type == KINDS["tf"].type)], *numbers]
 
-    def part(name: str, *values: Any) -> Any:
-        return types[f"geometry_msgs/msg/{name}"](*values)
 
-    def header(at: int) -> Any:
-        make = types["std_msgs/msg/Header"]
-        counter = (0,) if "seq" in make.__dataclass_fields__ else ()  # of ROS 1
-        return make(*counter, types["builtin_interfaces/msg/Time"](*stamps[at]), frames[at][0])
+def _built(store: Any, kind: str, leaves: Iterator[Any]) -> Any:
+    """Return a message of a type; headers of ROS 1 have a counter too."""
+    from rosbags.interfaces import Nodetype
 
-    def pose(at: int) -> Any:
-        own = numbers[at]
-        return part("PoseStamped", header(at), part("Pose", part("Point", *own[:3]), part("Quaternion", *own[3:])))
-
-    def transform(at: int) -> Any:
-        own = numbers[at]
-        moved = part("Transform", part("Vector3", *own[:3]), part("Quaternion", *own[3:]))
-        return part("TransformStamped", header(at), frames[at][1], moved)
-
-    each, make = range(len(frames)), types[kind.type]
-    if kind.type == KINDS["tf"].type:
-        return make([transform(at) for at in each])
-    if kind == KINDS["path"]:
-        return make(header(len(frames) - 1), [pose(at) for at in each])
-    if kind == KINDS["pose"]:
-        return pose(0)
-    if kind == KINDS["point"]:
-        return make(header(0), part("Point", *numbers[0]))
-    fixed_by_gps = types["sensor_msgs/msg/NavSatStatus"](0, 1)
-    return make(header(0), fixed_by_gps, *numbers[0], np.zeros(9), 0)  # unknown covariance
+    parts = (
+        0 if name == "seq" else _built(store, what, leaves) if node == Nodetype.NAME else next(leaves)
+        for name, (node, what) in store.fielddefs[kind][1]
+    )
+    return store.types[kind](*parts)
 
 
 BETWEEN_IDL = "=" * 80 + "\nIDL: "  # before the name of each file
