@@ -17,8 +17,8 @@ from frametool.frames.stamps import BILLION
 from frametool.frames.topology import resolve_name, static_and_moving, to_root, two_parents
 from frametool.geometry import floats, quaternion, rigid, uncertainty
 from frametool.grammar.edges import Diagnostics, Names, Topics
-from frametool.recordings.alike import POSE_ARRAY, posed_messages
 from frametool.recordings.messages import checked_components, numbers_of
+from frametool.recordings.types import POSE_ARRAY, posed_messages
 from frametool.ros.messages import PATH, STAMPS, stamp_problem
 
 if TYPE_CHECKING:
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
-    from frametool.recordings.made import MessageTypes
     from frametool.recordings.messages import RawTransform
     from frametool.recordings.read import Channel
+    from frametool.recordings.types import MessageTypes
 
 SAME = 1e-12  # metres, for positions of about a metre, and radians: the rounding of composing and writing numbers
 STATIC = "tf_static"

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from contextlib import ExitStack
 from io import BufferedReader
-from itertools import groupby
+from itertools import chain, groupby
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -18,8 +18,8 @@ from frametool.errors import FormatError, Unanswered, ValueInvalid, first_of, li
 from frametool.frames.stamps import BILLION
 from frametool.geometry import quaternion
 from frametool.grammar.edges import Edge, EdgeColumns
-from frametool.recordings.alike import POSE_ARRAY, Layouts, posed_messages, text_of
 from frametool.recordings.read import opened_recording
+from frametool.recordings.types import POSE_ARRAY, Layouts, posed_messages, text_of
 from frametool.ros.messages import PATH, POSES, STAMPS, body_of, stamp_problem
 from frametool.ros.plain_messages import unit_components, unit_rows
 from frametool.text.lines import Pieces
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Diagnostics, Options
-    from frametool.recordings.made import MessageTypes
     from frametool.recordings.read import Channel, Recorded, RecordingReader
 
 
@@ -61,20 +60,23 @@ class PointCloud(NamedTuple):
 
 
 def cloud_topics(reader: RecordingReader, chosen: Collection[str]) -> list[str]:
-    """Return the topics of clouds to read: those chosen, or the only one.
+    """Return the topics of clouds to read: those chosen, with or without a leading `/`, or the only one.
 
-    chosen: with or without a leading `/`; those of anything else are left out
     Raises Unanswered if there are several, FormatError if there is none.
     """
-    there, found = reader.on_topics({CLOUD}), reader.on_topics({CLOUD}, chosen)
-    if not there:
-        known = listing({each.topic for each in reader.channels}) or "none"
-        raise FormatError(f"no clouds (PointCloud2) in the bag; its topics: {known}", source=reader.path)
-    if not found:
-        known = listing({each.topic for each in there}, near=next(iter(chosen)))
-        raise FormatError(f"no clouds on {listing(chosen)}; topics with clouds: {known}", source=reader.path)
+    found = reader.on_topics({CLOUD}, chosen)
     _refuse_several(found, chosen, "clouds", reader.path)
+    if not found:
+        raise _nothing(reader, "clouds", chosen)
     return sorted({each.topic for each in found})
+
+
+def _nothing(reader: RecordingReader, what: str, chosen: Collection[str]) -> FormatError:
+    """Return the error that nothing of a kind is on the chosen topics, or on any."""
+    named = f" on {listing(chosen)}" if chosen else ""
+    known = listing({f"{each.topic} ({each.type})" for each in reader.channels}, near=next(iter(chosen), ""))
+    remedy = f"; its frames: frametool lookup {reader.path} TARGET SOURCE" if reader.on_topics(TYPES) else ""
+    return FormatError(f"no {what}{named}; topics: {known or 'none'}{remedy}", source=reader.path)
 
 
 def read_clouds(reader: RecordingReader, topics: list[str], tally: Diagnostics) -> Iterator[PointCloud | FormatError]:
@@ -140,7 +142,6 @@ def _rows(message: Any, kind: np.dtype[Any], width: int, height: int) -> NDArray
     return grid.reshape(-1)
 
 
-MANY = 4000  # messages
 FIX = "sensor_msgs/msg/NavSatFix"
 STAMPED = ("Point", "Pose", "PoseWithCovariance", "Vector3", "Quaternion", "Twist", "TwistWithCovariance", "Wrench",
            "Accel", "AccelWithCovariance", "Transform")  # fmt: skip
@@ -165,11 +166,7 @@ def open_records(path: str, chosen: Collection[str], tally: Diagnostics) -> Buff
             return _opened_lines(reader, channels, opened)
         if reader.on_topics({CLOUD}, chosen):
             return None
-        known = listing({f"{each.topic} ({each.type})" for each in reader.channels}, near=next(iter(chosen), ""))
-        has_frames = bool(reader.on_topics(TYPES))
-    named = f" on {listing(chosen)}" if chosen else ""
-    remedy = f"; its frames: frametool lookup {path} TARGET SOURCE" if has_frames else ""
-    raise FormatError(f"no points, poses or fixes{named}; topics: {known or 'none'}{remedy}", source=path)
+        raise _nothing(reader, "points, poses or fixes", chosen)
 
 
 def _refuse_several(channels: Iterable[Channel], chosen: Collection[str], what: str, path: str) -> None:
@@ -201,7 +198,7 @@ def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[by
     """Yield the messages, or the poses of lists, as lines, many together; an error follows the lines before it."""
     layouts, number = Layouts(reader.types), 1
     try:
-        for stretch in _stretches(reader.blocks(channels)):
+        for stretch in reader.blocks(channels):
             known: dict[int, bytes] = {}
             for at, layout, values in layouts.groups(stretch):
                 known |= zip(at, layout.lines(values).splitlines(keepends=True) if layout else (), strict=False)
@@ -217,21 +214,6 @@ def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[by
     except Exception as error:  # noqa: BLE001 - of broken bytes the libraries raise anything
         what = f"message {number}: cannot be read ({type(error).__name__})"
         raise FormatError(what, source=reader.path) from None
-
-
-def _stretches(blocks: Iterator[Iterable[Recorded]]) -> Iterator[list[Recorded]]:
-    """Yield messages in groups; those before an error too."""
-    held: list[Recorded] = []
-    try:
-        for block in blocks:
-            held += block
-            if len(held) >= MANY:
-                yield held
-                held = []
-    except Exception:
-        yield held
-        raise
-    yield held
 
 
 TYPES = frozenset(("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"))
@@ -310,72 +292,70 @@ def recorded_edges(
 ) -> Iterator[Edge | EdgeColumns]:
     """Yield the edges of the messages on some channels; raises FormatError if there are none, or one is broken."""
     layouts, number = Layouts(reader.types), 0
-    for stretch in _stretches(reader.blocks(channels)):
+    for stretch in reader.blocks(channels):
         for is_static, part in groupby(stretch, lambda each: each.channel.is_static):
             messages = [*part]
-            columns = None if is_static else _columns(layouts, messages, number, options)
-            if columns is not None:
-                yield columns
-            for place, each in enumerate(messages if columns is None else (), number + 1):
-                try:
-                    found = _transforms(reader.types, each.channel, each.data, options)
-                except ValueInvalid as error:
-                    what = f"message {place} on {each.channel.topic}: {error}"
-                    raise FormatError(what, source=reader.path) from None
-                for said in found:
-                    yield _edge(said, place, each, reader.path, options)
+            found = zip(_contents(reader, layouts, messages, number, options), messages, strict=True)
+            rows = [(each, at, sent) for at, (some, sent) in enumerate(found, number + 1) for each in some]
+            columns = None if is_static or not rows else _columns(rows, options)
+            yield from [columns] if columns else (_edge(*row, reader.path, options) for row in rows)
             number += len(messages)
     if not number:
         raise FormatError(f"no messages on {', '.join(each.topic for each in channels)}", source=reader.path)
 
 
-def _transforms(types: MessageTypes, channel: Channel, data: bytes, options: Options) -> list[RawTransform]:
-    """Return the transforms in a message, or the pose; raises ValueInvalid for invalid bytes."""
-    found = types.read(channel, data)
+def _contents(
+    reader: RecordingReader, layouts: Layouts, messages: Sequence[Recorded], number: int, options: Options
+) -> list[list[RawTransform]]:
+    """Return the transforms or the pose in each message, of equal layout at once; `number` of them before."""
+    found: list[list[RawTransform]] = [[] for _ in messages]
+    for at, layout, values in layouts.groups(messages):
+        first = messages[at[0]]
+        known = _transforms(reader, first._replace(data=layout.sample), 0, options) if layout else []
+        if layout and known and values.shape[1] in (9 * len(known), 10 * len(known)):  # ROS 1 counts its headers
+            numbers = np.vstack([layout.values([layout.sample])[0], values])
+            own, *rows = numbers.reshape(len(numbers), len(known), -1)[:, :, -9:].tolist()
+            if own == [[*each.stamp, *each.numbers] for each in known]:
+                for place, row in zip(at, rows, strict=True):
+                    found[place] = [
+                        RawTransform(each.parent, each.child, tuple(numbers), (int(second), int(part)))
+                        for each, (second, part, *numbers) in zip(known, row, strict=True)
+                    ]
+                continue
+        for place in at:
+            found[place] = _transforms(reader, messages[place], number + place + 1, options)
+    return found
+
+
+def _transforms(reader: RecordingReader, message: Recorded, number: int, options: Options) -> list[RawTransform]:
+    """Return the transforms in a message, or the pose; raises FormatError for invalid bytes."""
+    channel = message.channel
+    try:
+        found = reader.types.read(channel, message.data)
+    except ValueInvalid as error:
+        raise FormatError(f"message {number} on {channel.topic}: {error}", source=reader.path) from None
     parts = posed_messages(found, channel.type) if channel.type in POSES else found.transforms
     return [RawTransform.of(each, body_of(channel.topic, options.answers)) for each in parts]
 
 
-def _columns(layouts: Layouts, messages: Sequence[Recorded], number: int, options: Options) -> EdgeColumns | None:
-    """Return the edges of many messages at once; None where one of them has to be read by itself.
-
-    number: of the message before them
-    """
-    names: list[tuple[str, str]] = []
-    found = []
-    for at, layout, values in layouts.groups(messages):
-        if layout is None:
-            return None
-        channel, bare = messages[at[0]].channel, options.tally.names.bare
-        known = _transforms(layouts.types, channel, layout.sample, options)
-        frames = [(bare(each.parent), bare(each.child)) for each in known if each.parent and each.child]
-        numbers = layout.values([layout.sample])[0]
-        if not known or numbers.shape[1] not in (9 * len(frames), 10 * len(frames)):  # ROS 1 counts its headers
-            return None
-        said = [[*each.stamp, *each.numbers] for each in known]
-        if numbers.reshape(len(known), -1)[:, -9:].tolist() != said:
-            return None
-        if not all(options.topics.agrees(channel.topic, child) for _, child in frames):
-            return None
-        lines, places = np.repeat(at, len(known)), np.tile(np.arange(len(known)) + len(names), len(at))
-        found.append(np.column_stack([lines, places, values.reshape(len(lines), -1)[:, -9:]]))
-        names += frames
-    rows = np.concatenate(found)
-    rows = rows[rows[:, 0].argsort(kind="stable")]
-    order, places, seconds, parts = rows[:, :4].astype(np.int64).T
-    if any(stamp_problem(int(pick(seconds)), int(pick(parts)), STAMPS[0]) for pick in (np.min, np.max)):
+def _columns(rows: Sequence[tuple[RawTransform, int, Recorded]], options: Options) -> EdgeColumns | None:
+    """Return the edges of many messages at once; None, and no warnings, if one of them is refused."""
+    transforms, lines, sent = zip(*rows, strict=True)
+    *names, numbers, stamps = zip(*transforms, strict=True)
+    bare = {name: options.tally.names.bare(name) for name in dict.fromkeys(chain(*names))}
+    parents, children = ([*map(bare.__getitem__, each)] for each in names)
+    topics = [each.channel.topic for each in sent]
+    published = dict.fromkeys(zip(topics, children, strict=True))
+    seconds, parts = zip(*stamps, strict=True)
+    if (
+        not all(bare) or not all(options.topics.agrees(*each) for each in published)
+        or any(stamp_problem(pick(seconds), pick(parts), STAMPS[0]) for pick in (min, max))
+        or (components := unit_rows(numbers, lines, options.tally, options.normalize)) is None
+    ):  # fmt: skip
         return None
-    lines = (order + number + 1).tolist()
-    components = unit_rows(map(tuple, rows[:, 4:].tolist()), lines, options.tally, options.normalize)
-    if components is None:
-        return None
-    sent = [messages[each] for each in order.tolist()]
-    topics, received = [each.channel.topic for each in sent], [each.log_ns for each in sent]
     options.topics.counts.update(Counter(topics) + Counter(options.topics.counts))
-    parents, children = zip(*map(names.__getitem__, places.tolist()), strict=True)
-    return EdgeColumns(
-        parents, children, (seconds * BILLION + parts).tolist(), components, lines, topics, received
-    )
+    stamps_ns = [second * BILLION + part for second, part in stamps]
+    return EdgeColumns(parents, children, stamps_ns, components, lines, topics, [each.log_ns for each in sent])
 
 
 def _edge(said: RawTransform, number: int, message: Recorded, path: str, options: Options) -> Edge:

@@ -22,7 +22,7 @@ from frametool.documents.document import parse_documents
 from frametool.errors import FileProblem, FormatError, FrametoolError, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator
+    from collections.abc import Collection, Iterable, Iterator, Sequence
 
     from frametool.grammar.edges import Diagnostics
 
@@ -37,6 +37,7 @@ NO_SUMMARY = "{} has no summary: whether it lost messages cannot be known"
 RECORD_HEAD = 9  # bytes
 RECORD, MESSAGE = Struct("<BQ"), Struct("<HIQQ")  # the header of a record, and of a message in it (mcap.dev/spec)
 BLOCK = 1 << 10  # messages
+MANY = 4000  # messages
 
 
 @dataclass(eq=False, slots=True)
@@ -93,12 +94,11 @@ class McapFile:
         self.channels: dict[int, Channel] = {}
         reader = SeekingReader(self.stream)
         self.head, summary = reader.get_header(), reader.get_summary()
-        said = summary.statistics if summary else None
+        said, chunks = (summary.statistics, summary.chunk_indexes) if summary else (None, [])
         if said is None:
             tally.note(NO_SUMMARY.format(path.name), 1)
         self.said, self.total = said, said.message_count if said else None
         self.stated = (said.channel_message_counts if said else None) or None  # an empty map states nothing
-        chunks = summary.chunk_indexes if summary else []
         self._chunks = chunks if said and said.chunk_count == len(chunks) else []
         self.compression = self._chunks[0].compression if self._chunks else ""
         if summary and said and said.channel_count == len(summary.channels):
@@ -203,18 +203,24 @@ def _unpacked_chunk(chunk: Any) -> bytes:
 
 
 def _in_order(chunks: Iterable[list[Recorded]]) -> Iterator[list[Recorded]]:
-    """Yield the messages of chunks in the order of their times: chunks that overlap are merged; none is empty."""
-    time, held = itemgetter(1), list[Recorded]()
+    """Yield the messages of chunks in the order of their times, many together; those before an error too.
+
+    Chunks that overlap are merged.  No chunk is empty.
+    """
+    time, ready, held = itemgetter(1), list[Recorded](), list[Recorded]()
     try:
         for found in chunks:
             found.sort(key=time)
             at = bisect_left(held, found[0].log_ns, key=time)
-            yield held[:at]
+            ready += held[:at]
             held = sorted([*held[at:], *found], key=time) if at < len(held) else found
+            if len(ready) >= MANY:
+                yield ready
+                ready = []
     except Exception:
-        yield held
+        yield ready + held
         raise
-    yield held
+    yield ready + held
 
 
 class DatabaseFile:
@@ -317,7 +323,7 @@ class RecordingReader:
 
     def __init__(self, path: str, opened: ExitStack, tally: Diagnostics) -> None:
         """Open its files; the stack closes them."""
-        from frametool.recordings.made import MessageTypes
+        from frametool.recordings.types import MessageTypes
 
         self.path, self.metadata, files = path, dict[str, Any](), [Path(path)]
         if files[0].is_dir():
@@ -349,34 +355,31 @@ class RecordingReader:
         """Yield the messages on some channels, or on all; raises FormatError if any are missing."""
         return chain.from_iterable(self.blocks(wanted))
 
-    def blocks(self, wanted: Collection[Channel] | None = None) -> Iterator[Iterable[Recorded]]:
+    def blocks(self, wanted: Collection[Channel] | None = None) -> Iterator[Sequence[Recorded]]:
         """Yield them in lists of any length."""
         total, wanted = 0, None if wanted is None else {*wanted}
         for file in self.files:
             count, numbers = 0, {number for number, each in file.channels.items() if wanted is None or each in wanted}
             for block in _in_order(filter(None, file.found(numbers))):
-                yield map(_unpacked, block) if self._is_packed else block
+                yield [*map(_unpacked, block)] if self._is_packed else block
                 count += len(block)
             known = None if file.stated is None else sum(file.stated.get(number, 0) for number in numbers)
-            self._check(count, known, wanted)
-            self._check(count, file.total if wanted is None else None, wanted)  # a damaged file may lack a channel
+            self._check(wanted, count, known, file.total if wanted is None else None)  # a channel may be lost
             total += count
-        self._check(total, self._expected(wanted), wanted)
-
-    def _expected(self, wanted: Collection[Channel] | None) -> int | None:
-        """Return the number of messages stated in the metadata."""
         if wanted is None:
-            said = self.metadata.get("message_count")
-            return None if said is None else int(said)
+            self._check(wanted, total, self.metadata.get("message_count"))
+            return
         named = {(each.topic, each.type) for each in wanted}
         counts = [int(each["count"]) for each in self._topics if (each["name"], each["type"]) in named]
-        return sum(counts) if counts else None
+        self._check(wanted, total, sum(counts) if counts else None)
 
-    def _check(self, count: int, expected: int | None, wanted: Collection[Channel] | None) -> None:
+    def _check(self, wanted: Collection[Channel] | None, count: int, *stated: Any) -> None:
         """Raise FormatError unless all stated messages were found."""
-        if expected not in (None, count):
-            names = "" if wanted is None else f" on {', '.join(sorted({each.topic for each in wanted}))}"
-            raise FormatError(f"the bag is damaged: {count} of {expected} messages{names} are there", source=self.path)
+        for expected in stated:
+            if expected is not None and int(expected) != count:
+                names = "" if wanted is None else f" on {', '.join(sorted({each.topic for each in wanted}))}"
+                what = f"the bag is damaged: {count} of {expected} messages{names} are there"
+                raise FormatError(what, source=self.path)
 
     def on_topics(self, types: Collection[str], topics: Collection[str] = ()) -> list[Channel]:
         """Return the channels of some types, on some topics, with or without a leading `/`, or on all."""
@@ -435,16 +438,20 @@ def opened_recording(path: str, tally: Diagnostics) -> Iterator[RecordingReader]
     """
     if path != "-" and Path(path).is_file() and not Path(path).stat().st_size:
         raise FormatError("nothing in it: an empty file is not a bag", source=path)
-    try:
-        import mcap  # noqa: F401 - whether it is there
-        import rosbags.typesys  # noqa: F401 - as well
-    except ImportError:
-        raise FileProblem(f"{path}: bags are read with an extra; install it: pip install 'frametool[bag]'") from None
-
+    require_extra(f"{path}: bags are read")
     if path == "-":
         raise FileProblem("stdin: a bag cannot be read from a pipe; name its file")
     with broken(path), ExitStack() as opened:
         yield RecordingReader(path, opened, tally)
+
+
+def require_extra(what: str) -> None:
+    """Raise FileProblem if the libraries are not installed."""
+    try:
+        import mcap  # noqa: F401 - whether it is there
+        import rosbags.typesys  # noqa: F401 - as well
+    except ImportError:
+        raise FileProblem(f"{what} with an extra; install it: pip install 'frametool[bag]'") from None
 
 
 @contextmanager

@@ -1,42 +1,143 @@
 """Write recordings: MCAP files and folders with mcap, ROS 1 bags with rosbags, the extra `frametool[bag]`.
 
-New messages are logged at their stamps, or at the previous log time if a stamp goes back.
+Messages are made by rosbags, once for each set of frames; stamps and numbers are then written into the bytes, for one
+message or a million.  They are logged at their stamps, or at the previous log time if a stamp goes back.
 """
 
 from __future__ import annotations
 
 import re
+import struct
 from contextlib import contextmanager, suppress
+from functools import lru_cache
 from heapq import merge
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
 from shutil import rmtree
 from tempfile import gettempdir, mkdtemp
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, NamedTuple
 from weakref import finalize
 
 import numpy as np
 
 from frametool.documents.yaml_writer import dump
-from frametool.errors import FileProblem, FrametoolError, ValueInvalid, printable
+from frametool.errors import FileProblem, FrametoolError, ValueInvalid, printable, shown
+from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import floats, quaternion
-from frametool.recordings.made import KINDS, check_stamps, serialised, typestore
-from frametool.recordings.read import BAG1, BAG2, CDR, INFORMATION, ITSELF, METADATA, QOS, SERIALIZED, Channel, Recorded
+from frametool.recordings import read
+from frametool.recordings.read import BAG1, BAG2, QOS, Channel, Recorded
+from frametool.recordings.types import TF, typestore
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.frames.track import Track
     from frametool.grammar.result import Style
-    from frametool.recordings.made import Kind, Sample
+    from frametool.text.spans import Floats, Ints
+
+    Sample = tuple[int, tuple[str, str], Sequence[float]]  # its stamp, parent and child, and numbers
 
 NAME = "recording"  # of the file in a bag2 folder, whatever the folder's name: two runs write the same bytes
 PIECE = 1 << 20  # bytes
-NO_EXTRA = "recordings are written with an extra; install it: pip install 'frametool[bag]'"
 VERSION, VERSION_OF_NUMBERS = 9, 8  # of metadata: the newest, and the last with numeric policies
 BY_NUMBERS = re.compile(r"\bhistory: *\d")  # in a quality of service
+SECONDS = {BAG1: (0, (1 << 32) - 1)}  # of a stamp; int32 in ROS 2
+SECONDS_ROS2 = (-(1 << 31), (1 << 31) - 1)
+_PROBE, _PROBE_NS = 1.2345678912345e-67, 1532698752_187654321  # numbers and a stamp that no other bytes equal
+
+
+class Kind(NamedTuple):
+    """One kind of message: its usual topic, its type, and the count of numbers per stamp.
+
+    each: of a list, the type of its items
+    stays: it is latched, so that late subscribers get it too
+    """
+
+    topic: str
+    type: str
+    numbers: int
+    each: str = ""
+    stays: bool = False
+
+
+STAMPED = "geometry_msgs/msg/TransformStamped"
+KINDS = {
+    "tf_static": Kind("/tf_static", TF, 7, STAMPED, stays=True),
+    "tf": Kind("/tf", TF, 7, STAMPED),
+    "pose": Kind("/pose", "geometry_msgs/msg/PoseStamped", 7),
+    "path": Kind("/path", "nav_msgs/msg/Path", 7, "geometry_msgs/msg/PoseStamped"),
+    "point": Kind("/point", "geometry_msgs/msg/PointStamped", 3),
+    "fix": Kind("/fix", "sensor_msgs/msg/NavSatFix", 3),
+}
+
+
+def check_stamps(stamps_ns: Ints, fmt: str) -> None:
+    """Raise ValueInvalid for a stamp whose seconds a message cannot hold."""
+    first, last = SECONDS.get(fmt, SECONDS_ROS2)
+    seconds = stamps_ns // BILLION
+    bad = stamps_ns[(seconds < first) | (seconds > last)]
+    if len(bad):
+        stamp = format_stamp(int(bad[0]))
+        raise ValueInvalid(f"stamp {stamp} does not fit in {fmt}, whose seconds are {first} .. {last}")
+
+
+def filled(kind: Kind, fmt: str, frames: tuple[str, str], stamps_ns: Ints, numbers: Floats) -> list[bytes]:
+    """Return a message about one frame, or about one in another, for each of stamps (n,) and numbers (n, k)."""
+    data, stamp_at, numbers_at = _template(kind, fmt, frames)
+    count, size = len(stamps_ns), len(data)
+    rows = np.tile(np.frombuffer(data, np.uint8), (count, 1))
+    times = np.column_stack(np.divmod(stamps_ns, BILLION)).astype("<u4")  # seconds before 1970 wrap, like int32
+    for at, part in ((stamp_at, times), (numbers_at, np.ascontiguousarray(numbers, "<f8"))):
+        own = part.view(np.uint8)
+        rows[:, at : at + own.shape[1]] = own
+    whole = rows.tobytes()
+    return [whole[at : at + size] for at in range(0, count * size, size)]
+
+
+@lru_cache(1 << 10)
+def _template(kind: Kind, fmt: str, frames: tuple[str, str]) -> tuple[bytes, int, int]:
+    """Return the bytes of a message, and the positions of its stamp and its numbers."""
+    numbers = [_PROBE * (at + 1) for at in range(kind.numbers)]
+    data = serialised(kind, fmt, [(_PROBE_NS, frames, numbers)])
+    stamp_at = data.index(struct.pack("<II", *divmod(_PROBE_NS, BILLION)))
+    return data, stamp_at, data.index(struct.pack(f"<{kind.numbers}d", *numbers))
+
+
+def serialised(kind: Kind, fmt: str, samples: Iterable[Sample]) -> bytes:
+    """Return one message of some transforms, poses or points; raises ValueInvalid for names that are not text."""
+    store = typestore(ros1=fmt == BAG1)
+    whole = [_leaves(kind, *sample) for sample in samples]
+    leaves = whole[0]
+    if kind.each:
+        stamp_and_frame = whole[-1][:3] if kind == KINDS["path"] else []
+        leaves = [*stamp_and_frame, [_built(store, kind.each, iter(each)) for each in whole]]
+    message = _built(store, kind.type, iter(leaves))
+    try:
+        return bytes((store.serialize_ros1 if fmt == BAG1 else store.serialize_cdr)(message, kind.type))
+    except UnicodeEncodeError as error:
+        raise ValueInvalid(f"{shown(error.object)} is not a name that can be written") from None
+
+
+def _leaves(kind: Kind, stamp_ns: int, frames: tuple[str, str], numbers: Sequence[float]) -> list[Any]:
+    """Return the contents of a stamped message in the order of its definition."""
+    second, part = divmod(stamp_ns, BILLION)
+    stamp = (second + (1 << 31)) % (1 << 32) - (1 << 31), part  # rosbags takes seconds of ROS 1 as int32
+    if kind.type == KINDS["fix"].type:  # by GPS, of unknown covariance
+        return [*stamp, frames[0], 0, 1, *numbers, np.zeros(9), 0]
+    return [*stamp, *frames[: 1 + (kind.type == TF)], *numbers]
+
+
+def _built(store: Any, kind: str, leaves: Iterator[Any]) -> Any:
+    """Return a message of a type; headers of ROS 1 have a counter too."""
+    from rosbags.interfaces import Nodetype
+
+    parts = (
+        0 if name == "seq" else _built(store, what, leaves) if node == Nodetype.NAME else next(leaves)
+        for name, (node, what) in store.fielddefs[kind][1]
+    )
+    return store.types[kind](*parts)
 
 
 class FirstPiece(bytes):
@@ -53,12 +154,10 @@ class RecordingFile:
 
         compression: of its chunks, as MCAP files and bags name them; head: profile and library of MCAP
         """
-        try:
-            from mcap.writer import CompressionType
-            from mcap.writer import Writer as McapWriter
-            from rosbags.rosbag1 import Writer as Writer1
-        except ImportError:
-            raise FileProblem(NO_EXTRA) from None
+        read.require_extra("recordings are written")
+        from mcap.writer import CompressionType
+        from mcap.writer import Writer as McapWriter
+        from rosbags.rosbag1 import Writer as Writer1
 
         self.format, self.log_ns = fmt, 0
         self.counts: dict[Channel, int] = {}
@@ -109,25 +208,26 @@ class RecordingFile:
         number = self._numbers[schema] if schema else 0
         return self._writer.register_channel(channel.topic, channel.encoding, number, said)
 
-    def write(self, channel: Channel, stamp_ns: int, data: bytes | memoryview) -> None:
-        """Write one message; a late one is logged with the previous one."""
-        self.log_ns = max(self.log_ns, stamp_ns)
-        self.add(Recorded(channel, self.log_ns, bytes(data), self.log_ns))
+    def write(self, messages: Iterable[tuple[Channel, int, bytes]]) -> None:
+        """Write messages with their channels and stamps; a late one is logged with the previous one."""
+        self.add(Recorded(channel, self._logged(stamp_ns), data, self.log_ns) for channel, stamp_ns, data in messages)
 
-    def add(self, message: Recorded) -> None:
-        """Write one message as it was recorded."""
-        channel, log_ns, data, publish_ns, sequence = message
-        number = self._numbers[channel]
-        try:
-            if self.format == BAG1:
-                self._writer.write(number, log_ns, data)
-            else:
-                self._writer.add_message(number, log_ns, data, publish_ns, sequence)
-        except OSError as error:
-            raise _named(error, self._folder) from None
-        self.counts[channel] += 1
-        first, last = self.span or (log_ns, log_ns)
-        self.span = min(first, log_ns), max(last, log_ns)
+    def _logged(self, stamp_ns: int) -> int:
+        self.log_ns = max(self.log_ns, stamp_ns)
+        return self.log_ns
+
+    def add(self, messages: Iterable[Recorded]) -> None:
+        """Write messages as they were recorded."""
+        with room_in(self._folder):
+            for channel, log_ns, data, publish_ns, sequence in messages:
+                number = self._numbers[channel]
+                if self.format == BAG1:
+                    self._writer.write(number, log_ns, data)
+                else:
+                    self._writer.add_message(number, log_ns, data, publish_ns, sequence)
+                self.counts[channel] += 1
+                first, last = self.span or (log_ns, log_ns)
+                self.span = min(first, log_ns), max(last, log_ns)
 
     def add_other(self, other: Any) -> None:
         """Write an attachment or metadata, a record of mcap; rosbag2's metadata about the file itself are replaced."""
@@ -148,12 +248,12 @@ class RecordingFile:
             else:
                 metadata = self._metadata(before or {})
                 if itself or self.format == BAG2:
-                    self._writer.add_metadata(ITSELF, {SERIALIZED: dump(metadata)})
+                    self._writer.add_metadata(read.ITSELF, {read.SERIALIZED: dump(metadata)})
                 self._writer.finish()
                 self._stream.close()
         if self.format == BAG2:
-            pieces = {METADATA: dump({INFORMATION: metadata}).encode(), f"{NAME}.mcap": self._file.read(PIECE)}
-            for name, piece in pieces.items():
+            about = dump({read.INFORMATION: metadata}).encode()
+            for name, piece in (read.METADATA, about), (f"{NAME}.mcap", self._file.read(PIECE)):
                 first = FirstPiece(piece)
                 first.name = name
                 yield first
@@ -202,13 +302,13 @@ def tree_pieces(tree: Frames, style: Style) -> Iterator[bytes]:
     if still:
         data = serialised(KINDS["tf_static"], fmt, [row for track in still for row in _samples(track, style)])
         first = min((track.span[0] for track in moving), default=0)
-        file.write(file.channel(KINDS["tf_static"], asked.topic), first, data)
+        file.write([(file.channel(KINDS["tf_static"], asked.topic), first, data)])
     if moving:
         channel = file.channel(KINDS["tf"], asked.topic)
         samples = merge(*(_samples(track, style) for track in moving), key=itemgetter(0))
         for stamp, rows in groupby(samples, itemgetter(0)):
             check_stamps(np.array([stamp]), fmt)
-            file.write(channel, stamp, serialised(KINDS["tf"], fmt, rows))
+            file.write([(channel, stamp, serialised(KINDS["tf"], fmt, rows))])
     yield from file.pieces()
 
 
@@ -235,11 +335,8 @@ def room_in(folder: str) -> Iterator[None]:
     except FrametoolError:
         raise
     except OSError as error:
-        raise _named(error, folder) from None
-
-
-def _named(error: OSError, folder: str) -> FileProblem:
-    return FileProblem(f"{printable(folder or gettempdir())}: {(error.strerror or str(error)).lower()}")
+        said = (error.strerror or str(error)).lower()
+        raise FileProblem(f"{printable(folder or gettempdir())}: {said}") from None
 
 
 def new_channel(kind: Kind, topic: str, *, ros1: bool, like: Iterable[Channel] = ()) -> Channel:
@@ -247,7 +344,7 @@ def new_channel(kind: Kind, topic: str, *, ros1: bool, like: Iterable[Channel] =
     store = typestore(ros1=ros1)
     definition, digest = store.generate_msgdef(kind.type, ros_version=1 if ros1 else 2)
     known = [each for each in like if each.type == kind.type]
-    encoding = "ros1" if ros1 else CDR
+    encoding = "ros1" if ros1 else read.CDR
     schema = kind.type, f"ros{2 - ros1}msg", definition.encode()
     said = {"latching": str(int(kind.stays))}
     if not ros1:

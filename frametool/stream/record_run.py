@@ -29,10 +29,10 @@ from frametool.recordings.copy import (
     RecordedEdges,
     replaced,
 )
-from frametool.recordings.made import KINDS, SECONDS_ROS2, serialised, typestore
 from frametool.recordings.messages import TYPES, RawTransform, recorded_edges
 from frametool.recordings.read import ITSELF, SERIALIZED, Recorded, broken, read_metadata
-from frametool.recordings.write import RecordingFile, new_channel
+from frametool.recordings.types import typestore
+from frametool.recordings.write import KINDS, SECONDS_ROS2, RecordingFile, new_channel, serialised
 from frametool.stream.faults import STOP, Fault
 
 if TYPE_CHECKING:
@@ -251,17 +251,21 @@ class RecordRun:
             channel = self._latched(topic)
             file.begin([channel])
             data = serialised(TF_STATIC, fmt, [(stamp_ns, (edge.parent, edge.child), edge.numbers) for edge in edges])
-            file.add(Recorded(channel, first_ns, data, first_ns))
+            file.add([Recorded(channel, first_ns, data, first_ns)])
         file.begin(self.reader.all)
+        file.add(self._copied(advance))
+        with broken(self.path):
+            said = self._others(file)
+            yield from file.pieces(said or self.reader.metadata, itself=said is not None)
+
+    def _copied(self, advance: Advance) -> Iterator[Recorded]:
+        """Yield the messages of the copy."""
         for message in self._messages(advance):
             if self._is_inside(message.log_ns) or message.channel.is_static:
                 change = self.change.get(message.channel)
                 copied = message.data if change is None else change(message.data)
                 if copied is not None:
-                    file.add(message._replace(data=copied))
-        with broken(self.path):
-            said = self._others(file)
-            yield from file.pieces(said or self.reader.metadata, itself=said is not None)
+                    yield message._replace(data=copied)
 
     def _others(self, file: RecordingFile) -> dict[str, Any] | None:
         """Copy attachments and metadata of MCAP; return the metadata of rosbag2 in them, or None."""

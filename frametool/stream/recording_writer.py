@@ -11,8 +11,7 @@ from frametool.errors import ValueInvalid, first_of, listing, warn
 from frametool.formats.rows.pose_rows import MOST_NAMED
 from frametool.geometry import arrays, earth, quaternion
 from frametool.grammar.names import EARTH_FRAMES
-from frametool.recordings.made import KINDS, MessageTemplate, check_stamps, serialised
-from frametool.recordings.write import RecordingFile
+from frametool.recordings.write import KINDS, RecordingFile, check_stamps, filled, serialised
 from frametool.stream.row_layout import POINT, POSE
 from frametool.stream.row_poses import plain_cells
 from frametool.stream.writers import refuse_scale_in
@@ -61,7 +60,6 @@ class RecordingWriter:
         self.file = RecordingFile(style.format, asked.folder)
         self.channel = cache(lambda name: self.file.channel(KINDS[name], asked.topic))
         self.dropped = dict.fromkeys(extras)
-        self.template = cache(lambda name, frames: MessageTemplate(KINDS[name], style.format, *frames))
         self.path: list[tuple[str, Ints, Floats]] = []
         self.lost: dict[str, None] = {}  # names of frames that poses are of
         self.is_named = True  # whether all rows say what they are seen from
@@ -92,9 +90,9 @@ class RecordingWriter:
         if channels.pop("path", None):
             self.path += [(frames[0][0], stamps, numbers)]
         messages = [self._messages(name, frames, stamps, numbers) for name in channels]
-        for stamp, *row in zip(stamps.tolist(), *messages, strict=True):
-            for channel, message in zip(channels.values(), row, strict=True):
-                self.file.write(channel, stamp, message)
+        rows = zip(stamps.tolist(), *messages, strict=True)
+        topics = channels.values()
+        self.file.write((topic, stamp, each) for stamp, *row in rows for topic, each in zip(topics, row, strict=True))
         return b""
 
     def end(self) -> Iterator[bytes]:
@@ -165,13 +163,13 @@ class RecordingWriter:
     ) -> Sequence[bytes]:
         """Return the message of each row."""
         if len(frames) == 1:
-            return self.template(name, frames[0]).filled(stamps, numbers)
+            return filled(KINDS[name], self.style.format, frames[0], stamps, numbers)
         made: dict[int, bytes] = {}
         rows_of: dict[tuple[str, str], list[int]] = {}
         for row, each in enumerate(frames):
             rows_of.setdefault(each, []).append(row)
         for each, rows in rows_of.items():
-            made |= zip(rows, self.template(name, each).filled(stamps[rows], numbers[rows]), strict=True)
+            made |= zip(rows, filled(KINDS[name], self.style.format, each, stamps[rows], numbers[rows]), strict=True)
         return [made[row] for row in range(len(frames))]
 
     def _write_path(self) -> None:
@@ -181,4 +179,5 @@ class RecordingWriter:
             raise ValueInvalid(f"a path is seen from one frame, the poses from {listing(parents)}")
         rows = (zip(stamps.tolist(), poses.tolist(), strict=True) for _, stamps, poses in self.path)
         samples = [(stamp, (min(parents), ""), pose) for each in rows for stamp, pose in each]
-        self.file.write(self.channel("path"), samples[-1][0], serialised(KINDS["path"], self.style.format, samples))
+        data = serialised(KINDS["path"], self.style.format, samples)
+        self.file.write([(self.channel("path"), samples[-1][0], data)])

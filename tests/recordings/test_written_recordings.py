@@ -18,7 +18,7 @@ from rosbags.interfaces import ConnectionExtRosbag1, QosDurability, QosReliabili
 
 from frametool.errors import ValueInvalid
 from frametool.recordings import write as recordings
-from frametool.recordings.made import KINDS, MessageTemplate, serialised
+from frametool.recordings.write import KINDS, filled, serialised
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -101,9 +101,9 @@ def test_bytes_that_are_filled_in_are_those_of_the_library(form: str, name: str,
     random = np.random.default_rng(1)
     kind = KINDS[name]
     numbers, stamps = random.normal(size=(5, kind.numbers)), np.array([0, 1, 10**9 - 1, 2**31 * 10**9 - 1, 5 * 10**9])
-    filled = MessageTemplate(kind, form, parent, "child").filled(stamps, numbers)
+    made = filled(kind, form, (parent, "child"), stamps, numbers)
     wanted = [serialised(kind, form, [(int(stamp), (parent, "child"), row)]) for stamp, row in zip(stamps, numbers.tolist(), strict=True)]
-    assert filled == wanted
+    assert made == wanted
 
 
 def test_stamps_before_1970_have_a_place_in_ros_2_only(run: Run, tmp_path: Path) -> None:
@@ -316,4 +316,4 @@ def test_a_bag_that_finds_no_room_is_one_line_and_leaves_nothing(tmp_path: Path)
 
 def test_a_name_that_is_no_text_is_refused() -> None:
     with pytest.raises(ValueInvalid, match="is not a name that can be written"):
-        MessageTemplate(KINDS["tf"], "mcap", "\udc80", "b")
+        serialised(KINDS["tf"], "mcap", [(0, ("\udc80", "b"), [0.0] * 7)])

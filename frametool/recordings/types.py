@@ -1,13 +1,14 @@
-"""Messages of equal layout, converted to lines of JSON many at once.
+"""The types of recorded messages: as objects of rosbags, as lines of JSON, and the layout of their bytes.
 
-One message is parsed according to its type: where each number is, and which bytes are in between (names and lengths),
-in which other messages must agree exactly.
+Messages of equal layout are converted many at once.  One message is parsed according to its type: where each number is,
+and which bytes are in between (names and lengths), in which other messages must agree exactly.
 """
 
 from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import lru_cache
 from json import dumps
 from math import isfinite
 from types import SimpleNamespace
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from frametool.errors import ValueInvalid
 from frametool.ros.messages import PATH
 from frametool.text.spans import MARGIN, Spans, framed, join
 from frametool.text.write import shortest_spans
@@ -25,7 +27,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from rosbags.interfaces import Nodetype
 
-    from frametool.recordings.made import MessageTypes
     from frametool.recordings.read import Channel, Recorded
 
 CODES = {"float64": "<f8", "float32": "<f4", "uint32": "<u4", "int32": "<i4", "uint16": "<u2", "int16": "<i2",
@@ -36,9 +37,82 @@ CDR_LE = b"\0\1"
 HOLE = b"\0"  # a placeholder for a number; no JSON text contains it
 STRING_OR_NUMBER = re.compile(rb'("(?:[^"\\]|\\.)*")|-?\d[-+.\de]*')
 POINT_ZERO = 2  # the characters `.0` that an integer written as a float has too many
+TF, POSE_ARRAY = "tf2_msgs/msg/TFMessage", "geometry_msgs/msg/PoseArray"
 
 
-POSE_ARRAY = "geometry_msgs/msg/PoseArray"
+@lru_cache
+def typestore(*, ros1: bool) -> Any:
+    """Return the usual types of messages."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+    if TF not in store.types:  # the library's Noetic has only tf/tfMessage
+        store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms\n", TF))
+    return store
+
+
+BETWEEN_IDL = "=" * 80 + "\nIDL: "  # before the name of each file
+TIMES = {"builtin_interfaces/msg/Time": "uint32", "builtin_interfaces/msg/Duration": "int32"}  # wiki.ros.org/msg
+
+
+class MessageTypes:
+    """The types of some channels: those defined in the recording, or the usual ones if it defines none."""
+
+    def __init__(self, channels: Sequence[Channel], *, ros1: bool) -> None:
+        """Create an empty set; a type that cannot be read affects only its own messages."""
+        from rosbags.interfaces import Nodetype
+        from rosbags.typesys import Stores, get_typestore
+
+        self.channels, self.ros1 = channels, ros1
+        self.store: Any = get_typestore(Stores.EMPTY)
+        for name, code in TIMES.items() if ros1 else ():  # the library has int32 for both
+            fields: Any = [("sec", (Nodetype.BASE, (code, 0))), ("nanosec", (Nodetype.BASE, ("uint32", 0)))]
+            self.store.fielddefs[name] = ([], fields)
+
+    def read(self, channel: Channel, data: bytes) -> Any:
+        """Return a message; raises ValueInvalid for invalid bytes."""
+        if channel.type not in self.store.types:
+            self._learn(channel.type)
+        try:
+            return (self.store.deserialize_ros1 if self.ros1 else self.store.deserialize_cdr)(data, channel.type)
+        except Exception:  # noqa: BLE001 - of broken bytes the library raises anything
+            raise ValueInvalid(f"its bytes are not a {channel.type}") from None
+
+    def write(self, channel: Channel, message: Any) -> bytes:
+        """Return the bytes of a message that was read."""
+        return bytes((self.store.serialize_ros1 if self.ros1 else self.store.serialize_cdr)(message, channel.type))
+
+    def _learn(self, kind: str) -> None:
+        """Learn the definition of a type; raises TypeError if it does not match its hash."""
+        from rosbags.typesys import get_types_from_idl, get_types_from_msg
+
+        found: dict[str, Any] = {}
+        digests: set[str] = set()
+        for each in self.channels:
+            _, fmt, definition = each.schema or ("", "", b"")
+            if each.type != kind or fmt not in ("ros1msg", "ros2msg", "ros2idl", "omgidl"):
+                continue
+            digests |= {each.digest} - {""}
+            text = definition.decode()
+            if fmt.endswith("msg"):
+                found |= get_types_from_msg(text, kind)
+                continue
+            for part in text.split(BETWEEN_IDL)[1:] or [f"\n{text}"]:
+                found |= get_types_from_idl(part.partition("\n")[2])
+        known = self.store
+        self._register(found)
+        try:
+            known.generate_msgdef(kind)
+        except Exception:  # noqa: BLE001 - of a type that is not there, or has parts that are not
+            self._register(typestore(ros1=self.ros1).fielddefs)
+        for digest in digests:
+            made = known.generate_msgdef(kind)[1] if self.ros1 else known.hash_rihs01(kind)
+            if made != digest:
+                raise TypeError(f"hash of {kind} is {made}, not {digest}")
+
+    def _register(self, types: dict[str, Any]) -> None:
+        """Register types that are not known yet."""
+        self.store.register({name: each for name, each in types.items() if name not in self.store.types})
 
 
 def posed_messages(message: Any, kind: str) -> list[Any]:
@@ -127,24 +201,23 @@ class MessageNumbers:
 
     def __init__(self, types: MessageTypes, kind: str, data: bytes) -> None:
         """Read a message; raises ValueError if one of its parts has no fixed place."""
+        from rosbags.interfaces import Nodetype
+
         self.fields, self.data = types.store.fielddefs, data
         self.begin = self.at = 0 if types.ros1 else 4
         self.aligned = not types.ros1
         self.numbers: list[tuple[int, str]] = []
         self.shared = [slice(self.begin)]
-        self._message(kind)
+        self._value(Nodetype.NAME, kind)
         if self.at != len(data) or not self.numbers or (self.aligned and data[:2] != CDR_LE):
             raise ValueError
-
-    def _message(self, kind: str) -> None:
-        for _, node in self.fields[kind][1]:
-            self._value(*node)
 
     def _value(self, node: Nodetype, what: Any) -> None:
         from rosbags.interfaces import Nodetype  # the extra is named where it is missing
 
         if node == Nodetype.NAME:
-            self._message(what)
+            for _, inner in self.fields[what][1]:
+                self._value(*inner)
         elif node == Nodetype.ARRAY:
             for _ in range(min(what[1], MOST_NUMBERS)):
                 self._value(*what[0])
