@@ -56,9 +56,7 @@ def message_text(message: dict[str, Any], style: Style) -> str:
     """Return one message and the line that ends it."""
     if style.format == "foxglove":
         return f"{json_dump(message, style.number)}\n"
-    message = _respelled(message, style.format)
-    lines = _ros1_lines(message, style, "") if style.format == "ros1" else _ros2_lines(message, style, "")
-    return "".join(f"{line}\n" for line in lines) + "---\n"
+    return "".join(f"{line}\n" for line in _lines(_respelled(message, style.format), style)) + "---\n"
 
 
 def _respelled(value: Any, fmt: str) -> Any:
@@ -117,27 +115,35 @@ def _stamped(record: dict[str, Any], style: Style) -> dict[str, Any]:
     return {"header": header(record.get("frame"), record.get("stamp_ns"), style), key: position}
 
 
-def _ros2_lines(mapping: dict[str, Any], style: Style, indent: str) -> Iterator[str]:
-    """Write block style as PyYAML does: items of a list have the indentation of its key."""
+def _lines(mapping: dict[str, Any], style: Style, indent: str = "") -> Iterator[str]:
+    """Write block style as PyYAML does for ROS 2, or as genpy does for ROS 1, where numbers of a list are on one line."""
+    is_ros1 = style.format == "ros1"
+    scalar, opening = (_ros1_scalar, ": ") if is_ros1 else (_ros2_scalar, ":")
     for key, value in mapping.items():
-        if isinstance(value, dict) and value:
-            yield f"{indent}{key}:"
-            yield from _ros2_lines(value, style, indent + "  ")
-        elif isinstance(value, list) and value:
-            yield f"{indent}{key}:"
+        if isinstance(value, dict) and (value or is_ros1):
+            yield f"{indent}{key}{opening}"
+            yield from _lines(value, style, indent + "  ")
+        elif isinstance(value, list) and (any(isinstance(item, dict) for item in value) if is_ros1 else value):
+            yield f"{indent}{key}{opening}"
             for item in value:
-                yield from _ros2_item(item, style, indent)
+                yield from _item(item, style, indent)
+        elif isinstance(value, list) and is_ros1:
+            yield f"{indent}{key}: [{', '.join(scalar(item, style) for item in value)}]"
         else:
-            yield f"{indent}{key}: {_ros2_scalar(value, style)}"
+            yield f"{indent}{key}: {scalar(value, style):>{9 if key == 'nsecs' else 0}}"
 
 
-def _ros2_item(item: Any, style: Style, indent: str) -> Iterator[str]:
-    if not isinstance(item, dict):
+def _item(item: Any, style: Style, indent: str) -> Iterator[str]:
+    """Write an item of a list: in ROS 2 in the column of its key and the dash before it, in ROS 1 below the dash."""
+    if style.format == "ros1":
+        yield f"{indent}  - "
+        yield from _lines(item, style, indent + "    ")
+    elif isinstance(item, dict):
+        lines = _lines(item, style, indent + "  ")
+        yield f"{indent}- {next(lines).lstrip()}"
+        yield from lines
+    else:
         yield f"{indent}- {_ros2_scalar(item, style)}"
-        return
-    lines = _ros2_lines(item, style, indent + "  ")
-    yield f"{indent}- {next(lines).lstrip()}"
-    yield from lines
 
 
 def _ros2_scalar(value: Any, style: Style) -> str:
@@ -147,23 +153,6 @@ def _ros2_scalar(value: Any, style: Style) -> str:
         return dump(value, style.number).rstrip("\n")
     safe = quoted(value)
     return safe if safe == value or not value.isprintable() else "'" + value.replace("'", "''") + "'"
-
-
-def _ros1_lines(mapping: dict[str, Any], style: Style, indent: str) -> Iterator[str]:
-    """Write as genpy does: a list of messages as separate items, a list of numbers on one line."""
-    for key, value in mapping.items():
-        if isinstance(value, dict):
-            yield f"{indent}{key}: "
-            yield from _ros1_lines(value, style, indent + "  ")
-        elif isinstance(value, list) and any(isinstance(item, dict) for item in value):
-            yield f"{indent}{key}: "
-            for item in value:
-                yield f"{indent}  - "
-                yield from _ros1_lines(item, style, indent + "    ")
-        elif isinstance(value, list):
-            yield f"{indent}{key}: [{', '.join(_ros1_scalar(item, style) for item in value)}]"
-        else:
-            yield f"{indent}{key}: {_ros1_scalar(value, style):>{9 if key == 'nsecs' else 0}}"
 
 
 def _ros1_scalar(value: Any, style: Style) -> str:

@@ -25,7 +25,7 @@ from frametool.frames.stamps import BILLION
 from frametool.grammar.edges import Edge
 from frametool.grammar.readers import Misfit, Reading, as_mapping
 from frametool.ros import messages
-from frametool.ros.messages import body_of, is_pose, read_pose
+from frametool.ros.messages import body_of, is_pose
 from frametool.ros.plain_messages import plain_columns
 
 if TYPE_CHECKING:
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from typing import BinaryIO
 
     from frametool.documents.source import InputFile
-    from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Diagnostics, EdgeColumns, Options
     from frametool.grammar.readers import Path
 
@@ -278,11 +277,13 @@ def _message_edges(message: TextMessage | FormatError, options: Options) -> Iter
             continue
         reading = Reading(message.source, normalize=options.normalize)
         try:
-            parent, child, components, stamp_ns = _read(transform, reading, options, line, topic)
+            body = body_of(topic, options.answers)
+            parent, child, position, rotation, stamp_ns = messages.read_transform(transform, reading, body)
         except Misfit as misfit:
             options.report(message.error(misfit.below(*path)))
             continue
-        edge = Edge(parent, child, components, stamp_ns, line, message.received_ns, (), topic)
+        options.tally.note_all(reading.notes, line)
+        edge = Edge(parent, child, (*position, *rotation), stamp_ns, line, message.received_ns, (), topic)
         yield _on_topic(edge, message.source.name, options) if topic else edge
 
 
@@ -291,19 +292,6 @@ def _on_topic(edge: Edge, name: str, options: Options) -> Edge:
     if problem := options.topics.conflict(edge.topic, edge.child):
         options.report(FormatError(problem, source=name, line=edge.line, column=1, rule="two-topics"))
     return edge._replace(stamp_ns=None) if edge.topic.endswith("tf_static") else edge
-
-
-def _read(
-    transform: dict[str, Any], reading: Reading, options: Options, line: int, topic: str
-) -> tuple[str, str, Rigid, int | None]:
-    """Read one transform; warnings about normalised rotations are counted and emitted once."""
-    if is_pose(transform):
-        found = read_pose(transform, reading, body_of(topic, options.answers))
-    else:
-        found = messages.read_transform(transform, reading)
-    parent, child, position, rotation, stamp_ns = found
-    options.tally.note_all(reading.notes, line)
-    return parent, child, (*position, *rotation), stamp_ns
 
 
 def _transforms(value: Any, path: Path, options: Options) -> Iterator[tuple[dict[str, Any], Path]]:

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 
 STAMPS = (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec"))  # ROS 2, ROS 1, Foxglove
 SECONDS = {"sec": range(-(1 << 31), 1 << 32), "secs": range(1 << 32)}  # int32 of ROS 2, uint32 of the others
-PARTS = "a TransformStamped has header, child_frame_id, transform"
+PARTS, HAS = "a TransformStamped has header, child_frame_id, transform", "a message with a pose has header, pose"
+_TRANSFORM, _POSE = ("translation", "rotation"), ("position", "orientation")
 # messages with more than one part, or whose content is not obvious: the fields expressed in the frame of the header,
 # and their kinds, then the fields in another frame, which are unchanged; all other messages name their content
 HELD: dict[str, tuple[dict[str, str], tuple[str, ...]]] = {
@@ -84,20 +85,31 @@ def messages(value: dict[str, Any], path: Path) -> Iterator[tuple[dict[str, Any]
             yield within((*here, index), as_mapping, entry, "a TransformStamped"), (*here, index)
 
 
-def read_transform(message: dict[str, Any], reading: Reading) -> tuple[str, str, Vector, Quaternion, int | None]:
-    """Read one TransformStamped as (parent, child, position, rotation, stamp_ns); None without a stamp."""
+def read_transform(
+    message: dict[str, Any], reading: Reading, body: str = ""
+) -> tuple[str, str, Vector, Quaternion, int | None]:
+    """Read a TransformStamped, a FrameTransform or a stamped pose: parent, child, position, rotation, stamp_ns or None.
+
+    body: the child of a pose that names none
+    """
     if "parent_frame_id" in message:
         return _read_frame_transform(message, reading)
-    only(message, ("header", "child_frame_id", "transform"))
-    header = part(message, "header", PARTS)
-    transform = part(message, "transform", PARTS)
-    within(("header",), only, header, ("seq", "stamp", "frame_id"))
-    within(("transform",), only, transform, ("translation", "rotation", STALE))
-    position, rotation = within(("transform",), read_rigid, transform, ("translation", "rotation"), reading)
-    if STALE in transform:
-        _warn_of_stale_angles(transform[STALE], rotation, reading)
+    is_posed = is_pose(message)
+    key, what, keys = ("pose", HAS, _POSE) if is_posed else ("transform", PARTS, _TRANSFORM)
+    path: Path = (key,)
+    if not is_posed:
+        only(message, ("header", "child_frame_id", key))
+    header, inner = part(message, "header", what), part(message, key, what)
+    if is_posed and "pose" in inner:
+        inner, path = within(path, part, inner, key, "with a covariance"), (key, key)
+    if not is_posed:
+        within(("header",), only, header, ("seq", "stamp", "frame_id"))
+        within(path, only, inner, (*keys, STALE))
+    position, rotation = within(path, read_rigid, inner, keys, reading)
+    if STALE in inner:
+        _warn_of_stale_angles(inner[STALE], rotation, reading)
     parent = frame_of(header, "frame_id", ("header",), reading)
-    child = frame_of(message, "child_frame_id", (), reading)
+    child = frame_of(message, "child_frame_id", (), reading) if message.get("child_frame_id") or not is_posed else body
     return parent, child, position, rotation, header_stamp(header)
 
 
@@ -114,7 +126,6 @@ def _warn_of_stale_angles(value: Any, rotation: Quaternion, reading: Reading) ->
         reading.note(f"{STALE} differs from the quaternion by {apart:.3g} degrees; the quaternion is used", *path)
 
 
-HAS = "a message with a pose has header, pose"
 PATH = "nav_msgs/msg/Path"
 POSES = frozenset((  # over time
     "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped", "nav_msgs/msg/Odometry", PATH,
@@ -131,25 +142,12 @@ def body_of(topic: str, answers: Answers) -> str:
     return answers.frames[-1] if answers.frames else topic.strip("/") or "body"
 
 
-def read_pose(message: dict[str, Any], reading: Reading, body: str) -> tuple[str, str, Vector, Quaternion, int | None]:
-    """Read one message as (parent, child, position, rotation, stamp_ns); `body` is the default child."""
-    header = part(message, "header", HAS)
-    pose = part(message, "pose", HAS)
-    path: Path = ("pose",)
-    if "pose" in pose:
-        pose, path = within(path, part, pose, "pose", "with a covariance"), ("pose", "pose")
-    position, rotation = within(path, read_rigid, pose, ("position", "orientation"), reading)
-    parent = frame_of(header, "frame_id", ("header",), reading)
-    child = frame_of(message, "child_frame_id", (), reading) if message.get("child_frame_id") else body
-    return parent, child, position, rotation, header_stamp(header)
-
-
 def _read_frame_transform(message: dict[str, Any], reading: Reading) -> tuple[str, str, Vector, Quaternion, int | None]:
     """Read one FrameTransform as (parent, child, position, rotation, stamp_ns); None without a timestamp."""
-    only(message, ("timestamp", "parent_frame_id", "child_frame_id", "translation", "rotation"))
+    only(message, ("timestamp", "parent_frame_id", "child_frame_id", *_TRANSFORM))
     parent = frame_of(message, "parent_frame_id", (), reading)
     child = frame_of(message, "child_frame_id", (), reading)
-    position, rotation = read_rigid(message, ("translation", "rotation"), reading)
+    position, rotation = read_rigid(message, _TRANSFORM, reading)
     stamp_ns = within(("timestamp",), _read_timestamp, message["timestamp"]) if "timestamp" in message else None
     return parent, child, position, rotation, stamp_ns
 
@@ -226,8 +224,6 @@ def stamp_problem(seconds: int, nanoseconds: int, names: tuple[str, str]) -> Mis
 
 def _whole(stamp: dict[str, Any], key: str) -> int:
     text = stamp[key]
-    if isinstance(text, str) and len(text) <= MOST_DIGITS and text.isascii() and text.isdigit():
-        return int(text)
     if not isinstance(text, str) or not re.fullmatch(_INTEGER, text):
         raise Misfit(f"{key} must be a whole number, found {kind(text)}", (key,))
     return int(text)
