@@ -116,7 +116,7 @@ def _stamped(record: dict[str, Any], style: Style) -> dict[str, Any]:
 
 
 def _lines(mapping: dict[str, Any], style: Style, indent: str = "") -> Iterator[str]:
-    """Write block style as PyYAML does for ROS 2, or as genpy does for ROS 1, where numbers of a list are on one line."""
+    """Write block style as PyYAML does for ROS 2, as genpy does for ROS 1, where a list of numbers is one line."""
     is_ros1 = style.format == "ros1"
     scalar, opening = (_ros1_scalar, ": ") if is_ros1 else (_ros2_scalar, ":")
     for key, value in mapping.items():

@@ -171,7 +171,7 @@ def _published(source: Source, *, normalize: bool) -> list[Any]:
             warn(f"{source.name}: taken for arguments of {CALL}: x y z yaw pitch roll PARENT CHILD")
         for note in reading.notes:
             warn(f"{source.name}: {note.message}", rule=note.rule)
-        numbers = [repr(each) for each in pose.components]
+        numbers = [*map(repr, pose.components)]
         values.append({"name": pose.name, "parent": pose.parent, "xyz": numbers[:3], "xyzw": numbers[3:]})
     return values
 

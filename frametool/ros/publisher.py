@@ -21,7 +21,7 @@ from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge
 from frametool.grammar.pose import Pose
 from frametool.grammar.readers import INDICES, Reading, read_number
-from frametool.grammar.result import rotation_numbers
+from frametool.grammar.result import edge_results, rotation_numbers
 from frametool.grammar.rotation_spelling import ROTATION_KEYS, rotation_of
 
 if TYPE_CHECKING:
@@ -63,9 +63,7 @@ def moving_frames(names: Iterable[str]) -> str:
 
 def write_tree(tree: Frames, style: Style) -> str:
     """Return one line per edge."""
-    return "".join(
-        f"{_line(Pose.of(transform.components, child, parent), style)}\n" for parent, child, transform in tree.edges()
-    )
+    return write_poses(edge_results(tree), style)
 
 
 def _line(pose: Pose, style: Style) -> str:
