@@ -16,7 +16,7 @@ that of its class.
 
 from __future__ import annotations
 
-from itertools import islice
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.xml import Element, read_xml
@@ -30,13 +30,13 @@ from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Diagnostics, Edge, Options, Topics
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Sequence
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Path, Quaternion, Vector
 
-    Attributes = Mapping[str, "Attribute"]
+    Attributes = dict[str, Element]  # name -> the element, or the default, that has it
 
 WORLD = "world"
 WHOLE = "save it whole: mujoco.mj_saveLastXML('whole.xml', mujoco.MjModel.from_xml_path('FILE'))"
@@ -45,7 +45,9 @@ MADE = ("composite", "flexcomp")
 JOINTS = ("joint", "freejoint")
 NESTING = ("mujoco", "default", "worldbody", "body", "frame", "keyframe")  # with elements that are read
 TYPES = {"hinge": "revolute", "slide": "prismatic", "ball": "ball", "free": "floating"}
-ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
+ORIENTATIONS = {  # and their defaults
+    "quat": "1 0 0 0", "axisangle": "0 0 1 0", "euler": "0 0 0", "xyaxes": "1 0 0 0 1 0", "zaxis": "0 0 1",
+}  # fmt: skip
 MAIN = "main"
 STRAIGHT = ("capsule", "cylinder", "box", "ellipsoid")  # sites that may be defined by two ends
 LEAST = 1e-14  # below this length MuJoCo treats a vector as zero
@@ -61,7 +63,10 @@ class _Inside(NamedTuple):
 
 
 class MjcfModel:
-    """The frames of a model, parents before children."""
+    """The frames of a model, parents before children; its compiler's settings, and its default classes.
+
+    classes: class -> kind of element -> attributes; nested ones inherit the enclosing ones
+    """
 
     def __init__(self, root: Element, options: Options) -> None:
         """Read a model; raises FormatError."""
@@ -71,13 +76,63 @@ class MjcfModel:
             nodes += node.children if node.tag in NESTING else ()
             if node.tag in REFUSED:
                 raise node.error(f"<{node.tag}> is not expanded here; {WHOLE}")
-        self.poses = PoseReader(root)
-        self.classes = Classes(root)
+        self._read_compiler(root)
+        self.classes: dict[str, dict[str, Attributes]] = {MAIN: {}}
+        self._read_classes(root)
         self.links: dict[str, Link] = {}
         self.joints: dict[str, Joint] = {}
         self._counts: dict[tuple[str, str], int] = {}
         for section in root.all("worldbody"):
             self._walk(section)
+
+    def _read_compiler(self, root: Element) -> None:
+        """Read the compiler sections, anywhere in the file: the last value of a setting counts; raises FormatError."""
+        said: dict[str, Element] = {}
+        for section in root.all("compiler"):
+            said |= own_attributes(section)
+        self.degrees = word(said, "angle", "degree", "radian") == "degree"
+        self.limits_apply = word(said, "autolimits", "true", "false") == "true"
+        self.aligns_free = word(said, "alignfree", "false", "true")
+        self.eulerseq = said["eulerseq"].attributes["eulerseq"] if "eulerseq" in said else "xyz"
+        if len(self.eulerseq) != len("xyz") or not set(self.eulerseq) <= set("xyzXYZ"):
+            message = f"eulerseq {shown(self.eulerseq)}; expected three of xyz (moving axes) and XYZ (fixed axes)"
+            raise said["eulerseq"].error(message, "eulerseq")
+        if word(said, "coordinate", "local", "global") == "global":
+            message = "coordinate=global; MuJoCo reads it no more: save the model with MuJoCo 2.3.3 first"
+            raise said["coordinate"].error(message, "coordinate")
+
+    def _read_classes(self, root: Element) -> None:
+        """Read the sections of defaults, each from a copy of the enclosing one; raises FormatError."""
+        pending = []
+        for section in root.all("default"):
+            name = section.attribute("class") or MAIN
+            if name != MAIN:
+                raise section.error(f"the outermost default class is called main, found {shown(name)}", "class")
+            pending.append((section, MAIN))
+        for node, name in pending:  # grows during the loop
+            mine = self.classes[name]
+            for child in node.children:
+                if child.tag != "default":
+                    mine[child.tag] = over(own_attributes(child), mine.get(child.tag, {}))
+            for child in node.all("default"):
+                inner = child.attribute("class")
+                if not inner or inner in self.classes:
+                    said = f"default class {shown(inner)} twice" if inner else "a <default> without class"
+                    raise child.error(said, "class" if inner else "")
+                self.classes[inner] = dict(mine)
+                pending.append((child, inner))
+
+    def attributes(self, node: Element, around: str) -> Attributes:
+        """Return the attributes of an element; `around` is the class inherited from the enclosing bodies, if any."""
+        own = own_attributes(node)
+        name = node.attributes["class"] if "class" in own else around or MAIN
+        self._check_class(name, node, "class")
+        return over(own, self.classes[name].get(node.tag, {}))
+
+    def _check_class(self, name: str, node: Element, attribute: str) -> None:
+        """Raise FormatError for an undefined class; one may be used before it is defined."""
+        if name not in self.classes:
+            raise node.error(f"no default class {shown(name)}{alternatives(name, self.classes, 'classes')}", attribute)
 
     def _walk(self, section: Element) -> None:
         """Read the contents of a world in the order of the file; with a stack, because bodies may be deep."""
@@ -92,10 +147,10 @@ class MjcfModel:
         if node.tag in MADE:
             self.options.tally.note_each(f"<{node.tag}> is left out: its bodies are made by MuJoCo; {WHOLE}", node.line)
         elif node.tag == "frame":
-            pose = rigid.compose(*inside.frame, *self.poses.pose(own_attributes(node)))
+            pose = rigid.compose(*inside.frame, *self.pose(own_attributes(node)))
             return inside._replace(around=self._class(node, inside.around), frame=pose)
         elif node.tag == "body":
-            name = self._place(node, inside, self.poses.pose(own_attributes(node)))
+            name = self._place(node, inside, self.pose(own_attributes(node)))
             return _Inside(name, self._class(node, inside.around), IDENTITY)
         elif node.tag in JOINTS:
             self._join(node, inside)
@@ -107,17 +162,17 @@ class MjcfModel:
         """Return the default class for the children of a body or frame."""
         name = node.attribute("childclass")
         if name:
-            self.classes.check(name, node, "childclass")
+            self._check_class(name, node, "childclass")
         return name or around
 
     def _mark(self, node: Element, inside: _Inside) -> None:
         """Read a site or camera."""
-        attributes = self.classes.attributes(node, inside.around)
-        pose = self.poses.pose_of_site(attributes) if node.tag == "site" else self.poses.pose(attributes)
+        attributes = self.attributes(node, inside.around)
+        pose = self.pose_of_site(attributes) if node.tag == "site" else self.pose(attributes)
         name = self._place(node, inside, pose)
         if node.tag == "camera":
             self.options.tally.axes[name] = self.options.answers.camera_axes or "opengl"
-        if "mode" in attributes and (mode := attributes["mode"].text.strip()) != "fixed":
+        if "mode" in attributes and (mode := attributes["mode"].attribute("mode")) != "fixed":
             message = f"{name} has the mode {shown(mode)}, in which MuJoCo rotates it over time; its pose is as written"
             self.options.tally.note_each(message, node.line)
 
@@ -142,9 +197,9 @@ class MjcfModel:
             raise node.error("the world has no joints; put it into a <body>")
         link = self.links[inside.body]
         free = node.tag == "freejoint"
-        attributes = own_attributes(node) if free else self.classes.attributes(node, inside.around)
-        kind = "free" if free else self.poses.word(attributes, "type", "hinge", tuple(TYPES))
-        if kind == "free" and (node.attribute("align") or str(self.poses.aligns_free).lower()) == "true":
+        attributes = own_attributes(node) if free else self.attributes(node, inside.around)
+        kind = "free" if free else word(attributes, "type", *TYPES)
+        if kind == "free" and (node.attribute("align") or self.aligns_free) == "true":
             message = "alignfree: MuJoCo moves this body's frame onto its inertia, which is not computed here"
             raise node.error(f'{message}; write align="false", or {WHOLE}')
         name = node.attribute("name") or f"{link.child}/joint{len(link.joints) + 1}"
@@ -164,17 +219,114 @@ class MjcfModel:
 
     def _hinged(self, joint: Joint, attributes: Attributes, frame: Rigid) -> Joint:
         """Read the axis, anchor, limits and reference of a joint; enclosing frames transform axis and anchor."""
-        anchor = rigid.apply(*frame, *self.poses.vector(attributes, "pos"))
+        anchor = rigid.apply(*frame, *numbers_of(attributes, "pos", "0 0 0"))
         if joint.kind == "ball":
             return joint._replace(anchor=anchor)
-        axis = quaternion.rotate(*frame[3:], *self.poses.direction(attributes, "axis", (0.0, 0.0, 1.0)))
-        unit = DEGREE if joint.kind == "revolute" and self.poses.degrees else 1.0
-        rest = unit * self.poses.numbers(attributes, "ref", 1, (0.0,))[0]
-        limited = self.poses.word(attributes, "limited", "auto", ("auto", "true", "false"))
+        axis = quaternion.rotate(*frame[3:], *direction(attributes, "axis", numbers_of(attributes, "axis", "0 0 1")))
+        unit = DEGREE if joint.kind == "revolute" and self.degrees else 1.0
+        rest = unit * numbers_of(attributes, "ref", "0")[0]
+        limited = word(attributes, "limited", "auto", "true", "false")
         lower = upper = None
-        if "range" in attributes and (limited == "true" or (limited == "auto" and self.poses.limits_apply)):
-            lower, upper = (unit * limit for limit in self.poses.numbers(attributes, "range", 2, ()))
+        if "range" in attributes and (limited == "true" or (limited == "auto" and self.limits_apply)):
+            lower, upper = (unit * limit for limit in numbers_of(attributes, "range", "0 0"))
         return joint._replace(axis=axis, lower=lower, upper=upper, rest=rest, anchor=anchor)
+
+    def pose(self, attributes: Attributes) -> Rigid:
+        """Read position and orientation."""
+        x, y, z = numbers_of(attributes, "pos", "0 0 0")
+        present = [name for name in ORIENTATIONS if name in attributes]
+        if len(present) > 1:
+            raise attributes[present[1]].error(f"{' and '.join(present)} in one element; keep one", present[1])
+        return x, y, z, *(self._orientation(present[0], attributes) if present else IDENTITY[3:])
+
+    def pose_of_site(self, attributes: Attributes) -> Rigid:
+        """Read the pose of a site, which may be defined by two ends: its z axis points to the first end."""
+        if "fromto" not in attributes:
+            return self.pose(attributes)
+        if "pos" in attributes:
+            raise attributes["fromto"].error("pos and fromto in one site; keep one", "fromto")
+        if word(attributes, "type", "sphere", *STRAIGHT) == "sphere":
+            raise attributes["fromto"].error(f"type 'sphere'; expected {', '.join(STRAIGHT)}", "type")
+        ax, ay, az, bx, by, bz = numbers_of(attributes, "fromto", "0 0 0 0 0 0")
+        along = direction(attributes, "fromto", (ax - bx, ay - by, az - bz))
+        return 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz), *_turning_z(*along)
+
+    def _orientation(self, kind: str, attributes: Attributes) -> Quaternion:
+        """Read one of the five orientations; raises FormatError."""
+        numbers = numbers_of(attributes, kind, ORIENTATIONS[kind])
+        match kind:
+            case "quat":  # of any length but zero
+                w, x, y, z = numbers
+                if w == x == y == z == 0.0:
+                    raise attributes[kind].error("quat: 0 0 0 0 has no direction", kind)
+                is_unit = abs(w * w + x * x + y * y + z * z - 1.0) <= quaternion.UNIT
+                return (x, y, z, w) if is_unit else quaternion.normalized(x, y, z, w, floats)
+            case "axisangle":
+                axis = direction(attributes, kind, numbers[:3])
+                return quaternion.from_axis_angle(*axis, numbers[3], floats, degrees=self.degrees)
+            case "euler":
+                return self._euler(numbers)
+            case "xyaxes":  # x is used, and the part of y orthogonal to it
+                first = direction(attributes, kind, numbers[:3])
+                along = sum(a * b for a, b in zip(first, numbers[3:], strict=True))
+                rest = [b - along * a for a, b in zip(first, numbers[3:], strict=True)]
+                second = direction(attributes, kind, rest)
+                rows = zip(first, second, cross(*first, *second), strict=True)
+                return matrix.to_quaternion(*chain.from_iterable(rows), xp=floats)
+        return _turning_z(*direction(attributes, kind, numbers))
+
+    def _euler(self, angles: Sequence[float]) -> Quaternion:
+        """Multiply the rotations about the axes of eulerseq: a moving axis on the right, a fixed one on the left."""
+        turned = (0.0, 0.0, 0.0, 1.0)
+        for letter, angle in zip(self.eulerseq, angles, strict=True):
+            sine, cosine = half_sincos_deg(angle, floats) if self.degrees else half_sincos(angle, floats)
+            x, y, z = (sine if axis == letter.lower() else 0.0 for axis in "xyz")
+            turn = x, y, z, cosine
+            turned = quaternion.compose(*turned, *turn) if letter.islower() else quaternion.compose(*turn, *turned)
+        return turned
+
+
+def own_attributes(node: Element) -> Attributes:
+    """Return the attributes of an element; empty ones count as missing."""
+    return {name: node for name, text in node.attributes.items() if text.strip()}
+
+
+def over(inner: Attributes, outer: Attributes) -> Attributes:
+    """Return the attributes of an element merged over those of its class: one orientation replaces all others."""
+    turned = not inner.keys().isdisjoint(ORIENTATIONS)
+    return {name: each for name, each in outer.items() if not (turned and name in ORIENTATIONS)} | inner
+
+
+def word(attributes: Attributes, name: str, default: str, *others: str) -> str:
+    """Return an attribute with one of several values; raises FormatError."""
+    if name not in attributes:
+        return default
+    text = attributes[name].attribute(name)
+    if text not in (default, *others):
+        raise attributes[name].error(f"{name} {shown(text)}; expected {', '.join((default, *others))}", name)
+    return text
+
+
+def numbers_of(attributes: Attributes, name: str, default: str) -> tuple[float, ...]:
+    """Read an attribute of as many numbers as its default has."""
+    if name not in attributes:
+        return tuple(map(float, default.split()))
+    return attributes[name].numbers(len(default.split()), name)
+
+
+def direction(attributes: Attributes, name: str, vector: Sequence[float]) -> Vector:
+    """Return a vector of any length but zero, from an attribute, as a unit one; raises FormatError."""
+    x, y, z = vector
+    if quaternion.magnitude(x, y, z, floats) < LEAST:
+        raise attributes[name].error(f"{name}: {x:g} {y:g} {z:g} has no direction", name)
+    return unit_vector(x, y, z, floats)
+
+
+def _turning_z(x: float, y: float, z: float) -> Quaternion:
+    """Return the shortest rotation from the z axis to a direction; about x if that is -z, as in MuJoCo."""
+    if z < 0.0 and quaternion.length(x, y, 0.0, floats) < SAME_LINE:
+        return 1.0, 0.0, 0.0, 0.0
+    return quaternion.between(0.0, 0.0, 1.0, x, y, z, floats)
 
 
 SIZES = {"floating": 7, "ball": 4}  # numbers of a joint in qpos; the others have one
@@ -231,187 +383,3 @@ def _value(joint: Joint, numbers: list[float], refuse: Callable[[str, Path], For
         raise refuse(f"qpos of joint {shown(joint.name)}: 0 0 0 0 has no direction", ())
     pose: dict[str, Any] = {"xyzw": [repr(part) for part in quaternion.normalized(x, y, z, w, floats)]}
     return pose | {"xyz": [repr(part) for part in numbers[:3]]} if joint.kind == "floating" else pose
-
-
-class Attribute(NamedTuple):
-    """The text of an attribute, and its element or default."""
-
-    name: str
-    text: str
-    node: Element
-
-    def error(self, message: str) -> FormatError:
-        """Make the error for its place."""
-        return self.node.error(message, self.name)
-
-
-def own_attributes(node: Element) -> dict[str, Attribute]:
-    """Return the attributes of an element; empty ones count as missing."""
-    return {name: Attribute(name, text, node) for name, text in node.attributes.items() if text.strip()}
-
-
-def over(inner: Attributes, outer: Attributes) -> dict[str, Attribute]:
-    """Return the attributes of an element merged over those of its class: one orientation replaces all others."""
-    turned = any(name in inner for name in ORIENTATIONS)
-    kept = {name: each for name, each in outer.items() if not (turned and name in ORIENTATIONS)}
-    return {**kept, **inner}
-
-
-class Classes:
-    """The default classes of a model: class -> kind of element -> attributes; nested ones inherit the enclosing ones.
-
-    A class may be used before it is defined.
-    """
-
-    def __init__(self, root: Element) -> None:
-        """Read all sections of defaults; raises FormatError."""
-        self.classes: dict[str, dict[str, Attributes]] = {MAIN: {}}
-        for section in root.all("default"):
-            name = section.attribute("class") or MAIN
-            if name != MAIN:
-                raise section.error(f"the outermost default class is called main, found {shown(name)}", "class")
-            self._take(section)
-
-    def _take(self, section: Element) -> None:
-        """Read one section, then its children, each from a copy; with a stack, because they may be deep."""
-        pending = [(section, MAIN)]
-        while pending:
-            node, name = pending.pop()
-            mine = self.classes[name]
-            for child in node.children:
-                if child.tag != "default":
-                    mine[child.tag] = over(own_attributes(child), mine.get(child.tag, {}))
-            for child in node.all("default"):
-                inner = child.attribute("class")
-                if not inner or inner in self.classes:
-                    said = f"default class {shown(inner)} twice" if inner else "a <default> without class"
-                    raise child.error(said, "class" if inner else "")
-                self.classes[inner] = dict(mine)
-                pending.append((child, inner))
-
-    def attributes(self, node: Element, around: str) -> dict[str, Attribute]:
-        """Return the attributes of an element; `around` is the class inherited from the enclosing bodies, if any."""
-        own = own_attributes(node)
-        name = own["class"].text if "class" in own else around or MAIN
-        self.check(name, node, "class")
-        return over(own, self.classes[name].get(node.tag, {}))
-
-    def check(self, name: str, node: Element, attribute: str) -> None:
-        """Raise FormatError for an undefined class."""
-        if name not in self.classes:
-            raise node.error(f"no default class {shown(name)}{alternatives(name, self.classes, 'classes')}", attribute)
-
-
-class PoseReader:
-    """Reads numbers, angles and poses according to the compiler section of a model."""
-
-    def __init__(self, root: Element) -> None:
-        """Read the compiler sections, anywhere in the file: the last value of a setting counts; raises FormatError."""
-        said: dict[str, Attribute] = {}
-        for section in root.all("compiler"):
-            said.update(own_attributes(section))
-        self.degrees = self.word(said, "angle", "degree", ("degree", "radian")) == "degree"
-        self.limits_apply = self.word(said, "autolimits", "true", ("true", "false")) == "true"
-        self.aligns_free = self.word(said, "alignfree", "false", ("true", "false")) == "true"
-        self.eulerseq = said["eulerseq"].text if "eulerseq" in said else "xyz"
-        if len(self.eulerseq) != len("xyz") or not set(self.eulerseq) <= set("xyzXYZ"):
-            message = f"eulerseq {shown(self.eulerseq)}; expected three of xyz (moving axes) and XYZ (fixed axes)"
-            raise said["eulerseq"].error(message)
-        if self.word(said, "coordinate", "local", ("local", "global")) == "global":
-            message = "coordinate=global; MuJoCo reads it no more: save the model with MuJoCo 2.3.3 first"
-            raise said["coordinate"].error(message)
-
-    def word(self, attributes: Attributes, name: str, default: str, words: tuple[str, ...]) -> str:
-        """Return an attribute with one of several values."""
-        if name not in attributes:
-            return default
-        text = attributes[name].text.strip()
-        if text not in words:
-            raise attributes[name].error(f"{name} {shown(text)}; expected {', '.join(words)}")
-        return text
-
-    def numbers(self, attributes: Attributes, name: str, count: int, default: tuple[float, ...]) -> tuple[float, ...]:
-        """Read an attribute of this many numbers; without it the default."""
-        if name not in attributes:
-            return default
-        return attributes[name].node.numbers(count, name)
-
-    def direction(self, attributes: Attributes, name: str, default: Vector) -> Vector:
-        """Read a vector of any length but zero, as a unit one."""
-        return self._unit(attributes, name, self.numbers(attributes, name, 3, default))
-
-    def _unit(self, attributes: Attributes, name: str, vector: tuple[float, ...]) -> Vector:
-        x, y, z = vector
-        if quaternion.magnitude(x, y, z, floats) < LEAST:
-            raise attributes[name].error(f"{name}: {x:g} {y:g} {z:g} has no direction")
-        return unit_vector(x, y, z, floats)
-
-    def pose(self, attributes: Attributes) -> Rigid:
-        """Read position and orientation."""
-        return (*self.vector(attributes, "pos"), *self._orientation(attributes))
-
-    def vector(self, attributes: Attributes, name: str, default: Vector = (0.0, 0.0, 0.0)) -> Vector:
-        """Read three numbers."""
-        x, y, z = self.numbers(attributes, name, 3, default)
-        return x, y, z
-
-    def pose_of_site(self, attributes: Attributes) -> Rigid:
-        """Read the pose of a site, which may be defined by two ends: its z axis points to the first end."""
-        if "fromto" not in attributes:
-            return self.pose(attributes)
-        fromto = attributes["fromto"]
-        if "pos" in attributes:
-            raise fromto.error("pos and fromto in one site; keep one")
-        self.word({"type": Attribute("type", "sphere", fromto.node), **attributes}, "type", "", STRAIGHT)
-        ax, ay, az, bx, by, bz = self.numbers(attributes, "fromto", 6, ())
-        along = self._unit(attributes, "fromto", (ax - bx, ay - by, az - bz))
-        return 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz), *_turning_z(*along)
-
-    def _orientation(self, attributes: Attributes) -> Quaternion:
-        present = [name for name in ORIENTATIONS if name in attributes]
-        if len(present) > 1:
-            raise attributes[present[1]].error(f"{' and '.join(present)} in one element; keep one")
-        return getattr(self, f"_{present[0]}")(attributes) if present else (0.0, 0.0, 0.0, 1.0)
-
-    def _quat(self, attributes: Attributes) -> Quaternion:
-        """Read a quaternion, w first, of any length but zero."""
-        w, x, y, z = self.numbers(attributes, "quat", 4, ())
-        if w == x == y == z == 0.0:
-            raise attributes["quat"].error("quat: 0 0 0 0 has no direction")
-        if abs(w * w + x * x + y * y + z * z - 1.0) <= quaternion.UNIT:
-            return x, y, z, w
-        return quaternion.normalized(x, y, z, w, floats)
-
-    def _axisangle(self, attributes: Attributes) -> Quaternion:
-        x, y, z, angle = self.numbers(attributes, "axisangle", 4, ())
-        axis = self._unit(attributes, "axisangle", (x, y, z))
-        return quaternion.from_axis_angle(*axis, angle, floats, degrees=self.degrees)
-
-    def _euler(self, attributes: Attributes) -> Quaternion:
-        """Multiply the rotations about the axes of eulerseq: a moving axis on the right, a fixed one on the left."""
-        turned = (0.0, 0.0, 0.0, 1.0)
-        for letter, angle in zip(self.eulerseq, self.numbers(attributes, "euler", 3, ()), strict=True):
-            sine, cosine = half_sincos_deg(angle, floats) if self.degrees else half_sincos(angle, floats)
-            x, y, z = (sine if axis == letter.lower() else 0.0 for axis in "xyz")
-            turn = x, y, z, cosine
-            turned = quaternion.compose(*turned, *turn) if letter.islower() else quaternion.compose(*turn, *turned)
-        return turned
-
-    def _xyaxes(self, attributes: Attributes) -> Quaternion:
-        """Read x and y axes: x is used, and the part of y orthogonal to it."""
-        numbers = self.numbers(attributes, "xyaxes", 6, ())
-        x = self._unit(attributes, "xyaxes", numbers[:3])
-        along = sum(a * b for a, b in zip(x, numbers[3:], strict=True))
-        y = self._unit(attributes, "xyaxes", tuple(b - along * a for a, b in zip(x, numbers[3:], strict=True)))
-        z = cross(*x, *y)
-        return matrix.to_quaternion(x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2], floats)
-
-    def _zaxis(self, attributes: Attributes) -> Quaternion:
-        return _turning_z(*self.direction(attributes, "zaxis", (0.0, 0.0, 1.0)))
-
-
-def _turning_z(x: float, y: float, z: float) -> Quaternion:
-    """Return the shortest rotation from the z axis to a direction; about x if that is -z, as in MuJoCo."""
-    if z < 0.0 and quaternion.length(x, y, 0.0, floats) < SAME_LINE:
-        return 1.0, 0.0, 0.0, 0.0
-    return quaternion.between(0.0, 0.0, 1.0, x, y, z, floats)

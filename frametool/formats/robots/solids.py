@@ -102,18 +102,17 @@ class _Geoms(mjcf.MjcfModel):
     def _take(self, node: Element, inside: _Inside) -> _Inside | None:
         if node.tag != "geom":
             return super()._take(node, inside)
-        attributes = self.classes.attributes(node, inside.around)
-        kind = attributes["type"].text.strip() if "type" in attributes else "mesh" if "mesh" in attributes else "sphere"
-        hidden = "group" in attributes and self.poses.numbers(attributes, "group", 1, ())[0] >= SHOWN_GROUPS
-        if hidden or kind not in SHAPES:
+        attributes = self.attributes(node, inside.around)
+        usual = "mesh" if "mesh" in attributes else "sphere"
+        kind = attributes["type"].attribute("type") if "type" in attributes else usual
+        if mjcf.numbers_of(attributes, "group", "0")[0] >= SHOWN_GROUPS or kind not in SHAPES:
             return None
-        count = len(attributes["size"].text.split()) if "size" in attributes else 0
-        size = self.poses.numbers(attributes, "size", count, ())
+        size = mjcf.numbers_of(attributes, "size", attributes["size"].attribute("size") if "size" in attributes else "")
         if "fromto" in attributes:
-            ends = self.poses.numbers(attributes, "fromto", 6, ())
+            ends = mjcf.numbers_of(attributes, "fromto", "0 0 0 0 0 0")
             size = (*size[:1], 0.5 * dist(ends[:3], ends[3:]))
         size = tuple(2.0 * number if kind == "box" or at == 1 else number for at, number in enumerate(size))
-        pose = rigid.compose(*inside.frame, *self.poses.pose_of_site(attributes))
+        pose = rigid.compose(*inside.frame, *self.pose_of_site(attributes))
         self.solids.append(Solid(inside.body, kind, size[: SIZES.get(kind, 0)], pose))
         return None
 
