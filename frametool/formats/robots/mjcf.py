@@ -16,7 +16,7 @@ that of its class.
 
 from __future__ import annotations
 
-from itertools import chain, islice
+from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.xml import Element, read_xml
@@ -256,23 +256,22 @@ class MjcfModel:
         numbers = numbers_of(attributes, kind, ORIENTATIONS[kind])
         match kind:
             case "quat":  # of any length but zero
-                w, x, y, z = numbers
-                if w == x == y == z == 0.0:
+                qw, qx, qy, qz = numbers
+                if qw == qx == qy == qz == 0.0:
                     raise attributes[kind].error("quat: 0 0 0 0 has no direction", kind)
-                is_unit = abs(w * w + x * x + y * y + z * z - 1.0) <= quaternion.UNIT
-                return (x, y, z, w) if is_unit else quaternion.normalized(x, y, z, w, floats)
+                is_unit = abs(qw * qw + qx * qx + qy * qy + qz * qz - 1.0) <= quaternion.UNIT
+                return (qx, qy, qz, qw) if is_unit else quaternion.normalized(qx, qy, qz, qw, floats)
             case "axisangle":
                 axis = direction(attributes, kind, numbers[:3])
                 return quaternion.from_axis_angle(*axis, numbers[3], floats, degrees=self.degrees)
             case "euler":
                 return self._euler(numbers)
             case "xyaxes":  # x is used, and the part of y orthogonal to it
-                first = direction(attributes, kind, numbers[:3])
-                along = sum(a * b for a, b in zip(first, numbers[3:], strict=True))
-                rest = [b - along * a for a, b in zip(first, numbers[3:], strict=True)]
-                second = direction(attributes, kind, rest)
-                rows = zip(first, second, cross(*first, *second), strict=True)
-                return matrix.to_quaternion(*chain.from_iterable(rows), xp=floats)
+                x = direction(attributes, kind, numbers[:3])
+                along = sum(a * b for a, b in zip(x, numbers[3:], strict=True))
+                y = direction(attributes, kind, [b - along * a for a, b in zip(x, numbers[3:], strict=True)])
+                z = cross(*x, *y)
+                return matrix.to_quaternion(x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2], floats)
         return _turning_z(*direction(attributes, kind, numbers))
 
     def _euler(self, angles: Sequence[float]) -> Quaternion:
