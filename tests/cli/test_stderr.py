@@ -27,7 +27,7 @@ ALLOWED = {
     ("view/pictures.py", "catch_warnings"),  # what a drawing library says of fonts
     ("cli/embedded.py", "catch_warnings"),  # filters of the program that runs a command are put back
     ("view/scene.py", "catch_warnings"),  # what Python says of an expression
-    ("formats/trees/launch_python.py", "catch_warnings"),  # what Python says of a file of somebody else's
+    ("formats/trees/launch.py", "catch_warnings"),  # what Python says of a file of somebody else's
 }  # fmt: skip
 MOVE = ["apply", "--transform", "{xyz: [1, 0, 0]}"]
 LINES = '{"xyz": [1, 2, 3]}\n{"xyz": [1, "?", 3]}\n{"xyz": [4, 5, 6]}\n'

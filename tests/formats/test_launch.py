@@ -68,7 +68,7 @@ def python(folder: Path, body: str) -> tuple[Any, list[str]]:
         (PYTHON.format(POSITIONAL.split()), "a.launch.py"),
         (PYTHON.format(FLAGS.split()), "a_launch.py"),
         (PYTHON.format(f"{POSITIONAL!r}.split()"), "a"),
-        (PYTHON.format("['0.1', str(-0.2), '0.3', '1.5', '0.2', '-' '0.1', 'base', 'cam']"), "a"),
+        (PYTHON.format("['0.1', -0.2, '0.3', '1.5', '0.2', '-' '0.1', 'base', 'cam']"), "a"),
         (PYTHON.format("[0.1, -0.2, 0.3, 1.5, 0.2, -0.1, 'base', 'cam']"), "a"),
         (PYTHON.format(POSITIONAL.split()).replace("executable", "node_executable"), "a"),
         (PYTHON.format(POSITIONAL.split()).replace("Node(", "launch_ros.actions.Node("), "a"),
@@ -97,74 +97,26 @@ def test_the_transforms_of_a_lidar_odometry_turn_its_camera_axes_into_those_of_t
     assert said[0] == "a.launch:2: frame '/map': the leading / is no part of a name and was left out (3 more like it)"
 
 
-
-
 @pytest.mark.parametrize(
-    ("before", "arguments"),
+    ("number", "said"),
     [
-        ("    p = '1'\n    q = [p, '2', '3', '0', '0', '0', 'a', 'b']\n", "q"),
-        ("    p: list = ['1', '2', '3', '0', '0', '0', 'a', 'b']\n", "p"),
-        ("    h = 1\n    frame = 'a'\n", "[str(h), '2', '3', '0', '0', '0', frame, 'b']"),
-        ("    p = '1 2 3 0 0 0 a b'\n", "p.split()"),
-        ("    package = 'tf2_ros'\n", "['1', '2', '3', '0', '0', '0', 'a', 'b']"),
+        ("LaunchConfiguration('x')", "\"LaunchConfiguration('x')\" is not a literal"),
+        ("f'{x}'", "\"f'{x}'\" is not a literal"),
+        ("str(x + 1)", "'str(x + 1)' is not a literal"),
+        ("x + 1", "'x + 1' is not a literal"),
+        ("str(-math.pi / 2)", "'str(-math.pi / 2)' is not a literal"),
+        ("os.environ['X']", "\"os.environ['X']\" is not a literal"),
+        ("x", "'x' is not a literal"),
+        ("'1' + '2'", "\"'1' + '2'\" is not a literal"),
+        ("*['1']", "\"*['1']\" is not a literal"),
     ],
 )
-def test_a_name_bound_once_to_a_literal_is_that_literal(tmp_path: Path, before: str, arguments: str) -> None:
-    package = "package" if "package" in before else "'tf2_ros'"
-    call = f"Node(package={package}, executable='static_transform_publisher', arguments={arguments})"
-    tree, said = python(tmp_path, f"{before}    return [{call}]\n")
-    assert tree.lookup("a", "b").components == (1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0)
-    assert not said
-
-
-@pytest.mark.parametrize(
-    ("before", "number", "said"),
-    [
-        ("", "LaunchConfiguration('x')", "\"LaunchConfiguration('x')\" is not a literal"),
-        ("    x = LaunchConfiguration('x')\n", "x", "\"LaunchConfiguration('x')\" is not a literal"),
-        ("", "f'{x}'", "\"f'{x}'\" is not a literal"),
-        ("    x = 1\n", "str(x + 1)", "'x + 1' is not a literal"),
-        ("    x = 1\n", "x + 1", "'x + 1' is not a literal"),
-        ("", "str(-math.pi / 2)", "'-math.pi / 2' is not a literal"),
-        ("", "os.environ['X']", "\"os.environ['X']\" is not a literal"),
-        ("    x = '1'\n    x = '2'\n", "x", "'x' is not a literal"),
-        ("    x = '1'\n    x += '2'\n", "x", "'x' is not a literal"),
-        ("    for x in ['1', '2']: pass\n", "x", "'x' is not a literal"),
-        ("    x, y = '1', '2'\n", "x", "'x' is not a literal"),
-        ("    def other():\n        x = '2'\n    x = '1'\n", "x", "'x' is not a literal"),
-        ("", "'1' + '2'", "\"'1' + '2'\" is not a literal"),
-        ("", "*['1']", "\"*['1']\" is not a literal"),
-        ("    x = x\n", "x", "'x' is not a literal"),
-        ("    global x\n    x = '1'\n", "x", "'x' is not a literal"),
-        ("    from other import x\n", "x", "'x' is not a literal"),
-        ("", "True", "'True' is not a literal"),
-        ("", "['1', '2']", "\"['1', '2']\" is not a literal"),
-        ("", "nowhere", "'nowhere' is not a literal"),
-    ],
-)
-def test_what_python_would_have_to_work_out_is_listed_as_not_read(
-    tmp_path: Path, before: str, number: str, said: str
-) -> None:
+def test_what_python_would_have_to_work_out_is_listed_as_not_read(tmp_path: Path, number: str, said: str) -> None:
     publisher = "Node(package='tf2_ros', executable='static_transform_publisher', arguments="
-    body = f"{before}    a = {publisher}['0', {number}, '0', '0', '0', '0', 'a', 'b'])\n"
+    body = f"    x = '1'\n    a = {publisher}['0', {number}, '0', '0', '0', '0', 'a', 'b'])\n"
     tree, told = python(tmp_path, f"{body}    b = {publisher}{POSITIONAL.split()})\n")
     assert set(tree.frames) == {"base", "cam"}
-    assert told == [f"a.launch.py:{3 + before.count(chr(10))}: static_transform_publisher not read: {said}"]
-
-
-@pytest.mark.parametrize("change", ["x.append('c')", "x[0] = '2'", "x += ['c']", "del x[8]"])
-def test_a_list_that_is_changed_is_no_literal(tmp_path: Path, change: str) -> None:
-    call = "Node(package='tf2_ros', executable='static_transform_publisher', arguments=x)"
-    with pytest.raises(FormatError, match="no frames in it"), heard_by(unheard):
-        python(tmp_path, f"    x = {POSITIONAL.split()}\n    {change}\n    {call}\n")
-
-
-def test_the_argument_of_a_function_or_lambda_is_no_literal_even_if_the_module_has_its_name(tmp_path: Path) -> None:
-    call = "Node(package='tf2_ros', executable='static_transform_publisher', arguments=[x, '0', '0', '0', '0', '0', 'a', 'b'])"
-    for text in (f"x = '1'\ndef f(x): return {call}\n", f"x = '1'\nf = lambda x: {call}\n", f"x = '1'\nf = [{call} for x in '12']\n"):
-        (tmp_path / "a.py").write_text(f"{text}def generate_launch_description(): pass\n")
-        with heard_by(unheard), pytest.raises(FormatError, match="no frames in it"):
-            load(tmp_path / "a.py")
+    assert told == [f"a.launch.py:4: static_transform_publisher not read: {said}"]
 
 
 def test_python_is_never_run(tmp_path: Path) -> None:
@@ -174,15 +126,6 @@ def test_python_is_never_run(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="no frames"), heard_by(unheard):
         python(tmp_path, body)
     assert not trap.exists()
-
-
-@pytest.mark.parametrize("count", [30, 3000])
-def test_names_that_double_a_text_again_and_again_are_given_up_at_once(tmp_path: Path, count: int) -> None:
-    for empty in ("''", "'0'", "[]", "['0']"):
-        lines = "".join(f"    x{n} = x{n - 1} + x{n - 1}\n" for n in range(1, count))
-        call = f"    Node(package='tf2_ros', executable='static_transform_publisher', arguments=[x{count - 1}])\n"
-        with pytest.raises(FormatError), heard_by(unheard):
-            python(tmp_path, f"    x0 = {empty}\n{lines}{call}")
 
 
 @pytest.mark.parametrize(
@@ -344,11 +287,11 @@ def test_what_says_all_of_itself_is_read_without_a_word(run: Callable[..., Any])
     assert run("lookup", "a.launch", "base", "cam", files={"a.launch": f"<launch>{NODE.format(FLAGS)}</launch>"}).err == ""
 
 
-def test_reading_a_launch_file_in_xml_loads_neither_numpy_nor_the_reader_of_python(tmp_path: Path) -> None:
+def test_reading_a_launch_file_in_xml_loads_no_numpy(tmp_path: Path) -> None:
     (tmp_path / "a.launch").write_text(f"<launch>{NODE.format(FLAGS)}</launch>")
     code = "import sys; from frametool.cli import run; run(['lookup', 'a.launch', 'base', 'cam']); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
-    assert not {"numpy", "rich", "yaml", "frametool.formats.trees.launch_python"} & set(done.stdout.split())
+    assert not {"numpy", "rich", "yaml"} & set(done.stdout.split())
 
 
 ARGUMENTS = "--x 1 \\\n      --frame-id a \\\n      --child-frame-id b"

@@ -3,20 +3,27 @@
     <node pkg="tf" type="static_transform_publisher" name="a" args="0.1 0 0.2 1.57 0 0 base cam 100"/>
     <node pkg="tf2_ros" exec="static_transform_publisher" args="--x 1 --frame-id base --child-frame-id cam"/>
 
-XML of either ROS, YAML below `launch:`, and Python with `generate_launch_description`, which is parsed and never run.
-The pose of the child in its parent, metres, radians; the arguments are those of `frametool.ros.publisher`. Only literal
-values are read: a call with `$(arg x)`, `LaunchConfiguration("x")` or arithmetic is listed as not read, included files
-are named, and calls that start under a condition are read and listed.
+XML of either ROS, YAML below `launch:`, and Python with `generate_launch_description`, which is parsed and never run:
+
+    Node(package="tf2_ros", executable="static_transform_publisher", arguments=["0.1", "0", ..])
+    ExecuteProcess(cmd=["ros2", "run", "tf2_ros", "static_transform_publisher", ..])
+
+anywhere and under another name; `arguments` may be `"..".split()`.  The pose of the child in its parent, metres,
+radians; the arguments are those of `frametool.ros.publisher`.  Only literal values are read: a call with `$(arg x)`,
+`LaunchConfiguration("x")`, names or arithmetic is listed as not read, included files are named, and calls that start
+under a condition are read and listed.
 """
 
 from __future__ import annotations
 
+import ast
 import re
+import warnings
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import format_error, locate_many, parse_documents
 from frametool.documents.xml import Element, read_xml
-from frametool.errors import ValueInvalid, shown
+from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.formats.detect import Beginning
 from frametool.grammar.readers import Misfit, kind
 from frametool.ros import publisher
@@ -36,6 +43,12 @@ COMPOSABLE = "tf2_ros::StaticTransformBroadcasterNode"
 _PYTHON = re.compile(r"(?m)^ *(?:def |import |from \w[\w.]* import )")
 _SUBSTITUTION = re.compile(r"\$\([^()]*\)?")
 _NO, _YES = ("0", "false"), ("1", "true")
+# arguments of Python's calls -> the fields of XML; fields -> kinds of actions
+FIELDS = {
+    "package": "pkg", "executable": "exec", "node_executable": "exec", "arguments": "args", "cmd": "cmd",
+    "plugin": "plugin",
+}  # fmt: skip
+KINDS = {"cmd": "executable", "plugin": "composable_node", "pkg": "node"}
 
 
 class Action(NamedTuple):
@@ -73,9 +86,7 @@ def _actions(file: InputFile) -> Iterator[Action]:
     if begin.xml:
         return _of_xml(file)
     if file.path.endswith(".py") or _PYTHON.search(begin.text):
-        from frametool.formats.trees import launch_python
-
-        return (Action(*each) for each in launch_python.actions(file.source))
+        return _of_python(file.source)
     return _of_yaml(file.source)
 
 
@@ -181,6 +192,62 @@ def _entries(entries: Any, path: Path, conditions: list[str]) -> Iterator[tuple[
                 yield from _entries(nodes, (*here, "composable_node"), under)
             else:
                 yield here, Action(tag, fields, under)
+
+
+def _of_python(source: Source) -> Iterator[Action]:
+    """Yield the calls in Python, in the order of the text."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about unknown escapes in the user's code
+            tree = ast.parse(source.text)
+        yield from sorted(_calls(tree), key=lambda action: (action.line, action.column))
+    except SyntaxError as error:
+        line, column = error.lineno or 1, error.offset or 1
+        raise FormatError(f"not Python 3: {error.msg}", source=source.name, line=line, column=column) from None
+    except (ValueError, MemoryError, RecursionError) as error:
+        raise FormatError(f"not Python 3: {error or 'nested too deeply'}", source=source.name) from None
+
+
+def _calls(tree: ast.Module) -> Iterator[Action]:
+    """Yield the calls, each with the conditions around it."""
+    pending: list[tuple[ast.AST, tuple[str, ...]]] = [(tree, ())]
+    while pending:
+        node, conditions = pending.pop()
+        if isinstance(node, ast.Call):
+            conditions += tuple(_written(each.value) for each in node.keywords if each.arg == "condition")
+            fields = {FIELDS[each.arg]: _literal(each.value) for each in node.keywords if each.arg in FIELDS}
+            tag = next((tag for field, tag in KINDS.items() if field in fields), "")
+            if getattr(node.func, "attr", getattr(node.func, "id", "")) == "IncludeLaunchDescription":
+                named = [*node.args, *(each.value for each in node.keywords), node.func]
+                tag, fields["file"] = "include", _written(named[0])
+            if tag and (tag != "executable" or CALL in _written(node)):
+                yield Action(tag, fields, conditions, node.lineno, node.col_offset + 1)
+        for name, held in ast.iter_fields(node):
+            under = conditions
+            if isinstance(node, ast.If | ast.IfExp) and name != "test":
+                test = _written(node.test)
+                under += (f"if {test}" if name == "body" else f"if not ({test})",)
+            children = held if isinstance(held, list) else [held]
+            pending += [(each, under) for each in children if isinstance(each, ast.AST)]
+
+
+def _literal(node: ast.expr) -> Any:
+    """Return the literal value of an argument; else a Misfit with what is not literal in it."""
+    match node:
+        case ast.List(elts=items) | ast.Tuple(elts=items):
+            found = [_literal(each) for each in items]
+            return next((each for each in found if isinstance(each, Misfit)), found)
+        case ast.Call(func=ast.Attribute(attr="split", value=ast.Constant(value=str() as text)), args=[], keywords=[]):
+            return text.split()
+    try:
+        return ast.literal_eval(node)
+    except (TypeError, ValueError):
+        return Misfit(f"{shown(_written(node))} is not a literal")
+
+
+def _written(node: ast.expr) -> str:
+    """Return an expression as Python writes it, on one line."""
+    return " ".join(ast.unparse(node).split())
 
 
 def _conditions(fields: Mapping[str, Any]) -> list[str]:
