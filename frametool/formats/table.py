@@ -292,7 +292,7 @@ FORMATS = {
         conventions="parent<-child, metres, radians, roll pitch yaw about fixed axes",
     ),
     "named": _tree(
-        "extrinsics by hand: a pose under each name", "frametool.formats.trees.named",
+        "extrinsics by hand: a pose under each name", "frametool.formats.trees.calibrations",
         magic=(("entries", _POSE_WORDS),), conventions="pose of the name in its parent, metres, radians unless _deg",
         required_options=("frames", "direction", "order"),
     ),

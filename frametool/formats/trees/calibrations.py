@@ -1,4 +1,4 @@
-"""Calibrations in YAML and JSON whose keys are fixed: Autoware's, easy_handeye's, and tables of nuScenes.
+"""Calibrations in YAML and JSON: Autoware's, easy_handeye's, tables of nuScenes, and extrinsics by hand.
 
     base_link: {sensor_kit_base_link: {x: 0.9, y: 0.0, z: 2.0, roll: -0.001, pitch: 0.015, yaw: -0.0364}}
         Autoware: the pose of the inner frame in the outer one; radians, about the fixed axes x, y, z
@@ -16,6 +16,16 @@
         nuScenes: ego<-sensor, and global<-ego, which moves; w first, microseconds.  Names of sensors are in
         sensor.json, in the same folder or passed with the other files.
 
+    lidar: {x: 0.9, y: 0.0, z: 2.0, roll: 0.0, pitch: 0.0, yaw: 1.57}
+    camera: {parent: lidar, translation: [0.1, 0, -0.2], quaternion: {x: -0.5, y: 0.5, z: -0.5, w: 0.5}}
+    imu: {trans_x: 0.1, trans_y: 0.0, trans_z: 0.0, rot_x: 0.0, rot_y: 0.0, rot_z: 0.0, rot_w: 1.0}
+    base_to_left: {x: 0.1, y: 0.0, z: 0.0, ax: 0.0, ay: 0.0, az: 1.0, theta: 0.1}         needs --direction
+    left: {R: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], t: [0.1, 0.0, 0.0]}                      needs --direction
+    gps: {value: [0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 1.0]}                                     needs --from
+        by hand: a map of names, or a list under `transforms:`.  Radians unless a key states degrees.  The pose is that
+        of the name, or of `child`, in `parent`, by default in `base` (--frames).  The order of a list of four or seven
+        is ambiguous: --from xyzw|wxyz sets it, for all.
+
 Metres.
 """
 
@@ -30,12 +40,14 @@ from frametool.documents.document import parse_documents
 from frametool.documents.source import InputFile
 from frametool.documents.yaml_writer import flow, quoted
 from frametool.errors import FormatError, ValueInvalid, bare, listing, shown, warn
+from frametool.formats.trees.matrices import FRAME_KEYS, Ambiguous, Meaning, directed, meaning_of
 from frametool.formats.trees.tree_reader import XYZ, document_edges, named
 from frametool.formats.trees.written_poses import angles_of, static_edges, warn_lonely_roots
-from frametool.geometry import floats, quaternion
+from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
-from frametool.grammar.loose import read_loose_pose
+from frametool.grammar.loose import WORDS, read_loose_pose
+from frametool.grammar.pose import read_angle_unit
 from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import read_rotation
 
@@ -58,10 +70,16 @@ MOUNTS = {
 }
 POSES = {"transformation": QUATERNION, "transform": ("translation", "rotation")}
 SENSORS = "sensor.json"
+WRAPPERS = ("transforms", "extrinsics")  # an outermost key that is not a name
+PARENTS, CHILDREN = (tuple(dict.fromkeys(keys[at] for keys in FRAME_KEYS[:4])) for at in (0, 1))
+_OF_CAMERAS = ("rvec", "qvec", "tvec", "R", "T", "t")  # camera<-world in OpenCV and COLMAP, often the inverse
+_SELF = {"me": "cam", "imu": "imu", "body": "body"}
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the edges of a calibration."""
+    if file.format == "named":
+        return _read_named(file, options)
     take = {"autoware": _autoware, "handeye": _handeye}.get(file.format) or partial(_nuscenes, file, options)
     return document_edges(file, options, take)
 
@@ -200,10 +218,100 @@ def channels_of(file: InputFile) -> dict[str, str] | None:
         raise FormatError(str(misfit), source=table.name) from None
 
 
+def _read_named(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield one edge per name of handwritten extrinsics."""
+    frames = options.answers.frames
+    base = options.answers.names("base")[0]
+    in_base, said, left = list[bool](), list[bool](), dict[str, None]()  # of each pose; remarks
+
+    def take(value: Any, reading: Reading) -> Iterator[Edge]:
+        reading.bare_numbers = False
+        top: dict[Any, Any] = as_mapping(value, "poses by the names of frames")
+        path: Path = ()
+        if "angles" in top:
+            reading.degrees = read_angle_unit(top.pop("angles"))
+        if len(top) == 1 and (wrapper := next(iter(top))) in WRAPPERS:
+            value, path = top[wrapper], (wrapper,)
+            top = dict(enumerate(value)) if type(value) is list else as_mapping(value, "poses by the names of frames")
+        for name, entry in top.items():
+            here: Path = (*path, name)
+            reading.here = here
+            try:
+                pose, ends = _entry(name, entry, reading, options, left)
+                in_base.append(ends is None)
+                said.append(type(entry) is dict and not {*PARENTS}.isdisjoint(entry))
+                target, source, child = ends or (base, str(name), str(name))
+                if child != source:
+                    pose = rigid.inverse(*pose)
+                yield Edge(source if child == target else target, child, pose, path=here)
+            except Misfit as misfit:
+                reading.refuse(misfit.below(*here))
+
+    yield from document_edges(file, options, take)
+    if frames and all(said):
+        options.tally.note(f"--frames {','.join(frames)} has no effect: each pose names its parent", 1)
+    count = f"{len(said)} {'pose' if len(said) == 1 else 'poses'}"
+    assumed = f"{count} in {bare(base)} (--frames says another)" if any(in_base) and not frames else ""
+    others = f"{', '.join(map(bare, left))} left out" if left else ""
+    options.tally.assumed = "; ".join(filter(None, (assumed, others)))
+
+
+def _entry(
+    name: str | int, entry: Any, reading: Reading, options: Options, left: dict[str, None]
+) -> tuple[Rigid, tuple[str, str, str] | None]:
+    """Read one pose, and its frames: target, source and the child; None if only its own name is known.
+
+    Raises Misfit.
+    """
+    if type(entry) is list:
+        entry = {"value": entry}
+    fields = dict(as_mapping(entry, "a pose as {x: .., y: .., z: .., roll: .., pitch: .., yaw: ..}"))
+    parent, child = (_frame(fields, keys) for keys in (PARENTS, CHILDREN))
+    child = child or (None if type(name) is int else str(name))
+    if child is None:
+        accepted = f"{', '.join(CHILDREN)}; of its parent: {', '.join(PARENTS)}"
+        raise Misfit(f"missing child; in a list an entry names its frame; keys: {accepted}")
+    for key in [key for key, value in fields.items() if _is_remark(key, value)]:
+        left[key] = fields.pop(key)
+    read = read_loose_pose(fields, reading, order=options.answers.order)
+    if read.position is None and read.rotation is None:
+        raise Misfit("neither position nor rotation; a pose has x, y, z, or a key like translation, and a rotation")
+    if parent is not None:
+        return read.components, (parent, child, child)
+    meaning = meaning_of(child, dict.fromkeys(("before", "sensor"), "") | _SELF, options.answers.frames)
+    if isinstance(meaning, Ambiguous):
+        raise meaning.error(child)
+    if meaning is None and (pair := [key for key in fields if key in _OF_CAMERAS]) and len(pair) == len(fields) == 2:
+        meaning = directed(" and ".join(pair), (), options.answers.names("base")[0], child, options.answers)
+    elif isinstance(meaning, Meaning) and not meaning.said:
+        meaning = directed(child, (), meaning.target, meaning.source, options.answers)
+    if meaning is None or not (meaning.target and meaning.source):
+        return read.components, None
+    return read.components, (meaning.target, meaning.source, meaning.child)
+
+
+def _frame(fields: dict[str, Any], keys: tuple[str, ...]) -> str | None:
+    """Remove the name of a frame from an entry; raises Misfit for two of them."""
+    there = [key for key in keys if key in fields]
+    if len(there) > 1:
+        raise Misfit(f"{' and '.join(there)} in one entry; keep one", (there[1],), key=True)
+    found = named(fields, there[0]) if there else None
+    for key in there:
+        del fields[key]
+    return found
+
+
+def _is_remark(key: str, value: Any) -> bool:
+    """Return True for a text of an entry, such as a topic or a model; False for what may be a misspelt number."""
+    return key not in WORDS and type(value) is str and re.match(r"[-+.]*\d", value) is None
+
+
 def write_tree(tree: Frames, style: Style) -> str:
-    """Return the tree as Autoware or easy_handeye has it; raises ValueInvalid for what either cannot hold."""
+    """Return the tree as Autoware or easy_handeye has it, or by names; raises ValueInvalid for what cannot be held."""
     edges = static_edges(tree, style.format)
     warn_lonely_roots(tree, style.format)
+    if style.format == "named":
+        return "".join(_line_of(*edge, style) for edge in edges)
     if style.format == "handeye":
         if len(edges) != 1:
             children = listing(child for _, child, _ in edges)
@@ -218,6 +326,12 @@ def write_tree(tree: Frames, style: Style) -> str:
     if len(texts) > 1:
         warn(f"Autoware has a file for each frame that holds others; here in one: {listing(texts)}")
     return "".join(f"{quoted(parent)}:\n{children}" for parent, children in texts.items())
+
+
+def _line_of(parent: str, child: str, pose: Rigid, style: Style) -> str:
+    """Return a name and its pose on one line."""
+    rotation = dict(zip("xyzw", quaternion.from_quaternion(*pose[3:], floats), strict=True))
+    return f"{quoted(child)}: {flow({'parent': parent, 'xyz': [*pose[:3]], 'quaternion': rotation}, style.number)}\n"
 
 
 def write_mount(parent: str, child: str, pose: Rigid, style: Style, *, on_hand: bool) -> str:
