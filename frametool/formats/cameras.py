@@ -317,7 +317,7 @@ def _nerf(value: dict[str, Any]) -> dict[str, Any]:
 
 def _kitti(file: InputFile) -> Found:
     """Yield the cameras of a KITTI calibration."""
-    from frametool.formats.trees.kitti_calib import CAMERAS, RECTIFICATIONS, Calibration
+    from frametool.formats.trees.text_calibrations import CAMERAS, RECTIFICATIONS, Calibration
 
     read = Calibration(file, _options(file))
     numbers = {name: field.numbers for name, field in read.fields.items()}

@@ -309,7 +309,7 @@ FORMATS = {
         required_options=("direction", "frames"), cameras=True,
     ),
     "kalibr": _read_tree(
-        "results of Kalibr as text", "frametool.formats.trees.kalibr",
+        "results of Kalibr as text", "frametool.formats.trees.text_calibrations",
         magic=(
             ("text", r"(?im)^[ \t]*(?:baseline T_\d+_\d+:|Camera-system parameters:)"),
             ("text", r"(?im)^[ \t]*(?:Transformation[ \t]+)?T_(?:ci|ic|\w{1,40}_\w{1,40}):?[ \t]*\(\w{1,40} to \w"),
@@ -339,7 +339,7 @@ FORMATS = {
         conventions="parent<-child, metres, quaternion by name; its euler_angles_degree are not used",
     ),
     "kitti-calib": _read_tree(
-        "KITTI calibration", "frametool.formats.trees.kitti_calib", magic=(("text", _KITTI),),
+        "KITTI calibration", "frametool.formats.trees.text_calibrations", magic=(("text", _KITTI),),
         conventions="parent<-child, metres, optical axes of cameras by default",
         required_options=("frames", "camera_axes"), cameras=True,
     ),

@@ -1,4 +1,6 @@
-"""Calibrations of KITTI: cameras, lidar and IMU, a name and its numbers per line.
+r"""Calibrations as text: KITTI's, and Kalibr's results.
+
+KITTI: cameras, lidar and IMU, a name and its numbers per line.
 
     P0: 718.856 0 607.193 0 0 718.856 185.216 0 0 0 1 0       odometry, object: projection of a rectified camera
     Tr: 12 numbers                                            odometry: cam0<-velo, cam0 rectified
@@ -7,6 +9,18 @@
     R_01: 9    T_01: 3    R_rect_01: 9                        raw calib_cam_to_cam: cam1<-cam0, cam1_rect<-cam1
 
 Metres, row-major; cameras have optical axes.  A projection K [I t] contains the position of its camera: -t.
+
+Kalibr, results-cam-*.txt and results-imucam-*.txt: poses between cameras and IMUs.
+
+    baseline T_1_0:
+        q: [-0.00087935 -0.00270995 -0.0008824 0.99999555] +- [..]    x y z w, of the inverse rotation
+        t: [-0.02997144 -0.00027389 0.00036353] +- [..]               cam0 in cam1, metres
+    T_ci:  (imu0 to cam0):                                            maps points of imu0 to cam0
+    Transformation T_cam0_imu0 (imu0 to cam0, T_ci):                  the same
+    [[ 0.00852045 .. ]]                                               four rows of four
+
+The q of a baseline is the inverse of the matrix T_cn_cnm1 in the same camchain: Kalibr's quaternions are
+those of JPL.  The result agrees with the matrix; t is the same in both.
 """
 
 from __future__ import annotations
@@ -15,14 +29,15 @@ import os
 import re
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FormatError, Unanswered, ValueInvalid
-from frametool.formats.trees.matrices import MATRIX
+from frametool.errors import BadAnswer, FormatError, Unanswered, ValueInvalid
+from frametool.formats.trees.matrices import MATRIX, Stated, edges_of
 from frametool.formats.trees.tree_reader import line_error
-from frametool.geometry import rigid
+from frametool.geometry import quaternion, rigid
+from frametool.geometry.representations import notation
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
-from frametool.grammar.readers import Reading
-from frametool.grammar.rotation_spelling import rotation_of
+from frametool.grammar.readers import INDICES, Misfit, Reading, read_numbers
+from frametool.grammar.rotation_spelling import read_spelled, rotation_of
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
@@ -59,6 +74,9 @@ class Field(NamedTuple):
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the edges of one file of a calibration."""
+    if file.format == "kalibr":
+        yield from _read_kalibr(file, options)
+        return
     calibration = Calibration(file, options)
     for parent, child, pose, line in calibration.edges():
         names = (calibration.named(parent), calibration.named(child))
@@ -171,3 +189,81 @@ class Calibration:
                     raise line_error(self.file, field.line, 1, f"P{index}: the focal length {focal:g} is not positive")
             centre = 0.0 - (px - cx * pz) / fx, 0.0 - (py - cy * pz) / fy, 0.0 - pz
             yield f"cam0{rect}", f"cam{index}{rect}", (*centre, *IDENTITY[3:]), field.line
+
+
+# --- Kalibr ---
+
+# a baseline by its two numbers; a matrix between two frames; a matrix below the number of its IMU
+_HEAD = re.compile(
+    r"(?im)^[ \t]*(?:(?P<name>baseline T_(?P<to>\d+)_(?P<of>\d+)):|(?:Transformation[ \t]+)?(?P<key>T_\w+|Baseline):?"
+    r"[ \t]*\((?P<source>\w+) to (?P<target>\w+)(?:, T_\w+)?\)|(?P<imu>IMU\d+):[ \t\r]*$|(?P<own>T_i_b)[ \t\r]*$)"
+)
+_ROWS = re.compile(r"[^\n]*\n\s*\[\[([^\[\]]*(?:\]\s*\[[^\[\]]*)*)\]\]")
+_VECTOR = r"[^\n]*\n(?:[^\n]*\n)??[ \t]*{}:\s*\[([^\[\]]*)\]"
+
+
+def _read_kalibr(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield one edge per camera and IMU; duplicates are checked."""
+    reading = Reading(file.source, normalize=options.normalize)
+    text, lines, stated, imu = file.text, dict[str, int](), list[Stated](), ""
+    for head in _HEAD.finditer(text):
+        if head["imu"]:
+            imu = head["imu"].lower()
+            continue
+        target, source = (
+            (f"cam{head['to']}", f"cam{head['of']}") if head["name"]
+            else (imu, "imu0") if head["own"] else (head["target"], head["source"])
+        )  # fmt: skip
+        label = head["name"] or f"{head['own'] or head['key']} ({source} to {target})"
+        lines[label] = 1 + text.count("\n", 0, head.end())
+        reading.here = (label,)
+        try:
+            pose = _baseline(text, head, reading) if head["name"] else _matrix(text, head, reading)
+        except ValueInvalid as error:
+            raise FormatError(f"{label}: {error}", source=file.name, line=lines[label]) from None
+        if target != source:  # as the first IMU relative to itself
+            child = max(target, source, key=lambda name: (name[:3] == "cam", name[:3], len(name), name))
+            both = target[:3] == source[:3] == "cam"
+            stated.append(Stated(target, source, child, pose, (label,), chained=both))
+    if not stated:
+        raise FormatError("no pose in it: it would be under baseline T_1_0 or T_ci", source=file.name)
+    try:
+        edges = edges_of(stated, reading)
+    except Misfit as misfit:
+        raise FormatError(str(misfit), source=file.name, line=lines.get(str(misfit.path[0]), 0)) from None
+    for note in reading.notes:
+        options.tally.note_each(f"{note.path[0]}: {note.message}", lines[str(note.path[0])], note.rule)
+    yield from _named(edges, options, lines)
+
+
+def _baseline(text: str, head: re.Match[str], reading: Reading) -> Rigid:
+    """Read the q and t below a baseline; raises Misfit."""
+    turn, shift = (re.compile(_VECTOR.format(name)).match(text, head.end()) for name in "qt")
+    if turn is None or shift is None:
+        raise Misfit("expected q: [x y z w] and t: [x y z] below it")
+    if len(words := turn[1].split()) != 4:
+        raise Misfit(f"q: expected 4 numbers, found {len(words)}")
+    x, y, z = read_numbers(shift[1].split(), ("x", "y", "z"))
+    return x, y, z, *quaternion.conjugate(*rotation_of(notation("xyzw"), words, INDICES, reading))
+
+
+def _matrix(text: str, head: re.Match[str], reading: Reading) -> Rigid:
+    """Read the four rows below a line; raises Misfit."""
+    rows = _ROWS.match(text, head.end())
+    words = re.findall(r"[^\s\[\],]+", rows[1]) if rows else []
+    if len(words) != 16:
+        raise Misfit(f"expected a 4 x 4 matrix below it, found {f'{len(words)} numbers' if words else 'none'}")
+    position, rotation = read_spelled(MATRIX, words, INDICES, reading)
+    return *(position or (0.0, 0.0, 0.0)), *rotation
+
+
+def _named(edges: list[Edge], options: Options, lines: dict[str, int]) -> Iterator[Edge]:
+    """Yield edges with the names of --frames: of the IMUs, then of the cameras, by their numbers."""
+    found = {name: None for each in edges for name in (each.parent or "", each.child)}
+    frames = sorted(found, key=lambda name: (name[:3] == "cam", len(name), name))
+    if len(chosen := options.answers.frames) > len(frames):
+        raise BadAnswer(f"--frames names {len(chosen)} frames, there are {len(frames)}: {', '.join(frames)}")
+    names = dict(zip(frames, options.answers.names(*frames), strict=True))
+    for each in edges:
+        line = lines[str(each.path[0])]
+        yield each._replace(parent=names[each.parent or ""], child=names[each.child], line=line, path=())
