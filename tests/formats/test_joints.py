@@ -314,11 +314,10 @@ def test_joints_that_move_together_are_interpolated_at_each_others_times() -> No
     joints = [Joint(name, "prismatic") for name in "ab"]
     found = JointState(joints, options, "arm.urdf")
     for name, values in series.items():
-        found.still.pop(name)
-        found.moving[name] = {at: JointValue(value) for at, value in values.items()}
+        found.series[name] = {at: JointValue(value) for at, value in values.items()}
     steps = {at: tuple(motion(joint, value)[0] for joint, value in zip(joints, both, strict=True)) for at, both in found.values("a", "b")}
     assert steps == {5: (0.5, 0.5), 10: (1.0, 1.5)}
-    found.moving["b"] = {20: JointValue(0.0), 30: JointValue(1.0)}
+    found.series["b"] = {20: JointValue(0.0), 30: JointValue(1.0)}
     with pytest.raises(FormatError, match="joints a, b move one frame and have no time in common"):
         list(found.values("a", "b"))
 

@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Path
 
-    Series = Mapping[int, Value]
+    Series = Mapping[int | None, Value]
 
 SLACK = 1e-9  # tolerance of limits: values are printed with fewer digits than they have
 HALF_TURN = 3.141592653589793
@@ -62,9 +62,8 @@ STATES = "--joint NAME=VALUE"
 class JointState:
     """The values of all joints of a robot: one each, or samples over time.
 
-    still, moving: values by name, or by name and stamp
+    series: name -> stamp -> value; the only stamp is None if the value is the same at all times
     named: names of the joints with a value; the others follow them, or are at rest
-
     """
 
     def __init__(self, joints: Iterable[Joint], options: Options, file: str, *, fixed: Collection[str] = ()) -> None:
@@ -77,16 +76,14 @@ class JointState:
         Raises FormatError: an invalid value, a mimic of itself or of a missing joint.
         """
         self.joints = {joint.name: joint for joint in joints}
-        self.still: dict[str, Value] = {}
-        self.moving: dict[str, Series] = {}
-        self._times: dict[str, list[int]] = {}
+        self.series: dict[str, Series] = {}
         self._options = options
         self._fixed = frozenset(fixed)
         self._file = file
         self._take_files()
         self._take_options()
         self._tell_limits()
-        self.named = frozenset((*self.still, *self.moving))
+        self.named = frozenset(self.series)
         self.known = set(self.named)
         self._follow()
         options.tally.robot = self.still, [], [name for name in self.joints if name not in self.known]
@@ -97,6 +94,16 @@ class JointState:
         """Return the joint values for the joints of some links."""
         joints = (joint for link in links for joint in link.joints)
         return cls(joints, options, file, fixed=[link.fixed for link in links if link.fixed])
+
+    @property
+    def still(self) -> dict[str, Value]:
+        """Return the joints with the same value at all times."""
+        return {name: series[None] for name, series in self.series.items() if None in series}
+
+    @property
+    def moving(self) -> list[str]:
+        """Return the names of the other joints."""
+        return [name for name, series in self.series.items() if None not in series]
 
     def edges(self, links: Iterable[Link]) -> Iterator[Edge]:
         """Yield one edge per link: static, or a sample at each time at which one of its joints has a value."""
@@ -111,30 +118,24 @@ class JointState:
 
         A joint without a sample at the time of another one is interpolated.
         """
-        if moving := [name for name in names if name in self.moving]:
-            for stamp_ns in self._common_times(moving):
-                yield stamp_ns, [self._at(name, stamp_ns) for name in names]
-        else:
-            yield None, [self.still[name] for name in names]
-
-    def _common_times(self, moving: Sequence[str]) -> list[int]:
-        """Return the times at which any of some joints has a sample and all are known."""
-        begin = max(min(self.moving[name]) for name in moving)
-        end = min(max(self.moving[name]) for name in moving)
+        times = {name: [at for at in self.series[name] if at is not None] for name in names}
+        moving = {name: series for name, series in times.items() if series}
+        if not moving:
+            yield None, [self.series[name][None] for name in names]
+            return
+        begin, end = max(each[0] for each in moving.values()), min(each[-1] for each in moving.values())
         if begin > end:
             problem = f"joints {listing(moving)} move one frame and have no time in common"
             files = ", ".join(self._options.answers.joint_files)
             raise FormatError(f"{problem}; their values end at {format_stamp(end)}, or begin later", source=files)
-        return sorted({at for name in moving for at in self.moving[name] if begin <= at <= end})
+        for stamp_ns in sorted({at for each in moving.values() for at in each if begin <= at <= end}):
+            yield stamp_ns, [self._at(name, stamp_ns, times[name]) for name in names]
 
-    def _at(self, name: str, stamp_ns: int) -> Value:
+    def _at(self, name: str, stamp_ns: int, times: Sequence[int]) -> Value:
         """Return the value of a joint at a time between its first and last sample, or its only value."""
-        if name in self.still:
-            return self.still[name]
-        series = self.moving[name]
-        if stamp_ns in series:
-            return series[stamp_ns]
-        times = self._times.setdefault(name, [*series])
+        series = self.series[name]
+        if not times or stamp_ns in series:
+            return series[stamp_ns if times else None]
         after = bisect_left(times, stamp_ns)
         begin, end = times[after - 1], times[after]
         return _between(series[begin], series[end], (stamp_ns - begin) / (end - begin))
@@ -146,7 +147,7 @@ class JointState:
             setting = None
             for setting in read_joint_file(path, self.joints):
                 if setting.joint in self.joints:
-                    found.setdefault(setting.joint, []).append((setting.stamp_ns, self._read(setting)))
+                    found.setdefault(setting.joint, []).append((setting.stamp_ns, self._read(setting, path)))
                 else:
                     problem = unknown_joint(setting.joint, self.joints, self._fixed)
                     self._options.tally.unknown_joints.setdefault(setting.joint, setting.refuse(problem, ()))
@@ -155,25 +156,19 @@ class JointState:
             for name, values in found.items():
                 self._take(name, values)
 
-    def _read(self, setting: JointSample) -> Value:
-        normalize = self._options.normalize
+    def _read(self, setting: JointSample, path: str) -> Value:
         try:
-            return read_value(self.joints[setting.joint], setting.value, setting.source, normalize=normalize)
-        except Misfit as misfit:
-            raise setting.refuse(str(misfit), misfit.path) from None
+            joint, normalize = self.joints[setting.joint], self._options.normalize
+            return read_value(joint, setting.value, Source(path, ""), normalize=normalize)
         except ValueInvalid as error:
-            raise setting.refuse(str(error), ()) from None
+            raise setting.refuse(str(error), getattr(error, "path", ())) from None
 
     def _take(self, name: str, values: Sequence[tuple[int | None, Value]]) -> None:
         """Store the samples of one joint; constant ones are a single value, and without times the last counts."""
-        self.still.pop(name, None)
-        self.moving.pop(name, None)
-        series = {stamp_ns: value for stamp_ns, value in values if stamp_ns is not None}
+        series = dict(values)
         last = values[-1][1]
-        if any(stamp_ns is None for stamp_ns, _ in values) or all(value == last for value in series.values()):
-            self.still[name] = last
-        else:
-            self.moving[name] = dict(sorted(series.items()))
+        is_constant = None in series or all(value == last for value in series.values())
+        self.series[name] = {None: last} if is_constant else dict(sorted(series.items(), key=lambda each: each[0] or 0))
 
     def _take_options(self) -> None:
         """Read the values of `--joint`, which override files."""
@@ -203,7 +198,7 @@ class JointState:
     def _leader(self, name: str) -> str | None:
         """Return the joint that determines one without a value."""
         mimic = self.joints[name].mimic
-        if name in self.still or name in self.moving or mimic is None or mimic.joint in self._fixed:
+        if name in self.series or mimic is None or mimic.joint in self._fixed:
             return None
         leader = self.joints.get(mimic.joint)
         if leader is None or leader.posed:
@@ -217,23 +212,19 @@ class JointState:
     def _settle(self, joint: Joint) -> None:
         """Compute the value of a joint whose leader has one."""
         name, mimic = joint.name, joint.mimic
-        if name in self.still or name in self.moving:
+        if name in self.series:
             return
         leader = mimic.joint if mimic else ""
-        if leader in self.moving:
-            self.moving[name] = {at: followed(joint, value) for at, value in self.moving[leader].items()}
-        elif leader in self.still:
-            self.still[name] = followed(joint, self.still[leader])
-        else:
-            self.still[name] = followed(joint, JointValue(0.0)) if mimic else joint.start
+        rest = followed(joint, JointValue(0.0)) if mimic else joint.start
+        series = self.series.get(leader)
+        self.series[name] = {at: followed(joint, value) for at, value in series.items()} if series else {None: rest}
         if leader in self.known:
             self.known.add(name)
 
     def _tell_limits(self) -> None:
         """Record values beyond limits, and steps that a pose cannot follow."""
-        for name in (*self.still, *self.moving):
+        for name, series in self.series.items():
             joint, tally = self.joints[name], self._options.tally
-            series = self.moving.get(name) or {0: self.still[name]}
             values = [value.plain for value in series.values() if isinstance(value, JointValue)]
             if joint.lower is not None and joint.upper is not None and joint.lower <= joint.upper:
                 lower, upper = joint.lower - SLACK, joint.upper + SLACK
@@ -242,8 +233,8 @@ class JointState:
                     message = f"joint {shown(name)} is beyond its limits {limits}, {beyond[0]:g}"
                     tally.note(message, joint.line, "limit")
             steps = zip(series, values, values[1:], strict=False) if joint.kind == "revolute" else ()
-            if wide := next((at for at, one, two in steps if abs(two - one) >= HALF_TURN), None):
-                far = f"joint {shown(name)} turns by half a turn or more in the step from {format_stamp(wide)}"
+            for wide in [at for at, one, two in steps if abs(two - one) >= HALF_TURN][:1]:
+                far = f"joint {shown(name)} turns by half a turn or more in the step from {format_stamp(wide or 0)}"
                 tally.note(f"{far}; poses between go the shorter way", joint.line)
 
     def _about(self) -> str:
@@ -251,7 +242,7 @@ class JointState:
         free = [joint for joint in self.joints.values() if joint.name not in self.known]
         if not free:
             return ""
-        at_zero = all(joint.posed or self.still[joint.name] == JointValue(0.0) for joint in free)
+        at_zero = all(joint.posed or self.series[joint.name] == {None: JointValue(0.0)} for joint in free)
         many = f"{len(free)} joint{'s' * (len(free) > 1)}"
         return f"{many} at {'0' if at_zero else 'rest'} ({STATES})"
 
@@ -342,7 +333,6 @@ class JointSample(NamedTuple):
     value: Any
     stamp_ns: int | None
     refuse: Callable[[str, Path], FormatError]
-    source: Source
 
 
 def read_joint_file(path: str, joints: Mapping[str, Joint]) -> Iterator[JointSample]:
@@ -397,7 +387,7 @@ def _of_value(value: Any, path: Path, message: TextMessage, joints: Mapping[str,
             stamp_ns = messages.stamp_of_state(mapping)
             for joint, position, place in messages.positions(mapping):
                 refuse = partial(_refused, message, (*path, *place))
-                yield JointSample(joint, position, stamp_ns, refuse, message.source)
+                yield JointSample(joint, position, stamp_ns, refuse)
         except Misfit as misfit:
             raise misfit.below(*path) from None
 
@@ -415,7 +405,7 @@ def _of_map(
         path, mapping = (*path, keys[0]), mapping[keys[0]]
         keys = list(mapping)
     for key in keys:
-        yield JointSample(key, mapping[key], stamp_ns, partial(_refused, message, (*path, key)), message.source)
+        yield JointSample(key, mapping[key], stamp_ns, partial(_refused, message, (*path, key)))
 
 
 def _of_table(
@@ -433,7 +423,7 @@ def _of_table(
     used = {column.place for column in columns} | {stamp[0] if stamp else -1}
     if others := [name for place, name in enumerate(names) if place not in used]:
         warn(f"{file.name}:{first}: columns that are no joints were left out: {listing(others)}")
-    source, stamp_ns, at = Source(file.name, ""), None, ""
+    stamp_ns, at = None, ""
     for number, line in rows:
         if line.lstrip().startswith("#"):
             continue
@@ -448,7 +438,7 @@ def _of_table(
             for place, joint, degrees, per_metre in columns:
                 at = names[place]
                 value = JointValue(parse_number(cells[place]) / per_metre, degrees)
-                yield JointSample(joint, value, stamp_ns, refuse, source)
+                yield JointSample(joint, value, stamp_ns, refuse)
         except ValueInvalid as error:
             raise refuse(f"{at}: {error}") from None
 

@@ -356,7 +356,7 @@ def read_joints(file: InputFile, state: str) -> Iterator[JointSample]:
 
     for joint, size in zip(joints, sizes, strict=True):
         value = _value(joint, list(islice(numbers, size)), refuse)
-        yield JointSample(joint.name, value, None, refuse, root.source)
+        yield JointSample(joint.name, value, None, refuse)
 
 
 def _key(root: Element, state: str) -> Element:
