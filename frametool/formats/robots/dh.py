@@ -29,7 +29,7 @@ from frametool.grammar.readers import kind
 from frametool.text.numbers import LENGTHS, NotFinite, parse_angle, parse_length, parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Collection, Iterable, Iterator
 
     from frametool.documents.source import InputFile
     from frametool.grammar.edges import Diagnostics, Edge, Options
@@ -62,18 +62,7 @@ KINDS = {
 _BRACKETED = r"(.+?)[ _]*[\[(] *([\w°]+) *[\])]"
 _SUFFIXED = r"(.+)_([a-z]+)"
 _INDEX = r"[ _]*[({\[]*(?:i|n|j|k)(?: *[-_] *1)?[)}\]]*$"  # theta_i, a_(i-1), alpha_{i-1}
-_VARIABLE = r"(?!(?i:null|none|true|false)\b)([^\W\d]\w*)\*?(?: *([-+]) *(.+))?"  # q1, d3*, q2 - pi/2
-_STARRED = r"(.*?) *\*"
-
-
-class Column(NamedTuple):
-    """A column and its unit, "" if it states none."""
-
-    name: str
-    unit: str
-
-
-NAME = Column("name", "")
+_VARIABLE = r"(?!(?i:null|none|true|false)\b)([^\W\d]\w*)(?: *([-+]) *(.+))?"  # q1, q2 - pi/2
 
 
 class Cell(NamedTuple):
@@ -89,7 +78,7 @@ class Amount(NamedTuple):
 
     number: float = 0.0
     degrees: bool = False
-    variable: str | None = None
+    variable: str = ""
 
     def plus(self, other: Amount) -> Amount:
         """Add another amount."""
@@ -118,10 +107,10 @@ def rows_of(file: InputFile, tally: Diagnostics) -> list[DhRow]:
     rows: dict[str, DhRow] = {}
     others: dict[str, None] = {}
     for number, (items, fail, line) in enumerate((_of_documents if is_document else _of_lines)(file), 1):
-        row = _row(number, _cells(items, others), fail)
+        row = _row(number, _cells(items, others), fail, line)
         if row.name in rows:
             raise fail(f"two joints are called {shown(row.name)}: rows {[*rows].index(row.name) + 1} and {number}")
-        rows[row.name] = row._replace(line=line)
+        rows[row.name] = row
     if not rows:
         raise FormatError("a table without rows", source=file.name)
     if others:
@@ -135,23 +124,23 @@ def _cells(items: Iterable[Item], others: dict[str, None]) -> dict[str, Cell]:
     cells: dict[str, Cell] = {}
     known = [each for names in COLUMNS.values() for each in names if len(each) > 1]
     for written, value, fail in items:
-        column = column_of(written)
-        if column is None:
+        name, unit = column_of(written) or ("", "")
+        if not name:
             near = did_you_mean(written.strip().lower(), known, cutoff=0.75)
             if near or value is None:  # the half of a number with a decimal comma is a key without a value
                 raise fail(f"unknown column {shown(written)}{near}; a row has {', '.join(COLUMNS)}")
             others[written] = None
-        elif column.name in cells:
-            raise fail(f"two columns for {column.name}; keep one")
+        elif name in cells:
+            raise fail(f"two columns for {name}; keep one")
         elif type(value) is not str:
             raise fail(f"expected a number, found {kind(value)}")
         else:
-            cells[column.name] = Cell(value, column.unit, fail)
+            cells[name] = Cell(value, unit, fail)
     return cells
 
 
-def column_of(written: str) -> Column | None:
-    """Return the column with a header name, by any of the names in use; None for other names."""
+def column_of(written: str) -> tuple[str, str] | None:
+    """Return the column with a header name, by any of the names in use, and its unit; None for other names."""
     base, unit = written.strip().lower(), ""
     for pattern in (_BRACKETED, _SUFFIXED):
         if (match := re.fullmatch(pattern, base)) and match[2] in UNITS:
@@ -159,56 +148,49 @@ def column_of(written: str) -> Column | None:
             break
     for name in (base, re.sub(_INDEX, "", base)):
         if found := next((column for column, names in COLUMNS.items() if name in names), None):
-            return Column(found, unit)
+            return found, unit
     return None
 
 
-def _row(number: int, cells: dict[str, Cell], fail: Fail) -> DhRow:
+def _row(number: int, cells: dict[str, Cell], fail: Fail, line: int) -> DhRow:
     """Read one row."""
     if missing := [name for name in NEEDED if name not in cells]:
         raise fail(f"missing {', '.join(missing)}; a row has theta, d, a, alpha, maybe offset, type and joint")
     zero = Cell("0", "", fail)
-    theta = _read(cells.get("theta", zero), _angle)
-    d = _read(cells["d"], _length)
-    kind = "prismatic" if d.variable is not None else "revolute"
+    theta, d = _read(cells.get("theta", zero), _angle), _read(cells["d"], _length)
+    kind = "prismatic" if d.variable else "revolute"
     if "type" in cells and (written := cells["type"].text):
         if written.lower() not in KINDS:
             raise cells["type"].fail(f"unknown type {shown(written)}; known: revolute (R, 0), prismatic (P, 1), fixed")
         kind = KINDS[written.lower()]
-    if (d.variable if kind != "prismatic" else theta.variable) is not None:
-        raise fail(f"a {kind} joint with a variable {'d' if kind != 'prismatic' else 'theta'}")
-    if kind == "fixed" and theta.variable is not None:
-        raise fail("a fixed joint with a variable theta")
+    for name, amount, varies in (("theta", theta, "revolute"), ("d", d, "prismatic")):
+        if amount.variable and kind != varies:
+            raise fail(f"a {kind} joint with a variable {name}")
     offset = _read(cells.get("offset", zero), _length if kind == "prismatic" else _angle)
     theta, d = (theta, d.plus(offset)) if kind == "prismatic" else (theta.plus(offset), d)
     written = cells["name"].text if "name" in cells else ""
     name = theta.variable or d.variable or (f"joint{number}" if not written or written.isdecimal() else written)
     a, alpha = _read(cells["a"], _length), _read(cells["alpha"], _angle)
     for column, amount in (("a", a), ("alpha", alpha)):
-        if amount.variable is not None:
+        if amount.variable:
             raise cells[column].fail(f"{shown(cells[column].text)} is not a number; only theta or d vary")
-    return DhRow(name, kind, theta, d, a.number, alpha)
+    return DhRow(name, kind, theta, d, a.number, alpha, line)
 
 
 def _read(cell: Cell, read: Callable[[str, str], Amount]) -> Amount:
     """Read a number, or the joint's variable and an offset; raises the error of the cell."""
-    text = cell.text
     try:
-        return read(text, cell.unit)
-    except NotFinite as error:
-        raise cell.fail(str(error)) from None
+        return read(cell.text, cell.unit)
     except ValueInvalid as error:
+        match = re.fullmatch(_VARIABLE, cell.text) if not isinstance(error, NotFinite) else None
         try:
-            if match := re.fullmatch(_STARRED, text):
-                constant = read(match[1] or "0", cell.unit)
-                return constant._replace(variable="")
-            if match := re.fullmatch(_VARIABLE, text):
-                constant = read(match[3] or "0", cell.unit)
-                signed = -constant.number if match[2] == "-" else constant.number
-                return constant._replace(number=signed, variable=match[1])
+            constant = read(match[3] or "0", cell.unit) if match else None
         except ValueInvalid:
-            pass
-        raise cell.fail(str(error)) from None
+            constant = None
+        if match is None or constant is None:
+            raise cell.fail(str(error)) from None
+    signed = -constant.number if match[2] == "-" else constant.number
+    return constant._replace(number=signed, variable=match[1])
 
 
 def _angle(text: str, unit: str) -> Amount:
@@ -228,7 +210,7 @@ def _length(text: str, unit: str) -> Amount:
 def _of_lines(file: InputFile) -> Iterator[tuple[list[Item], Fail, int]]:
     """Yield the rows of a text with one row per line, below a header."""
     lines = [(number, line) for number, line in enumerate(file.text.split("\n"), 1) if line.strip()]
-    begin = next((at for at, (_, line) in enumerate(lines) if _is_header(_split(line))), None)
+    begin = next((at for at, (_, line) in enumerate(lines) if _is_row({word.text for word in _split(line)})), None)
     if begin is None:
         message = "no header with d, a and alpha above the rows; write theta,d,a,alpha"
         raise FormatError(message, source=file.name, line=1)
@@ -242,10 +224,6 @@ def _of_lines(file: InputFile) -> Iterator[tuple[list[Item], Fail, int]]:
             raise fail(f"expected {len(header)} cells, found {len(words)}")
         places = (partial(line_error, file, number, word.column) for word in words)
         yield [(name, word.text, place) for name, word, place in zip(header, words, places, strict=True)], fail, number
-
-
-def _is_header(words: Iterable[LineCell]) -> bool:
-    return _is_row({word.text: "" for word in words})
 
 
 def _split(line: str) -> list[LineCell]:
@@ -269,7 +247,7 @@ def _of_documents(file: InputFile) -> Iterator[tuple[list[Item], Fail, int]]:
 
         tables = list(_tables(document.value, (), fail))
         if len(tables) != 1:
-            expected = "expected a list of {theta, d, a, alpha}, a map of them, or a list a column"
+            expected = "expected a list of {theta, d, a, alpha}, or a map of them"
             raise fail((), f"{len(tables)} tables in it; keep one" if tables else f"no table in it: {expected}")
         (rows,) = tables
         lines = locate_many(source.text, [(document.index, *path) for path, _ in rows])
@@ -283,36 +261,23 @@ def _tables(value: Any, path: Path, fail: Callable[..., FormatError]) -> Iterato
     if len(path) > 4 or type(value) not in (dict, list) or not value:
         return
     items = list(value.items() if type(value) is dict else enumerate(value))
-    if any(_is_row(each) for _, each in items):
+    if any(type(each) is dict and _is_row(each) for _, each in items):
         rows = []
         for name, row in items:
             if type(row) is dict:
-                named = [("name", name, ())] if type(value) is dict and not _has_name(row) else []
-                rows.append(((*path, name), [*((key, cell, (key,)) for key, cell in row.items()), *named]))
+                is_named = type(value) is list or any(column_of(key) == ("name", "") for key in row)
+                own = [] if is_named else [("name", name, ())]
+                rows.append(((*path, name), [*((key, cell, (key,)) for key, cell in row.items()), *own]))
             elif type(value) is list:
                 raise fail((*path, name), f"expected a row {{theta, d, a, alpha}}, found {kind(row)}")
         yield rows
-    elif _is_row(value):  # a map of columns, or of the numbers of one row
-        columns = {key: each if type(each) is list else [each] for key, each in items if column_of(key) is not None}
-        size = max(map(len, columns.values()))
-        for key, each in [*columns.items()]:
-            if len(each) != size and column_of(key) == NAME:  # the name of the robot
-                del columns[key]
-            elif len(each) != size:
-                raise fail((*path, key), f"{key}: expected {size} numbers, as another has, found {len(each)}")
-        yield [(path, [(key, each[at], (key, at)) for key, each in columns.items()]) for at in range(size)]
     else:
         for key, each in items:
             yield from _tables(each, (*path, key), fail)
 
 
-def _has_name(row: dict[str, Any]) -> bool:
-    return any(column_of(key) == NAME for key in row)
-
-
-def _is_row(value: Any) -> bool:
-    names = {column.name for key in value if (column := column_of(key))} if type(value) is dict else set()
-    return {"a", "alpha"} <= names
+def _is_row(keys: Collection[str]) -> bool:
+    return {"a", "alpha"} <= {column[0] for key in keys if (column := column_of(key))}
 
 
 AXIS = (0.0, 0.0, 1.0)
