@@ -35,7 +35,6 @@ from frametool.formats.table import CHOICES, FORMATS, readers
 from frametool.frames import topology
 from frametool.frames.lookups import FrameTree
 from frametool.geometry.representations import EARTH_FRAMES
-from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import (
     Answers,
     Diagnostics,
@@ -53,7 +52,7 @@ from frametool.grammar.readers import alike, more_like_it
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from frametool.frames.buffer import TransformBuffer
     from frametool.geometry.camera import Camera
@@ -144,7 +143,9 @@ class FrameFile(InputFile):
         finally:
             self.close()
         if self.format in OWN and re.search(r"""\bcamera["']?:""", self.text):
-            self._take_cameras()
+            from frametool.formats.cameras import cameras_of
+
+            self.cameras = {name: make() for name, make in cameras_of(self).items()}
         if missing := self.topics.missing():
             report(FormatError(missing, source=self.name))
         if tell:
@@ -153,12 +154,6 @@ class FrameFile(InputFile):
     def __getstate__(self) -> dict[str, Any]:
         """Allow pickling a tree that still reads its cameras."""
         return {key: each for key, each in vars(self).items() if key != "stream"}
-
-    def _take_cameras(self) -> None:
-        """Store the cameras of a frametool tree that was read without errors."""
-        from frametool.formats.cameras import cameras_of
-
-        self.cameras = {name: make() for name, make in cameras_of(self).items()}
 
     def tell(self) -> None:
         """Emit the warnings about the file, once it was read."""
@@ -303,25 +298,26 @@ class TreeBuilder:
         if place.edge.covariance is not None:
             self.covariances[child] = place.edge.covariance
 
-    def add_samples(self, placed: SamplesOfFile) -> None:
+    def add_samples(self, file: FrameFile, samples: Samples) -> None:
         """Add the poses of one frame: in one piece if their order is known to be correct, else one by one."""
-        parent, child, stamps_ns, components, _ = placed.samples
+        parent, child, stamps_ns, components, lines = samples
         if not stamps_ns:
             return
-        if self._takes_whole(placed.samples):
+        if self._takes_whole(samples):
+            place = EdgePlace(file, Edge(parent, child, components[0], stamps_ns[0], lines[0]))
             try:
                 self._moving().insert_many(parent, child, stamps_ns, components)
             except BadTopology as error:
-                raise self._placed(error, parent, child, placed.place(0)) from None
-            self._first.setdefault(child, (parent, components[0], placed.place(0)))
+                raise self._placed(error, parent, child, place) from None
+            self._first.setdefault(child, (parent, components[0], place))
             self._stamps.setdefault(child, stamps_ns[0])
             self._moves.add(child)
             return
         if child not in self._late and any(map(gt, stamps_ns, islice(stamps_ns, 1, None))):
             self._late.add(child)
-            warn(f"{placed.file.name}: stamps of {shown(child)} are out of order; sorted")
-        for at, (stamp_ns, pose) in enumerate(zip(stamps_ns, components, strict=True)):
-            self.add(parent, child, pose, stamp_ns, placed.place(at))
+            warn(f"{file.name}: stamps of {shown(child)} are out of order; sorted")
+        for edge in samples.edges():
+            self.add(parent, child, edge.components, edge.stamp_ns, EdgePlace(file, edge))
 
     def add_columns(self, file: FrameFile, columns: EdgeColumns) -> None:
         """Add edges: samples of known frames in bulk, frame by frame, the others one by one."""
@@ -334,7 +330,7 @@ class TreeBuilder:
         if all(self._goes_on(*pair) for pair in found):  # the order of new edges matters for cycles
             whole = {pair: samples for pair, samples in found.items() if self._takes_whole(samples)}
         for samples in whole.values():
-            self.add_samples(SamplesOfFile(file, samples))
+            self.add_samples(file, samples)
         for pair, edge in zip(pairs, columns.edges(), strict=True) if len(whole) < len(found) else ():
             if pair not in whole:
                 self.add(*pair, edge.components, edge.stamp_ns, EdgePlace(file, edge))
@@ -458,18 +454,6 @@ class EdgePlace(NamedTuple):
         return f"line {line}" if other.file.name == self.file.name else f"{self.file.name}:{line}"
 
 
-class SamplesOfFile(NamedTuple):
-    """Poses of one frame, and the file they were read from."""
-
-    file: FrameFile
-    samples: Samples
-
-    def place(self, at: int) -> EdgePlace:
-        """Return the place of one of them."""
-        parent, child, stamps_ns, _, lines = self.samples
-        return EdgePlace(self.file, Edge(parent, child, IDENTITY, stamps_ns[at], lines[at]))
-
-
 def load(
     *paths: str | PathLike[str],
     moving: bool = False,
@@ -532,7 +516,7 @@ def load_sources(
     return tree
 
 
-def _read_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile]) -> dict[str, Callable[..., Camera]]:
+def _read_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile]) -> dict[str, Any]:
     from frametool.formats.cameras import cameras_of_tree
 
     return cameras_of_tree(tree, files)
@@ -553,7 +537,7 @@ def _add(builder: TreeBuilder, file: FrameFile) -> None:
     rules = builder.rules
     for piece in file.pieces(normalize=rules.normalize):
         if isinstance(piece, Samples) and not builder.renames(piece.parent, piece.child):
-            builder.add_samples(SamplesOfFile(file, piece))
+            builder.add_samples(file, piece)
         elif isinstance(piece, EdgeColumns) and not builder.renames(*dict.fromkeys((*piece.parents, *piece.children))):
             builder.add_columns(file, piece)
         else:

@@ -23,6 +23,7 @@ import re
 import struct
 from collections import Counter
 from functools import partial
+from itertools import accumulate
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -67,39 +68,27 @@ class PcdField(NamedTuple):
         return f"<{self.kind.lower()}{self.size}"
 
 
-class PcdColumn(NamedTuple):
-    """A column of a cloud: its name, its field and index in it, its byte in a record and its cell in a row."""
+class PcdLayout(NamedTuple):
+    """The columns of a cloud, one per value, without padding: names, cells in a row, and the type of a point."""
 
-    name: str
-    field: PcdField
-    place: int
-    offset: int
-    cell: int
+    names: list[str]
+    cells: list[int]
+    record: Kind
 
 
-def columns_of(fields: Sequence[PcdField]) -> list[PcdColumn]:
-    """Return the columns of fields, one per value; padding has none, but occupies bytes."""
-    found: list[PcdColumn] = []
-    offset, cell = 0, 0
-    for field in fields:
-        for place in range(field.values):
-            if field.name != PADDING:
-                name = field.name if field.values == 1 else f"{field.name}_{place}"
-                found.append(PcdColumn(name, field, place, offset, cell))
-            offset += field.size
-            cell += 1
-    return found
-
-
-def record_type(fields: Sequence[PcdField]) -> Kind:
-    """Return the type of a point."""
-    columns = columns_of(fields)
-    return np.dtype({
-        "names": [f"{place}" for place in range(len(columns))],
-        "formats": [column.field.code for column in columns],
-        "offsets": [column.offset for column in columns],
-        "itemsize": sum(field.size * field.values for field in fields),
+def layout_of(fields: Sequence[PcdField]) -> PcdLayout:
+    """Return the columns of fields; padding has none, but occupies bytes."""
+    values = [(field, place) for field in fields for place in range(field.values)]
+    offsets = [0, *accumulate(field.size for field, _ in values)]
+    used = [(at, field, place) for at, (field, place) in enumerate(values) if field.name != PADDING]
+    record = np.dtype({
+        "names": [f"{number}" for number in range(len(used))],
+        "formats": [field.code for _, field, _ in used],
+        "offsets": [offsets[at] for at, _, _ in used],
+        "itemsize": offsets[-1],
     })  # fmt: skip
+    names = [field.name if field.values == 1 else f"{field.name}_{place}" for _, field, place in used]
+    return PcdLayout(names, [at for at, _, _ in used], record)
 
 
 class PcdHead:
@@ -290,14 +279,14 @@ class PcdFile(CloudFile):
     def __init__(self, file: InputFile) -> None:
         """Read the header and check it against the file; raises FormatError."""
         head = self.head = PcdHead(file.stream, file.name)
-        self.columns = columns_of(head.fields)
-        super().__init__(file, (column.name for column in self.columns), record_type(head.fields), head.points)
+        names, cells, record = layout_of(head.fields)
+        super().__init__(file, names, record, head.points)
         self.viewpoint = ""
         if head.data == "binary":
             column_file.check_declared(file, self.count, self.record.itemsize, self.what, last=True)
         elif head.data == "ascii":
             every = sum(field.values for field in head.fields)
-            self.text = TextRows(self, [column.cell for column in self.columns], every, head.text.count(b"\n") + 1)
+            self.text = TextRows(self, cells, every, head.text.count(b"\n") + 1)
 
     def moved_by(self, pose: Components | None) -> None:
         """Transform VIEWPOINT by the pose that transforms all points; None: there is no such pose."""
@@ -359,7 +348,7 @@ class PcdFile(CloudFile):
 
     def record_with(self, columns: Sequence[OutColumn]) -> Kind:
         """Return the type of a point with other columns."""
-        return record_type(self._fields(columns))
+        return layout_of(self._fields(columns)).record
 
     def header(self, columns: Sequence[OutColumn], count: int) -> bytes:
         """Return the header with changes."""
@@ -408,4 +397,5 @@ def create(
         lines = "".join(f"{key} {each}\n" for key, each in words.items())
         return f"# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n{lines}".encode()
 
-    return column_file.CountedWriter(partial(column_file.encode_records, columns, record_type(fields)), head, count)
+    encode = partial(column_file.encode_records, columns, layout_of(fields).record)
+    return column_file.CountedWriter(encode, head, count)
