@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.source import Source
 from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.explain import derive
-from frametool.explain.derive import ByTree, DerivationStyle
+from frametool.explain.derive import DerivationStyle
 from frametool.explain.operations import WrittenPose
 from frametool.explain.run import DIGITS
 from frametool.frames.lookups import Frames
@@ -19,7 +19,7 @@ from frametool.geometry.transform import Transform
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Style
 from frametool.sim.followed import FollowStep, derive_follow
-from frametool.stream.written import derive_record, written_poses
+from frametool.stream.written import ByTree, derive_record, written_poses
 
 if TYPE_CHECKING:
     from collections.abc import Callable

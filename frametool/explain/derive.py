@@ -18,7 +18,6 @@ from frametool.explain.run import DIGITS, Row, Sheet
 from frametool.frames.lookups import Frames
 from frametool.geometry import floats, quaternion, representations
 from frametool.grammar import pose_algebra
-from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import looked_up, looked_up_across
 from frametool.grammar.result import Result, Style, pose_numbers
 
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
     from frametool.explain.operations import OtherAxes
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Rigid
+    from frametool.grammar.pose import Pose
 
 
 METRES, RADIANS, DEGREES = "m", "rad", "deg"
@@ -162,7 +162,7 @@ def convert(
     )
 
 
-def _written(sheet: Sheet, poses: Sequence[WrittenPose], labels: Sequence[tuple[str, str]]) -> list[Rigid]:
+def derived_from(sheet: Sheet, poses: Sequence[WrittenPose], labels: Sequence[tuple[str, str]]) -> list[Rigid]:
     """List the poses as written, and add the derivation of each; `labels` are its target and source."""
     sheet.heading("Given")
     for each, label in zip(poses, labels, strict=True):
@@ -179,7 +179,7 @@ def compose(plan: DerivationStyle, *poses: WrittenPose) -> Explanation:
     labels = list(itertools.pairwise(names))
 
     def way(sheet: Sheet) -> Rigid:
-        pose, *factors = _written(sheet, poses, labels)
+        pose, *factors = derived_from(sheet, poses, labels)
         for factor, (middle, last) in zip(factors, labels[1:], strict=True):
             pose = operations.compose(sheet, pose, factor, (names[0], middle, last))
         return pose
@@ -193,7 +193,7 @@ def invert(plan: DerivationStyle, pose: WrittenPose) -> Explanation:
     target, source = frames_of([pose.pose])
 
     def way(sheet: Sheet) -> Rigid:
-        (found,) = _written(sheet, [pose], [(target, source)])
+        (found,) = derived_from(sheet, [pose], [(target, source)])
         return operations.inverse(sheet, found, target, source)
 
     return derived_pose(plan, f"{source}_from_{target}", own, way)
@@ -205,7 +205,7 @@ def relative(plan: DerivationStyle, a: WrittenPose, b: WrittenPose) -> Explanati
     frames, labels = _three_frames(a, b)
 
     def way(sheet: Sheet) -> Rigid:
-        one, other = _written(sheet, [a, b], labels)
+        one, other = derived_from(sheet, [a, b], labels)
         pose = operations.relative(sheet, one, other, frames)
         values = sheet.play("extent", operations.posed("", pose), frame=frames[1])
         for name, found in zip(pose_algebra.RELATIVE_EXTRAS, ("d", "angle", "angle_deg"), strict=True):
@@ -224,7 +224,7 @@ def interpolate(plan: DerivationStyle, a: WrittenPose, b: WrittenPose, fraction:
     frames, labels = _three_frames(a, b)
 
     def way(sheet: Sheet) -> Rigid:
-        one, other = _written(sheet, [a, b], labels)
+        one, other = derived_from(sheet, [a, b], labels)
         return operations.between(sheet, one, other, fraction)
 
     return derived_pose(plan, f"{frames[1]} to {frames[2]} at {fraction!r}", own, way)
@@ -269,47 +269,3 @@ class ByTree(NamedTuple):
     target: str
     source: str | None = None
     at_ns: int | None = None
-
-
-MOVED = {"point": METRES, "vector": ""}
-
-
-class MovedRecord(NamedTuple):
-    """A record, and the command's result for it.
-
-    kind: point, vector or pose; target, source: its new and its old frame
-    mover: target_from_source; numbers: of a point or a vector, as written; result: the numbers of the result
-    pose: a pose as written
-    """
-
-    kind: str
-    target: str
-    source: str
-    mover: Rigid
-    numbers: Sequence[float]
-    result: Sequence[float]
-    pose: WrittenPose | None = None
-
-
-def apply(plan: DerivationStyle, way: ByTree | WrittenPose, record: MovedRecord) -> Explanation:
-    """Derive a record in the target's frame; the source and the time of a lookup are those of the record."""
-    kind, target, source = record.kind, printable(record.target), printable(record.source)
-
-    def write(sheet: Sheet) -> None:
-        if isinstance(way, WrittenPose):
-            (pose,) = _written(sheet, [way], [(target, source)])
-        else:
-            pose = chain(sheet, way.frames, record.target, record.source, way.at_ns)
-        check_vector(sheet, pose[:3], record.mover[:3])
-        if (written := record.pose) is None:
-            sheet.reached(record.numbers)
-            check_vector(sheet, operations.moved(sheet, kind, pose, record.numbers, target, source), record.result)
-            sheet.result(f"in {target}", [row(kind, "xyz", record.result, MOVED[kind])])
-            return
-        name = printable(written.pose.name or "it")
-        sheet.heading("The record")
-        written.say(sheet, source, name)
-        derived = operations.compose(sheet, pose, written.components(sheet, source, name), (target, source, name))
-        end_with_pose(sheet, derived, Result(Pose.of(record.result, written.pose.name, record.target)), plan)
-
-    return explained(plan, f"{kind} in {target} of a {kind} in {source}", write)

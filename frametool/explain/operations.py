@@ -47,63 +47,49 @@ BLOCKS = {  # the names of a representation's numbers in its two sheets, as writ
     "euler_unity": ("a2 a3 a1", "a2 a3 a1"),
 }
 AXES_OF = {"rpy": "sxyz", "rpy_unreal": "sxyz", "euler_unity": "szxy"}  # Euler angles under another name
-ORDERS = {"wxyz": "w, x, y, z: the scalar w is first.", "": "x, y, z, w: the scalar w is last."}
-UNITS = {True: {"deg": "_deg", "unit": "deg"}, False: {"deg": "", "unit": "rad"}}
 PLAIN = ("quaternion", "xyzw")
 
 
-def block_of(notation: Notation) -> tuple[str, str]:
-    """Return the names of a notation's numbers; raises ValueInvalid for a representation without sheets."""
-    name = notation.representation.name
-    if name not in BLOCKS:
-        raise ValueInvalid(f"there is no derivation of {shown(name)}; derived are {', '.join(BLOCKS)}")
-    return BLOCKS[name]
-
-
-def names_of(names: str, notation: Notation, *, degrees: bool) -> list[str]:
-    """Return the names of numbers, angles in degrees with their unit."""
-    return [
-        f"{name}_deg" if degrees and at in notation.representation.angles else name
-        for at, name in enumerate(names.split())
-    ]
-
-
-def sheet_of(notation: Notation) -> str:
-    """Return the first word of the names of a notation's sheets."""
-    return "quaternion" if notation.representation.name == "xyzw" else notation.representation.name
+def names_of(notation: Notation, found: int, *, degrees: bool) -> list[str]:
+    """Return the names of a notation's numbers, as written or as found; raises ValueInvalid if it has no sheets."""
+    form = notation.representation
+    if form.name not in BLOCKS:
+        raise ValueInvalid(f"there is no derivation of {shown(form.name)}; derived are {', '.join(BLOCKS)}")
+    names = enumerate(BLOCKS[form.name][found].split())
+    return [f"{name}_deg" if degrees and at in form.angles else name for at, name in names]
 
 
 def to_quaternion(sheet: Sheet, numbers: Sequence[float], notation: Notation, *, degrees: bool) -> Quaternion:
     """Add the derivation of the quaternion from the numbers of a notation."""
-    names, name = names_of(block_of(notation)[0], notation, degrees=degrees), sheet_of(notation)
-    values: Values = dict(zip(names, numbers, strict=True))
-    words = UNITS[degrees].copy()
+    values: Values = dict(zip(names_of(notation, 0, degrees=degrees), numbers, strict=True))
+    words, name = _units(degrees=degrees), notation.representation.name
     if name.startswith("euler"):
         axes = AXES_OF.get(name) or notation.bound_axes()
         first, third = "31" if axes[0] == "s" else "13"
         words |= _axes(axes, values) | {"first": first, "third": third}
         words |= {"A": axes[int(first)], "B": axes[2], "C": axes[int(third)]}
-    is_plain = name in ("wxyz", "quaternion")
-    sheet.play("quaternion to" if is_plain else f"{name} to", values, order=ORDERS.get(name, ORDERS[""]), **words)
-    return quaternion_of(values)
+    return quaternion_of(sheet.play(f"{name} to", values, **words))
 
 
 def from_quaternion(
     sheet: Sheet, q: Quaternion, notation: Notation, *, degrees: bool, keep_sign: bool
 ) -> Sequence[float]:
     """Add the derivation of a notation from the quaternion; return its numbers."""
-    names = names_of(block_of(notation)[1], notation, degrees=degrees)
-    x, y, z, w = q
+    names, (x, y, z, w) = names_of(notation, 1, degrees=degrees), q
     values = named("", q) | {"degrees": float(degrees), "negative": float((w or x or y or z) < 0.0)}
     values["signed"] = 0.0 if keep_sign else values["negative"]
-    words = UNITS[degrees].copy()
-    if (name := notation.representation.name) in ("euler", *AXES_OF):
+    words, name = _units(degrees=degrees), notation.representation.name
+    if name in ("euler", *AXES_OF):
         axes = AXES_OF.get(name) or notation.bound_axes()
         values["locked"] = float(euler.locked(*q, axes))
         shown_as = ANGLES if name.startswith("euler") else ROLL_PITCH_YAW
         words |= _axes(axes, values) | dict(zip(ANGLES.split(), shown_as.split(), strict=True))
-    sheet.play(f"{sheet_of(notation)} from", values, **words)
-    return [values[name] for name in names]
+    sheet.play(f"{name} from", values, **words)
+    return [values[each] for each in names]
+
+
+def _units(*, degrees: bool) -> dict[str, str]:
+    return {"deg": "_deg" * degrees, "unit": "deg" if degrees else "rad"}
 
 
 def _axes(axes: str, values: Values) -> dict[str, str]:

@@ -14,9 +14,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.errors import Finding, NotConnected, ValueInvalid, alternatives, first_of, printable, shown, warn
-from frametool.fit.graph import bodies_of, bridges, require_connected, top_of
 from frametool.fit.least_squares import KEPT, NotSettled, applied, errors, inverse, length, stacked
-from frametool.fit.tree_solver import Fitted, Noise, TreeProblem, TreeRows, jacobians, of_body
+from frametool.fit.tree_problem import (
+    Noise,
+    TreeProblem,
+    bodies_of,
+    bridges,
+    jacobians,
+    of_body,
+    require_connected,
+    top_of,
+)
 from frametool.frames.lookups import Frames, FrameTree
 from frametool.frames.topology import Groups
 from frametool.geometry.conventions import axes_change
@@ -28,45 +36,8 @@ from frametool.stream.measurements import Measurement, parted
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.fit.graph import Bodies
+    from frametool.fit.tree_problem import Bodies, Fitted
     from frametool.geometry.types import Array
-
-
-class Uncertainty:
-    """Covariances (6, 6) of poses between frames of bodies, along the axes of the target frame.
-
-    None if a pose depends on rows whose noise is neither stated nor observable from a loop.
-    """
-
-    def __init__(self, problem: TreeProblem, found: Fitted) -> None:
-        """Store a fit; nothing is computed yet."""
-        self._problem, self._found = problem, found
-        self._known = Groups[int]()
-        for row in np.flatnonzero(found.kept & (problem.rows.stated | found.estimated)).tolist():
-            self._known.join(*problem.pairs[row])
-
-    def between(self, target: tuple[int, Transform], source: tuple[int, Transform]) -> Array | None:
-        """Return the covariance of source in target, each a body and the pose of a frame of it."""
-        if target[0] == source[0]:
-            return np.zeros((6, 6))
-        if self._known.of(target[0]) != self._known.of(source[0]):
-            return None
-        by_ends = zip((target, source), jacobians(target[1], source[1], np.zeros(3)), strict=True)
-        slopes = np.hstack([of_body(by, self._found.bodies[body], frame) for (body, frame), by in by_ends])
-        ends = [target[0], source[0]]
-        found: Array = slopes @ self._of_bodies[ends][:, :, ends].reshape(12, 12) @ slopes.T
-        return (found + found.T) / 2.0
-
-    @cached_property
-    def _of_bodies(self) -> Array:
-        """Return the covariance of all bodies, (bodies, 6, bodies, 6); zeros for the root."""
-        problem, found = self._problem, self._found
-        information = problem.information(found.noise) * found.kept[:, None, None]
-        whole = np.zeros((problem.count, 6, problem.count, 6))
-        if problem.unknown:
-            normal = problem.normal_equations(found.bodies, information)[0]
-            whole[1:, :, 1:] = inverse(normal).reshape(problem.unknown, 6, problem.unknown, 6)
-        return whole
 
 
 NEAR = Tolerance(0.01, math.radians(1.0))  # the tolerance without any sigmas
@@ -172,50 +143,70 @@ def _sigmas(errors: Array, information: Array) -> Array:
 ONE_LINE = 200  # characters
 
 
-def judged(problem: TreeProblem, measurements: Sequence[Measurement], found: Fitted) -> tuple[Fitted, list[str | None]]:
-    """Explain the rejected rows; if a rival has a mistake instead, reject the rival.
+class TreeFit:
+    """A fit with its inliers: residuals, rows in no loop, covariances; and the verdicts on its outliers."""
 
-    Raises ValueInvalid if none of a row and its rivals, or more than one, has a mistake that fits.
-    """
-    tried = {found.kept.tobytes()}
-    while True:
-        case = _Case(problem, measurements, found)
-        fits, noise, swaps, undecided = case.verdicts()
-        for taken, left in ((noise, []), *(([row], [rival]) for row, rival in swaps)):
-            kept = found.kept.copy()
-            kept[taken], kept[left] = True, False
-            if kept.tobytes() not in tried:
-                break
-        else:
-            break
-        tried.add(kept.tobytes())
-        bodies = problem.placed([problem.tree(np.flatnonzero(kept).tolist())])[0]
-        found = problem.selected(bodies, kept, found.noise, robust=True)
-    if undecided:
-        raise ValueInvalid(case.open_loop(*undecided))
-    return found, fits
-
-
-def place_of(measurements: Sequence[Measurement], row: int) -> str:
-    """Return the place of a measurement, else its number."""
-    return printable(measurements[row].place) or f"measurement {row + 1}"
-
-
-class _Case:
-    """A fit, and its inliers and outliers."""
-
-    def __init__(self, problem: TreeProblem, measurements: Sequence[Measurement], found: Fitted) -> None:
-        self.problem, self.measurements, self.found = problem, measurements, found
+    def __init__(self, problem: TreeProblem, found: Fitted) -> None:
+        """Store a fit; covariances are not computed yet."""
+        self.problem, self.found = problem, found
         kept = np.flatnonzero(found.kept).tolist()
         self.tree = problem.tree(kept)
         self.alone = bridges(self.tree, problem.pairs, kept)
         self.parents, self.children = problem.ends(found.bodies)
         self.poses = self.parents.inverse() @ self.children
-        self.errors = errors(self.poses, problem.rows.measured)
-        self.information = problem.information(found.noise, found.noise.factor)
-        noise = found.noise.at_least(Noise()) if found.few_loops else found.noise
-        self.least_information = problem.information(noise, noise.factor)
-        self.uncertainty = Uncertainty(problem, found)
+        self.errors = errors(self.poses, problem.measured)
+        self._known = Groups[int]()
+        for row in np.flatnonzero(found.kept & (problem.stated | found.estimated)).tolist():
+            self._known.join(*problem.pairs[row])
+
+    def covariance(self, target: tuple[int, Transform], source: tuple[int, Transform]) -> Array | None:
+        """Return the covariance (6, 6) of source in target, along its axes, each a body and the pose of a frame of it.
+
+        None if it depends on rows whose noise is neither stated nor observable from a loop.
+        """
+        if target[0] == source[0]:
+            return np.zeros((6, 6))
+        if self._known.of(target[0]) != self._known.of(source[0]):
+            return None
+        by_ends = zip((target, source), jacobians(target[1], source[1], np.zeros(3)), strict=True)
+        slopes = np.hstack([of_body(by, self.found.bodies[body], frame) for (body, frame), by in by_ends])
+        ends = [target[0], source[0]]
+        found: Array = slopes @ self._of_bodies[ends][:, :, ends].reshape(12, 12) @ slopes.T
+        return (found + found.T) / 2.0
+
+    @cached_property
+    def _of_bodies(self) -> Array:
+        """Return the covariance of all bodies, (bodies, 6, bodies, 6); zeros for the root."""
+        problem, found = self.problem, self.found
+        information = problem.information(found.noise) * found.kept[:, None, None]
+        whole = np.zeros((problem.count, 6, problem.count, 6))
+        if problem.unknown:
+            normal = problem.normal_equations(found.bodies, information)[0]
+            whole[1:, :, 1:] = inverse(normal).reshape(problem.unknown, 6, problem.unknown, 6)
+        return whole
+
+    def judged(self) -> tuple[TreeFit, list[str | None]]:
+        """Explain the rejected rows; if a rival has a mistake instead, reject the rival.
+
+        Raises ValueInvalid if none of a row and its rivals, or more than one, has a mistake that fits.
+        """
+        fit, problem = self, self.problem
+        tried = {fit.found.kept.tobytes()}
+        while True:
+            fits, noise, swaps, undecided = fit.verdicts()
+            for taken, left in ((noise, []), *(([row], [rival]) for row, rival in swaps)):
+                kept = fit.found.kept.copy()
+                kept[taken], kept[left] = True, False
+                if kept.tobytes() not in tried:
+                    break
+            else:
+                break
+            tried.add(kept.tobytes())
+            bodies = problem.placed([problem.tree(np.flatnonzero(kept).tolist())])[0]
+            fit = TreeFit(problem, problem.selected(bodies, kept, fit.found.noise, robust=True))
+        if undecided:
+            raise ValueInvalid(fit.open_loop(*undecided))
+        return fit, fits
 
     def verdicts(self) -> tuple[list[str | None], list[int], list[tuple[int, int]], tuple[int, list[int]] | None]:
         """Try the mistakes on each rejected row, and on its rivals: used rows that only it checks.
@@ -223,21 +214,25 @@ class _Case:
         Returns the mistake of each row; rows without one that the uncertainty of the fit explains; rows to exchange,
         (rejected, rival); and the first row whose loop does not identify the outlier, with its rivals.
         """
+        measurements, noise_found = self.problem.measurements, self.found.noise
+        information = self.problem.information(noise_found, noise_found.factor)
+        floor = noise_found.at_least(Noise()) if self.found.few_loops else noise_found
+        least_information = self.problem.information(floor, floor.factor)
         fits: list[str | None] = [None] * self.problem.size
         noise, swaps, undecided = list[int](), list[tuple[int, int]](), None
         for row in np.flatnonzero(~self.found.kept).tolist():
             rivals = sorted(self.alone.intersection(self.tree.way(*self.problem.pairs[row])))
-            words = {row: best_blunder(self.measurements[row], self.poses[row], self.information[row])}
+            words = {row: best_blunder(measurements[row], self.poses[row], information[row])}
             for rival in rivals:
                 pose = self._pose_without(rival, row)
-                words[rival] = best_blunder(self.measurements[rival], pose, self.information[rival])
+                words[rival] = best_blunder(measurements[rival], pose, information[rival])
             blamed = [each for each, blunder in words.items() if blunder]
-            unsure = self._with_doubt(row, self.least_information[row])
+            unsure = self._with_doubt(row, least_information[row])
             if not blamed and self.errors[row] @ unsure @ self.errors[row] <= 6 * KEPT**2:
                 noise.append(row)
             if not rivals:
-                doubted = self._with_doubt(row, self.information[row])
-                fits[row] = words[row] or best_blunder(self.measurements[row], self.poses[row], doubted)
+                doubted = self._with_doubt(row, information[row])
+                fits[row] = words[row] or best_blunder(measurements[row], self.poses[row], doubted)
             elif blamed == [row]:
                 fits[row] = words[row]
             elif len(blamed) == 1:
@@ -249,12 +244,12 @@ class _Case:
     def _with_doubt(self, row: int, information: Array) -> Array:
         """Return the information of a row relative to the fit, whose own uncertainty between the frames is included."""
         parent, child = self.problem.pairs[row]
-        doubt = self.uncertainty.between((parent, self.parents[row]), (child, self.children[row]))
+        doubt = self.covariance((parent, self.parents[row]), (child, self.children[row]))
         return information if doubt is None else inverse(inverse(information) + doubt)
 
     def _pose_without(self, rival: int, row: int) -> Transform:
         """Return the pose that a rival would measure if the rejected row placed the bodies below it."""
-        measured, pairs = self.problem.rows.measured[row], self.problem.pairs
+        measured, pairs = self.problem.measured[row], self.problem.pairs
         hanging = set(self.tree.beyond(rival))
         parent, child = self.parents[row], self.children[row]
         if pairs[row][1] in hanging:
@@ -269,10 +264,10 @@ class _Case:
         """Return the rows of a loop and its closure error, on one line."""
         error = self.errors[row]
         open_by = f"{1e3 * np.linalg.norm(error[:3]):.1f} mm {np.degrees(np.linalg.norm(error[3:])):.1f} deg"
-        places = [place_of(self.measurements, each) for each in sorted([row, *rivals])]
+        places = [self.problem.place(each) for each in sorted([row, *rivals])]
         advice = "measure again or leave one out"
-        if self.measurements[row].place:
-            advice += f" (--without {place_of(self.measurements, row)})"
+        if self.problem.measurements[row].place:
+            advice += f" (--without {self.problem.place(row)})"
         for most in range(len(places), 0, -1):
             text = f"undecided: {first_of(places, most)} form a loop open by {open_by}; {advice}"
             if len(text) <= ONE_LINE:
@@ -281,35 +276,31 @@ class _Case:
 
 
 FEW_LOOPS = 6  # with fewer the sigmas are rough if rotations can close them
-SINGULAR = 1e-12  # of the correlations: the least eigenvalue of a valid covariance
 
 
 def solve_tree(
-    measurements: Sequence[Measurement], *, root: str | None = None, fixed: Frames | None = None,
-    robust: bool = True, progress: Callable[[float], None] | None = None,
-) -> TreeSolution:  # fmt: skip
+    measurements: Sequence[Measurement], *, root: str | None = None, fixed: Frames | None = None, robust: bool = True
+) -> TreeSolution:
     """Find the tree that fits measurements best.
 
     root: the frame in which the others are expressed; default the first that is never a child
     fixed: a tree of exact edges, whose frames move as one body
-    robust: reject outliers; progress: called with the finished share
+    robust: reject outliers
     Raises ValueInvalid: frames are not connected, an unknown root, undecided.
     """
     if not measurements:
         raise ValueInvalid("no measurements")
-    for row, each in enumerate(measurements):
+    for row, each in enumerate(measurements, 1):
         if each.parent == each.child:
-            raise ValueInvalid(f"{place_of(measurements, row)}: {shown(each.child)} is measured from itself")
-    report = progress or (lambda _: None)
+            place = printable(each.place) or f"measurement {row}"
+            raise ValueInvalid(f"{place}: {shown(each.child)} is measured from itself")
     fixed = fixed or FrameTree()
     bodies = bodies_of(measurements, root, fixed)
     require_connected(bodies, [(bodies.number[each.parent], bodies.number[each.child]) for each in measurements])
     try:
         with np.errstate(over="raise", invalid="raise"):
-            problem = TreeProblem(_rows(measurements, bodies), bodies.size)
-            found, fits = judged(problem, measurements, problem.fitted(robust=robust, report=report))
-            report(1.0)
-            solution = TreeSolution(measurements, bodies, problem, found, fits, fixed)
+            problem = TreeProblem(measurements, bodies)
+            solution = TreeSolution(*TreeFit(problem, problem.fitted(robust=robust)).judged(), bodies, fixed)
     except (NotSettled, FloatingPointError):
         far = max(abs(part) for each in measurements for part in each.components[:3])
         raise ValueInvalid(f"translations (up to {far:.3g} m) or sigmas differ too much in size to be solved") from None
@@ -318,101 +309,57 @@ def solve_tree(
     return solution
 
 
-def _rows(measurements: Sequence[Measurement], bodies: Bodies) -> TreeRows:
-    """Return measurements as arrays."""
-    parents, children = [m.parent for m in measurements], [m.child for m in measurements]
-    information = np.zeros((len(measurements), 6, 6))
-    for row, each in enumerate(measurements):
-        if each.covariance is not None:
-            covariance = np.array(each.covariance, float).reshape(6, 6)
-            sigmas = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
-            if not sigmas.all() or np.linalg.eigvalsh(covariance / np.outer(sigmas, sigmas))[0] < SINGULAR:
-                what = "the covariance is exact in some direction; exact: --fix"
-                raise ValueInvalid(f"{place_of(measurements, row)}: {what}")
-            information[row] = inverse(covariance)
-    return TreeRows(
-        np.array([bodies.number[name] for name in parents]), np.array([bodies.number[name] for name in children]),
-        stacked(bodies.pose[name] for name in parents), stacked(bodies.pose[name] for name in children),
-        stacked(m.transform for m in measurements), np.array([m.covariance is not None for m in measurements]),
-        information,
-    )  # fmt: skip
-
-
-def _noise_hints(problem: TreeProblem, found: Fitted) -> list[str]:
-    """Return a warning if there are too few loops to separate the sigma of metres from that of radians."""
-    loops = int(found.kept.sum()) - problem.unknown
-    if not (found.estimated and found.few_loops and loops < FEW_LOOPS):
-        return []
-    verb = "loop does" if loops == 1 else "loops do"
-    return [f"{loops} {verb} not tell metres from radians: the sigmas are rough; give sigma"]
-
-
 class TreeSolution:
     """A tree of measured frames, and the results for the measurements.
 
     root, frames: the reference frame; all frames, in order of first mention
-    parents: of each frame, the one its entry names: the root, or the frame that it is fixed in (`fixed`)
     residuals (n, 6), u, used, checked, fits: of each measurement
     sigma: estimated (metres, radians) of those without a covariance, or None; sigma_factor: 1, or the factor by which
-    the
-        stated sigmas are too small, without changing them
+        the stated sigmas are too small, without changing them
     dof: degrees of freedom of metres and of radians; rms_distance, rms_angle: of the inliers
-    tree: all of that as a tree with covariances
+    tree: all of that as a tree with covariances: frames in the root, or in the frame that they are fixed in
     hints: warnings about the sigmas
-    rows: the number of used measurements of each frame; frame_checked: whether its pose in the root depends only on
-    loops
+    rows: the number of used measurements of each frame
+    frame_checked: whether its pose in the root depends only on loops
     """
 
-    def __init__(
-        self, measurements: Sequence[Measurement], bodies: Bodies, problem: TreeProblem, found: Fitted,
-        fits: list[str | None], fixed: Frames,
-    ) -> None:  # fmt: skip
+    def __init__(self, fit: TreeFit, fits: list[str | None], bodies: Bodies, fixed: Frames) -> None:
         """Compute the results of a fit."""
-        self.measurements, self.fits = tuple(measurements), fits
+        problem, found = fit.problem, fit.found
+        self.measurements, self.fits = tuple(problem.measurements), fits
         self.root, self.frames = bodies.root, bodies.frames
-        self.fixed = frozenset(track.child for track in fixed.tracks())
-        self._of, self._uncertainty = bodies, Uncertainty(problem, found)
-        self.residuals: Array = problem.errors(found.bodies)
-        self.used = found.kept
-        noise = found.noise if found.estimated else None
-        self.u: Array = problem.u(self.residuals, found.noise)
-        self.sigma = noise and (noise.place, noise.turn)
+        self._number, self._fit = bodies.number, fit
+        self.residuals, self.used = fit.errors, found.kept
+        self.u: Array = problem.u(fit.errors, found.noise)
+        self.sigma = (found.noise.place, found.noise.turn) if found.estimated else None
         self.sigma_factor = found.noise.factor
-        self.hints = _noise_hints(problem, found)
-        self.dof = max(3 * (int(self.used.sum()) - problem.unknown), 0)
-        self.rms_distance, self.rms_angle = (
-            math.sqrt((part[self.used] ** 2).sum() / self.used.sum())
-            for part in (self.residuals[:, :3], self.residuals[:, 3:])
-        )
-        rows = np.flatnonzero(self.used).tolist()
-        tree = problem.tree(rows)
-        alone = bridges(tree, problem.pairs, rows)
-        self.checked = ~np.isin(np.arange(problem.size), list(alone))
+        loops = int(found.kept.sum()) - problem.unknown
+        self.dof = max(3 * loops, 0)
+        self.hints: list[str] = []
+        if found.estimated and found.few_loops and loops < FEW_LOOPS:
+            verb = "loop does" if loops == 1 else "loops do"
+            self.hints = [f"{loops} {verb} not tell metres from radians: the sigmas are rough; give sigma"]
+        squares = (fit.errors[found.kept] ** 2).reshape(-1, 2, 3).sum((0, 2))
+        self.rms_distance, self.rms_angle = np.sqrt(squares / found.kept.sum()).tolist()
+        self.checked = ~np.isin(np.arange(problem.size), list(fit.alone))
         sure = [True] * bodies.size
-        for body in tree.order[1:]:
-            sure[body] = sure[tree.above[body]] and tree.row[body] not in alone
+        for body in fit.tree.order[1:]:
+            sure[body] = sure[fit.tree.above[body]] and fit.tree.row[body] not in fit.alone
         self.frame_checked = {name: sure[bodies.number[name]] for name in self.frames}
-        ends = Counter(name for row in rows for name in measurements[row][:2])
+        used = (each for each, kept in zip(problem.measurements, found.kept, strict=True) if kept)
+        ends = Counter(name for each in used for name in each[:2])
         self.rows = {name: ends[name] for name in self.frames}
-        top = top_of(fixed, self.root)
-        above = {name: track.parent if (track := fixed.track(name)) else self.root for name in self.frames}
-        self.parents = {name: parent for name, parent in above.items() if name != top}
         number = np.array([bodies.number[name] for name in self.frames])
         self._poses = found.bodies[number] @ stacked(bodies.pose[name] for name in self.frames)
         self.poses = dict(zip(self.frames, self._poses.canonical(), strict=True))
-        self.tree = FrameTree("the result")
+        self.tree, top = FrameTree("the result"), top_of(fixed, self.root)
         for name in self.frames:
             if (track := fixed.track(name)) is not None:
                 self.tree.add(track.parent, name, Transform.of(*track.components), fixed.covariances.get(name))
-            elif name in self.parents:
-                self.tree.add(self.root, name, self.pose(name), self.marginal(name))
-            else:
+            elif name == top:
                 self.tree.add_root(name)
-
-    @property
-    def count(self) -> int:
-        """Return the number of measurements."""
-        return len(self.measurements)
+            else:
+                self.tree.add(self.root, name, self.pose(name), self.marginal(name))
 
     def pose(self, frame: str, parent: str | None = None) -> Transform:
         """Return the pose of a frame in the root, or in another."""
@@ -424,11 +371,11 @@ class TreeSolution:
 
         As in ROS: x, y, z, rotation about X, Y, Z, in metres and radians along the axes of target.
         """
-        return self._uncertainty.between(self._at(target), self._at(source))
+        return self._fit.covariance(self._at(target), self._at(source))
 
     def marginal(self, frame: str) -> Array | None:
         """Return the covariance (6, 6) of the pose of a frame in the root; None if it is not known."""
-        return self._uncertainty.between((0, Transform.identity()), self._at(frame))
+        return self._fit.covariance((0, Transform.identity()), self._at(frame))
 
     def _known(self, frame: str) -> str:
         if frame not in self.poses:
@@ -436,4 +383,4 @@ class TreeSolution:
         return frame
 
     def _at(self, frame: str) -> tuple[int, Transform]:
-        return self._of.number[self._known(frame)], self._poses[self.frames.index(frame)]
+        return self._number[self._known(frame)], self._poses[self.frames.index(frame)]

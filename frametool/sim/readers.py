@@ -121,16 +121,6 @@ def parse_spawn(text: str) -> Place:
     return parse_number(cells[0]), parse_number(cells[1]), theta
 
 
-def parse_seconds(text: str) -> float:
-    """Parse a duration in seconds.
-
-    Raises ValueInvalid if it is negative or longer than stamps allow.
-    """
-    seconds = parse_number(text)
-    nanoseconds("a time", seconds)
-    return seconds
-
-
 def nanoseconds(name: str, seconds: float) -> int:
     """Return a duration in nanoseconds.
 

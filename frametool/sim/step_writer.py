@@ -16,7 +16,9 @@ from frametool.documents.json import dump
 from frametool.errors import ValueInvalid, printable
 from frametool.formats.rows.csv import row
 from frametool.frames.stamps import BILLION
-from frametool.ros.echo_format import message_text
+from frametool.grammar.pose import Pose
+from frametool.grammar.result import Result
+from frametool.ros.echo_format import message_text, transform_stamped
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -66,7 +68,7 @@ class StepWriter:
 
     def write(self, step: SimulationStep) -> Iterator[str]:
         """Yield each record of a step, the first one below the header if the format has one."""
-        for emission in self._emissions(step):
+        for emission in self._emissions(step, self._style):
             if not self._headed:
                 self._headed = True
                 yield self._header(emission)
@@ -122,7 +124,7 @@ def _commands(commands: Iterable[IssuedCommand]) -> Iterator[Emission]:
         yield Emission(labels | cells | command.state._asdict(), message, labels)
 
 
-def _poses(step: SimulationStep) -> Iterator[Emission]:
+def _poses(step: SimulationStep, _: Style) -> Iterator[Emission]:
     """Yield the poses of a tick, as turtlesim/Pose; turtles at time 0 have not moved yet."""
     for name, pose in step.poses.items() if step.t_ns else ():
         if not all(map(math.isfinite, pose)):
@@ -132,27 +134,18 @@ def _poses(step: SimulationStep) -> Iterator[Emission]:
         yield Emission(labels | message, message, labels)
 
 
-def _transforms(step: SimulationStep) -> Iterator[Emission]:
+def _transforms(step: SimulationStep, style: Style) -> Iterator[Emission]:
     """Yield the transforms that were published, as geometry_msgs/TransformStamped."""
     for stamp_ns, parent, child, transform in step.broadcasts:
-        seconds, nanoseconds = divmod(stamp_ns, BILLION)
-        numbers = transform.components
-        cells = {"t": stamp_ns / BILLION, "parent": parent, "child": child}
-        message = {
-            "header": {"stamp": {"sec": seconds, "nanosec": nanoseconds}, "frame_id": parent},
-            "child_frame_id": child,
-            "transform": {
-                "translation": dict(zip("xyz", numbers[:3], strict=True)),
-                "rotation": dict(zip("xyzw", numbers[3:], strict=True)),
-            },
-        }
-        cells |= dict(zip(("x", "y", "z", "qx", "qy", "qz", "qw"), numbers, strict=True))
-        yield Emission(cells, message, {})
+        numbers = zip(("x", "y", "z", "qx", "qy", "qz", "qw"), transform.components, strict=True)
+        cells = {"t": stamp_ns / BILLION, "parent": parent, "child": child, **dict(numbers)}
+        result = Result(Pose.of(transform.components, child, parent), {"stamp_ns": stamp_ns})
+        yield Emission(cells, transform_stamped(result, style), {})
 
 
-_EMISSIONS: dict[str, Callable[[SimulationStep], Iterator[Emission]]] = {
-    "commands": lambda step: _commands(step.commands),
-    "all commands": lambda step: _commands([*step.led, *step.commands]),
+_EMISSIONS: dict[str, Callable[[SimulationStep, Style], Iterator[Emission]]] = {
+    "commands": lambda step, _: _commands(step.commands),
+    "all commands": lambda step, _: _commands([*step.led, *step.commands]),
     "poses": _poses,
     "tf": _transforms,
 }

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import ValueInvalid, shown
-from frametool.explain import derive
-from frametool.explain.derive import ByTree, MovedRecord
+from frametool.errors import ValueInvalid, printable, shown
+from frametool.explain import derive, operations
 from frametool.explain.operations import WrittenPose
 from frametool.geometry import floats
+from frametool.grammar.pose import Pose
+from frametool.grammar.result import Result
 from frametool.stream.record_values import pose_of, read_text
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_layout import POINT, POSE, VECTOR
@@ -17,7 +18,18 @@ if TYPE_CHECKING:
     from frametool.documents.source import Source
     from frametool.explain.derive import DerivationStyle
     from frametool.explain.render import Explanation
+    from frametool.explain.run import Sheet
+    from frametool.frames.lookups import Frames
     from frametool.stream.record import Record
+
+
+class ByTree(NamedTuple):
+    """Transform by a lookup: from `source`, or the frame of the record, at a time or the latest."""
+
+    frames: Frames
+    target: str
+    source: str | None = None
+    at_ns: int | None = None
 
 
 def written_poses(source: Source, *, degrees: bool = False, normalize: bool = False) -> list[WrittenPose]:
@@ -58,18 +70,36 @@ def derive_record(
         raise ValueInvalid(f"no derivation {what}; leave --explain out")
     target, origin = _target_and_source(way, record.parent.text)
     if isinstance(way, WrittenPose):
-        mover = way.pose.components
+        at_ns, mover = None, way.pose.components
     else:
         at_ns = None if timeless or way.frames.latest(target, origin) is None else record.stamp_ns
-        way = way._replace(source=origin, at_ns=at_ns if way.at_ns is None else way.at_ns)
-        mover = way.frames.lookup(target, origin, way.at_ns).components
-    if shape.kind == POSE:
-        written = _written_pose(record, request)
-        result = operation.pose([written.pose.components], mover, floats)
-        return derive.apply(plan, way, MovedRecord(POSE, target, origin, mover, (), result, written))
-    start = tuple(record.values) if shape.unit is None else shape.position(record.values)
-    result = operation.move(shape, start, (), mover)
-    return derive.apply(plan, way, MovedRecord(shape.kind, target, origin, mover, start, result))
+        at_ns = at_ns if way.at_ns is None else way.at_ns
+        mover = way.frames.lookup(target, origin, at_ns).components
+    written = _written_pose(record, request) if shape.kind == POSE else None
+    start = shape.position(record.values) if shape.unit is not None else tuple(record.values)
+    of_pose = written and operation.pose([written.pose.components], mover, floats)
+    result = of_pose or operation.move(shape, start, (), mover)
+    into, out_of = printable(target), printable(origin)
+
+    def write(sheet: Sheet) -> None:
+        if isinstance(way, WrittenPose):
+            (pose,) = derive.derived_from(sheet, [way], [(into, out_of)])
+        else:
+            pose = operations.chain(sheet, way.frames, target, origin, at_ns)
+        derive.check_vector(sheet, pose[:3], mover[:3])
+        if written is None:
+            sheet.reached(start)
+            derive.check_vector(sheet, operations.moved(sheet, shape.kind, pose, start, into, out_of), result)
+            unit = derive.METRES if shape.kind == POINT else ""
+            sheet.result(f"in {into}", [derive.row(shape.kind, "xyz", result, unit)])
+            return
+        name = printable(written.pose.name or "it")
+        sheet.heading("The record")
+        written.say(sheet, out_of, name)
+        found = operations.compose(sheet, pose, written.components(sheet, out_of, name), (into, out_of, name))
+        derive.end_with_pose(sheet, found, Result(Pose.of(result, written.pose.name, target)), plan)
+
+    return derive.explained(plan, f"{shape.kind} in {into} of a {shape.kind} in {out_of}", write)
 
 
 def _target_and_source(way: ByTree | WrittenPose, own: str | None) -> tuple[str, str]:

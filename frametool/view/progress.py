@@ -20,7 +20,7 @@ class ProgressBar:
     """Show the progress of a job, if stderr is a terminal and it takes longer than two seconds."""
 
     def __init__(self, total: int | None, *, quiet: bool, counted: str = "rows") -> None:
-        """Start the clock; total: bytes, if known; counted: the unit of the count, "" for none."""
+        """Start the clock; total: bytes, if known; counted: the unit of the count."""
         self.total, self._counted = total, counted
         self.rows = self.size = 0
         self._hidden = quiet or sys.stderr is None or not sys.stderr.isatty()
@@ -55,8 +55,7 @@ class ProgressBar:
 def _bar(total: int | None, counted: str) -> Any:
     from rich import progress
 
-    text = f"{{task.fields[rows]}} {counted}  {{task.fields[rate]}} {counted}/s" if counted else "solving"
-    columns: list[Any] = [progress.TextColumn(text)]
+    columns: list[Any] = [progress.TextColumn(f"{{task.fields[rows]}} {counted}  {{task.fields[rate]}} {counted}/s")]
     if total:
         columns += [progress.BarColumn(), progress.TaskProgressColumn(), progress.TimeRemainingColumn()]
     return progress.Progress(*columns, console=coloured_console(stderr=True), transient=True)

@@ -33,7 +33,7 @@ def test_the_tree_is_that_of_the_robot_without_the_inverted_row() -> None:
     assert np.flatnonzero(~found.used).tolist() == [make_measurements.INVERTED]
     assert found.fits[make_measurements.INVERTED] == "inverted"
     assert np.flatnonzero(~found.checked).tolist() == [19]
-    assert (len(found.frames), found.count) == (7, 20)
+    assert (len(found.frames), len(found.measurements)) == (7, 20)
     for name in found.frames[1:-1]:
         off = found.pose(name).distance(robot.lookup("base_link", name))
         covariance = found.covariance("base_link", name)

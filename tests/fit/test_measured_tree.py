@@ -351,14 +351,17 @@ def test_noise_that_adds_up_around_a_loop_is_not_undecided() -> None:
 # fixed bodies
 
 
+def parents(found: TreeSolution) -> dict[str, str]:
+    return {track.child: track.parent for track in found.tree.tracks()}
+
+
 def test_fixed_frames_move_as_one_body_and_keep_their_entries() -> None:
     truth = world(7, 20, 4, sigmas=True)
     mount = Transform(Rotation.from_rpy((0.1, 0.2, 0.3)), (0.3, 0.2, 0.1))
     fixed = fixed_tree(("f2", "g", mount), ("g", "h", mount))
     row = Measurement("f0", "h", (truth.true("f0", "f2") @ mount @ mount).components, COVARIANCE)
     found = solve_tree([*truth.measurements, row], fixed=fixed)
-    assert found.fixed == {"g", "h"}
-    assert found.parents == {**dict.fromkeys(["f1", "f2", "f3", "f4", "f5", "f6"], "f0"), "g": "f2", "h": "g"}
+    assert parents(found) == {**dict.fromkeys(["f1", "f2", "f3", "f4", "f5", "f6"], "f0"), "g": "f2", "h": "g"}
     assert found.pose("h", "f2").is_close(mount @ mount, angle=1e-14, distance=1e-14)
     assert not np.any(found.covariance("g", "h"))
     without = sure(solve_tree(truth.measurements).marginal("f2"))
@@ -369,7 +372,7 @@ def test_a_fixed_root_hangs_where_it_is_fixed() -> None:
     truth = world(4, 8, 4)
     found = solve_tree(truth.measurements, root="f0", fixed=fixed_tree(("base", "f0", truth.poses[1])))
     assert found.root == "f0"
-    assert found.parents == {"f0": "base", "f1": "f0", "f2": "f0", "f3": "f0"}
+    assert parents(found) == {"f0": "base", "f1": "f0", "f2": "f0", "f3": "f0"}
     assert found.pose("base").is_close(truth.poses[1].inverse())
 
 
@@ -454,12 +457,8 @@ def test_unknown_frames_are_named_with_the_nearest() -> None:
 @pytest.mark.large
 def test_a_thousand_frames_come_to_an_end() -> None:
     truth = world(1000, 2500, 1, near=20).with_inverted(25)
-    told: list[float] = []
-    found = solve_tree(truth.measurements, progress=told.append)
+    found = solve_tree(truth.measurements)
     assert left_out(found) == dict.fromkeys(truth.wrong, "inverted")
-    assert told == sorted(told)
-    assert told[-1] == 1.0
-    assert len(told) > 2
     for name in ("f1", "f500", "f999"):
         assert relative(found.covariance("f0", name), sure(found.marginal(name))) < 1e-9
 

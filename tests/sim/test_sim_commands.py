@@ -95,7 +95,7 @@ def test_the_example_scene_has_three_turtles_that_come_together(run: Run) -> Non
         (("follow", "--spawn", "1"), 2, "expected X,Y,THETA"),
         (("follow", "--rate", "0"), 2, "rate must be"),
         (("follow", "--gain-linear", "nan"), 2, "is not finite"),
-        (("follow", "--duration", "-1"), 2, "a time must be 0 .. "),
+        (("follow", "--duration", "-1"), 2, "duration must be 0 .. "),
         (("follow", "--reach", "-1"), 2, "--reach must be 0 or more"),
         (("follow", "--live"), 2, "--live draws in a terminal"),
         (("follow", "--plot", "a.gif"), 2, "invalid value for '--plot': 'a.gif' does not end in .svg or .html or .png"),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.fit.graph import bridges, spanning_tree
+from frametool.fit.tree_problem import bridges, spanning_tree
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 from frametool.stream.measurements import Measurement

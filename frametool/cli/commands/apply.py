@@ -35,13 +35,14 @@ if TYPE_CHECKING:
 
     from frametool.cli.output import Output
     from frametool.cli.streaming import Stream
-    from frametool.explain.derive import ByTree, DerivationStyle
+    from frametool.explain.derive import DerivationStyle
     from frametool.explain.operations import WrittenPose
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Components
     from frametool.recordings.messages import PointCloud
     from frametool.stream.request import Request
+    from frametool.stream.written import ByTree
 
 
 PLACES: dict[str, Callable[[PointCloud], str]] = {
@@ -374,7 +375,7 @@ def way_by_tree(inputs: Inputs, *, numbers: bool) -> tuple[Way, tuple[str, ...]]
     in_time = at_times if chosen is None else None
 
     def explained() -> ByTree:
-        from frametool.explain.derive import ByTree
+        from frametool.stream.written import ByTree
 
         return ByTree(tree, target, source, options.at_ns(chosen))
 

@@ -25,7 +25,7 @@ from frametool.documents.source import Source, read_text
 from frametool.errors import FileProblem, alternatives, shown
 from frametool.frames.stamps import BILLION
 from frametool.sim import drivers
-from frametool.sim.readers import lines_as_they_come, parse_seconds, parse_spawn, read_commands, read_script
+from frametool.sim.readers import lines_as_they_come, parse_spawn, read_commands, read_script
 from frametool.sim.scene import Scene, duration_ns, read_scene, tutorial
 from frametool.sim.simulate import RunSummary, SimulationStep, simulate
 from frametool.sim.step_writer import EMITS, FORMS, StepWriter
@@ -45,7 +45,7 @@ _of_turtles = partial(option, under="Turtles")
 
 def parse_duration(text: str) -> float:
     """Read seconds, or inf."""
-    return math.inf if text == "inf" else parse_seconds(text)
+    return math.inf if text == "inf" else parse_number(text)
 
 
 def follow_options(duration: str) -> Callable[[Any], Any]:
@@ -63,7 +63,7 @@ def follow_options(duration: str) -> Callable[[Any], Any]:
         _of_turtles("--target", "the leader, a carrot 2 m to its left, or a carrot that circles it at 10 m",
                     drivers.TARGETS, default="leader"),
         _of_turtles("--delay S", "follow the target's past position, looked up through world  [default: 0]",
-                    parse_seconds, default=0.0),
+                    parse_number, default=0.0),
         option("--spawn X,Y,THETA", "start of turtle2: metres, radians (or 90deg)", parse_spawn, default="4,2,0"),
         option("--duration S", "simulated seconds, or inf", parse_duration, default=duration),
         _of_turtles("--turtlesim", "whose turtlesim", VARIANTS, default="ros1"),
@@ -332,7 +332,8 @@ def run(inputs: Inputs) -> None:
     output, duration = SimOutput(inputs), inputs.duration
     with inline_misuse():
         read = read_scene(source_of(inputs.scene), seed=inputs.seed)
-    chosen = read if duration is None else read._replace(duration_ns=duration_ns(duration))
+    with misuse():
+        chosen = read if duration is None else read._replace(duration_ns=duration_ns(duration))
     if late := chosen.late_calls():
         end = f"{(chosen.duration_ns or 0) / BILLION:g} s"
         more = f", nor do{f'es {late[1].place}' if len(late) == 2 else f' {len(late) - 1} more'}" if late[1:] else ""

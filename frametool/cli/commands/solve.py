@@ -39,31 +39,26 @@ if TYPE_CHECKING:
 
 
 NAMES = ("base", "gripper", "camera", "target")
-SHARES = 1000  # of the way, as progress counts it
 UNSURE = 1.2  # times: sigmas of the input that are smaller than that are reported
 
 
 def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
     """Solve the tree of the measurements in files, with its fixed edges."""
     from frametool.fit.measured_tree import solve_tree
-    from frametool.view.progress import ProgressBar
 
     measurements = _measurements(inputs, files)
     fixed = _fixed_tree(inputs, {name for each in measurements for name in each[:2]}) if inputs.fix else None
-    with ProgressBar(SHARES, quiet=inputs.quiet, counted="") as bar:
-        found = solve_tree(
-            measurements, root=inputs.root, fixed=fixed, robust=robust,
-            progress=lambda share: bar.advance(0, round(SHARES * share) - bar.size),
-        )  # fmt: skip
+    found = solve_tree(measurements, root=inputs.root, fixed=fixed, robust=robust)
     if found.sigma_factor > UNSURE:
         warn(f"the sigmas of the input are {found.sigma_factor:.2g} times too small for what the used rows are off")
     frames = []
     for name in sorted(found.frames, key=lambda name: name != found.root):
         track = found.tree.track(name)  # in the root, or as --fix has it
         pose = IDENTITY if track is None else track.components
-        seen = found.rows[name], found.frame_checked[name], name in found.fixed
+        is_fixed = fixed is not None and fixed.track(name) is not None
         covariance = found.tree.covariances.get(name)
-        frames.append(SolvedFrame(name, found.parents.get(name), _numbers(pose), covariance, *seen))
+        seen = found.rows[name], found.frame_checked[name], is_fixed
+        frames.append(SolvedFrame(name, None if track is None else track.parent, _numbers(pose), covariance, *seen))
     unknown = [each.name for each in frames if each.parent and not each.fixed and not each.covariance]
     if unknown:
         warn(f"no covariance of {first_of(unknown, 5)}: neither loops nor sigmas say how sure that is")

@@ -1,7 +1,7 @@
-"""Robust least squares for poses of bodies from measurements between them: Gauss-Newton, with outlier rejection.
+"""The graph of measurements, and robust least squares for the poses of its bodies: Gauss-Newton, outlier rejection.
 
-Bodies are numbered; body 0 is fixed.  A row measures a frame of one body in a frame of another:
-r = [t(P) - t(M), Log(R(P) R(M)')], P = inv(X_a) X_b.
+Frames that are fixed to each other form bodies, numbered, 0 is the root.  A row measures a frame of one body in a frame
+of another: r = [t(P) - t(M), Log(R(P) R(M)')], P = inv(X_a) X_b.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.fit.graph import SpanningTree, bridges, spanning_tree
+from frametool.errors import ValueInvalid, alternatives, listing, printable, shown
 from frametool.fit.least_squares import (
     LEAST,
     MEDIAN_OF_SIX,
@@ -30,16 +30,154 @@ from frametool.fit.least_squares import (
     stacked,
     stepped,
 )  # fmt: skip
+from frametool.frames.topology import Groups
 from frametool.geometry.rigid import IDENTITY
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable, Sequence
     from typing import Any
 
-    from frametool.geometry.types import Array, Indices
+    from frametool.frames.lookups import Frames
+    from frametool.geometry.types import Array
+    from frametool.stream.measurements import Measurement
+
+    Pairs = Sequence[tuple[int, int]]
+
+class SpanningTree(NamedTuple):
+    """Rows that connect every body to the root by one path.
+
+    order: the bodies, each after its parent
+    above: the parent of each body, itself for the root; row: the row that joins them, -1 for the root
+    depth: the number of rows from the root
+    """
+
+    order: list[int]
+    above: list[int]
+    row: list[int]
+    depth: list[int]
+
+    def way(self, a: int, b: int) -> list[int]:
+        """Return the rows between two bodies."""
+        rows = []
+        while a != b:
+            if self.depth[a] < self.depth[b]:
+                a, b = b, a
+            rows.append(self.row[a])
+            a = self.above[a]
+        return rows
+
+    def beyond(self, row: int) -> list[int]:
+        """Return the bodies below a row."""
+        hang = [False] * len(self.order)
+        for body in self.order:
+            hang[body] = self.row[body] == row or (self.row[body] >= 0 and hang[self.above[body]])
+        return [body for body, hangs in enumerate(hang) if hangs]
+
+
+def spanning_tree(count: int, pairs: Pairs, rows: Iterable[int]) -> SpanningTree:
+    """Return the tree of the first rows that close no loop (Kruskal); together the rows join all bodies."""
+    groups = Groups[int]()
+    near: list[list[tuple[int, int]]] = [[] for _ in range(count)]
+    for row in rows:
+        a, b = pairs[row]
+        if groups.join(a, b):
+            near[a].append((b, row))
+            near[b].append((a, row))
+    order, above, by, depth = [0], [0] * count, [-1] * count, [0] * count
+    for body in order:  # grows during the loop
+        for other, row in near[body]:
+            if row != by[body]:
+                above[other], by[other], depth[other] = body, row, depth[body] + 1
+                order.append(other)
+    return SpanningTree(order, above, by, depth)
+
+
+def bridges(tree: SpanningTree, pairs: Pairs, rows: Iterable[int]) -> set[int]:
+    """Return the rows of a spanning tree that are in no loop with any of these rows."""
+    found = {row for row in tree.row if row >= 0}
+    looped = Groups[int]()  # bodies joined by loops so far; the highest represents them
+    for row in set(rows) - found:
+        a, b = map(looped.of, pairs[row])
+        while a != b:
+            if tree.depth[a] < tree.depth[b]:
+                a, b = b, a
+            found.discard(tree.row[a])
+            looped.join(a, tree.above[a])
+            a = looped.of(a)
+    return found
+
+
+MOST = 1000  # frames
+LISTED = 150  # characters of names in the message about unconnected frames
+
+
+class Bodies(NamedTuple):
+    """The bodies formed by measured and fixed frames.
+
+    frames: in order of first mention; number: the body of each, 0 for the root's
+    pose: of each frame in its body; in the root's body, in the root
+    """
+
+    root: str
+    frames: tuple[str, ...]
+    number: dict[str, int]
+    pose: dict[str, Transform]
+
+    @property
+    def size(self) -> int:
+        """Return how many bodies there are."""
+        return 1 + max(self.number.values())
+
+
+def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Frames) -> Bodies:
+    """Group frames into bodies; raises ValueInvalid for an unknown root."""
+    edges = [*((m.parent, m.child) for m in measurements), *((each.parent, each.child) for each in fixed.tracks())]
+    frames = tuple(dict.fromkeys(name for edge in edges for name in edge))
+    if len(frames) > MOST:
+        raise ValueInvalid(f"{len(frames)} frames; solve takes at most {MOST}")
+    if root is None:
+        children = {child for _, child in edges}
+        root = next((name for name in frames if name not in children), frames[0])
+    elif root not in frames:
+        raise ValueInvalid(f"unknown root {shown(root)}{alternatives(root, frames, 'frames')}")
+    first: dict[str, str] = {}  # of each body, by the top of its tree
+    for name in (root, *frames):
+        first.setdefault(top_of(fixed, name), name)
+    number = {top: at for at, top in enumerate(first)}
+    anchors = {name: first[top_of(fixed, name)] for name in frames}
+    pose = {name: Transform.identity() if name == at else fixed.lookup(at, name) for name, at in anchors.items()}
+    return Bodies(root, frames, {name: number[top_of(fixed, name)] for name in frames}, pose)
+
+
+def top_of(fixed: Frames, name: str) -> str:
+    """Return the root of the tree of fixed frames that holds a frame."""
+    while name in fixed.frames and (above := fixed.parent(name)) is not None:
+        name = above
+    return name
+
+
+def require_connected(bodies: Bodies, pairs: Iterable[tuple[int, int]]) -> None:
+    """Raise ValueInvalid, with the groups of frames, if rows do not join all bodies."""
+    joined = Groups[int]()
+    for pair in pairs:
+        joined.join(*pair)
+    groups: dict[int, list[str]] = {}
+    for name in bodies.frames:
+        groups.setdefault(joined.of(bodies.number[name]), []).append(name)
+    if len(groups) > 1:
+        most = next(most for most in (*range(20, 0, -1), 0) if not most or len(_grouped(groups, most)) <= LISTED)
+        raise ValueInvalid(f"no measurement connects {_grouped(groups, max(most, 1))[:LISTED]}")
+
+
+def _grouped(groups: dict[int, list[str]], most: int) -> str:
+    parts = [listing(names, most) for names in list(groups.values())[: most + (len(groups) == most + 1)]]
+    more = len(groups) - len(parts)
+    return " | ".join(parts) + (f" | {more} more groups" if more else "")
+
 
 TREES = 200
+SINGULAR = 1e-12  # of the correlations: the least eigenvalue of a valid covariance
 ROWS_AT_ONCE = 20_000  # of trees that are tried together
 STEPS = 100
 MOST_DAMPED = 1e12
@@ -61,22 +199,6 @@ class Noise(NamedTuple):
 
 
 LOWEST = Noise(0.001, math.radians(0.1))  # medians if loops are few: most rows of a tree have no residual
-
-
-class TreeRows(NamedTuple):
-    """Measurements as arrays.
-
-    parent, child: the bodies; in_parent, in_child: poses of the measured frames in them
-    stated: which have a covariance; information: its inverse, (n, 6, 6), zeros for the others
-    """
-
-    parent: Indices
-    child: Indices
-    in_parent: Transform
-    in_child: Transform
-    measured: Transform
-    stated: Any
-    information: Array
 
 
 class Fitted(NamedTuple):
@@ -114,28 +236,37 @@ def of_body(jacobian: Array, body: Transform, frame: Transform) -> Array:
 class TreeProblem:
     """Rows between bodies, and the poses that fit them."""
 
-    def __init__(self, rows: TreeRows, count: int) -> None:
-        """Store rows between this many bodies."""
-        self.rows, self.count, self.size = rows, count, len(rows.parent)
-        self.unknown = count - 1
-        self.pairs = list(zip(rows.parent.tolist(), rows.child.tolist(), strict=True))
-        self.arm = max(float(np.median(length(rows.measured.xyz))), LEAST) if self.size else 1.0
-        self._moves = (rows.parent != rows.child)[:, None, None]  # a row within a body has no effect
+    def __init__(self, measurements: Sequence[Measurement], bodies: Bodies) -> None:
+        """Store measurements as arrays: of bodies, of the poses of the measured frames in them, of covariances."""
+        self.measurements, self.count, self.size = measurements, bodies.size, len(measurements)
+        self.unknown = self.count - 1
+        sides = [[each.parent for each in measurements], [each.child for each in measurements]]
+        self.parent, self.child = (np.array([bodies.number[name] for name in side]) for side in sides)
+        self.in_parent, self.in_child = (stacked(bodies.pose[name] for name in side) for side in sides)
+        self.measured = stacked(each.transform for each in measurements)
+        self.stated = np.array([each.covariance is not None for each in measurements])
+        self._stated = np.stack([_information(each, self.place(row)) for row, each in enumerate(measurements)])
+        self.pairs = list(zip(self.parent.tolist(), self.child.tolist(), strict=True))
+        self.arm = max(float(np.median(length(self.measured.xyz))), LEAST)
+        self._moves = (self.parent != self.child)[:, None, None]  # a row within a body has no effect
+
+    def place(self, row: int) -> str:
+        """Return the place of a measurement, else its number."""
+        return printable(self.measurements[row].place) or f"measurement {row + 1}"
 
     def ends(self, bodies: Transform) -> tuple[Transform, Transform]:
         """Return the poses of the frames of each row."""
-        rows = self.rows
-        return bodies[rows.parent] @ rows.in_parent, bodies[rows.child] @ rows.in_child
+        return bodies[self.parent] @ self.in_parent, bodies[self.child] @ self.in_child
 
     def errors(self, bodies: Transform) -> Array:
         """Return the residuals, (n, 6)."""
         parent, child = self.ends(bodies)
-        return errors(parent.inverse() @ child, self.rows.measured)
+        return errors(parent.inverse() @ child, self.measured)
 
     def information(self, noise: Noise, factor: float = 1.0) -> Array:
         """Return the inverse covariances, (n, 6, 6); factor: of stated sigmas."""
         diagonal = [noise.place**-2] * 3 + [noise.turn**-2] * 3
-        return np.where(self.rows.stated[:, None, None], self.rows.information / factor**2, np.diag(diagonal))
+        return np.where(self.stated[:, None, None], self._stated / factor**2, np.diag(diagonal))
 
     def u(self, errors: Array, noise: Noise) -> Array:
         """Return the residual of each row in sigmas: the root mean square of its six numbers."""
@@ -176,11 +307,10 @@ class TreeProblem:
 
     def placed(self, trees: list[SpanningTree]) -> Transform:
         """Return the poses of bodies in trees of rows, (trees, bodies): paths to the root by doubling."""
-        rows = self.rows
         above, row = np.array([tree.above for tree in trees]), np.array([tree.row for tree in trees])
-        across = rows.in_parent @ rows.measured @ rows.in_child.inverse()
+        across = self.in_parent @ self.measured @ self.in_child.inverse()
         forth, back = across[row].components, across.inverse()[row].components
-        down = rows.child[row] == np.arange(self.count)
+        down = self.child[row] == np.arange(self.count)
         parts = [np.where(down, one, other) for one, other in zip(forth, back, strict=True)]
         for part, own in zip(parts, IDENTITY, strict=True):
             part[:, 0] = own
@@ -195,12 +325,12 @@ class TreeProblem:
 
     def normal_equations(self, bodies: Transform, information: Array) -> tuple[Array, Array, float]:
         """Return J'LJ and J'Lr, six rows for each unknown body, and r'Lr."""
-        rows, (parent, child), count = self.rows, self.ends(bodies), self.count
-        off = errors(parent.inverse() @ child, rows.measured)
+        (parent, child), count = self.ends(bodies), self.count
+        off = errors(parent.inverse() @ child, self.measured)
         by_parent, by_child = (self._moves * by for by in jacobians(parent, child, off[:, 3:]))
         sides = [
-            (rows.parent, of_body(by_parent, bodies[rows.parent], parent)),
-            (rows.child, of_body(by_child, bodies[rows.child], child)),
+            (self.parent, of_body(by_parent, bodies[self.parent], parent)),
+            (self.child, of_body(by_child, bodies[self.child], child)),
         ]
         weighed = applied(information, off)
         normal, gradient = np.zeros((count, count, 6, 6)), np.zeros((count, 6))
@@ -251,7 +381,7 @@ class TreeProblem:
         if dof <= 0:
             return Noise()
         errors = self.errors(bodies)
-        free, stated = kept & ~self.rows.stated, kept & self.rows.stated
+        free, stated = kept & ~self.stated, kept & self.stated
         factor = 1.0
         if stated.any():
             chi2 = 6 * float((self.u(errors, Noise())[stated] ** 2).sum())
@@ -274,8 +404,8 @@ class TreeProblem:
         """
         information = self.information(noise) * kept[:, None, None]
         covariance = inverse(self.normal_equations(bodies, information)[0])
-        information *= ~self.rows.stated[:, None, None]
-        count, found = 3.0 * (kept & ~self.rows.stated).sum(), []
+        information *= ~self.stated[:, None, None]
+        count, found = 3.0 * (kept & ~self.stated).sum(), []
         for half in np.kron(np.eye(2), np.ones(3)):
             own = self.normal_equations(bodies, information * np.outer(half, half))[0]
             found.append(count - float((covariance * own).sum()))
@@ -285,7 +415,7 @@ class TreeProblem:
         """Return the noise from the medians of the rows in loops."""
         unknown = self.unknown - (self.size - looped.sum())  # every row in no loop determines one
         share = math.sqrt(max(1 - unknown / looped.sum(), LEAST_SHARE))
-        free, stated = looped & ~self.rows.stated, looped & self.rows.stated
+        free, stated = looped & ~self.stated, looped & self.stated
         noise = Noise()
         if stated.any():
             factor = float(np.median(_odd_count(self.u(errors, noise)[stated]))) / (MEDIAN_OF_SIX * share)
@@ -295,11 +425,10 @@ class TreeProblem:
             noise = noise._replace(place=place, turn=turn)
         return noise.at_least(LOWEST) if looped.sum() <= 2 * unknown else noise
 
-    def fitted(self, *, robust: bool, report: Callable[[float], None]) -> Fitted:
+    def fitted(self, *, robust: bool) -> Fitted:
         """Select the rows that agree, or all, and fit them by plain least squares."""
         every = range(self.size)
         bodies, noise = self.start(TREES if robust and self.size > self.unknown else 1), Noise()
-        report(0.3)
         kept = np.ones(self.size, bool)
         looped = kept.copy()
         looped[list(bridges(self.tree(every), self.pairs, every))] = False
@@ -315,7 +444,6 @@ class TreeProblem:
         if robust and looped.any():
             bodies, kept = first_inliers(bodies, by_medians, rough)
             noise = self.medians(self.errors(bodies), looped)
-        report(0.6)
         return self.selected(bodies, kept, noise, robust=robust)
 
     def selected(self, bodies: Transform, kept: Any, noise: Noise, *, robust: bool) -> Fitted:
@@ -331,7 +459,7 @@ class TreeProblem:
         if (reached & ~kept).any():
             kept, bodies = kept | reached, self.placed([tree])[0]
         alone = np.isin(np.arange(self.size), list(bridges(tree, self.pairs, np.flatnonzero(kept).tolist())))
-        estimate = bool((kept & ~alone & ~self.rows.stated).any()) and kept.sum() > self.unknown
+        estimate = bool((kept & ~alone & ~self.stated).any()) and kept.sum() > self.unknown
         few_loops = bool((kept & ~alone).sum() <= 2 * (self.unknown - alone.sum()))
         bodies, noise = self.settled(bodies, kept, noise, estimate=estimate, few_loops=few_loops)
         return Fitted(bodies, kept, noise, estimate, few_loops), kept, self.u(self.errors(bodies), noise)
@@ -344,3 +472,14 @@ def _halves(errors: Array) -> tuple[Array, Array]:
 def _odd_count(values: Array) -> Array:
     """Return an odd number of values, without the largest if necessary: of two rows that disagree one is wrong."""
     return values if len(values) % 2 else np.sort(values)[:-1]
+
+
+def _information(measurement: Measurement, place: str) -> Array:
+    """Return the inverse of the covariance of a measurement, zeros if it has none."""
+    if measurement.covariance is None:
+        return np.zeros((6, 6))
+    covariance = np.array(measurement.covariance, float).reshape(6, 6)
+    sigmas = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+    if not sigmas.all() or np.linalg.eigvalsh(covariance / np.outer(sigmas, sigmas))[0] < SINGULAR:
+        raise ValueInvalid(f"{place}: the covariance is exact in some direction; exact: --fix")
+    return inverse(covariance)
