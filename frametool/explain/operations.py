@@ -52,11 +52,11 @@ PLAIN = ("quaternion", "xyzw")
 
 def names_of(notation: Notation, found: int, *, degrees: bool) -> list[str]:
     """Return the names of a notation's numbers, as written or as found; raises ValueInvalid if it has no sheets."""
-    form = notation.representation
-    if form.name not in BLOCKS:
-        raise ValueInvalid(f"there is no derivation of {shown(form.name)}; derived are {', '.join(BLOCKS)}")
-    names = enumerate(BLOCKS[form.name][found].split())
-    return [f"{name}_deg" if degrees and at in form.angles else name for at, name in names]
+    representation = notation.representation
+    if representation.name not in BLOCKS:
+        raise ValueInvalid(f"there is no derivation of {shown(representation.name)}; derived are {', '.join(BLOCKS)}")
+    names = enumerate(BLOCKS[representation.name][found].split())
+    return [f"{name}_deg" if degrees and at in representation.angles else name for at, name in names]
 
 
 def to_quaternion(sheet: Sheet, numbers: Sequence[float], notation: Notation, *, degrees: bool) -> Quaternion:
