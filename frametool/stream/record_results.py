@@ -147,9 +147,9 @@ def documents(blocks: Iterable[BlockResults], style: Style) -> Iterator[bytes]:
         singles = [(place, parting + write_poses([value], style)) for place, value in block.values]
         rows = []
         for batch in block.batches:
-            from frametool.stream.text_rows import document_rows
+            from frametool.stream.text_rows import in_document
 
-            rows.append(document_rows(batch, parting + write_poses([batch.marked.value], exact), style))
+            rows.append(batch.text(in_document(parting + write_poses([batch.marked.value], exact), style), style))
         text = text_of(singles, block.batches, rows)
         yield text if begun else text[len(parting) :]
         begun = begun or bool(text)
@@ -189,9 +189,9 @@ class CsvTable:
         lines = [(place, row([cells.get(name, "") for name in self.columns], self.style)) for place, cells in singles]
         rows = []
         for batch, cells in zip(block.batches, marked, strict=True):
-            from frametool.stream.text_rows import table_rows
+            from frametool.stream.text_rows import in_table
 
-            rows.append(table_rows(batch, cells, self.columns, self.style))
+            rows.append(batch.text(in_table(cells, self.columns, self.style), self.style))
         text = text_of(lines, block.batches, rows)
         self.waiting.write(text)
         self.sizes.append((len(self.columns), len(text)))

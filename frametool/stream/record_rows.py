@@ -6,7 +6,6 @@ what is invalid, or worth telling, takes that way itself.
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -35,8 +34,21 @@ from frametool.stream.record_values import (
 )
 from frametool.stream.row_layout import AS_READ, POINT, POSE, ROTATION, VECTOR, Target
 from frametool.stream.row_poses import RowPoses, objects
+from frametool.stream.rows import spans_of
 from frametool.stream.splitter import Part
 from frametool.stream.stamp_columns import read_stamps
+from frametool.stream.text_rows import (
+    CELL,
+    LEAF,
+    MORE_NUMBERS,
+    NAME,
+    NUMBERS,
+    PARENT,
+    STAMP_NS,
+    filled,
+    leaf_mark,
+    words,
+)
 from frametool.text.spans import MARGIN, Spans, framed
 
 if TYPE_CHECKING:
@@ -49,15 +61,12 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
     from frametool.stream.splitter import Splitter
     from frametool.stream.template import Template
+    from frametool.stream.text_rows import Syntax
     from frametool.text.spans import Bytes, Floats, Ints
 
 QUATERNIONS = ((notation("quaternion"), False),)
-NUMBERS = (0.1370842961, -3.7208412957, 29.6518402397, 0.22360679774997896, -0.37416573867739417, 0.5099019513592785,
-           0.7416198487095663)  # fmt: skip
-STAMP_NS = 1234567890987654321
 MOST_ENTRIES = 8  # points or poses of a record: each is looked at for itself
-PARENT, NAME = "@@parent@@", "@@name@@"
-LEAF = re.compile(r"73105857(\d{7})")  # a whole number: in JSON it needs no quotes either
+LAST_ASCII = 127
 
 
 class Marked(NamedTuple):
@@ -94,6 +103,28 @@ class RecordBatch(NamedTuple):
         stretch, node = self.cut.template.leaves[at]
         return node, Spans(self.data, self.cut.starts[:, stretch] + MARGIN, self.cut.ends[:, stretch] + MARGIN)
 
+    def text(self, parts: Sequence[tuple[str, Syntax]], style: Style) -> list[Spans]:
+        """Return the rows as text; parts: the text of the result with marks."""
+        return filled(parts, style, self.marked.numbers, self.results, self._scalar)
+
+    def _scalar(self, mark: str, syntax: Syntax) -> tuple[Spans, str]:
+        """Return what is in the place of a mark, as it is written there, and the quotes around it."""
+        if mark in (PARENT, NAME):
+            return words(self.parents if mark == PARENT else self.names, len(self.places), syntax), ""
+        if self.stamps_ns is not None and mark == str(STAMP_NS):
+            return spans_of([b"%d" % stamp for stamp in self.stamps_ns.tolist()]), ""
+        at = int(mark[-7:])
+        node, found = self.leaf(at)
+        is_cell = syntax is CELL
+        if node.quote:
+            passes = (is_cell or not (found.data > LAST_ASCII).any()) and not _holds(found, syntax.unsafe)
+        else:
+            passes = self.cut.template.json or is_cell
+            passes = passes and not (is_cell and (found.data[found.starts] == ord("n")).any())  # it may be null
+        if passes:
+            return found, syntax.quote if node.quote else ""
+        return words(plain_texts(self, at), len(self.places), syntax), ""
+
     def take(self, rows: Ints) -> RecordBatch:
         """Return some of the rows."""
         size = len(self.places)
@@ -101,6 +132,12 @@ class RecordBatch(NamedTuple):
         cut = Cut(self.cut.template, self.cut.starts[rows], self.cut.ends[rows])
         stamps = None if self.stamps_ns is None else self.stamps_ns[rows]
         return RecordBatch(self.marked, cut, self.data, self.places[rows], self.results[rows], parents, names, stamps)
+
+
+def _holds(cells: Spans, characters: bytes) -> bool:
+    """Return True if any cell holds one of some characters."""
+    counts = np.concatenate([[0], np.cumsum(np.isin(cells.data, [*characters]), dtype=np.int32)])
+    return bool((counts[cells.ends] > counts[cells.starts]).any())
 
 
 class Alone(NamedTuple):
@@ -250,7 +287,7 @@ def marked(template: Template, at: int, request: Request, style: Style, target: 
     text, begin = "", 0
     for number, (stretch, _) in enumerate(template.leaves):
         start, end = template.stretches[stretch]
-        text, begin = f"{text}{template.text[begin:start]}73105857{number:07d}", end
+        text, begin = f"{text}{template.text[begin:start]}{leaf_mark(number)}", end
     text += template.text[begin:]
     operation, shape = request.operation, record.shape
     if operation.formula is None:
@@ -258,7 +295,7 @@ def marked(template: Template, at: int, request: Request, style: Style, target: 
     else:  # of numbers alone, what was the row's own counts for nothing
         own, carried = 3 if operation.result_kind(shape.kind) in (POINT, VECTOR) else 7, 0
     size = own + len(operation.extras(shape)) + carried
-    parts = (*NUMBERS[:own], *(0.7310585786300049 + at for at in range(size - own)))
+    parts = (*NUMBERS[:own], *(MORE_NUMBERS + at for at in range(size - own)))
     parent, name = entry.parent and PARENT, entry.name and NAME
     stamp = None if record.stamp_ns is None else STAMP_NS
     shown = entry._replace(parent=parent, name=name, record=record._replace(stamp_ns=stamp))

@@ -1,6 +1,6 @@
-"""Rows of records that are alike as text: lines of CSV or JSON, documents of YAML.
+"""Rows that are written alike as text: lines of CSV or JSON, documents of YAML.
 
-A result of which all that differs is a mark is written once; numbers of results and scalars of records then take the
+A result of which all that differs is a mark is written once; the numbers, names and other scalars of rows then take the
 places of the marks.
 """
 
@@ -9,12 +9,9 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from frametool.documents import json
 from frametool.documents.yaml_writer import quoted as quoted_in_yaml
 from frametool.formats.rows.csv import cell, quoted
-from frametool.stream.record_rows import LEAF, NAME, PARENT, STAMP_NS, plain_texts
 from frametool.stream.rows import constant, number_spans, spans_of
 from frametool.text.spans import Spans
 
@@ -22,7 +19,15 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from frametool.grammar.result import Style
-    from frametool.stream.record_rows import RecordBatch
+    from frametool.text.spans import Floats
+
+# marks: of numbers (those of a pose; more of them are 0.7310585786300049 + n), stamps, names, and scalars
+NUMBERS = (0.1370842961, -3.7208412957, 29.6518402397, 0.22360679774997896, -0.37416573867739417, 0.5099019513592785,
+           0.7416198487095663)  # fmt: skip
+MORE_NUMBERS = 0.7310585786300049
+STAMP_NS = 1234567890987654321
+PARENT, NAME = "@@parent@@", "@@name@@"
+LEAF = re.compile(r"73105857(\d{7})")  # a whole number: in JSON it needs no quotes either
 
 
 class Syntax(NamedTuple):
@@ -33,34 +38,44 @@ class Syntax(NamedTuple):
     write: Callable[[Any], str]
 
 
-LAST_ASCII = 127
 CELL = Syntax("", b'",\\\r\n', lambda value: quoted("" if value is None else str(value)))
 IN_CELL = Syntax('""', b'"\\', lambda value: json.dump(value).replace('"', '""'))
 JSON = Syntax('"', b'"\\', json.dump)
 YAML = Syntax('"', bytes(range(128)), lambda value: quoted_in_yaml(value) if type(value) is str else json.dump(value))
 
 
-def table_rows(batch: RecordBatch, cells: Mapping[str, Any], columns: Iterable[str], style: Style) -> list[Spans]:
-    """Return the rows of a batch as lines of CSV; cells: those of the result with marks."""
+def leaf_mark(number: int) -> str:
+    """Return the mark of a scalar."""
+    return f"73105857{number:07d}"
+
+
+def in_table(cells: Mapping[str, Any], columns: Iterable[str], style: Style) -> list[tuple[str, Syntax]]:
+    """Return a line of CSV of the cells of a result with marks."""
     parts: list[tuple[str, Syntax]] = []
     exact = style.changed(precision=None, screen=False)
     for at, name in enumerate(columns):
         value = cells.get(name, "")
         parts += [("," * (at > 0) + cell(value, exact), IN_CELL if isinstance(value, (dict, list)) else CELL)]
-    return _filled(batch, [*parts, ("\n", CELL)], style)
+    return [*parts, ("\n", CELL)]
 
 
-def document_rows(batch: RecordBatch, text: str, style: Style) -> list[Spans]:
-    """Return the rows of a batch as lines of JSON or documents of YAML; text: that of the result with marks."""
-    return _filled(batch, [(text, YAML if style.format == "yaml" else JSON)], style)
+def in_document(text: str, style: Style) -> list[tuple[str, Syntax]]:
+    """Return a line of JSON or a document of YAML: the text of a result with marks."""
+    return [(text, YAML if style.format == "yaml" else JSON)]
 
 
-def _filled(batch: RecordBatch, parts: Sequence[tuple[str, Syntax]], style: Style) -> list[Spans]:
-    """Put what the rows have in the places of marks."""
-    size, columns = len(batch.places), batch.marked.numbers
+def filled(
+    parts: Sequence[tuple[str, Syntax]], style: Style, columns: Mapping[str, int], results: Floats,
+    scalar: Callable[[str, Syntax], tuple[Spans, str]],
+) -> list[Spans]:  # fmt: skip
+    """Put what the rows have in the places of marks.
+
+    columns: which column of the results is marked by a number's text
+    scalar: what rows have in the place of another mark, as it is written there, and the quotes around it
+    """
+    size, width = results.shape
     marks = rf"(?<![\w.+-])(?:{'|'.join([*map(re.escape, columns), str(STAMP_NS)])})(?![\w.+-])"
-    width = batch.results.shape[1]
-    numbers = number_spans(batch.results, style.precision, b"," * width, yaml=style.format == "yaml") if width else None
+    numbers = number_spans(results, style.precision, b"," * width, yaml=style.format == "yaml") if width else None
     found: list[Spans] = []
     waiting = ""
     for text, syntax in parts:
@@ -70,12 +85,8 @@ def _filled(batch: RecordBatch, parts: Sequence[tuple[str, Syntax]], style: Styl
             if numbers is not None and mark in columns:
                 at = columns[mark]
                 made = Spans(numbers.data, numbers.starts[:, at], numbers.ends[:, at] - 1)
-            elif mark in (PARENT, NAME):
-                made = _words(batch.parents if mark == PARENT else batch.names, size, syntax)
-            elif mark == str(STAMP_NS) and batch.stamps_ns is not None:
-                made = spans_of([b"%d" % stamp for stamp in batch.stamps_ns.tolist()])
-            elif leaf := LEAF.fullmatch(mark):
-                made, around = _leaf(batch, int(leaf[1]), syntax)
+            elif mark in (PARENT, NAME, str(STAMP_NS)) or LEAF.fullmatch(mark):
+                made, around = scalar(mark, syntax)
                 waiting += around
             else:
                 waiting += piece
@@ -85,27 +96,7 @@ def _filled(batch: RecordBatch, parts: Sequence[tuple[str, Syntax]], style: Styl
     return [*found, constant(waiting.encode(), size)] if waiting else found
 
 
-def _leaf(batch: RecordBatch, at: int, syntax: Syntax) -> tuple[Spans, str]:
-    """Return a scalar of the records as it is written in a place, and the quotes around it."""
-    node, found = batch.leaf(at)
-    is_cell = syntax is CELL
-    if node.quote:
-        passes = (is_cell or not (found.data > LAST_ASCII).any()) and not _holds(found, syntax.unsafe)
-    else:
-        passes = batch.cut.template.json or is_cell
-        passes = passes and not (is_cell and (found.data[found.starts] == ord("n")).any())  # it may be null
-    if passes:
-        return found, syntax.quote if node.quote else ""
-    return _words(plain_texts(batch, at), len(batch.places), syntax), ""
-
-
-def _holds(cells: Spans, characters: bytes) -> bool:
-    """Return True if any cell holds one of some characters."""
-    counts = np.concatenate([[0], np.cumsum(np.isin(cells.data, [*characters]), dtype=np.int32)])
-    return bool((counts[cells.ends] > counts[cells.starts]).any())
-
-
-def _words(values: Sequence[Any], size: int, syntax: Syntax) -> Spans:
+def words(values: Sequence[Any], size: int, syntax: Syntax) -> Spans:
     """Return plain values as they are written in a place, one a row or one for all."""
-    known = {value: syntax.write(value).encode() for value in values}
+    known = {value: syntax.write(value).encode() for value in dict.fromkeys(values)}
     return spans_of([known[value] for value in values]) if len(values) == size else constant(known[values[0]], size)

@@ -6,17 +6,17 @@ be, the format writes row after row as it writes single results.  Other columns 
 
 from __future__ import annotations
 
-import re
+from functools import partial
 from importlib import import_module
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from frametool.documents.json import dump
 from frametool.documents.source import Verbatim
 from frametool.errors import ValueInvalid, listing, warn
-from frametool.formats.rows.csv import quoted
+from frametool.formats.rows.csv import cells_of, row
 from frametool.formats.rows.pose_rows import (
     IMAGE,
     MOST_NAMED,
@@ -31,13 +31,13 @@ from frametool.formats.rows.pose_rows import (
     turned,
 )
 from frametool.formats.table import FORMATS
+from frametool.formats.trees import written_poses
 from frametool.frames.stamps import BILLION
 from frametool.geometry import arrays, floats, quaternion, rigid
 from frametool.geometry.representations import notation
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.result import Result, with_entries
-from frametool.stream.header import XYZ
 from frametool.stream.layout import Const, In, Out
 from frametool.stream.row_layout import POSE, SIX, Target
 from frametool.stream.row_poses import (
@@ -52,23 +52,33 @@ from frametool.stream.row_poses import (
     texts_of,
 )
 from frametool.stream.rows import assemble, number_spans, separators, spans_of
+from frametool.stream.text_rows import (
+    CELL,
+    MORE_NUMBERS,
+    NAME,
+    NUMBERS,
+    PARENT,
+    STAMP_NS,
+    filled,
+    in_document,
+    in_table,
+    leaf_mark,
+    words,
+)
 from frametool.text.spans import Spans, join
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from frametool.geometry.place import Place
     from frametool.geometry.types import Components
     from frametool.grammar.result import Style
     from frametool.stream.layout import Piece
     from frametool.stream.row_poses import RowPoses
+    from frametool.stream.text_rows import Syntax
     from frametool.text.spans import Floats
 
 LEARNED = ("csv", "json", "yaml")
-PROBE_NS = 1234567890987654321
-PROBE = (0.1370842961, -3.7208412957, 29.6518402397, 0.22360679774997896, -0.37416573867739417, 0.5099019513592785,
-         0.7416198487095663)  # fmt: skip
-MARK = "@@{}@@"
 
 
 def target_in(style: Style, kind: str, *, placed: bool) -> Target:
@@ -120,12 +130,12 @@ class TextWriter:
         self.placed = placed or kind != POSE
         self.target = target_in(style, kind, placed=placed)
         far = 1.0 if self.target.place is None else 1e6  # nothing near the Earth's centre has a latitude
-        self.probe = (*(far * part for part in PROBE[:3]), *PROBE[3:])
+        size = {POSE: 7, **dict.fromkeys(SIX, 6)}.get(kind, 3)
+        self.probe = (*(far * part for part in NUMBERS[:3]), *NUMBERS[3:size])
+        self.more = [MORE_NUMBERS + at for at in range(len(self.extras))]
         self.count = 0
         self.dropped: dict[str, None] = {}
-        self.rows: RowForm | None = None
-        self.looked = False  # whether the format was seen to write a row
-        self.order: list[int] = []
+        self.known: dict[tuple[Any, ...], Alike | None] = {}
         self.first: Any = None
         self.empty: RowPoses | None = None  # a block without rows says what columns there are
 
@@ -147,7 +157,11 @@ class TextWriter:
         text = b""
         for start, end in pairwise(cuts):
             run = block if len(cuts) == 2 else kept(block, slice(start, end))
-            text += self._fixed(self.fixed, run) if self.fixed else self._free(run, is_null=bool(absent[start]))
+            if self.fixed:
+                text += self._fixed(self.fixed, run)
+            else:
+                alike = None if absent[start] else self._alike(run)
+                text += self._one_by_one(run) if alike is None else self._filled(alike, run)
             self.count += end - start
         return text
 
@@ -157,13 +171,10 @@ class TextWriter:
             if self.dropped:
                 warn(f"{self.style.format}: {listing(self.dropped, MOST_NAMED)} left out")
             if self.style.format == "csv" and not self.count and self.empty is not None:
-                self._learn(self.empty)
-                yield self.rows.head if self.rows is not None else b""
+                yield self._learned(self.empty).head
             return
         self.dropped_fields.tell()
         yield self.fixed.tail if self.count else self.fixed.head + self.fixed.tail
-
-    # --- formats that say what a row is ---
 
     def _fixed(self, fmt: RowForm, block: RowPoses) -> bytes:
         dropped = self.dropped_fields
@@ -182,12 +193,8 @@ class TextWriter:
         pose = turned(self.style, (tx, ty, tz, *quaternion.unit(x, y, z, w, arrays)))
         tx, ty, tz, x, y, z, w = rigid.inverse(*pose) if FORMATS[self.style.format].poses.inverse else pose
         turn = (x, y, z, w) if self.style.keep_sign else quaternion.from_quaternion(x, y, z, w, arrays)
-        return self._joined(fmt, np.array(fmt.numbers(tx, ty, tz, *turn)).T + 0.0, block)  # none is -0.0
-
-    def _joined(self, fmt: RowForm, values: Floats, block: RowPoses) -> bytes:
-        """Put the rows of a block together."""
-        if not np.isfinite(values).all():
-            raise ValueInvalid("a result is too large for a double")
+        values = np.array(fmt.numbers(tx, ty, tz, *turn)).T + 0.0  # none is -0.0
+        _refuse_infinite(values)
         pieces: list[Piece] = [Const(fmt.between)] if fmt.between else []
         parts: list[Spans] = []
         first = 0
@@ -200,16 +207,13 @@ class TextWriter:
             else:
                 pieces.append(In(len(parts)))
                 parts.append(self._field(piece, block, fmt.first))
-        after, is_yaml = separators(pieces), self.style.format == "yaml"
-        numbers = number_spans(np.ascontiguousarray(values), self.style.precision, after, yaml=is_yaml)
+        numbers = number_spans(np.ascontiguousarray(values), self.style.precision, separators(pieces))
         text = join(assemble(pieces, parts, numbers, np.zeros(len(values), np.int64)))
         return text if self.count else fmt.head + text[len(fmt.between) :]
 
     def _field(self, name: str, block: RowPoses, first: int) -> Spans:
         """Return what is written in one field of each row."""
         size = len(block.numbers)
-        if name.startswith("@@"):
-            return self._cells(name, block)
         stamps = self._stamps(block)
         if name == IMAGE:
             images = texts_of(block.extras[IMAGE]) if IMAGE in block.extras else [None] * size
@@ -227,103 +231,77 @@ class TextWriter:
         stamps: list[int] = block.stamps_ns.tolist()
         return stamps
 
-    def _cells(self, mark: str, block: RowPoses) -> Spans:
-        """Return a column of names or of what is not ours, as the format writes texts."""
-        what = mark[2:-2]
-        if what in ("name", "parent"):
-            texts: Sequence[str | None] = block.names if what == "name" else block.parents
-            texts = list(texts) * (len(block.numbers) if len(texts) == 1 else 1)
-        elif self.style.format != "csv" and not isinstance(cells := list(block.extras.values())[int(what)], Spans):
-            return spans_of([dump(value).encode() for value in plain_cells(cells)])
-        else:
-            texts = texts_of(list(block.extras.values())[int(what)])
-        in_csv = self.style.format == "csv"
-        known = {text: (quoted(text or "") if in_csv else dump(plain_cell(text or ""))).encode() for text in {*texts}}
-        return spans_of([known[text] for text in texts])
-
     # --- formats whose rows depend on what is written ---
 
-    def _free(self, block: RowPoses, *, is_null: bool) -> bytes:
-        """Write a block as the format was seen to write poses; one by one where unseen, or angles are not unique."""
-        if is_null:
-            return self._one_by_one(block)
-        if not self.looked:
-            self.looked = True
-            self._learn(block)
-            if self.rows is not None and self._filled(self.rows, first_of(block)) != self._one_by_one(first_of(block)):
-                self.rows = None
-        locked = self.target.locked(columns_of(block, placed=self.placed)[:7])
-        if self.rows is None or (locked is not None and bool(np.any(locked))):
-            return self._one_by_one(block)
-        return self._filled(self.rows, block)
-
-    def _filled(self, rows: RowForm, block: RowPoses) -> bytes:
-        """Fill the numbers of a block into the rows that were learned."""
-        written = self.target.written(block.unmoved(columns_of(block, placed=self.placed)), arrays)
-        values = np.empty((len(block.numbers), len(self.order)))
-        for at, place in enumerate(self.order):
-            values[:, at] = written[place]
-        values += 0.0  # none is -0.0
-        return self._joined(rows, values, block)
-
-    def _learn(self, block: RowPoses) -> None:
-        """See how the format writes a pose whose numbers are all different, and take them for places to fill in."""
-        style = self.style.changed()
-        style.precision = None
-        varies = block.extras or {len(block.names), len(block.parents)} != {1}
+    def _alike(self, block: RowPoses) -> Alike | None:
+        """Return how rows are written that are alike; None where they are not, or angles are not unique."""
+        alone = [each[0] if len(each) == 1 else len(each) > 0 for each in (block.names, block.parents)]
+        varies = bool(block.extras) or True in alone
         is_worded = self.target.place is not None and bool(self.target.place.words)
-        if style.format not in LEARNED or (style.format == "yaml" and varies) or is_worded:
-            return
-        probe = self._probe(block)
-        alone, twice = (self.write([probe] * count, style) for count in (1, 2))
-        row = twice[len(alone) :]
-        head, between = (alone[: -len(row)], "") if alone.endswith(row) else ("", row[: -len(alone)])
-        row = row[len(between) :]
-        own = self.probe[: self._size]
-        extra = (0.7310585786300049 + at for at in range(len(self.extras)))
-        written = [*self.target.written(own, floats), *extra]
-        marks = {repr(value): at for at, value in enumerate(written) if type(value) is float}
-        marks |= {MARK.format(what): -1 for what in ("name", "parent", *range(len(block.extras)))}
-        marks[str(PROBE_NS)] = -1
-        pieces: list[str | bytes | Numbers] = []
-        for text in re.split("(" + "|".join(map(re.escape, marks)) + ")", row):
-            if text not in marks:
-                pieces += [text.encode()] if text else []
-            elif marks[text] >= 0:
-                pieces.append(Numbers(1, b""))
-                self.order.append(marks[text])
-            else:
-                pieces.append("nanoseconds" if text == str(PROBE_NS) else text)
-        self.rows = RowForm(tuple(pieces), head=head.encode(), between=between.encode())
+        if self.style.format not in LEARNED or (self.style.format == "yaml" and varies) or is_worded:
+            return None
+        locked = self.target.locked(columns_of(block, placed=self.placed)[:7])
+        if locked is not None and bool(np.any(locked)):
+            return None
+        key = (*alone, *block.extras, block.stamps_ns is None)
+        if key not in self.known:
+            alike, first = self._learned(block), first_of(block)
+            self.known[key] = alike if self._filled(alike, first) == self._one_by_one(first) else None
+        return self.known[key]
 
-    @property
-    def _size(self) -> int:
-        return len(PROBE) if self.kind == POSE else 6 if self.kind in SIX else len(XYZ)
+    def _learned(self, block: RowPoses) -> Alike:
+        """Write a result whose numbers, and what differs from row to row, are marks."""
+        style, probe = self.style.changed(precision=None, screen=False), self._probe(block)
+        numbers = [*self.target.written(self.probe, floats), *self.more]
+        columns = {repr(number): at for at, number in enumerate(numbers) if type(number) is float}
+        if style.format == "csv":
+            cells = cells_of(probe, style)
+            return Alike(in_table(cells, cells, style), columns, row(cells, style).encode())
+        parting = "---\n" if style.format == "yaml" else ""
+        return Alike(in_document(parting + written_poses.write_poses([probe], style), style), columns)
 
     def _probe(self, block: RowPoses) -> Any:
         """Make a result with what this block's have; what differs from row to row is marked."""
         name, parent = (
-            each[0] if len(each) == 1 else Verbatim(MARK.format(what))
-            for what, each in (("name", block.names), ("parent", block.parents))
+            each[0] if len(each) == 1 else mark for mark, each in ((NAME, block.names), (PARENT, block.parents))
         )
-        if self.kind != POSE:
-            named = {} if parent is None else {"frame": parent}
-            if self.target.place is not None:
-                from frametool.grammar.place import point_entry
-
-                named = point_entry(EARTH_FRAMES[0], self.probe[:3], self.target.place)
-                return named | self._probe_extras(block)
-            return named | spelled(self.kind, PROBE[: self._size]) | self._probe_extras(block)
-        pose = Pose.of(self.probe, name, parent)
-        return Result(pose if self.placed else pose._replace(position=None), self._probe_extras(block))
-
-    def _probe_extras(self, block: RowPoses) -> dict[str, Any]:
-        extras: dict[str, Any] = {name: 0.7310585786300049 + at for at, name in enumerate(self.extras)}
+        extras: dict[str, Any] = dict(zip(self.extras, self.more, strict=True))
         if self.style.format != "csv":
             extras = with_entries(extras)
         if block.stamps_ns is not None:
-            extras["stamp_ns"] = PROBE_NS
-        return extras | {name: Verbatim(MARK.format(at)) for at, name in enumerate(block.extras)}
+            extras["stamp_ns"] = STAMP_NS
+        extras |= {name: Verbatim(leaf_mark(at)) for at, name in enumerate(block.extras)}
+        if self.kind == POSE:
+            pose = Pose.of(self.probe, name, parent)
+            return Result(pose if self.placed else pose._replace(position=None), extras)
+        if self.target.place is not None:
+            from frametool.grammar.place import point_entry
+
+            return point_entry(EARTH_FRAMES[0], self.probe, self.target.place) | extras
+        return ({} if parent is None else {"frame": parent}) | spelled(self.kind, self.probe) | extras
+
+    def _filled(self, alike: Alike, block: RowPoses) -> bytes:
+        """Put the rows of a block in the places of marks."""
+        numbers = self.target.written(block.unmoved(columns_of(block, placed=self.placed)), arrays)
+        values = np.stack(np.broadcast_arrays(*numbers), axis=-1) + 0.0  # none is -0.0
+        _refuse_infinite(values)
+        text = join(filled(alike.parts, self.style, alike.columns, values, partial(self._scalar, block)))
+        if self.count:
+            return text
+        return alike.head + text[4 * (self.style.format == "yaml") :]
+
+    def _scalar(self, block: RowPoses, mark: str, syntax: Syntax) -> tuple[Spans, str]:
+        """Return what rows have in the place of a mark, as it is written there."""
+        if mark == str(STAMP_NS) and block.stamps_ns is not None:
+            return spans_of([b"%d" % stamp for stamp in block.stamps_ns.tolist()]), ""
+        if mark in (NAME, PARENT):
+            return words(block.names if mark == NAME else block.parents, len(block.numbers), syntax), ""
+        cells = list(block.extras.values())[int(mark[-7:])]
+        if syntax is CELL or isinstance(cells, Spans):
+            texts = texts_of(cells)
+            known = {text: syntax.write(text if syntax is CELL else plain_cell(text)).encode() for text in {*texts}}
+            return spans_of([known[text] for text in texts]), ""
+        return spans_of([dump(value).encode() for value in plain_cells(cells)]), ""
 
     def _one_by_one(self, block: RowPoses) -> bytes:
         """Write the rows as the format does for single results."""
@@ -336,6 +314,19 @@ class TextWriter:
         known = "" if not self.count else self.write([first], self.style)
         text = self.write(results if not self.count else [first, *results], self.style)
         return text[len(known) :].encode()
+
+
+class Alike(NamedTuple):
+    """The text of rows that are alike, with marks; which number each mark stands for; what is before the first row."""
+
+    parts: Sequence[tuple[str, Syntax]]
+    columns: Mapping[str, int]
+    head: bytes = b""
+
+
+def _refuse_infinite(values: Floats) -> None:
+    if not np.isfinite(values).all():
+        raise ValueInvalid("a result is too large for a double")
 
 
 def refuse_scale_in(fmt: str, extra: Iterable[str]) -> None:

@@ -10,6 +10,13 @@ import numpy as np
 import pytest
 from clouds import pcd, pcd_rows, ply, ply_rows
 
+from frametool.geometry.representations import notation
+from frametool.grammar.pose import Pose
+from frametool.grammar.result import Result, Style
+from frametool.stream.row_layout import NOWHERE
+from frametool.stream.row_poses import block_of
+from frametool.stream.writers import TextWriter
+
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
@@ -68,3 +75,11 @@ def moved(run: Run, tmp_path: Path) -> Callable[[str, str], bytes]:
 def test_any_form_becomes_any_other_with_the_same_bits(moved: Callable[[str, str], bytes], form: str, into: str) -> None:
     wanted = np.array(FORMS["csv"][1](moved("csv", "csv")))
     assert np.array(FORMS[into][1](moved(form, into)), np.float64).tobytes() == wanted.tobytes()
+
+
+@pytest.mark.parametrize("form", ["csv", "json"])
+def test_blocks_whose_rows_all_name_one_frame_each_name_their_own(form: str) -> None:
+    writer = TextWriter(Style(form, (notation("quaternion"),)))
+    texts = [writer.of_block(block_of([Result(Pose.of(NOWHERE, None, frame))] * 2)).decode() for frame in ("map", "odom")]
+    assert ["map" in text for text in texts] == [True, False]
+    assert ["odom" in text for text in texts] == [False, True]
