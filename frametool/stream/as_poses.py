@@ -25,7 +25,7 @@ from frametool.stream.row_layout import POINT, POSE, Shape, Target
 from frametool.stream.row_poses import RowPoses, kept
 from frametool.stream.rows import Block, spans_of
 from frametool.stream.table import rename_of
-from frametool.stream.table_stream import TableRows, begin_table
+from frametool.stream.table_stream import TableRows
 from frametool.stream.writers import LEARNED, TextWriter
 
 if TYPE_CHECKING:
@@ -154,13 +154,12 @@ class FormatConverter:
         """Yield the rows of a table, with the stamps of a file, their own, or their numbers as seconds."""
         fmt = FORMATS[self.fmt].poses
         file = StampFile(self.answers.stamps) if self.answers.stamps else None
-        begun = begin_table(stream, self.fmt, self.request, source=self.source, header=header)
-        rows = TableRows(begun.table, self.request, self.source)
+        rows = TableRows(stream, self.fmt, self.request, self.source, header=header)
         self._begin(rows, line=1)
         none = RowPoses(np.empty((0, 7)), None, np.empty(0, np.int64), [None], [None], {})
-        yield none, Outcome(b"", lines=begun.lines, size=begun.taken)
+        yield none, Outcome(b"", lines=rows.lines, size=rows.taken)
         count = 0
-        for block, _, outcome in rows.blocks(begun):
+        for block, _, outcome in rows.blocks():
             before, count = count, count + len(block.numbers)
             poses = self._with_place(block)
             if self.looks_up_places:

@@ -132,19 +132,20 @@ class ColumnRows(PlannedRows):
             gone=self._without_pose(absent), frames=[frames],
         )  # fmt: skip
         run = self.ran(block)
-        self._round(run)
+        for number, kind in self.narrow.items():
+            with np.errstate(over="ignore"):  # bad rows, no infinities
+                run.refuse(~np.isfinite(run.results[:, number].astype(kind)), f"the result is too large for {kind}")
         self.faults = run.faults()
         self.notes = self.notes_of(run)
+        first, targets = 0, self.plan.targets
+        for flags, target in zip(absent, targets, strict=False):
+            last = first + target.size if len(targets) > 1 else None
+            run.results[flags, first:last] = np.nan
+            first += target.size
         rows, numbers = run.settled()
         if self.request.on_error == STOP and run.reasons:
             stay = rows < min(run.reasons)
             rows, numbers = rows[stay], numbers[stay]
-        ends = np.cumsum([target.size for target in self.plan.targets]).tolist()
-        several = len(ends) > 1  # results, each of a shape of its own
-        for at, flags in enumerate(absent):
-            if flags is not None:
-                first, last = (ends[at] - self.plan.targets[at].size, ends[at]) if several else (0, numbers.shape[1])
-                numbers[flags[rows], first:last] = np.nan
         return RowResults(run, rows, numbers)
 
     def outcome(self, batch: Batch, text: bytes = b"") -> Outcome:
@@ -157,44 +158,36 @@ class ColumnRows(PlannedRows):
         run, rows, numbers = self.of_batch(batch)
         return self.poses_of(run, rows, numbers, batch.column, rows)
 
-    # --- what is read ---
-
-    def _read(self, batch: Batch) -> tuple[Floats, list[Flags | None], dict[int, tuple[str, str]]]:
+    def _read(self, batch: Batch) -> tuple[Floats, Flags, dict[int, tuple[str, str]]]:
         """Return our numbers (n, c); for each shape which rows have none, which count as 0; and rows that are bad."""
-        places, formula = self.layout.places, self.request.operation.formula
+        places, shapes = self.layout.places, self.plan.shapes
         columns = np.empty((len(places), batch.size))
-        absent: list[Flags | None] = []
+        absent = np.zeros((max(len(shapes), 1), batch.size), np.bool_)
         bad: dict[int, tuple[str, str]] = {}
         first = 0
-        for shape in self.plan.shapes:
-            flags: Flags | None = None
+        for flags, shape in zip(absent, shapes, strict=False):
             for at in range(first, first + shape.size):
                 if at in self.plan.words:
                     columns[at], reasons = coded_texts(batch.texts(places[at])).numbers(self.plan.words[at])
                     bad |= {row: (self.plan.names[at], reason) for row, reason in reasons.items()}
                     continue
                 columns[at], missing = batch.numbers(places[at])
-                invalid = not_finite(columns[at])
-                if invalid is not None and not self.file.gaps:
+                if missing is not None:
+                    np.logical_or(flags, missing, out=flags)
+                if (invalid := not_finite(columns[at])) is not None and self.file.gaps:
+                    np.logical_or(flags, invalid, out=flags)
+                elif invalid is not None:
                     wrong = invalid if missing is None else invalid & ~missing
                     bad |= dict.fromkeys(np.flatnonzero(wrong).tolist(), (self.plan.names[at], "not finite"))
-                else:
-                    missing = _either(missing, invalid)
-                flags = _either(flags, missing)
-            if flags is not None:
-                columns[first : first + shape.size, flags] = 0.0 if formula is None else np.nan
-            absent.append(flags)
+            columns[first : first + shape.size, flags] = 0.0 if self.request.operation.formula is None else np.nan
             first += shape.size
-        return columns.T, absent or [None], bad
+        return columns.T, absent, bad
 
-    def _without_pose(self, absent: Sequence[Flags | None]) -> Ints | None:
+    def _without_pose(self, absent: Flags) -> Ints | None:
         """Return which rows cannot be computed: 0 is a point, but no rotation."""
-        gone: Flags | None = None
-        request = self.request
-        for shape, flags in zip(self.plan.shapes, absent, strict=False):
-            if shape.notation is not None or request.operation.formula is not None or request.gathered is not None:
-                gone = _either(gone, flags)
-        return None if gone is None else np.flatnonzero(gone)
+        computes = self.request.operation.formula is None and self.request.gathered is None
+        rows = [flags for flags, shape in zip(absent, self.plan.shapes, strict=False) if shape.notation or not computes]
+        return np.flatnonzero(np.logical_or.reduce(rows)) if np.any(rows) else None
 
     def _stamps(self, batch: Batch) -> tuple[list[Any], dict[int, tuple[str, str]]]:
         """Read the stamps, weights or labels of rows, and which of them have none."""
@@ -211,26 +204,9 @@ class ColumnRows(PlannedRows):
         if request.gathered is not None and request.gathered.labelled:
             return [np.array(batch.texts(place), object)], {}
         weights, nulls = batch.numbers(place)
-        invalid = _either(nulls, not_finite(weights))
-        bad = [] if invalid is None else np.flatnonzero(invalid).tolist()
-        weights[bad] = 0.0
-        return [weights], dict.fromkeys(bad, (name, "not finite"))
-
-    # --- what becomes of it ---
-
-    def _round(self, run: Run) -> None:
-        """Find results that are too large for the type of their column: bad rows, no infinities."""
-        for number, kind in self.narrow.items():
-            with np.errstate(over="ignore"):
-                beyond = ~np.isfinite(run.results[:, number].astype(kind))
-            if beyond.any():
-                run.refuse(beyond, f"the result is too large for {kind}")
-
-
-def _either(first: Flags | None, second: Flags | None) -> Flags | None:
-    if first is None or second is None:
-        return first if second is None else second
-    return first | second
+        invalid = ~np.isfinite(weights) if nulls is None else nulls | ~np.isfinite(weights)
+        weights[invalid] = 0.0
+        return [weights], dict.fromkeys(np.flatnonzero(invalid).tolist(), (name, "not finite"))
 
 
 def run_columns(
@@ -240,9 +216,8 @@ def run_columns(
     rows = ColumnRows(file, request, source)
     columns = rows.out_columns(named=into is not None)
     move_along(file, request)
-    if rows.narrow and not request.gathered:
-        kinds = ", ".join(sorted({kind.name for kind in rows.narrow.values()}))
-        warn(f"{source}: {kinds} columns are computed as float64 and rounded once")
+    if not request.gathered:
+        _say_rounded([rows], f"{source}: ")
     drops = request.on_error == SKIP or request.operation.velocity
     writer: ColumnWriter | None = None
     other = None if into is None else ColumnsWriter(style, into)
@@ -283,8 +258,7 @@ class MergedClouds:
         others = dict.fromkeys(name for columns in every for name in columns if name not in self.kinds)
         if others:
             warn(f"{listing(others)} left out: not all of the clouds have it")
-        if narrow := {kind.name for _, rows in self.parts for kind in rows.narrow.values()}:
-            warn(f"{', '.join(sorted(narrow))} columns are computed as float64 and rounded once")
+        _say_rounded([rows for _, rows in self.parts])
         for file, request, _ in files:
             move_along(file, request)
 
@@ -301,6 +275,12 @@ class MergedClouds:
             }
             text = self.writer.of_columns(len(results.numbers), typed)
             yield rows.outcome(batch, text)
+
+
+def _say_rounded(every: Sequence[ColumnRows], begin: str = "") -> None:
+    """Warn of columns of fewer digits than results are computed with."""
+    if kinds := sorted({kind.name for rows in every for kind in rows.narrow.values()}):
+        warn(f"{begin}{', '.join(kinds)} columns are computed as float64 and rounded once")
 
 
 def _in_other_format(

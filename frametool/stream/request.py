@@ -14,7 +14,7 @@ from frametool.geometry.representations import HEADING, notation
 from frametool.geometry.rigid import EXACT, SCALED, UNCERTAIN
 from frametool.grammar.pose import SCALE, VELOCITY
 from frametool.stream.faults import STOP
-from frametool.stream.row_layout import MOVERS, POINT, POSE, RATE, SIX, TURNED, VECTOR, Shape, Target, pose_of
+from frametool.stream.row_layout import MOVERS, POINT, POSE, RATE, SIX, TURNED, VECTOR, Shape, Target
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -310,7 +310,8 @@ class Operation(NamedTuple):
         first, second = (*others, result) if self.of == "first" else (result, *others)
         exact = len(first) == len(second) == EXACT
         result = rigid.relative(*first, *second) if exact else _placed().relative(first, second)
-        metres, angle = rigid.extent(*pose_of(result[:3], result[3:EXACT]), xp)
+        tx, ty, tz, x, y, z, w = result[:EXACT]
+        metres, angle = rigid.extent(tx, ty, tz, x, y, z, w, xp)
         return (*result[:EXACT], metres, angle, angle * RADIAN, *result[EXACT:])
 
 
@@ -344,7 +345,7 @@ def _placed() -> Any:
 
 def thing_pose(shape: Shape, own: Components, rotation: Callable[[Components], Components]) -> Rigid:
     """Return the pose that numbers say, which may be the inverse of what is written."""
-    pose = pose_of(shape.position(own), shape.turned(own, rotation(own)))
+    pose: Any = (*shape.position(own), *shape.turned(own, rotation(own)))
     return rigid.inverse(*pose) if shape.inverse else pose
 
 

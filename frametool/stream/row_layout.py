@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from frametool.geometry.place import Place, Spot
     from frametool.geometry.representations import Notation, Whole
-    from frametool.geometry.types import Components, Namespace, Quaternion, Rigid
+    from frametool.geometry.types import Components, Namespace, Quaternion
 
 POINT, VECTOR, POSE, TWIST, WRENCH, ACCEL = "point", "vector", "pose", "twist", "wrench", "accel"
 ROTATION = "rotation"  # without a position, which no move gives it
@@ -315,13 +315,6 @@ def count_of(unit: Unit | None) -> int:
 def _each(unit: Any) -> tuple[float, float, float]:
     """Return the unit of x, y and z each."""
     return unit if type(unit) is tuple else (unit, unit, unit)
-
-
-def pose_of(position: Components, rotation: Components) -> Rigid:
-    """Join position and quaternion."""
-    x, y, z = position
-    qx, qy, qz, qw = rotation
-    return x, y, z, qx, qy, qz, qw
 
 
 def checked_rotation(

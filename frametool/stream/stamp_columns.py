@@ -17,7 +17,7 @@ from frametool.stream.row_layout import NOWHERE
 from frametool.stream.row_poses import NO_STAMP, texts_of
 from frametool.stream.rows import numbered, read_each
 from frametool.stream.stamp_source import read_header_stamp, read_stamp
-from frametool.text.digits import ZEROS, first_point, not_digits, read_eight_digits
+from frametool.text.digits import TENS, ZEROS, first_point, not_digits, read_eight_digits
 from frametool.text.numbers import parse_number
 from frametool.text.parse import LOWEST, parse_floats, trimmed
 from frametool.text.spans import windows
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Rigid
     from frametool.stream.request import Request
     from frametool.stream.stamp_source import Timed
-    from frametool.text.spans import Bytes, Flags, Floats, Ints, Spans, Words
+    from frametool.text.spans import Bytes, Flags, Ints, Spans, Words
 
     Blame = Callable[[int, str, str | FrametoolError], None]
 
@@ -37,7 +37,7 @@ _LONGEST = 8 * _WORDS
 _MOST = (1 << 63) - 1
 _MOST_SECONDS = _MOST // BILLION
 _MOST_UPPER = (1 << 63) // 10**16
-_BELOW_NS = np.uint64(10**7)
+_NINE = 9  # decimals of a second in nanoseconds
 
 
 def read_extra(cells: Sequence[Spans], request: Request, name: str) -> tuple[Any, dict[int, tuple[str, str]]]:
@@ -85,8 +85,11 @@ def _parse_plain(data: Bytes, starts: Ints, ends: Ints, *, in_ns: int) -> tuple[
     ends = ends - 2 * suffixed
     points = starts + _point(data, starts, ends)
     whole, sure = _integer(data, points, points - starts)
-    below, fine = _fraction(data, points + 1, ends - points - 1)
-    sure &= fine & (ends - starts <= _LONGEST) & (ends - starts > (points < ends))
+    decimals = np.maximum(ends - points - 1, 0)
+    digits, fine = _integer(data, ends, decimals)
+    finer = TENS.take(decimals - _NINE, mode="clip")  # what is finer than a nanosecond must be 0
+    below = digits // finer * TENS.take(_NINE - decimals, mode="clip")
+    sure &= fine & (digits % finer == 0) & (ends - starts <= _LONGEST) & (ends - starts > (points < ends))
     is_whole = points == ends
     each = np.where(suffixed, 1, in_ns or np.where(is_whole, nanoseconds_each(whole), BILLION))
     sure &= (is_whole | ~(suffixed | bool(in_ns))) & (whole < _MOST // each)
@@ -121,33 +124,19 @@ def _integer(data: Bytes, ends: Ints, length: Ints) -> tuple[Ints, Flags]:
     return total.view(np.int64), (wrong == 0) & (upper < _MOST_UPPER)
 
 
-def _fraction(data: Bytes, starts: Ints, length: Ints) -> tuple[Ints, Flags]:
-    """Read so many digits from `starts` as nanoseconds; what is finer must be 0."""
-    characters = windows(data, 16)[starts].view("<u8").reshape(-1, 2)
-    first, second = ((characters[:, word] ^ ZEROS) & LOWEST.take(length - 8 * word, mode="clip") for word in range(2))
-    sure = (not_digits(first) | not_digits(second)) == 0
-    rest = read_eight_digits(second)
-    nanoseconds = read_eight_digits(first) * np.uint64(10) + rest // _BELOW_NS
-    return nanoseconds.view(np.int64), sure & (rest % _BELOW_NS == 0) & (length <= 16)
-
-
 def by_frame(edge_of: Callable[..., Rigid], frames: Sequence[str | None], blame: Blame, column: str = "") -> Rigid:
     """Return the pose of each row by its frame's name; a row whose frame has none is bad."""
     known, codes = numbered(frames)
-    edges = [_edge(edge_of, name) for name in known]
-    for at, (_, problem) in enumerate(edges):
-        for row in np.flatnonzero(codes == at).tolist() if problem else ():
-            blame(row, column, problem or "")
-    columns = zip_longest(*(edge for edge, _ in edges), fillvalue=0.0)
+    edges = []
+    for name, at in known.items():
+        try:
+            edges.append(edge_of(name))
+        except FrametoolError as error:
+            edges.append(NOWHERE)
+            for row in np.flatnonzero(codes == at).tolist():
+                blame(row, column, error)
+    columns = zip_longest(*edges, fillvalue=0.0)
     return tuple(np.array(each)[codes] for each in columns)  # type: ignore[return-value]
-
-
-def _edge(edge_of: Callable[..., Rigid], name: str | None) -> tuple[Rigid, FrametoolError | None]:
-    """Return the edge of a frame, or why there is none."""
-    try:
-        return edge_of(name), None
-    except FrametoolError as error:
-        return NOWHERE, error
 
 
 def by_time(
@@ -159,34 +148,19 @@ def by_time(
     frames: one a row, or one for all (None: the one SOURCE); column: the one that names them
     """
     poses = np.full((timed.width, len(times)), np.nan)
-    for frame, some in _by_frame(frames, rows):
-        _fill(poses, timed, frame, some, times, blame, column)
-    return tuple(poses)  # type: ignore[return-value]
-
-
-def _by_frame(frames: Sequence[str | None], rows: Ints) -> list[tuple[str | None, Ints]]:
-    """Part rows by their frames."""
-    if len(set(frames)) == 1:
-        return [(frames[0], rows)]
     known, codes = numbered(frames)
-    return [(frame, rows[codes[rows] == number]) for frame, number in known.items()]
-
-
-def _fill(poses: Floats, timed: Timed, frame: str | None, rows: Ints, times: Ints, blame: Blame, column: str) -> None:
-    """Look the rows of one frame up at once, then ask singly why some have no data."""
-    try:
-        poses[:, rows] = timed.many(frame, times[rows])
-    except FrametoolError as error:
-        for row in rows.tolist():
-            blame(row, column, error)
-    else:
-        for row in rows[np.isnan(poses[6, rows])].tolist():
-            blame(row, timed.column, _reason(timed, frame, int(times[row])))
-
-
-def _reason(timed: Timed, frame: str | None, stamp_ns: int) -> str | FrametoolError:
-    try:
-        timed.one(frame, stamp_ns)
-    except FrametoolError as error:
-        return error
-    return "no data"
+    for frame, at in known.items():
+        some = rows if len(known) == 1 else rows[codes[rows] == at]
+        try:
+            poses[:, some] = timed.many(frame, times[some])
+        except FrametoolError as error:
+            for row in some.tolist():
+                blame(row, column, error)
+            continue
+        for row in some[np.isnan(poses[6, some])].tolist():  # asked singly, it says why
+            try:
+                timed.one(frame, int(times[row]))
+                blame(row, timed.column, "no data")
+            except FrametoolError as error:
+                blame(row, timed.column, error)
+    return tuple(poses)  # type: ignore[return-value]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.errors import FormatError, FrametoolError, shown, warn
+from frametool.errors import FormatError, FrametoolError
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import UPPER_ROWS, notation
@@ -245,14 +245,14 @@ def open_table(
     own = header and not (all(numeric) if delimiter else any(numeric))
     if named is not None and not (own and has_pose_column(map(_unquoted, cells))):
         head, titles, title, end = named
-        return Table(delimiter, _names(titles, source), len(titles), mark + head, titles, title, end), rest
+        return Table(delimiter, tuple(map(_unquoted, titles)), len(titles), mark + head, titles, title, end), rest
     if not own:
         if header and not expected and delimiter and not row.columns and len(cells) != len(FORMATS["tum"].columns):
             raise FormatError("the first line holds numbers and no names; give --no-header", source=source, line=1)
         return Table(delimiter, None, len(cells), mark + comments), rest
     title = line.rstrip(b"\r\n")
     end = line[len(title) :] or b"\n"
-    table = Table(delimiter, _names(cells, source), len(cells), mark + comments, tuple(cells), title, end)
+    table = Table(delimiter, tuple(map(_unquoted, cells)), len(cells), mark + comments, tuple(cells), title, end)
     return table, rest[len(line) :]
 
 
@@ -284,14 +284,6 @@ def _named_comment(
         return None
     before = comments[: start + len(text) - len(words)]
     return before, tuple(cells), words, comments[start + len(text) :]
-
-
-def _names(cells: Sequence[bytes], source: str) -> tuple[str, ...]:
-    """Return the names of columns; a quote within one opens nothing, which is said."""
-    for cell in cells:
-        if b'"' in cell and not cell.strip().startswith(b'"'):
-            warn(f"{source}:1: the quote in the name {shown(_unquoted(cell))} opens nothing and is taken as it stands")
-    return tuple(map(_unquoted, cells))
 
 
 def _first_record(text: bytes, delimiter: bytes) -> bytes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from itertools import chain
 from shlex import quote
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -51,39 +51,11 @@ def run_table(
     stream: ByteStream, fmt: str, request: Request, *, source: str, header: bool = True
 ) -> Generator[Outcome]:
     """Yield the outcomes of a table's blocks, the first one its head."""
-    begun = begin_table(stream, fmt, request, source=source, header=header)
-    rows = TableRows(begun.table, request, source)
-    yield Outcome(begun.table.opening(rows.layout), lines=begun.lines, size=begun.taken)
-    for text in begun.texts():
+    rows = TableRows(stream, fmt, request, source, header=header)
+    yield Outcome(rows.table.opening(rows.layout), lines=rows.lines, size=rows.taken)
+    for text in rows.texts:
         run, outcome, _ = rows.of_text(text)
         yield outcome._replace(text=written(run.groups(run.first_fault())))
-
-
-class Begun(NamedTuple):
-    """A table whose head was read: what follows of the first block, the other blocks, bytes and lines of the head."""
-
-    table: Table
-    rest: bytes
-    blocks: Iterator[bytes]
-    taken: int
-    lines: int
-
-    def texts(self) -> Iterator[bytes]:
-        """Yield the text of the rows, block by block."""
-        return chain((self.rest,) if self.rest else (), self.blocks)
-
-
-def begin_table(stream: ByteStream, fmt: str, request: Request, *, source: str, header: bool = True) -> Begun:
-    """Read the head of a table in a format; raises FormatError."""
-    delimiter = (FORMATS[fmt].delimiter or "").encode()
-    blocks = read_blocks(stream, whole=RecordEnds(delimiter) if delimiter else whole_lines)
-    first = _first_rows(blocks)
-    if first is None:
-        raise FormatError("nothing in it", source=source)
-    table, rest = open_table(first, fmt, header=header, source=source, expected=request.given or request.given_place)
-    table = as_trajectory(table, fmt, request, source)
-    taken = len(first) - len(rest)
-    return Begun(table, rest, blocks, taken, first.count(b"\n", 0, taken))
 
 
 def _first_rows(blocks: Iterator[bytes]) -> bytes | None:
@@ -212,7 +184,26 @@ class PlannedRows:
 
 
 class TableRows(PlannedRows):
-    """The rows of a table, block by block."""
+    """The rows of a table, block by block.
+
+    texts: those of the blocks; taken, lines: how many bytes and lines the head had
+    """
+
+    def __init__(
+        self, stream: ByteStream, fmt: str, request: Request, source: str, *, header: bool = True
+    ) -> None:
+        """Read the head of a table in a format, and plan its rows; raises FormatError or Misused."""
+        delimiter = (FORMATS[fmt].delimiter or "").encode()
+        blocks = read_blocks(stream, whole=RecordEnds(delimiter) if delimiter else whole_lines)
+        first = _first_rows(blocks)
+        if first is None:
+            raise FormatError("nothing in it", source=source)
+        known = request.given or request.given_place
+        table, rest = open_table(first, fmt, header=header, source=source, expected=known)
+        super().__init__(as_trajectory(table, fmt, request, source), request, source)
+        self.texts = chain((rest,) if rest else (), blocks)
+        self.taken = len(first) - len(rest)
+        self.lines = first.count(b"\n", 0, self.taken)
 
     def of_text(self, text: bytes) -> tuple[Run, Outcome, Cells]:
         """Return what becomes of a block, and its outcome; behind a quote that is not closed nothing is read."""
@@ -229,10 +220,10 @@ class TableRows(PlannedRows):
         rows = len(block.places) + len(block.broken)
         return run, Outcome(b"", faults, rows, text.count(b"\n"), len(run.mended), self.notes_of(run), len(text)), cells
 
-    def blocks(self, begun: Begun) -> Iterator[tuple[RowPoses, int, Outcome]]:
-        """Yield the poses of all blocks of a table, each with the line, from 1, at which it begins."""
-        line = 1 + begun.lines
-        for text in begun.texts():
+    def blocks(self) -> Iterator[tuple[RowPoses, int, Outcome]]:
+        """Yield the poses of all blocks, each with the line, from 1, at which it begins."""
+        line = 1 + self.lines
+        for text in self.texts:
             run, outcome, cells = self.of_text(text)
             rows, numbers = run.settled()
             lines = run.block.places[rows]
