@@ -34,7 +34,7 @@ def run(arguments: list[str]) -> int:
     """Run one command; whatever goes wrong becomes one line on stderr and an exit code."""
     from frametool.cli.commands import TROUBLE
     from frametool.cli.signals import die_of
-    from frametool.cli.stderr import TROUBLES, discard, say, say_warning, words_of
+    from frametool.cli.sink import TROUBLES, discard, say, say_warning, words_of
     from frametool.documents.source import DEEPEST
     from frametool.errors import heard_by
 
@@ -66,7 +66,7 @@ def run(arguments: list[str]) -> int:
 def _run(arguments: list[str], own: int | None) -> int:
     """Run one command, whose errors may have an exit code of its own; trouble with stdout is the caller's."""
     from frametool.cli.commands import answered, called
-    from frametool.cli.stderr import say_error, wants_json
+    from frametool.cli.sink import say_error, wants_json
     from frametool.errors import FrametoolError
 
     try:

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.sink import checked_by, show
-from frametool.cli.stderr import say
+from frametool.cli.sink import checked_by, say, show
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, heard_by
 
 if TYPE_CHECKING:
@@ -74,6 +73,15 @@ class Inputs:
     def but(self, **values: Any) -> Inputs:
         """Return these inputs with other values."""
         return Inputs(self._values | values, self._idle)
+
+    def says_earth(self) -> bool:
+        """Return True if an option says something of places on the Earth."""
+        return any(map(self.peek, ("origin", "local_axes", "zone")))
+
+    def note(self, *texts: str | None) -> None:
+        """Report how the input is taken, unless --quiet; what is empty is no report."""
+        for text in () if self.quiet else filter(None, texts):
+            say(text)
 
     def idle(self) -> set[str]:
         """Return the options that were passed and that nobody has asked for."""
@@ -342,9 +350,10 @@ class WithHelp(click.Command):
     """
 
     def __init__(self, *args: Any, own: Sequence[str] = (), **kwargs: Any) -> None:
-        """Add --help-all, which click does not know."""
+        """Add --help-all, which click does not know; of options with one name the first counts, as a command's own."""
         super().__init__(*args, **kwargs)
-        self.params.append(HELP_ALL)
+        names = {name: each for each in reversed(self.params) for name in each.opts}
+        self.params = [*(each for each in self.params if names[each.opts[-1]] is each), HELP_ALL]
         self.own = own
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

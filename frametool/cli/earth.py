@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import inputs, misuse, refuse
-from frametool.cli.stderr import say
+from frametool.cli.sink import say
 from frametool.documents.source import Source
 from frametool.errors import FormatError, warn
 from frametool.geometry.conventions import world_of

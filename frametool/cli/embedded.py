@@ -12,7 +12,7 @@ from threading import Lock
 from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 
 from frametool import cli
-from frametool.cli.stderr import say_error
+from frametool.cli.sink import say_error
 from frametool.errors import Misused
 from frametool.text.shell_words import pipeline, split
 

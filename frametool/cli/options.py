@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import Inputs, Text, inputs, misuse, option, refuse, say_if_typed, together
-from frametool.cli.stderr import say_error
+from frametool.cli.sink import say_error
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
 from frametool.geometry.euler import AXES
 from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, WORLDS, notations
 from frametool.stream.faults import RowsSkipped
+from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -39,6 +40,26 @@ def utf8(text: str) -> str:
     except UnicodeEncodeError:
         raise ValueInvalid(f"{shown(text)} is not UTF-8 text") from None
     return text
+
+
+def read_names(text: str) -> tuple[str, ...]:
+    """Read names with commas between them."""
+    names = tuple(name.strip() for name in text.split(",")) if text else ()
+    if not all(names):
+        raise ValueInvalid(f"{shown(text)} is not names with commas between them")
+    return names
+
+
+def names_as(spec: str) -> Callable[[str], tuple[str, ...]]:
+    """Return what reads as many names as REF,EST has, each once."""
+
+    def read(text: str) -> tuple[str, ...]:
+        names = read_names(text)
+        if len({*names}) < len(names) or len(names) != spec.count(",") + 1:
+            raise ValueInvalid(f"{shown(text)} is not {spec}, different names")
+        return names
+
+    return read
 
 
 FULL = -1  # digits: as many as the number has
@@ -146,6 +167,9 @@ class ColumnNames(Text):
         return dict.fromkeys((done + comma + name for name in names), "")
 
 
+COLUMN = ColumnNames()
+
+
 def tree_on_the_line(ctx: click.Context) -> str | None:
     """Return the first file of frames; behind an option click has not come to the arguments."""
     named = ctx.params.get("files") or ctx.params.get("arguments") or ctx.args
@@ -183,35 +207,25 @@ _CAMERA_AXES = _of_formats(
 _STAMPS = _of_formats("--stamps FILE", "timestamps for poses without any, one per line")
 _EDGES = _of_formats("--edges", "read the edges of a g2o graph instead of its vertices")
 _TOPIC = _of_files("--topic NAME", "read only this topic; may be repeated", name="topics", multiple=True)
-_ORDER = _of_formats("--from", "order of quaternions in lists of numbers", ORDERS, name="order")
 # of streams about trajectories: the topic of a bag, the times of their poses, the axes of cameras
 pose_reading_options = together(_TOPIC, _CAMERA_AXES, _STAMPS, _EDGES)
-_READING = (
+# how files of frames are read; `opened` heeds them
+reading_options = together(
+    in_option,
+    _TOPIC,
+    _of_files("--quiet", "suppress notes on files"),
     _of_formats("-j --joint NAME=VALUE", "value of a robot's joint: radians or metres, 30deg, 2cm, a POSE; "
               "may be repeated", JointSetting(), name="joints", multiple=True),
     _of_formats("--joints FILE", "joint values: a map, JointState messages, CSV, MJCF:KEY", name="joint_files",
               multiple=True),
     _of_formats("--frames WORLD,BODY", "frame names that a format does not store; may be repeated, "
-              "in the order of the files", name="named_frames", multiple=True),
+              "in the order of the files", read_names, name="named_frames", multiple=True),
     _of_formats("--direction", "direction of matrices whose key does not say it", DIRECTIONS),
     _CAMERA_AXES,
     _of_formats("--dh", "convention of Denavit-Hartenberg parameters", DH),
     _STAMPS,
+    _of_formats("--from", "order of quaternions in lists of numbers", ORDERS, name="order"),
 )  # fmt: skip
-
-
-def reading_options(
-    *, streams: bool = False, order: bool = True, topics: bool = True, camera_axes: Any = _CAMERA_AXES
-) -> Adds:
-    """Add to a command the options that say how files of frames are read; `opened` heeds them.
-
-    streams: the command has those of streams too, `--in`, `--quiet` and `--from` among them
-    order, topics: it has no --from, or --topic, of its own; camera_axes: its --camera-axes
-    """
-    if streams:
-        return together(_TOPIC, *(camera_axes if each is _CAMERA_AXES else each for each in _READING))
-    quiet = _of_files("--quiet", "suppress notes on files")
-    return together(in_option, *[_TOPIC] * topics, quiet, *_READING, *[_ORDER] * order)
 
 
 def input_formats(*, streams: bool = False) -> tuple[list[str], str]:
@@ -234,12 +248,10 @@ def for_each(formats: Sequence[str], files: int) -> list[str]:
 # --- results -------------------------------------------------------------------------------------------------------
 
 PRECISION = _of_results("--precision N|full", "decimals  [default: full; a terminal shows 9 digits]", _digits)
-_PLACE = (
+_PLACE = together(
     _of_results("-o --output FILE", "write to this file, atomically"),
     _of_results("--force", "let --output overwrite a file", requires=("output", "report")),
 )
-
-
 MESSAGES = ("pose", "tf", "path", "point", "fix")
 
 
@@ -252,23 +264,23 @@ def parse_messages(text: str) -> tuple[str, ...]:
     return kinds
 
 
-_RECORDING = (
+_RECORDING = together(
     _of_results("--messages KIND,..", f"message types of a recording: {', '.join(MESSAGES)}  [default: by the rows]",
                 parse_messages, default=()),
     _of_results("--topic-out NAME", "topic of the messages of a recording"),
 )  # fmt: skip
 # of commands that have no --frames for what they read
 _FRAMES_OUT = "names of the frames of poses in a recording; adds /tf"
-frames_out_option = _of_results("--frames WORLD,BODY", _FRAMES_OUT, name="recorded_frames")
+frames_out_option = _of_results("--frames WORLD,BODY", _FRAMES_OUT, names_as("WORLD,BODY"), name="recorded_frames")
 
 
 def result_options(*what: str) -> Adds:
     """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
     formats = writers(*what)
-    recording = [] if set(formats).isdisjoint(writers("recording")) else _RECORDING
+    recording = [_RECORDING] * (not set(formats).isdisjoint(writers("recording")))
     kind = FormatName(("text", *formats), "written here")
     chosen = option("-f --format FORMAT", "of the result (frametool formats)", kind, name="format_name")
-    return together(chosen, *_PLACE, PRECISION, *recording)
+    return together(chosen, _PLACE, PRECISION, *recording)
 
 
 def list_options(*more: str) -> Adds:
@@ -277,31 +289,26 @@ def list_options(*more: str) -> Adds:
     more: formats besides text and those of reports
     """
     formats = "text", *writers("report"), *more
-    return together(option("-f --format", "of the result  [default: text]", formats, name="format_name"), *_PLACE)
+    return together(option("-f --format", "of the result  [default: text]", formats, name="format_name"), _PLACE)
 
 
-_TO = together(
+rotation_options = together(
     _of_rotations("--to REP[,REP..]", "representations of the result  [default: quaternion]", Notations(),
                   name="notations"),
     _of_rotations("--deg", "angles in degrees"),
-)  # fmt: skip
-_SIGNS = together(
     _of_rotations("--keep-sign", "do not normalize the quaternion's sign to w >= 0"),
     _of_rotations("--local-axes", "axes of rotations at a position on the Earth (help earth)",
                   ("enu", "ned", "grid", "ecef")),
     _of_rotations("--origin PLACE|first", "position of east north up 0 0 0, as LAT,LON[,ALT]"),
     _of_rotations("--zone 32N", "UTM zone for all positions"),
 )  # fmt: skip
-# how poses are read; how rotations are written; both
 pose_options = _of_rotations("--normalize", "accept any non-zero quaternion, matrices off by 0.1")
-rotation_options = together(_TO, _SIGNS)
-whole_pose_options = together(_TO, pose_options, _SIGNS)
 scale_option = option("--scale", "read a matrix s R as a similarity with scale s")
 
 
 def pose_result_options(*what: str) -> Adds:
     """Add to a command the options that say how poses are read, and those of its result."""
-    return together(whole_pose_options, result_options(*what))
+    return together(rotation_options, pose_options, result_options(*what))
 
 
 # --- times ---------------------------------------------------------------------------------------------------------
@@ -349,6 +356,21 @@ def read_limit(text: str) -> int:
     return parse_time(text)
 
 
+def read_span(text: str) -> int:
+    """Read a time that is not negative."""
+    found = read_limit(text)
+    if found < 0:
+        raise ValueInvalid(f"a time here is not less than 0, found {shown(text)}")
+    return found
+
+
+def read_rate(text: str) -> float:
+    """Read how many a second."""
+    from frametool.frames.lookups import checked_rate
+
+    return checked_rate(parse_number(text))
+
+
 def read_time(text: str) -> Any:
     """Return nanoseconds, or `latest`."""
     if text == LATEST:
@@ -371,10 +393,11 @@ def at_ns(chosen: int | str | None) -> int | None:
     return chosen if isinstance(chosen, int) else None
 
 
-# how moving frames are taken
+# of a tree: more files, and how moving frames are taken
 rules_options = together(
+    _of_files("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True),
     _of_times("--moving", "an edge with one timestamp is valid only at that time"),
-    _of_times("--cache SECONDS", "drop older transforms  [default: none]", read_limit),
+    _of_times("--cache SECONDS", "drop older transforms  [default: none]", read_span),
 )
 _TIMES = "several: T,T,.., START:STOP:STEP, or the stamps of FILE"
 times_option = _of_times("--times TIMES", _TIMES, excludes=("explain",))
@@ -385,10 +408,16 @@ limit_options = together(
     _of_times("--stop TIME", "ignore everything after", read_limit),
     offset_option,
 )
-# a command of files of frames; of one tree whose frames may move; and one that writes poses of it
-file_options = together(reading_options(), verbose_option, pose_options)
-moving_options = together(rules_options, offset_option, reading_options(order=False), verbose_option)
-tree_options = together(moving_options, _ORDER, whole_pose_options)
+# a command of files of frames; of one tree whose frames may move
+file_options = together(reading_options, verbose_option, pose_options)
+moving_options = together(rules_options, offset_option, reading_options, verbose_option)
+
+
+def tree_result_options(*what: str) -> Adds:
+    """Add to a command of one tree the options of what is read, and of its result."""
+    return together(moving_options, pose_result_options(*what))
+
+
 _COLOR = "colour of the text; auto: on terminals, unless NO_COLOR is set"
 color_option = _of_results("--color", _COLOR, ("auto", "always", "never"), default="auto")
 
@@ -406,11 +435,9 @@ def window_of(passed: Inputs) -> tuple[int, int] | None:
 
 def rules(passed: Inputs) -> Rules:
     """Collect what the options say about how frames are taken."""
-    keep_ns = passed.cache
-    refuse(keep_ns is not None and keep_ns < 0, "--cache takes seconds, not less than 0")
     from frametool.formats.load import Rules
 
-    return Rules(moving=bool(passed.moving), keep_ns=keep_ns, normalize=bool(passed.normalize))
+    return Rules(moving=bool(passed.moving), keep_ns=passed.cache, normalize=bool(passed.normalize))
 
 
 def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int]:

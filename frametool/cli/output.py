@@ -17,8 +17,7 @@ from click import UsageError
 
 from frametool.cli.command import refuse
 from frametool.cli.options import FULL
-from frametool.cli.sink import filling, in_colour, is_special, writing
-from frametool.cli.stderr import say
+from frametool.cli.sink import filling, in_colour, is_special, say, writing
 from frametool.errors import FrametoolError, ValueInvalid, first_of, listing, printable, shown, warn
 from frametool.formats import table
 from frametool.formats.table import FORMATS, by_name, is_folder, writers
@@ -44,11 +43,8 @@ if TYPE_CHECKING:
 def recorded(chosen: Inputs, fmt: str, output: str | None) -> RecordingStyle:
     """Return what of results a recording of a format holds, as options say; raises UsageError."""
     place = _place(fmt, output)
-    names = chosen.recorded_frames or next(iter(chosen.named_frames), "")
-    frames = tuple(name.strip() for name in names.split(",")) if names else ()
-    if frames and (len(frames) != len(("WORLD", "BODY")) or not all(frames)):
-        raise UsageError(f"--frames takes WORLD,BODY; found {shown(names)}")
-    refuse(len({*frames}) < len(frames), f"--frames {names}: no frame is its own parent; give two names")
+    frames = chosen.recorded_frames or next(iter(chosen.named_frames), ())
+    refuse(len(frames) not in (0, 2) or len({*frames}) < len(frames), "--frames takes WORLD,BODY, different names")
     return RecordingStyle(tuple(chosen.messages), chosen.topic_out or "", frames, folder_of(place))
 
 
@@ -88,6 +84,7 @@ def copied_as(fmt: str, path: str, output: str | None, named: str | None) -> tup
 
 
 BATCH = 256  # poses
+QUATERNION = (notation("quaternion"),)  # where no representation is asked for
 ZEROS = r"(?<![\w.:])(?P<dim>-?0\.0+)(?![\w.])"
 WITH_PLACES = ("text", "yaml", "json", "csv", *table.writers("recording"))
 OF_TEXT = (".txt", ".out", ".log", ".dat")
@@ -128,7 +125,7 @@ class Output:
         self.holds_all = self._in_blocks or fmt == "csv"  # rows, of which there may be many
         if self._holds_arrays and self.path is None and sys.stdout.isatty():
             raise ValueInvalid(f"{fmt} is no text for a terminal; give -o FILE, or pipe it")
-        usual = () if fmt in ("text", "dot", "mermaid") else (notation("quaternion"),)  # drawings choose their own
+        usual = () if fmt in ("text", "dot", "mermaid") else QUATERNION  # drawings choose their own
         digits = inputs.peek("precision")
         self.style = Style(
             fmt, notations or usual, degrees=bool(inputs.deg), precision=None if digits == FULL else digits,

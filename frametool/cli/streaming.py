@@ -1,11 +1,13 @@
-"""Streams on the command line: the options they add, and the run itself."""
+"""Streams on the command line: their options and their run; for commands on poses also arguments and `--explain`."""
 
 from __future__ import annotations
 
 import os
 import re
 import sys
+from contextlib import closing, nullcontext
 from functools import partial
+from importlib import import_module
 from io import BufferedReader
 from typing import TYPE_CHECKING, Any
 
@@ -13,42 +15,41 @@ import click
 
 from frametool.cli import options
 from frametool.cli.command import Inputs, option, refuse, say_if_typed, together
-from frametool.cli.stderr import say, say_error
+from frametool.cli.output import Output
+from frametool.cli.poses import inline_misuse, is_pasted, pasted_stream, pose_source, values_of, without_inverse
+from frametool.cli.sink import say, say_error
 from frametool.documents.source import HEAD, Source, has_line, has_record, opened
-from frametool.errors import FormatError
-from frametool.formats.table import (
-    BAG,
-    FORMATS,
-    by_suffix,
-    has_no_text,
-    holds_arrays,
-    is_recording,
-    is_trajectory,
-    readers,
-)
+from frametool.errors import FormatError, heard_by, warn
+from frametool.formats import table
+from frametool.formats.table import BAG, FORMATS, has_no_text, holds_arrays, is_trajectory, readers
 from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRow, BadRows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+    from collections.abc import Generator, Iterable, Iterator, Sequence
 
-    from frametool.cli.output import Output
+    from frametool.cli.command import Adds
+    from frametool.documents.source import InputFile
+    from frametool.explain.derive import DerivationStyle
+    from frametool.explain.operations import WrittenPose
+    from frametool.explain.render import Explanation
+    from frametool.grammar.edges import Diagnostics
     from frametool.stream.faults import Outcome
     from frametool.stream.request import Request
-
-    About = Callable[[], str] | None  # what else there is to say of a format
 
 TOP = 2  # lines of a table up to its first row: what is bad there may be bad in every row
 BAGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
 _MAGICS: list[Any] = [what for name in BAGS for kind, what in FORMATS[name].magic if kind == "magic"]
-_STREAMS = ", ".join(readers(*options.STREAMED))
 RECORDS = readers("records")
+FORMS = ("text", "markdown")
+ONE_RECORD = "--explain derives one record; write it as an argument"
 
 
 _of_rows = partial(option, under="Rows")
-_ROWS = (
+_ROWS = together(
+    options.in_option,
     option("--from REP", "representation of bare numbers", options.Notations(), name="from_rep", under="Rotations"),
     _of_rows("--columns NAME,..", "pose columns by name or number, once per pose; or one key of records, a.b",
-             options.ColumnNames(), multiple=True),
+             options.COLUMN, multiple=True),
     _of_rows("--keep", "append result columns, keep the input's"),
     _of_rows("--prefix TEXT", "prefix of the result's column names", options.utf8, default=""),
     _of_rows("--on-error", "bad rows", ON_ERROR, default=STOP),
@@ -56,24 +57,28 @@ _ROWS = (
     _of_rows("--no-header", "table without a header; columns are numbered", name="header",
              callback=lambda _context, _option, chosen: not chosen),
     option("--quiet", "suppress progress and notes on files", under="Files"),
+    options.verbose_option,
 )  # fmt: skip
-_INPUT = _of_rows("-i --input FILE", "read this file instead of standard input", name="input_path")
-_SEVERAL = "read this file, not stdin; several clouds become one"
-SEVERAL = _of_rows("-i --input FILE", _SEVERAL, name="input_path", multiple=True)
+_input = partial(_of_rows, "-i --input FILE", name="input_path")
+stream_options = together(_input("read this file instead of standard input"), _ROWS)
+several_stream_options = together(_input("read this file, not stdin; several clouds become one", multiple=True), _ROWS)
+pose_stream_options = together(stream_options, options.pose_reading_options)
 
 
-def stream_options(function: Any, first: Any = _INPUT) -> Any:
-    """Add to a command the options of streams; `Stream` takes them.  first: the option for the input."""
-    return together(first, options.in_option, *_ROWS, options.verbose_option)(function)
+def explain_option(**rest: Any) -> Adds:
+    """Return --explain, with what it says of other options."""
+    return option("--explain [=FORM]", "derive the result step by step (help explain)", FORMS, under="Result", **rest)
+
+
+EXPLAIN = explain_option()
 
 
 class Stream:
-    """The stream of a command, as its options describe it."""
+    """The stream of a command and where its results go, as the options describe them."""
 
-    def __init__(self, inputs: Inputs) -> None:
+    def __init__(self, inputs: Inputs, output: Output) -> None:
         """Look at what the options say; each is asked for where it counts."""
-        self._tell = partial(say_error, in_json=inputs.peek("format_name") == "json")
-        self.inputs = inputs
+        self.inputs, self.output = inputs, output
         path = inputs.peek("input_path")
         self.paths: Sequence[str] = path if isinstance(path, tuple) else () if path is None else (path,)
         self.path: str | None = self.paths[0] if self.paths and self.paths[0] != "-" else None
@@ -101,12 +106,10 @@ class Stream:
 
     def _shows_format(self, begin: bytes) -> bool:
         """Return True if what comes later does not change the format that is found."""
-        if has_record(begin):
-            return True
-        if not has_line(begin):
-            return False
+        if has_record(begin) or not has_line(begin):
+            return has_record(begin)
         try:
-            return bool(self.chosen_format() or self._detected(begin, is_table=self._says_columns(), quiet=True))
+            return bool(self.chosen_format() or self.detected(begin, is_table=self._says_columns()))
         except FormatError:
             return False
 
@@ -115,16 +118,13 @@ class Stream:
 
         Raises FormatError for a bag without any, unless it may hold clouds instead.
         """
-        if self._opened is not None or not self.path or not _may_be_bag(self.path):
-            return self._opened
-        if not is_bag(self.path):
-            return None
-        from frametool.grammar.edges import Diagnostics
-        from frametool.recordings.messages import open_records
+        if self._opened is None and self.path and is_bag(self.path):
+            from frametool.grammar.edges import Diagnostics
+            from frametool.recordings.messages import open_records
 
-        self._opened = open_records(self.path, self.inputs.topics, Diagnostics())
-        self.within = "json"
-        self.inputs.leave(topics=())
+            self._opened = open_records(self.path, self.inputs.topics, Diagnostics())
+            self.within = "json"
+            self.inputs.leave(topics=())
         return self._opened
 
     def read_clouds_as_rows(self) -> None:
@@ -157,16 +157,17 @@ class Stream:
             return False
         return bool(self.opened().peek(1))
 
-    def takes_rows(self, path: str) -> bool:
+    def has_table(self, argument: str) -> bool:
         """Stream a file that an argument names if it is a table; one of records, or none known, is not touched.
 
         What can be read once only, as `<(command)`, is streamed whatever it holds.
         """
-        once = os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path))
-        is_rows = once or _may_be_bag(path) or (self.chosen_format() or _format_of(path)) not in ("", *RECORDS)
-        if path == "-" or not is_rows:
+        if argument == "-" or is_pasted(argument, self.notation):
             return False
-        self.path = path
+        once = os.path.exists(argument) and not (os.path.isfile(argument) or os.path.isdir(argument))
+        if not (once or is_bag(argument) or (self.chosen_format() or _format_of(argument)) not in ("", *RECORDS)):
+            return False
+        self.path = argument
         return True
 
     def chosen_format(self) -> str:
@@ -174,7 +175,8 @@ class Stream:
         others, fmt = options.input_formats(streams=True)
         if others and not self.inputs.reads_trees:
             both = f"--in {others[0]} and --in {fmt}: there is one stream"
-            raise click.UsageError(both if fmt else f"--in {others[0]} is not streamed; streams are {_STREAMS}")
+            streams = ", ".join(readers(*options.STREAMED))
+            raise click.UsageError(both if fmt else f"--in {others[0]} is not streamed; streams are {streams}")
         return fmt
 
     @property
@@ -182,40 +184,34 @@ class Stream:
         """Return what messages call the stream."""
         return self.path or "stdin"
 
-    def run(self, request: Request, output: Output, *, tables_only: bool = False) -> int:
-        """Run the stream and return its exit status."""
-        from frametool.formats.detect import refuse_robots
+    def run(self, request: Request, *, tables_only: bool = False) -> int:
+        """Run the stream and return its exit status; the error that ends it says what to do."""
+        from frametool.formats.detect import refuse_robots, with_hint
 
         self.inputs.ask("input_path", "on_error", "max_errors")
         with self.opened() as source:
             head = source.peek()
-            if head.lstrip()[:1] == b"<":
-                refuse_robots(head, self.name)
+            refuse_robots(head, self.name)
             try:
-                return self._run_opened(source, request, output, tables_only=tables_only)
+                return self._run_opened(source, request, tables_only=tables_only)
             except FormatError as error:
-                raise self._with_remedy(error, head) from None
+                if isinstance(error, BadRow) and not (error.fault.final or head[:1] == b"[" or error.fault.line <= TOP):
+                    error.remedy = "; --on-error skip goes on"
+                raise with_hint(error, head, self.name, chosen=bool(self.chosen_format())) from None
 
-    def _with_remedy(self, error: FormatError, head: bytes) -> FormatError:
-        """Return the error that ends a stream with what to do."""
-        from frametool.formats.detect import with_hint
-
-        if isinstance(error, BadRow) and not (error.fault.final or head[:1] == b"[" or error.fault.line <= TOP):
-            error.remedy = "; --on-error skip goes on"
-        return with_hint(error, head, self.name, chosen=bool(self.chosen_format()))
-
-    def _run_opened(self, stream: BufferedReader, request: Request, output: Output, *, tables_only: bool) -> int:
+    def _run_opened(self, stream: BufferedReader, request: Request, *, tables_only: bool) -> int:
         """Run the stream, of whatever format it is."""
+        output, is_table = self.output, tables_only or self._says_columns()
         fmt = self.within or self.chosen_format()
         signed = fmt or _signed(stream.peek(), self.name)
-        is_listed = is_trajectory(signed) or holds_arrays(signed)
-        if not (fmt or tables_only or self._says_columns() or is_listed):
-            from frametool.cli.poses import pasted_stream
-
+        if not (fmt or is_table or is_trajectory(signed) or holds_arrays(signed)):
             pasted, stream = pasted_stream(stream, self.name, request, self.notation, self.place)
             if pasted is not None:
-                return self._run_pasted(pasted, request, output)
-        fmt = fmt or self._detected(stream.peek(), is_table=tables_only or self._says_columns())
+                return self._run_pasted(pasted, request)
+        if not fmt:
+            fmt = self.detected(stream.peek(), is_table=is_table)
+            if self.inputs.verbose:
+                say(f"{self.name}: read as {fmt} ({FORMATS[fmt].summary})")
         if fmt == "kitti" and self.notation and not self.chosen_format():
             fmt = "columns"  # --from says what the numbers are, and nothing of pictures
         if request.poses:
@@ -223,7 +219,7 @@ class Stream:
         if output.chosen is None and (output.path or "").endswith(".bin") and not fmt.endswith("-bin"):
             raise click.UsageError(f"-o {output.path} does not name its format; give -f kitti-bin or nuscenes-bin")
         refuse(tables_only and fmt in RECORDS, f"frames are looked up for the rows of a table, not of {fmt}")
-        request = self._completed(request, output, fmt)
+        request = self._completed(request, fmt)
         if request.offset_ns and fmt in RECORDS:
             from frametool.stream.record_stream import at_other_times
 
@@ -234,98 +230,103 @@ class Stream:
         if is_trajectory(fmt) and not output.notations:
             request = request._replace(notations=())  # its rows stay what they are
         if fmt in RECORDS and (output.chosen or fmt) != fmt and request.gathered is None:
-            return self._run_as_values(stream, fmt, request, output)
-        way = self._way(fmt, request, output)
-        outcomes, about = way(stream, fmt, request, output)
+            return self._run_as_values(stream, fmt, request)
+        return self._run_blocks(stream, fmt, request)
+
+    def _run_blocks(self, stream: BufferedReader, fmt: str, request: Request) -> int:
+        """Write what becomes of each block as it comes, unless somebody gathers it; return the exit status."""
+        from frametool.stream.faults import run
+        from frametool.view.progress import ProgressBar
+
+        output, gathered = self.output, request.gathered
+        outcomes, written, tally = self._outcomes(stream, fmt, request)
         bad = self.policy(self.name, "row" if holds_arrays(fmt) else "line")
-        outcomes = outcomes if request.gathered is None else request.gathered.placing(outcomes, bad.place)
-        status = self._write(outcomes, output, bad, gathers=request.gathered is not None)
-        if output.path and request.gathered is None:
-            output.report_suffix(_kept(fmt, output) if way == self._as_poses else fmt)
-        if about is not None and (assumed := about()) and not self.inputs.quiet:
-            say(f"{self.name}: {assumed}")
+        outcomes = outcomes if gathered is None else gathered.placing(outcomes, bad.place)
+        with (
+            output.opened() if gathered is None else nullcontext(lambda _: None) as write,
+            ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.inputs.quiet) as progress,
+            self.opened(),  # closed before a file takes its place, which Windows asks for
+            closing(outcomes),
+        ):
+            status = run(outcomes, write, bad, progress.advance)
+        if output.path and gathered is None:
+            output.report_suffix(written)
+        if tally is not None and tally.assumed:
+            self.inputs.note(f"{self.name}: {tally.assumed}")
         return status
 
-    def _detected(self, begin: bytes, *, is_table: bool, quiet: bool = False) -> str:
+    def detected(self, begin: bytes, *, is_table: bool = False) -> str:
         """Find the format of the stream by what it begins with, and by its name."""
         from frametool.formats.detect import detect
 
-        fmt = detect(begin, *options.STREAMED, name=self.path or "", otherwise="columns" if is_table else "")
-        if self.inputs.verbose and not quiet:
-            say(f"{self.name}: read as {fmt} ({FORMATS[fmt].summary})")
-        return fmt
+        return detect(begin, *options.STREAMED, name=self.path or "", otherwise="columns" if is_table else "")
 
-    def _way(self, fmt: str, request: Request, output: Output) -> Callable[..., tuple[Generator[Outcome], About]]:
-        """Choose how rows become results: their text edited, as columns of numbers, or as poses in another format."""
+    def _outcomes(
+        self, stream: Any, fmt: str, request: Request
+    ) -> tuple[Generator[Outcome], str, Diagnostics | None]:
+        """Choose how rows become results: as columns of numbers, as poses in another format, or in place.
+
+        Also: the format in which they are, and what was assumed of that of the input.
+        """
         from frametool.formats.rows.pose_rows import is_turned
         from frametool.stream.row_layout import POSE, Shape
 
-        gathers = request.gathered is not None
-        if holds_arrays(fmt) and (gathers or output.chosen is None or holds_arrays(output.chosen)):
-            return self._as_columns
+        output, gathers, chosen = self.output, request.gathered is not None, self.output.chosen
+        if holds_arrays(fmt) and (gathers or chosen is None or holds_arrays(chosen)):
+            return self._columns(stream, fmt, request), fmt, None
         listed = holds_arrays(fmt) or (is_trajectory(fmt) and not FORMATS[fmt].is_table)
-        is_kindred = output.chosen == "csv" and fmt in ("tsv", "semicolon")
-        if gathers or fmt in RECORDS or is_kindred:
-            return self._as_poses if gathers and listed else self._as_text
+        is_kindred = chosen == "csv" and fmt in ("tsv", "semicolon")
         # a trajectory has no room for more columns, or for other ones
-        no_room = output.is_trajectory and bool(request.extras(Shape(POSE)) or output.notations)
-        no_room |= output.is_trajectory and output.style.place is not None
-        turns = bool(output.style.axes) and not output.notations
-        no_room |= turns and is_turned(output.style.changed(format=output.chosen or fmt))
-        return self._as_poses if listed or no_room or output.chosen not in (None, fmt) else self._as_text
+        no_room = output.is_trajectory and bool(request.extras(Shape(POSE)) or output.notations or output.style.place)
+        turns = output.style.axes and not output.notations and is_turned(output.style.changed(format=chosen or fmt))
+        converts = chosen not in (None, fmt) or no_room or turns
+        if (listed and gathers) or ((listed or converts) and not (gathers or is_kindred or fmt in RECORDS)):
+            return self._poses(stream, fmt, request)
+        return self._in_place(stream, fmt, request._replace(notations=()) if gathers else request), fmt, None
 
-    def _as_columns(self, stream: Any, fmt: str, request: Request, output: Output) -> tuple[Generator[Outcome], About]:
-        """Write columns of numbers in the format they came in, or in another that holds such."""
-        from importlib import import_module
+    def _in_place(self, stream: Any, fmt: str, request: Request) -> Generator[Outcome]:
+        """Put the results where the numbers stood; all other text stays."""
+        if fmt in RECORDS:
+            from frametool.stream.record_stream import run_records
 
-        from frametool.cli.trees import answers
-        from frametool.documents.source import InputFile
-        from frametool.grammar.edges import Diagnostics, Options, Topics
-        from frametool.stream.column_stream import run_columns
+            return run_records(stream, fmt, request, source=self.name)
+        from frametool.stream.table_stream import run_table
 
-        if output.path is None and request.gathered is None and sys.stdout.isatty():
-            raise click.UsageError(f"{fmt} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
-        module: Any = import_module(FORMATS[fmt].reader)
-        file = InputFile(self.path or "-", stream)
-        file.format = fmt
-        opened = module.open_columns(file, Options(Diagnostics(), Topics(), answers=answers()))
-        into: Any = module
-        if output.chosen is not None and request.gathered is None:
-            into = import_module(FORMATS[output.chosen].writer)
-        style = output.style.changed(format=output.chosen or fmt)
-        request = request._replace(by_default=not output.notations)
-        return run_columns(opened, request, style, source=self.name, into=None if into is module else into), None
+        return run_table(stream, fmt, request, source=self.name, header=self.inputs.header)
 
-    def _as_poses(self, stream: Any, fmt: str, request: Request, output: Output) -> tuple[Generator[Outcome], About]:
+    def _poses(self, stream: Any, fmt: str, request: Request) -> tuple[Generator[Outcome], str, Diagnostics]:
         """Write the results of rows, or of poses that no table holds, in another format."""
         from frametool.cli.trees import answers
         from frametool.stream.as_poses import FormatConverter
 
-        target = output.chosen or _kept(fmt, output)
+        output = self.output
+        target = output.chosen or (fmt if "poses" in FORMATS[fmt].writes and not output.notations else "csv")
         refuse(target not in FORMATS, f"--format {target} is for single results and records, not for a stream of {fmt}")
         request = request._replace(by_default=not output.notations)
         converted = FormatConverter(fmt, request, self.name, output.style.changed(format=target), answers())
-        outcomes = converted.outcomes(stream, header=self.inputs.header)
-        return outcomes, lambda: converted.tally.assumed
+        return converted.outcomes(stream, header=self.inputs.header), target, converted.tally
 
-    def _as_text(self, stream: Any, fmt: str, request: Request, _output: Output) -> tuple[Generator[Outcome], None]:
-        """Put the results where the numbers stood; all other text stays."""
-        if request.gathered is not None:
-            request = request._replace(notations=())
-        if fmt in RECORDS:
-            from frametool.stream.record_stream import run_records
+    def _columns(self, stream: Any, fmt: str, request: Request) -> Generator[Outcome]:
+        """Write columns of numbers in the format they came in, or in another that holds such."""
+        from frametool.documents.source import InputFile
+        from frametool.stream.column_stream import run_columns
 
-            return run_records(stream, fmt, request, source=self.name), None
-        from frametool.stream.table_stream import run_table
-
-        return run_table(stream, fmt, request, source=self.name, header=self.inputs.header), None
+        output = self.output
+        if output.path is None and request.gathered is None and sys.stdout.isatty():
+            raise click.UsageError(f"{fmt} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
+        columns = open_columns(InputFile(self.path or "-", stream), fmt)
+        written = FORMATS[output.chosen].writer if output.chosen and request.gathered is None else FORMATS[fmt].reader
+        into = None if written == FORMATS[fmt].reader else import_module(written)
+        style = output.style.changed(format=output.chosen or fmt)
+        request = request._replace(by_default=not output.notations)
+        return run_columns(columns, request, style, source=self.name, into=into)
 
     def _says_columns(self) -> bool:
         """Return True if an option says that the stream is a table."""
         looked = self.inputs.peek
         return bool(looked("columns") or looked("keep") or looked("prefix") or looked("header") is False)
 
-    def _run_pasted(self, source: Source, request: Request, output: Output) -> int:
+    def _run_pasted(self, source: Source, request: Request) -> int:
         """Write the results of a text that was pasted."""
         from frametool.stream.record_values import read_poses, results
 
@@ -333,39 +334,42 @@ class Stream:
         if request.gathered is not None:
             request.gathered.add(read_poses(source, request), source.name)
             return 0
-        request = request._replace(notations=request.notations or output.notations)
-        output.values(results(source, request, output.style))
+        request = request._replace(notations=request.notations or self.output.notations)
+        self.output.values(results(source, request, self.output.style))
         return 0
 
-    def _run_as_values(self, stream: Any, fmt: str, request: Request, output: Output) -> int:
+    def _run_as_values(self, stream: Any, fmt: str, request: Request) -> int:
         """Write the results of records in another format than theirs."""
         from frametool.stream.record_results import stream_rows
 
-        if self.inputs.on_error == NULL and output.chosen not in ("csv", *RECORDS):
-            raise click.UsageError(f"--on-error null: {output.chosen} cannot hold a row without a result; give skip")
+        chosen, output = self.output.chosen or "", self.output
+        if self.inputs.on_error == NULL and chosen not in ("csv", *RECORDS):
+            raise click.UsageError(f"--on-error null: {chosen} cannot hold a row without a result; give skip")
         bad = self.policy(self.name)
-        request = request._replace(by_default=has_no_text(output.chosen or "") and not output.notations)
-        if is_recording(output.chosen or ""):
+        request = request._replace(by_default=has_no_text(chosen) and not output.notations)
+        if table.is_recording(chosen):
             request = request._replace(place=None)  # a fix is made of ecef, unless of what was read
         output.rows(_then_closed(self.opened(), stream_rows(stream, fmt, request, output.style, bad)))
         return ROWS_SKIPPED if bad.count else 0
 
     def policy(self, name: str, counted: str = "line") -> BadRows:
         """Return what reports and counts the bad rows of a source."""
-        return BadRows(name, self.inputs.on_error, most=self.inputs.max_errors, tell=self._tell, counted=counted)
+        tell = partial(say_error, in_json=self.inputs.peek("format_name") == "json")
+        return BadRows(name, self.inputs.on_error, most=self.inputs.max_errors, tell=tell, counted=counted)
 
-    def _completed(self, request: Request, output: Output, fmt: str) -> Request:
+    def _completed(self, request: Request, fmt: str) -> Request:
         """Add what the stream's options say to the request."""
-        inputs = self.inputs
+        inputs, output = self.inputs, self.output
+        is_table, alone = fmt not in RECORDS, request.gathered is None
         adds = bool(request.poses) or request.operation.formula is None  # look-ups add by themselves
-        if fmt not in RECORDS and output.chosen not in RECORDS and adds and request.gathered is None:
+        if is_table and output.chosen not in RECORDS and adds and alone:
             request = request._replace(keep=inputs.keep)
-        if (fmt not in RECORDS or request.operation.only_adds) and request.gathered is None:
+        if (is_table or request.operation.only_adds) and alone:
             request = request._replace(prefix=inputs.prefix)
         if request.poses:
             inputs.ask("from_rep")
             request = request._replace(columns=inputs.columns)
-        several = fmt in RECORDS and "," in ",".join(request.columns)
+        several = not is_table and "," in ",".join(request.columns)
         refuse(several, "--columns names one key of records, as detections.pose")
         if not has_no_text(output.chosen or fmt):
             inputs.ask("precision")
@@ -375,36 +379,30 @@ class Stream:
             precision=output.style.precision, keep_sign=output.style.keep_sign, on_error=inputs.on_error,
         )  # fmt: skip
 
-    def _write(self, outcomes: Generator[Outcome], output: Output, bad: BadRows, *, gathers: bool) -> int:
-        """Write what becomes of each block as it comes, unless somebody gathers it; return the exit status."""
-        from contextlib import closing, nullcontext
+    def at_places(self, request: Request) -> Request:
+        """Add what the options say of places on the Earth, where they say anything."""
+        place = self.output.style.place
+        if not (place or self.place or self.inputs.says_earth()):
+            return request
+        from frametool.cli.earth import earth
 
-        from frametool.stream.faults import run
-        from frametool.view.progress import ProgressBar
-
-        with (
-            nullcontext(lambda _: None) if gathers else output.opened() as write,
-            ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.inputs.quiet) as progress,
-            self.opened(),  # closed before a file takes its place, which Windows asks for
-            closing(outcomes),
-        ):
-            return run(outcomes, write, bad, progress.advance)
+        usual = request.by_default or not self.output.notations
+        return request._replace(place=place, given_place=self.place, earth=earth(), by_default=usual)
 
 
-def _kept(fmt: str, output: Output) -> str:
-    """Return the format in which poses that no table holds are written, if none is chosen."""
-    return fmt if "poses" in FORMATS[fmt].writes and not output.notations else "csv"
+def open_columns(file: InputFile, fmt: str) -> Any:
+    """Return the columns of numbers that a file of a format holds, read as the options say."""
+    from frametool.cli.trees import answers
+    from frametool.grammar.edges import Diagnostics, Options, Topics
+
+    file.format = fmt
+    return import_module(FORMATS[fmt].reader).open_columns(file, Options(Diagnostics(), Topics(), answers=answers()))
 
 
 def _then_closed(stream: Any, results: Iterable[Any]) -> Iterator[Any]:
     """Yield the results of a stream, and close it behind them."""
     with stream:
         yield from results
-
-
-def _may_be_bag(path: str) -> bool:
-    """Recognize a bag by its suffix, or a folder."""
-    return by_suffix(path, BAGS) is not None or os.path.isdir(path)
 
 
 def _signed(begin: bytes, name: str) -> str:
@@ -434,4 +432,123 @@ def is_bag(path: str) -> bool:
         return of_folder(path) in BAGS
     with open(path, "rb") as file:
         head = file.read(HEAD)
-    return re.match(b"|".join(_MAGICS), head, re.DOTALL) is not None if head else by_suffix(path, BAGS) is not None
+    return bool(re.match(b"|".join(_MAGICS), head, re.DOTALL) if head else table.by_suffix(path, BAGS))
+
+
+class PoseTask(Stream):
+    """What the options of a command on poses say.
+
+    derives: whether the derivation is wanted instead of the result
+    plan: how then
+    window: the first and the last nanosecond that --start and --stop leave
+    """
+
+    def __init__(self, inputs: Inputs, *what: str) -> None:
+        """Look at what the options say; `what` are the results that the command writes."""
+        self._format: str = inputs.explain or ""
+        self.derives = bool(self._format)
+        self.normalize: bool = inputs.normalize
+        super().__init__(inputs, Output(inputs, *what or ("poses",)))
+        self.window = options.window_of(inputs)
+        self.plan = self._plan() if self.derives else None
+
+    def request(self, **rest: Any) -> Request:
+        """Return what is done with rows and records: they are read as the options say."""
+        from frametool.stream.request import Request
+
+        offset_ns = 0 if self.inputs.reads_trees else self.inputs.time_offset or 0
+        if self.window:
+            self.inputs.ask("start", "stop")
+            rest["extra_column"] = rest.get("extra_column") or ""
+        said = [self.inputs.peek(name) or () for name in ("values", "poses", "pose", "a", "b")]
+        texts = [text for each in said for text in ([each] if isinstance(each, str) else each)]
+        if rest.get("poses") != 0 and not (texts and all(map(_says_all, texts))):
+            self.inputs.ask("from_rep")
+        own = {"given": self.notation, "degrees": self.output.style.degrees, "normalize": self.normalize}
+        made = self.at_places(Request(offset_ns=offset_ns, window=self.window, **own, **rest))
+        self.output.take_axes("", made.operation)
+        return made
+
+    def only_arguments(self, arguments: Sequence[str | Source | None]) -> None:
+        """Ask for what is said of files, where arguments are all that is read and one of them may be a file."""
+        refuse(self.path is not None, "-i FILE and arguments are two inputs; give one")
+        if any(isinstance(each, str) and os.path.exists(each) for each in arguments):
+            self.inputs.ask("input_formats")
+
+    def answer(self, argument: str | Source, request: Request, timed: dict[str, Any] | None = None) -> int:
+        """Write the results of the records of one argument: inline, a file, or the stream of the command.
+
+        timed: the stamp of a single result, {} for none, where it is not that of its record
+        """
+        if isinstance(argument, str):
+            bare, is_inverse = without_inverse(argument)
+            if bare == "-" or self.has_table(bare):
+                return self.run(request.of_inverses() if is_inverse else request)
+        self.only_arguments([argument])
+        values = values_of([argument], request, self.output)
+        if timed is not None:
+            from frametool.stream.record_values import at_time
+
+            values = (at_time(each, timed) for each in values)
+        self.output.values(values)
+        return 0
+
+    def _plan(self) -> DerivationStyle:
+        """Return how to derive; refuse what a derivation cannot be: a machine format, a stream."""
+        from frametool.explain.derive import DerivationStyle
+
+        if self.output.chosen not in (None, "text"):
+            written = f"{', '.join(FORMS)}, not {self.output.chosen}"
+            raise click.UsageError(f"--explain writes {written}; leave one of them out")
+        return DerivationStyle(self.output.style, significant(self.inputs.precision))
+
+    def written(self, argument: str | Source | None, *, warned: bool = False) -> WrittenPose:
+        """Read the one pose of an argument as it is written.
+
+        warned: its warnings are on stderr already
+        """
+        if isinstance(argument, str):
+            argument, is_inverse = without_inverse(argument)
+            if is_inverse:
+                return self.written(argument, warned=warned).turned()
+        from frametool.stream.written import written_poses
+
+        request = self.request()
+        with inline_misuse(), heard_by(lambda *_: None) if warned else nullcontext():
+            source = pose_source(one_argument(argument), request)
+            found = written_poses(source, degrees=request.degrees, normalize=request.normalize)
+        refuse(len(found) != 1, f"--explain derives one pose, {source.name} holds {len(found)}")
+        if found[0].pose.covariance is not None:
+            warn(f"{source.name}: --explain derives the pose alone; its covariance is left out")
+        return found[0]
+
+    def derive(self, operation: str, *parts: Any, **more: Any) -> int:
+        """Write the derivation of an operation where the result would go."""
+        from frametool.explain import derive
+
+        return self.write(getattr(derive, operation)(self.plan, *parts, **more))
+
+    def write(self, explanation: Explanation) -> int:
+        """Write a derivation where the result would go."""
+        self.output.text(explanation.render(self._format))
+        return 0
+
+
+def _says_all(text: str) -> bool:
+    """Return True for a mapping, whose keys say what its numbers are."""
+    bare = without_inverse(text)[0].strip()
+    return bare.startswith("{") and ":" in bare
+
+
+def significant(precision: int | None) -> int | None:
+    """Return how many significant digits --precision asks for; None for all."""
+    from frametool.explain.run import DIGITS
+
+    refuse(precision == 0, "--precision counts significant digits with --explain; give 1 or more, or full")
+    return DIGITS if precision is None else None if precision == options.FULL else precision
+
+
+def one_argument(argument: str | Source | None) -> str | Source:
+    """Return an argument that holds a record; standard input is a stream."""
+    refuse(argument in (None, "-"), f"standard input is a stream; {ONE_RECORD}")
+    return argument or ""

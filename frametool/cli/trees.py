@@ -14,7 +14,7 @@ import click
 from frametool.cli.command import Text, inputs, refuse, refuse_two_readers, say_if_typed
 from frametool.cli.options import input_formats, tree_on_the_line
 from frametool.cli.poses import is_inline, source_of
-from frametool.cli.stderr import say
+from frametool.cli.sink import say
 from frametool.documents.source import ReadCache
 from frametool.errors import bare, listing, shown, warn
 from frametool.formats.table import FORMATS, ORDERS
@@ -167,7 +167,7 @@ def opened(
     say_if_typed("-" if "-" in arguments else "")
     chosen = inputs()
     chosen.reads_trees = True
-    formats, named = input_formats(streams=streams)[0], [*map(_frame_names, chosen.peek("named_frames"))]
+    formats, named = input_formats(streams=streams)[0], [*chosen.peek("named_frames")]
     reads = ("tree", "drawing") if drawings else ("tree",)
     if other := [fmt for fmt in formats if {*reads}.isdisjoint(FORMATS[fmt].reads)]:
         raise click.UsageError(f"--in {other[0]}: no frames are read from that; `frametool formats` lists what is")
@@ -230,13 +230,6 @@ def _joints(texts: Sequence[str]) -> dict[str, str]:
         refuse(name in values, f"--joint {shown(name)} has two values, {values.get(name)} and {value}; leave one out")
         values[name] = value
     return values
-
-
-def _frame_names(text: str) -> tuple[str, ...]:
-    """Take WORLD,BODY apart."""
-    names = tuple(name.strip() for name in text.split(",")) if text else ()
-    refuse(not all(names), f"--frames takes names with commas between them, found {shown(text)}")
-    return names
 
 
 def tree_file(argument: str) -> str:

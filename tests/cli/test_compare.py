@@ -97,7 +97,7 @@ REFUSED = {
     ("kitti-ref.txt", "drone-est.tum"): (2, "kitti-ref.txt has no stamps, the other has; give them with --stamps FILE"),
     ("drone-ref.tum", "line-est.tum", "--offset", "auto"): (1, "no clear clock offset (score 0.19); give one: --offset T"),
     (*DRONE, "--delta", "5"): (2, "'5' is not a distance between poses; write a number with m, s, deg, frames"),
-    (*DRONE, "--max-diff", "1ms"): (2, "--max-diff is of --match nearest; --max-gap is of interpolation"),
+    (*DRONE, "--max-diff", "1ms"): (2, "--max-diff has no effect here"),
     (*DRONE, "--tolerance", "5%"): (2, "--tolerance needs --all-pairs"),
     (*DRONE, "--fail", "ate>1", "--delta", "x"): (2, "'x' is not a distance between poses"),
     (*DRONE, "--fail", "atee>1"): (2, "no number is called 'atee'; did you mean 'ate'?"),

@@ -94,7 +94,7 @@ FRAMES = ("--frames", "left,right", "-o", "x.ply")
         (("map", *BOTH, "--frames", "left,right"), 2, "several clouds become one: -o all.ply, or -f; formats: "),
         (("map", *BOTH, *FRAMES, "--keep"), 2, "--keep has no effect here"),
         (("map", *BOTH, *FRAMES, "--columns", "x,y,z"), 2, "--columns has no effect here"),
-        (("map", "left", *BOTH, "1", "2", "3", "-o", "x.ply"), 2, "several clouds are moved whole, without records, "),
+        (("map", "left", *BOTH, "1", "2", "3", "-o", "x.ply"), 2, "clouds are moved whole, without records, "),
         (("map", "-i", "a.ply", "-i", "-", *FRAMES), 2, "-i -: several -i are files of one cloud each"),
         (("map", "-i", "a.ply", "-i", "cut.ply", *FRAMES), 1, "cut.ply:10: expected 4 numbers (x y z intensity), found 1"),
     ],

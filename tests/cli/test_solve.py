@@ -558,7 +558,7 @@ USAGE: tuple[tuple[str, str], ...] = (
     ("--points a b --hand-eye", "--hand-eye and --points exclude each other"),
     ("--points a b --names c", "--names takes two names, A,B"),
     ("--hand-eye a b --names c,d", "--names takes four names, BASE,GRIPPER,CAMERA,TARGET"),
-    ("--points a b --names c,c", "'c,c': names stand with commas between them, each once"),
+    ("--points a b --names c,c", "--names takes two names, A,B; no two may be the same"),
     ("- -", "standard input can be read once; only one argument may be -"),
     ("m.yaml --force", "--force needs --output"),
     ("m.yaml --report r.html", "'r.html' does not end in .json or .csv"),

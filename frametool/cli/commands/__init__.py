@@ -9,7 +9,7 @@ import os
 import sys
 from importlib import import_module
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -19,7 +19,7 @@ from frametool.cli.sink import writing
 from frametool.errors import SHOWN, FileProblem, Misused, any_near, did_you_mean, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from click.shell_completion import CompletionItem
 
@@ -76,9 +76,12 @@ COMPLETION = "_FRAMETOOL_COMPLETE"  # the variable by which shells ask for compl
 
 
 class Group(WithHelp, click.Group):
-    """The commands of a table, each imported when it is called and not before."""
+    """The commands of a table, name -> (module, what it does), each imported when it is called and not before."""
 
-    table = COMMANDS
+    def __init__(self, *args: Any, table: Mapping[str, tuple[str, str]] = COMMANDS, **kwargs: Any) -> None:
+        """Keep the table."""
+        super().__init__(*args, **kwargs)
+        self.table = table
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Answer a call without arguments with help; click's own way to it has changed with its versions."""
@@ -92,7 +95,9 @@ class Group(WithHelp, click.Group):
         return list(self.table)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
-        """Import one command, or say which ones there are."""
+        """Import one command, if it is not here, or say which ones there are."""
+        if cmd_name in self.commands:
+            return self.commands[cmd_name]
         if cmd_name not in self.table:
             rest = f"`{ctx.command_path} --help` lists all, `frametool help WORD` searches"
             hint = f"; a file follows a command: frametool tree {cmd_name}" * os.path.isfile(cmd_name)

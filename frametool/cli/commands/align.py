@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from frametool.cli.command import Inputs, argument, command_named, option, refuse
-from frametool.cli.comparing import comparisons, pairing_options, trajectory_options, write_trajectory
-from frametool.cli.options import reading_options, result_options, rotation_options
+from frametool.cli.command import Inputs, argument, command_named, option
+from frametool.cli.commands.compare import comparisons, pairing_options, trajectory_options, write_trajectory
+from frametool.cli.options import names_as, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.stream.faults import ROWS_SKIPPED
 
@@ -13,9 +13,8 @@ from frametool.stream.faults import ROWS_SKIPPED
 @argument("ref")
 @argument("est")
 @pairing_options
-@option("--names REF,EST", "names of the two worlds  [default: their own]")
+@option("--names REF,EST", "names of the two worlds  [default: their own]", names_as("REF,EST"))
 @trajectory_options
-@reading_options()
 @rotation_options
 @result_options("poses")
 def command(inputs: Inputs) -> int:
@@ -32,13 +31,12 @@ def command(inputs: Inputs) -> int:
     """
     into = Output(inputs, "poses") if inputs.output else None
     entry = Output(inputs.but(output=None, format_name=None) if into else inputs, "poses")
-    chosen = _names(inputs.names)
     (found,), skipped = comparisons(inputs.ref, [inputs.est], inputs)
     from frametool.fit.numbers import whole_estimate, worlds
     from frametool.grammar.pose import Pose
     from frametool.grammar.result import Result
 
-    named = chosen or worlds(found)
+    named = inputs.names or worlds(found)
     whole = whole_estimate(found)._replace(world=found.pairs.ref.world)
     if into is not None or entry.is_trajectory:
         write_trajectory(into or entry, whole)
@@ -46,11 +44,3 @@ def command(inputs: Inputs) -> int:
         pose = Pose.of(found.fit.transform.components, named[1], named[0])
         entry.values([Result(pose._replace(scale=found.fit.scale))])
     return ROWS_SKIPPED if skipped else 0
-
-
-def _names(text: str | None) -> tuple[str, str] | None:
-    if text is None:
-        return None
-    names = [name.strip() for name in text.split(",")]
-    refuse(len(names) != 2 or not all(names), "--names takes two names: REF,EST")
-    return names[0], names[1]

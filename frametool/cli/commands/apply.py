@@ -5,36 +5,31 @@ from __future__ import annotations
 import re
 from contextlib import ExitStack
 from functools import cache, partial
-from importlib import import_module
-from itertools import groupby
+from itertools import chain, groupby
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from frametool.cli import options
-from frametool.cli.command import Inputs, argument, command_named, option, refuse
-from frametool.cli.explaining import EXPLAIN, ONE_RECORD, PoseTask
-from frametool.cli.options import for_each
+from frametool.cli import options, streaming
+from frametool.cli.command import Inputs, argument, command_named, option, refuse, together
 from frametool.cli.poses import inline_misuse, is_inline, is_pasted, one_pose, pose_source, values_of
-from frametool.cli.sink import writing
-from frametool.cli.stderr import say, say_warning
-from frametool.cli.streaming import SEVERAL, is_bag, stream_options
+from frametool.cli.sink import say_warning, writing
 from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, report_granted
-from frametool.documents.source import Source
+from frametool.documents.source import InputFile, Source
 from frametool.errors import FormatError, FrametoolError, FrametoolWarning, ValueInvalid, heard_by, shown, warn
 from frametool.formats.table import FORMATS, holds_arrays, writers
 from frametool.frames.stamps import format_stamp
 from frametool.geometry.rigid import EXACT, UNCERTAIN
 from frametool.geometry.uncertainty import warn_if_wide
+from frametool.grammar.edges import Diagnostics
 from frametool.grammar.names import EARTH_FRAMES
-from frametool.stream.faults import BadRows, Fault
+from frametool.stream.faults import BadRows, Fault, run
 from frametool.text.numbers import NotFinite, parse_length
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.cli.output import Output
-    from frametool.cli.streaming import Stream
+    from frametool.cli.streaming import PoseTask
     from frametool.explain.derive import DerivationStyle
     from frametool.explain.operations import WrittenPose
     from frametool.frames.buffer import TransformBuffer
@@ -58,32 +53,30 @@ _WRITTEN = f"formats: {', '.join(writers('arrays'))}"
 class BagOfClouds:
     """The clouds of a bag that -i names, and the files that they become."""
 
-    def __init__(self, path: str, output: Output, stream: Stream) -> None:
+    def __init__(self, task: PoseTask) -> None:
         """Open the bag and choose its topics; of --topic, what names no clouds is left to the tree."""
-        from frametool.grammar.edges import Diagnostics
         from frametool.recordings.messages import cloud_topics
         from frametool.recordings.read import opened_recording
 
-        self.path, self.output, self.stream, inputs = path, output, stream, stream.inputs
+        self.task, self.path, inputs = task, task.name, task.inputs
+        self.output, chosen = task.output, inputs.topics
         inputs.ask("input_path")
-        is_one = output.path in (None, "-") or not holds_arrays(output.chosen or "")
+        is_one = self.output.path in (None, "-") or not holds_arrays(self.output.chosen or "")
         refuse(is_one, f"each cloud of a bag is a file: -o 'scan_{{stamp_ns}}.pcd'; {_WRITTEN}")
         self.tally, self.names = Diagnostics(), dict[str, int]()
-        chosen = inputs.topics
         with ExitStack() as opened:
-            self.reader = opened.enter_context(opened_recording(path, self.tally))
+            self.reader = opened.enter_context(opened_recording(self.path, self.tally))
             self.topics = cloud_topics(self.reader, chosen)
             self.opened = opened.pop_all()
         clouds = {topic.strip("/") for topic in self.topics}
         inputs.leave(topics=tuple(topic for topic in chosen if topic.strip("/") not in clouds))
 
-    def run(self, way: Way, *, alone: bool) -> int:
-        """Move and write cloud after cloud; return the exit status.  alone: there is nothing else to do."""
+    def run(self, way: Way) -> int:
+        """Move and write cloud after cloud; return the exit status."""
         from frametool.recordings.messages import read_clouds
 
-        refuse(way.uncertain or not alone, "the clouds of a bag are moved whole, each at its own stamp; no records")
-        bad = self.stream.policy(self.path, "message")
-        self.stream.inputs.refuse_idle()
+        bad = self.task.policy(self.path, "message")
+        self.task.inputs.refuse_idle()
         count = points = 0
         once: Any = cache(say_warning)
         with self.opened, heard_by(once):
@@ -97,9 +90,8 @@ class BagOfClouds:
                 once(f"{self.path}: {finding.message}", finding.rule, FrametoolWarning)
         if not count:
             raise FormatError(f"no messages on {', '.join(self.topics)}", source=self.path)
-        if not self.stream.inputs.quiet:
-            files = f"{len(self.names)} {'file' if len(self.names) == 1 else 'files'}"
-            say(f"{self.path}: {points} points{_where(way)}, metres, in {files} ({', '.join(self.topics)})")
+        files = f"{len(self.names)} file{'s' * (len(self.names) != 1)} ({', '.join(self.topics)})"
+        self.task.inputs.note(f"{self.path}: {points} points{way.into}, metres, in {files}")
         return bad.finish(count)
 
     def _write(self, cloud: PointCloud, way: Way, bad: BadRows) -> int:
@@ -116,8 +108,8 @@ class BagOfClouds:
         with writing(name, force=self.output.force) as write:
             for outcome in moved_cloud(cloud, pose, style, self.path):
                 for fault in outcome.faults:
-                    reason = f"point {fault.line + 1}: {fault.reason}"
-                    raise FormatError(f"message {cloud.number}: {reason}", source=self.path)
+                    reason = f"message {cloud.number}: point {fault.line + 1}: {fault.reason}"
+                    raise FormatError(reason, source=self.path)
                 write(outcome.text)
         self.names[name] = cloud.number
         return len(cloud.rows)
@@ -132,39 +124,29 @@ class BagOfClouds:
         return name
 
 
-def _where(way: Way) -> str:
-    return f" in {way.target}" if way.target else ""
-
-
 class SeveralClouds:
     """Clouds of several -i that become one: each is expressed in a frame of its own, or all in SOURCE."""
 
-    def __init__(self, output: Output, stream: Stream) -> None:
+    def __init__(self, task: PoseTask) -> None:
         """Take --frames and the --in of clouds; the tree may not have them too.  Raises click.UsageError."""
-        self.output, self.stream, inputs = output, stream, stream.inputs
+        self.task, inputs = task, task.inputs
         self.paths: Sequence[str] = inputs.input_path
-        others = [path for path in self.paths if path == "-" or is_bag(path)]
+        others = [path for path in self.paths if path == "-" or streaming.is_bag(path)]
         refuse(others, f"-i {''.join(others[:1])}: several -i are files of one cloud each")
-        refuse(not holds_arrays(output.chosen or ""), f"several clouds become one: -o all.ply, or -f; {_WRITTEN}")
+        refuse(not holds_arrays(task.output.chosen or ""), f"several clouds become one: -o all.ply, or -f; {_WRITTEN}")
         formats = inputs.input_formats
         named = [fmt for fmt in formats if "arrays" in FORMATS[fmt].reads]
-        self.formats = for_each(named, len(self.paths))
-        self.frames = [name.strip() for text in inputs.named_frames for name in text.split(",")]
+        self.formats = options.for_each(named, len(self.paths))
+        self.frames = [*chain.from_iterable(inputs.named_frames)]
         inputs.leave(input_formats=[fmt for fmt in formats if fmt not in named], named_frames=())
 
-    def run(self, way: Way, *, alone: bool) -> int:
-        """Move all and write them as one; return the exit status.  alone: there is nothing else to do."""
-        from frametool.cli.trees import answers
-        from frametool.documents.source import InputFile
+    def run(self, way: Way) -> int:
+        """Move all and write them as one; return the exit status."""
         from frametool.formats.detect import detect
-        from frametool.grammar.edges import Diagnostics, Options, Topics
         from frametool.stream.column_stream import MergedClouds
-        from frametool.stream.faults import run
         from frametool.stream.request import Operation, Request
 
-        count, frames, inputs = len(self.paths), self.frames, self.stream.inputs
-        is_more = way.uncertain or not alone
-        refuse(is_more, "several clouds are moved whole, without records, --covariance or --explain")
+        count, frames, output, on_error = len(self.paths), self.frames, self.task.output, self.task.inputs.on_error
         is_open = way.has_source == bool(frames) or len(frames) not in (0, count)
         refuse(is_open, f"name SOURCE, the frame of all clouds, or --frames A,B with one for each of the {count}")
         with ExitStack() as opened:
@@ -172,58 +154,59 @@ class SeveralClouds:
             for path, named, frame in zip(self.paths, self.formats, frames or [""] * count, strict=True):
                 file = InputFile(path)
                 opened.callback(file.close)
-                file.format = fmt = named or detect(file.head(), "records", "rows", "arrays", name=path)
+                fmt = named or detect(file.head(), "records", "rows", "arrays", name=path)
                 if "arrays" not in FORMATS[fmt].reads:
                     hint = f"make one of it: frametool convert -i {path} -o NEW.pcd"
                     raise FormatError(f"{FORMATS[fmt].summary}, no cloud; {hint}", source=path)
-                reading = Options(Diagnostics(), Topics(), answers=answers())
-                columns = import_module(FORMATS[fmt].reader).open_columns(file, reading)
                 operation = Operation(left=way.from_frame(frame or None, None), moves=True)
-                planned.append((columns, Request(operation, on_error=inputs.on_error), path))
-            merged = MergedClouds(planned, self.output.style)
+                planned.append((streaming.open_columns(file, fmt), Request(operation, on_error=on_error), path))
+            merged = MergedClouds(planned, output.style)
             status = 0
-            with writing(self.output.path, force=self.output.force) as write:
+            with writing(output.path, force=output.force) as write:
                 for at, path in enumerate(self.paths):
-                    policy = self.stream.policy(path, "row")
+                    policy = self.task.policy(path, "row")
                     status = max(status, run(merged.outcomes(at), write, policy, lambda _rows, _size: None))
                 for piece in merged.writer.end():
                     write(piece)
-        if not inputs.quiet:
-            froms = f", from {', '.join(frames)}" if frames else ""
-            say(f"{count} clouds{_where(way)} as one{froms}; metres")
+        froms = f", from {', '.join(frames)}" if frames else ""
+        self.task.inputs.note(f"{count} clouds{way.into} as one{froms}; metres")
         return status
 
 
-def clouds_of(stream: Stream, output: Output) -> BagOfClouds | SeveralClouds | None:
+def clouds_of(task: PoseTask) -> BagOfClouds | SeveralClouds | None:
     """Return several clouds, or those of a bag if -i names one whose messages are no records."""
-    if len(stream.paths) > 1:
-        return SeveralClouds(output, stream)
-    if not stream.path or not is_bag(stream.path):
+    if len(task.paths) > 1:
+        return SeveralClouds(task)
+    is_bag = task.path and streaming.is_bag(task.path)
+    if not is_bag or (not holds_arrays(task.output.chosen or "") and task.messages() is not None):
         return None
-    if not holds_arrays(output.chosen or "") and stream.messages() is not None:
-        return None
-    return BagOfClouds(stream.path, output, stream)
+    return BagOfClouds(task)
 
 
 CHOICES = ("point", "vector", "pose", "twist", "wrench")
+# of rows that are moved by a tree
+frame_column_option = option("--frame-column NAME", "column with the frame of each row, without SOURCE", options.COLUMN)
+moving_row_options = together(
+    option("--time-column NAME", "column or key with the time of each row", options.COLUMN, excludes=("at",),
+           under="Time"),
+    option("--at TIME", "one time for all  [default: latest]", options.read_time, under="Time"),
+    options.rules_options,
+    options.offset_option,
+)  # fmt: skip
 
 
-@command_named("apply", own=("input_path", "output"))
+@command_named("apply", own=("input_path", "output", "time_column", "at"))
 @argument("arguments", FRAME, nargs=-1, metavar="[TREE TARGET [SOURCE]] [X Y Z | RECORD]..")
 @option("--transform POSE", "move by this pose, not by a lookup", name="pose", excludes=("at", "time_column"))
 @option("--as KIND", "point, vector, pose, twist, wrench; once per --columns", CHOICES, name="kinds", multiple=True)
-@option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files")
-@partial(stream_options, first=SEVERAL)
+@streaming.several_stream_options
 @options.pose_result_options("points", "trajectory")
 @option("--covariance", "include that of the tree's edges, or of --transform", excludes=("explain",))
 @options.scale_option
-@EXPLAIN
-@option("--frame-column NAME", "column with the frame of each row, without SOURCE", options.ColumnNames())
-@option("--time-column NAME", "column or key with the time of each row", options.ColumnNames(), excludes=("at",))
-@option("--at TIME", "one time for all  [default: latest]", options.read_time)
-@options.rules_options
-@options.offset_option
-@options.reading_options(streams=True)
+@streaming.EXPLAIN
+@frame_column_option
+@moving_row_options
+@options.reading_options
 def command(inputs: Inputs) -> int:
     """Move points, vectors and poses from SOURCE into TARGET.
 
@@ -236,20 +219,22 @@ def command(inputs: Inputs) -> int:
     A RECORD is a pose, {vector: [x, y, z]} or a point, also X Y Z (help records). Without SOURCE it names its frame. -i
     FILE or stdin holds several: rows, JSON lines, clouds, what `ros2 topic echo` prints.
     """
-    task = PoseTask(inputs, "points", "trajectory")
-    stream, output, plan = task.stream, task.output, task.plan
-    clouds = clouds_of(stream, output)
+    task = streaming.PoseTask(inputs, "points", "trajectory")
+    output, plan = task.output, task.plan
+    clouds = clouds_of(task)
     if inputs.pose is None:
-        way, rest = way_by_tree(inputs, numbers=bool(stream.place))
+        way, rest = way_by_tree(inputs, numbers=bool(task.place))
     else:
         way, rest = _way_by_pose(inputs, task), inputs.arguments
     is_stream = rest in ((), ("-",))
     if clouds is not None:
-        return clouds.run(way, alone=is_stream and plan is None)
+        is_more = way.uncertain or not is_stream or plan is not None
+        refuse(is_more, "clouds are moved whole, without records, --covariance or --explain")
+        return clouds.run(way)
     kind = _kind(inputs)
     if plan is not None:
         records = list(sources_of(rest, kind))
-        refuse(is_stream or len(records) != 1, f"a stream, or several records; {ONE_RECORD}")
+        refuse(is_stream or len(records) != 1, f"a stream, or several records; {streaming.ONE_RECORD}")
         return _derived(task, plan, way, records[0], kind or "")
     request = way.request(*((inputs.frame_column, inputs.time_column) if is_stream else (None, None)))
     request = request._replace(kind=kind or "", degrees=output.style.degrees, normalize=task.normalize)
@@ -259,12 +244,12 @@ def command(inputs: Inputs) -> int:
         if (count := len(inputs.peek("columns"))) > 1:
             kinds = inputs.kinds if len(inputs.kinds) == count else (kind or "",) * count
             request = request._replace(poses=count, kinds=kinds)
-        status = stream.run(request, output)
+        status = task.run(request)
     else:
         task.only_arguments(rest)
-        if stream.place:
+        if task.place:
             inputs.ask("from_rep")
-        output.values(values_of(list(sources_of(rest, kind, stream.place)), request, output))
+        output.values(values_of(list(sources_of(rest, kind, task.place)), request, output))
     way.tell()
     return status
 
@@ -314,6 +299,11 @@ class Way(NamedTuple):
     uncertain: bool = False
     tell: Callable[[], None] = lambda: None
     tree: FrameTree | TransformBuffer | None = None
+
+    @property
+    def into(self) -> str:
+        """Return in which frame records are then expressed, for messages."""
+        return f" in {self.target}" if self.target else ""
 
     def request(self, frame_column: str | None, time_column: str | None) -> Request:
         """Return how records move: from one frame or each from its own, all alike or each at its own time."""

@@ -17,7 +17,7 @@ import click
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, say_if_typed
 from frametool.cli.commands import TROUBLE, answered, called, called_in, group
 from frametool.cli.embedded import streams, writer
-from frametool.cli.stderr import TROUBLES, BatchLine, say_error, telling_of, wants_json, words_of
+from frametool.cli.sink import TROUBLES, BatchLine, say_error, telling_of, wants_json, words_of
 from frametool.documents.source import ReadCache, opened
 from frametool.errors import FileProblem, FrametoolError, Misused, ValueInvalid, alternatives
 from frametool.stream.faults import ROWS_SKIPPED, SKIP, STOP, RowsSkipped
@@ -63,36 +63,6 @@ READABLE = (None, "json", "yaml")  # the same numbers; other formats are for pri
 KEPT_ARE = "a name keeps one pose, point, number or tree"
 
 
-class KeptResults:
-    """The results of lines `NAME = COMMAND`."""
-
-    def __init__(self) -> None:
-        """Create it without any."""
-        self._texts: dict[str, str] = {}
-        self._failed: dict[str, int] = {}  # name -> the line that sets it
-
-    def value_of(self, name: str) -> str:
-        """Return the value of a name; raise Misused for one that has no value."""
-        if name in self._texts:
-            return self._texts[name]
-        if name in self._failed:
-            raise Misused(f"${name} has no value: line {self._failed[name]}, which sets it, has failed")
-        known = alternatives(name, self._texts, "names") if self._texts else "; no line before has kept a result"
-        raise Misused(f"unknown name ${name}{known}; a dollar sign is $$")
-
-    def keep(self, name: str, text: str) -> None:
-        """Keep a result that was printed as JSON; raise ValueInvalid for none or several."""
-        if (lines := text.count("\n")) != 1:
-            raise ValueInvalid(f"{name}: the command has {lines or 'no'} result{'s' * (lines != 1)}; {KEPT_ARE}")
-        self._texts[name] = text.strip()
-        self._failed.pop(name, None)
-
-    def lose(self, name: str, line: int) -> None:
-        """Forget what a name stood for: the line that sets it has failed."""
-        self._texts.pop(name, None)
-        self._failed[name] = line
-
-
 def print_as_json(name: str, context: click.Context) -> None:
     """Let a command that is about to run print what can be kept; raise Misused where it cannot."""
     formats: Any = next((each.type for each in context.command.params if each.name == "format_name"), None)
@@ -127,7 +97,7 @@ class CommandBatch:
         """Create a batch of which nothing has run."""
         self.source = source
         self.skips = skips
-        self.results = KeptResults()
+        self.kept: dict[str, str | int] = {}  # name -> its result as JSON, or the line that sets it and has failed
         self.context = click.Context(group, info_name="frametool", obj=ReadCache())
         self.count = self.failed = self.status = 0
         self.in_json = True  # as all lines that failed wanted their errors
@@ -160,7 +130,7 @@ class CommandBatch:
             try:
                 if "\0" in line.text:
                     raise Misused("not UTF-8 text, but UTF-16 or no text: it holds a NUL byte")
-                words = split(line.text, self.results.value_of)
+                words = split(line.text, self._value_of)
                 if not words:
                     raise Misused(f"no command behind {line.name} =")
                 status = self._called(words, line.name)
@@ -174,7 +144,7 @@ class CommandBatch:
             except TROUBLES as error:
                 problem = FileProblem(words_of(error))
             if line.name:
-                self.results.lose(line.name, line.number)
+                self.kept[line.name] = line.number
             self.in_json &= (in_json := wants_json(words))
             say_error(problem, in_json=in_json, fate="line skipped" if self.skips else "")
         return status or TROUBLE.get(words[0] if words else "", problem.exit_code)
@@ -191,8 +161,22 @@ class CommandBatch:
         with streams(sys.stdin, writer(held)):
             status = answered(lambda: called_in(self.context, words, partial(print_as_json, name)), words)
         if status in FINISHED:
-            self.results.keep(name, held.getvalue().decode())
+            text = held.getvalue().decode()
+            if (lines := text.count("\n")) != 1:
+                raise ValueInvalid(f"{name}: the command has {lines or 'no'} result{'s' * (lines != 1)}; {KEPT_ARE}")
+            self.kept[name] = text.strip()
         return status
+
+    def _value_of(self, name: str) -> str:
+        """Return the value of a name; raise Misused for one that has no value."""
+        found = self.kept.get(name)
+        if isinstance(found, int):
+            raise Misused(f"${name} has no value: line {found}, which sets it, has failed")
+        if found is None:
+            kept = [each for each, value in self.kept.items() if isinstance(value, str)]
+            known = alternatives(name, kept, "names") if kept else "; no line before has kept a result"
+            raise Misused(f"unknown name ${name}{known}; a dollar sign is $$")
+        return found
 
 
 class _Pipe(TextIOWrapper):

@@ -8,7 +8,7 @@ from frametool.cli.command import Inputs, argument, command_named, refuse
 from frametool.cli.options import result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.poses import inline_misuse, pose_source
-from frametool.cli.stderr import say
+from frametool.cli.sink import say
 from frametool.grammar.pose_algebra import turn_between
 
 if TYPE_CHECKING:

@@ -17,11 +17,10 @@ from frametool.calc.parser import Line, mentions_row, walk
 from frametool.calc.values import LIST, POINT, POSE, TREE, VECTOR, Term, Type
 from frametool.cli.command import Command, Inputs, Text, argument, command_named, option, refuse
 from frametool.cli.commands.help import topic
-from frametool.cli.options import ColumnNames, reading_options, result_options, whole_pose_options
+from frametool.cli.options import COLUMN, pose_result_options, reading_options
 from frametool.cli.output import Output
 from frametool.cli.poses import source_of
-from frametool.cli.sink import writing
-from frametool.cli.stderr import say_error, tell
+from frametool.cli.sink import say_error, tell, writing
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.trees import load_tree
 from frametool.documents.source import HEAD, decode, opened, read_text
@@ -60,21 +59,21 @@ def named_file(path: str, scope: Scope) -> Term:
     """Read a file for a name in expressions; `-` is standard input.  Raises FileProblem, FormatError."""
     from frametool.calc.rows import poses_of_table, values_of_document
 
-    if path == "-":
-        source = source_of("-")
-        if found := values_of_document(source, scope):
-            return found
-        from frametool.formats.load import load_sources
+    fmt = "yaml"
+    if path != "-":
+        from frametool.formats.detect import detect
 
-        return Term(Type(TREE), (), tree=load_sources([source]))
-    from frametool.formats.detect import detect
-
-    with opened(path) as file:  # what is neither a table nor a document may be a tree
-        fmt = detect(file.read(HEAD), "tree", "rows", "records", name=path, otherwise="yaml")
+        with opened(path) as file:  # what is neither a table nor a document may be a tree
+            fmt = detect(file.read(HEAD), "tree", "rows", "records", name=path, otherwise=fmt)
     if "rows" in FORMATS[fmt].reads:
         return poses_of_table(path, fmt, normalize=scope.normalize, degrees=scope.degrees)
-    found = values_of_document(source_of(path), scope) if "records" in FORMATS[fmt].reads else None
-    return found or Term(Type(TREE), (), tree=load_tree(path, streams=True))
+    source = source_of(path) if "records" in FORMATS[fmt].reads else None
+    if source and (found := values_of_document(source, scope)):
+        return found
+    from frametool.formats.load import load_sources
+
+    tree = load_sources([source]) if source and path == "-" else load_tree(path, streams=True)
+    return Term(Type(TREE), (), tree=tree)
 
 
 class Expression(Text):
@@ -131,38 +130,40 @@ def _for_a_person(term: Term, style: Style) -> str:
     return line_of_value(term, style)
 
 
-def calculate_lines(stream: Stream, output: Output, scope: Scope) -> int:
-    """Write the value of each line of standard input; a binding is shown only where nothing follows it.
+def shown_of(values: Iterable[tuple[Line, Term]]) -> Iterator[Term]:
+    """Yield the values of lines; one that is bound to a name is shown only where nothing follows it."""
+    last = None
+    for line, term in values:
+        last = term if line.name else None
+        if not line.name:
+            yield term
+    if last is not None:
+        yield last
+
+
+def calculate_lines(stream: Stream, scope: Scope) -> int:
+    """Write the value of each line of standard input.
 
     Ends at the first error, or with --on-error skip goes on behind it, and then returns 3.
     """
     bad, count = stream.policy("stdin"), 0
 
-    def values() -> Iterator[Term]:
+    def values() -> Iterator[tuple[Line, Term]]:
         nonlocal count
-        last: Term | None = None
         for number, data in enumerate(iter(sys.stdin.buffer.readline, b"") if sys.stdin else (), 1):
             text = decode(data, "stdin").rstrip("\r\n")
             if not text.strip() or text.lstrip().startswith("#"):
                 continue
             count += 1
-            last = None
             try:
                 line = read_line(text)
-                term = evaluate_line(line, scope)
+                yield line, evaluate_line(line, scope)
             except FrametoolError as error:
                 if bad.on_error == STOP:
                     raise
                 bad.take([Fault.of(number, str(error.details().get("column", "")), error)])
-                continue
-            if line.name:
-                last = term
-            else:
-                yield term
-        if last is not None:
-            yield last
 
-    output.pieces(value_texts(values(), output.style))
+    stream.output.pieces(value_texts(shown_of(values()), stream.output.style))
     return bad.finish(count)
 
 
@@ -196,8 +197,7 @@ def _answer(line: str, scope: Scope, output: Output) -> None:
             write(topic("calc"))
         return
     try:
-        found = file_named_in(line, scope)
-        if found is None:
+        if file_named_in(line, scope) is None:
             output.pieces(value_texts([evaluate_line(read_line(line), scope)], output.style))
     except click.UsageError as error:
         tell(f"frametool: {error.format_message()}")
@@ -257,11 +257,10 @@ def _begins_with_minus(argument: str) -> bool:
 @option("-e NAME=EXPR", "a result in its own columns: NAME, NAME_x ..; may be repeated; also EXPR, @FILE",
     Expression(), name="expressions", multiple=True)
 @option("--as", "what the rows are  [default: as they look]", KINDS, name="kind")
-@option("--time-column NAME", "of the time of @ row  [default: the one that looks so]", ColumnNames(), under="Time")
+@option("--time-column NAME", "of the time of @ row  [default: the one that looks so]", COLUMN, under="Time")
 @stream_options
-@whole_pose_options
-@result_options("points")
-@reading_options(streams=True)
+@pose_result_options("points")
+@reading_options
 def command(inputs: Inputs) -> int:
     """Calculate with poses whose frames are checked like units.
 
@@ -276,9 +275,10 @@ def command(inputs: Inputs) -> int:
     NAME=EXPR to a value. An expression with row is computed for each row of -i FILE or standard input and replaces
     what the row was. Without an expression a terminal gets a prompt; from a pipe one expression a line is read.
     """
-    stream, output = Stream(inputs), Output(inputs, "points")
+    output = Output(inputs, "points")
+    stream = Stream(inputs, output)
     scope = Scope(degrees=inputs.deg, normalize=inputs.normalize)
-    if any(map(inputs.peek, ("origin", "local_axes", "zone"))):
+    if inputs.says_earth():
         from frametool.cli.earth import earth
 
         scope.earth = earth()
@@ -287,13 +287,16 @@ def command(inputs: Inputs) -> int:
     scope.tree = _tree(inputs.trees, lines)
     if not lines:
         inputs.ask("origin", "local_axes", "zone")  # whatever comes
-        return _without_expression(stream, output, scope)
+        refuse(stream.path is not None, "-i FILE needs an expression over row")
+        is_prompt = sys.stdin is not None and sys.stdin.isatty()
+        return talk(scope, output) if is_prompt else calculate_lines(stream, scope)
     if stream.path is not None or any(mentions_row(line.tree) for line in lines):
         formula = _over_rows(lines, [is_option for _, is_option in texts], scope, output)
         formula.check((inputs.kind,) if inputs.kind else ("pose", "point", "vector"))
         request = _request(formula, inputs)
-        return stream.run(request, output)
-    output.pieces(value_texts(_results(lines, scope), output.style))
+        return stream.run(request)
+    values = ((line, evaluate_line(line, scope)) for line in lines)
+    output.pieces(value_texts(shown_of(values), output.style))
     return 0
 
 
@@ -312,22 +315,6 @@ def _tree(files: Sequence[str], lines: Sequence[Line]) -> Any:
         return load_tree(files[0], files[1:], streams=True)
     asks = any(branch.kind == "lookup" and not branch.value[1] for line in lines for branch in walk(line.tree))
     return load_tree(".", streams=True) if os.environ.get("FRAMETOOL_TREE") and (asks or not lines) else None
-
-
-def _results(lines: Sequence[Line], scope: Scope) -> Iterator[Term]:
-    """Yield the values of expressions; one that is bound to a name is shown only where nothing follows it."""
-    for at, line in enumerate(lines):
-        term = evaluate_line(line, scope)
-        if not line.name or at == len(lines) - 1:
-            yield term
-
-
-def _without_expression(stream: Stream, output: Output, scope: Scope) -> int:
-    """Read expressions from a pipe, one a line, or talk at a terminal."""
-    refuse(stream.path is not None, "-i FILE needs an expression over row")
-    if sys.stdin is not None and sys.stdin.isatty():
-        return talk(scope, output)
-    return calculate_lines(stream, output, scope)
 
 
 def _over_rows(lines: Sequence[Line], flags: Sequence[bool], scope: Scope, output: Output) -> RowExpressions:

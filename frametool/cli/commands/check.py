@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 from frametool.cli.command import EVERYTHING, FILE, Command, Inputs, argument, command_named, option, refuse_two_readers
 from frametool.cli.options import file_options
-from frametool.cli.sink import in_colour, writing
-from frametool.cli.stderr import folded, say
+from frametool.cli.sink import folded, in_colour, say, writing
 from frametool.cli.trees import opened, state
 from frametool.errors import Finding, FormatError, listing, warn
 from frametool.lint.findings import RULES, WRITERS, level

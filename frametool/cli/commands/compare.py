@@ -1,35 +1,71 @@
-"""`frametool compare`: how far trajectories are from a reference."""
+"""`frametool compare`: how far trajectories are from a reference; and what `align` and `resample` share with it."""
 
 from __future__ import annotations
 
+import os
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import OPTIONAL, Inputs, argument, command_named, option, refuse
-from frametool.cli.comparing import comparisons, error_options, pairing_options, trajectory_options
-from frametool.cli.options import file_with, list_options, reading_options, suffix_of
+from frametool.cli import options, poses
+from frametool.cli.command import (
+    OPTIONAL,
+    Inputs,
+    argument,
+    command_named,
+    option,
+    refuse,
+    refuse_two_readers,
+    together,
+)
 from frametool.cli.output import Output
-from frametool.cli.sink import refuse_existing, writing
-from frametool.cli.stderr import say
-from frametool.errors import FrametoolError
-from frametool.stream.faults import ROWS_SKIPPED
+from frametool.cli.sink import refuse_existing, say, say_error, writing
+from frametool.cli.trees import answers, load_tree
+from frametool.errors import FrametoolError, ValueInvalid, shown, warn
+from frametool.frames.stamps import parse_stamp, parse_time
+from frametool.stream.faults import MOST, ROWS_SKIPPED, STOP, BadRows
+from frametool.text.numbers import parse_lengths, parse_share
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.fit.comparison import Comparison
+    from frametool.fit.comparison import Comparison, Delta, Settings
     from frametool.fit.numbers import Limit
+    from frametool.frames.trajectory import Trajectory
 
-EXCEEDED, TROUBLE = 1, 2
-EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 5 file; --fail: 0 within, 1 exceeded, 2 error."
-TABLES = ("csv", "markdown", "latex")
-REPORTS = {".html": "html", ".htm": "html", ".svg": "svg"}
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+ALIGN = ("se3", "sim3", "yaw", "origin", "origin+scale", "none")
 
 
-def _format_of(path: str | None) -> str:
-    """Return the format of a report by its suffix, "" for anything else."""
-    return REPORTS.get(suffix_of(path or ""), "")
+def _read_offset(text: str) -> tuple[int | str, float | None]:
+    word, colon, limit = text.partition(":")
+    if word != "auto":
+        return parse_time(text), None
+    seconds = parse_time(limit) / 1e9 if colon else None
+    if seconds is not None and seconds <= 0:
+        raise ValueInvalid(f"{shown(text)}: how far is looked behind auto: is more than 0 s")
+    return "auto", seconds
+
+
+def _read_limit(text: str) -> tuple[bool, int]:
+    """Read `12.5` on the reference's clock, or `+5s` after the first pair."""
+    return (True, options.read_span(text[1:])) if text.startswith("+") else (False, parse_stamp(text))
+
+
+def _read_up(text: str) -> tuple[float, float, float]:
+    sign, name = (-1.0, text[1:]) if text.startswith("-") else (1.0, text.removeprefix("+"))
+    if name not in AXES:
+        raise ValueInvalid(f"{shown(text)} is no axis; write x, y, z, -x, -y or -z")
+    x, y, z = (sign * part + 0.0 for part in AXES[name])
+    return x, y, z
+
+
+def read_delta(text: str, *units: str) -> Delta:
+    """Read a step in one of some units, all without any; a number of frames needs no unit."""
+    from frametool.fit.comparison import parse_delta
+
+    return parse_delta(f"{text}frames" if text.isdigit() and "frames" in units else text, *[units] * bool(units))
 
 
 def _read_limits(text: str) -> list[Limit]:
@@ -38,18 +74,48 @@ def _read_limits(text: str) -> list[Limit]:
     return parse_limits(text)
 
 
+gap_option = option("--max-gap TIME", "longest gap to interpolate  [default: 3 medians]", options.read_span,
+                    name="max_gap_ns")  # fmt: skip
+pairing_options = together(
+    option("--match HOW", "interpolate or nearest  [default: interpolate]", ("interpolate", "nearest")),
+    gap_option,
+    option("--max-diff TIME", "largest difference of stamps  [default: 10ms]", options.read_span, name="max_diff_ns"),
+    option("--min-match SHARE", "fewer pairs are an error  [default: 10%]", parse_share),
+    option("--start TIME", "ignore pairs before, a stamp of REF; +5s: after the first", _read_limit, under="Time"),
+    option("--stop TIME", "ignore pairs after", _read_limit, under="Time"),
+    option("--offset TIME|auto", "seconds by which EST's clock lags; auto:LIMIT", _read_offset),
+    option("--mount POSE|auto", "pose of REF's sensor in EST's body; FILE:BODY:POINT"),
+    option("--align FIT", ", ".join(ALIGN).replace("se3", "se3 (default)", 1), ALIGN),
+    option("--align-first N|10s|5m", "fit to the first pairs only", lambda text: read_delta(text, "frames", "s", "m")),
+    option("--tie-first", "with se3, sim3, yaw: first positions coincide"),
+    option("--up AXIS", "up axis of REF's world: z, -y ..  [default: z]", _read_up),
+)
+trajectory_options = together(
+    option("--on-error", "bad rows", (STOP, "skip"), default=STOP, under="Rows"), options.reading_options
+)
+REPORTS = {".html": "html", ".htm": "html", ".svg": "svg"}
+EXCEEDED, TROUBLE = 1, 2
+EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 5 file; --fail: 0 within, 1 exceeded, 2 error."
+
+
 @command_named("compare", epilog=EXIT_CODES)
 @argument("ref")
 @argument("est", nargs=-1, required=True, metavar="EST..")
 @pairing_options
-@error_options
+@option("--delta 1m,5deg,..", "of rpe, also s, deg, frames  [default: 1m,10m,100m]",
+        lambda text: tuple(map(read_delta, text.split(","))), name="deltas")  # fmt: skip
+@option("--all-pairs", "rpe from every pose, not from end to end")
+@option("--tolerance SHARE", "of --delta with --all-pairs  [default: 10%]", parse_share, requires=("all_pairs",))
+@option("--pairs-from WHICH", "reference or estimate  [default: reference]", ("reference", "estimate"))
+@option("--segments 100,200,..", "lengths of kitti, metres  [default: 100,..,800]", parse_lengths)
+@option("--segment-step N", "one for every N-th pair  [default: 10]", click.IntRange(1))
+@option("--as", "defaults of evo", ("evo",), name="like")
 @option("--rows [=ate|rpe|kitti]", "one row per pair, step or segment: CSV, JSON", OPTIONAL["--rows"])
-@option("--explain", "the formulas with this run's numbers", ("text",), under="Result")
+@option("--explain", "the formulas with this run's numbers", ("text",), under="Result", excludes=("rows",))
 @option("--fail LIMIT,..", "exit with 1 if a limit is exceeded: ate>5cm", _read_limits, name="limits")
-@option("--report FILE.html|svg", "also write a report in one file; with -o instead", file_with(*REPORTS))
+@option("--report FILE.html|svg", "also write a report in one file; with -o instead", options.file_with(*REPORTS))
 @trajectory_options
-@reading_options()
-@list_options("markdown", "latex")
+@options.list_options("markdown", "latex")
 def command(inputs: Inputs) -> int:
     """Compare trajectories with a reference: absolute and relative errors.
 
@@ -61,28 +127,28 @@ def command(inputs: Inputs) -> int:
 
     REF and EST are trajectories or positions in any format (help trajectories).
     """
-    path, chosen, rows, explain, report = inputs.output, inputs.format_name, inputs.rows, inputs.explain, inputs.report
-    limits, est = inputs.limits, inputs.est
-    instead = path if chosen is None and _format_of(path) else None
-    for name in filter(None, (report, instead)):
-        refuse_existing(name, force=inputs.force)
-    refuse(instead and rows, "--rows are CSV or JSON, no picture; write them with -f, or leave them out")
-    if len(est) > 1 and "svg" in (_format_of(report), _format_of(instead)):
-        raise click.UsageError("an SVG shows one comparison; write .html for several")
-    if explain and (rows or instead or chosen not in (None, "text")):
-        raise click.UsageError("--explain writes text; leave --rows, -f and pictures out")
+    limits, force, path = inputs.limits or (), inputs.force, inputs.output or ""
+    instead = path if inputs.format_name is None and options.suffix_of(path) in REPORTS else None
+    reports = [path for path in (inputs.report, instead) if path]
+    for path in reports:
+        refuse_existing(path, force=force)
+        is_one = len(inputs.est) == 1 or REPORTS[options.suffix_of(path)] != "svg"
+        refuse(not is_one, "an SVG shows one comparison; write .html for several")
     output = Output(inputs, "report", otherwise="text")
+    explain, rows = (None, None) if instead else (inputs.explain, inputs.rows)
+    refuse(explain and output.style.format != "text", f"--explain writes text, not {output.style.format}")
     try:
-        found, skipped = comparisons(inputs.ref, est, inputs)
+        found, skipped = comparisons(inputs.ref, inputs.est, inputs)
         from frametool.fit.numbers import numbers
-        from frametool.view.reports import write_explanation
 
         every = [numbers(each) for each in found]
-        asked = [(each, limit) for each in every for limit in limits or ()]
+        asked = [(each, limit) for each in every for limit in limits]
         passed = [(each, limit, now) for each, limit in asked if (now := limit.passed(each)) is not None]
-        for name in filter(None, (report, instead)):
-            _write_report(found, name, force=inputs.force)
+        for path in reports:
+            _write_report(found, path, force=force)
         if explain:
+            from frametool.view.reports import write_explanation
+
             output.text("\n".join(map(write_explanation, every)))
         elif not instead:
             _write(output, found, every, rows)
@@ -101,8 +167,9 @@ def _write_report(found: Sequence[Comparison], path: str, *, force: bool) -> Non
 
     from frametool.view.comparison_page import write_report
 
+    line = shlex.join(["frametool", *click.get_current_context().obj])
     with writing(path, force=force) as write:
-        write(write_report(found, _format_of(path), shlex.join(["frametool", *click.get_current_context().obj])))
+        write(write_report(found, REPORTS[options.suffix_of(path)], line))
 
 
 def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], rows: str | None) -> None:
@@ -116,9 +183,103 @@ def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], ro
         records = [{"est": each.names[1]} | row if several else row for each in found for row in rows_of(each, rows)]
         output.style = output.style.changed(format="csv" if fmt == "text" else fmt)
         output.report(records)
-    elif fmt in TABLES or (fmt == "text" and len(every) > 1):
+    elif fmt in ("csv", "markdown", "latex") or (fmt == "text" and len(every) > 1):
         output.text(write_table(every, fmt))
     elif fmt == "text":
         output.text(write_comparison(every[0]))
     else:
         output.report(every)
+
+
+def trajectory(inputs: Inputs, argument: str, fmt: str = "", on_error: str = STOP) -> tuple[Trajectory, str, bool]:
+    """Read a trajectory of the command line; return it with what it is called, and whether rows were skipped."""
+    from frametool.stream.trajectories import read_trajectory, split_name
+
+    made: list[BadRows] = []
+
+    def policy(name: str) -> BadRows:
+        made.append(BadRows(name, on_error, most=MOST, tell=partial(say_error, in_json=False)))
+        return made[-1]
+
+    known = answers()
+    found = read_trajectory(
+        argument, fmt=fmt, topics=inputs.topics, answers=known._replace(time_offset=0), policy=policy,
+        normalize=bool(inputs.normalize),
+    )  # fmt: skip
+    if found.stamps_ns is not None:
+        inputs.ask("time_offset")
+        found = found._replace(stamps_ns=found.stamps_ns + known.time_offset)
+    file, inside = split_name(argument)
+    name = ":".join(["stdin" if file == "-" else os.path.basename(file), *inside])
+    return found, name, any(bad.count for bad in made)
+
+
+def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Comparison], bool]:
+    """Compare estimates with a reference as the options say, with warnings. Also: whether rows were skipped."""
+    from frametool.fit.comparison import compare
+
+    refuse_two_readers([ref, *ests])
+    chosen, formats = _settings(inputs), options.for_each(inputs.input_formats, 1 + len(ests))
+    reference, ref_name, skipped = trajectory(inputs, ref, formats[0], inputs.on_error)
+    found = []
+    for est, fmt in zip(ests, formats[1:], strict=True):
+        estimate, name, some = trajectory(inputs, est, fmt, inputs.on_error)
+        skipped |= some
+        if (reference.stamps_ns is None) != (estimate.stamps_ns is None):
+            lacking = ref_name if reference.stamps_ns is None else name
+            raise click.UsageError(f"{lacking} has no stamps, the other has; give them with --stamps FILE")
+        found.append(compare(reference, estimate, chosen, (ref_name, name)))
+        for hint in found[-1].hints:
+            warn(hint)
+    return found, skipped
+
+
+def _settings(inputs: Inputs) -> Settings:
+    """Take what the options say; those not passed are as evo has them, or as we do."""
+    from frametool.fit.comparison import EVO, Settings
+
+    base = EVO if inputs.like else Settings()
+    of_other_match = "max_gap_ns" if (inputs.match or base.match) == "nearest" else "max_diff_ns"
+    asked = (name for name in Settings._fields if name != of_other_match)
+    passed = {name: value for name in asked if (value := getattr(inputs, name)) is not None}
+    if "offset" in passed:
+        passed["offset"], limit = passed["offset"]
+        passed |= {} if limit is None else {"offset_limit_s": limit}
+    if "mount" in passed:
+        passed["mount"] = _mount(passed["mount"])
+    return base._replace(**passed)
+
+
+def _mount(text: str) -> Any:
+    """Read the mount: auto, a pose, or FILE:BODY:POINT, the pose of a point on a body of a tree."""
+    if text == "auto":
+        return text
+    if poses.is_pasted(text):
+        from frametool.geometry.transform import Transform
+        from frametool.stream.request import Request
+
+        return Transform.of(*poses.one_pose(text, Request()).components)
+    from frametool.stream.trajectories import split_name
+
+    file, names = split_name(text)
+    refuse(len(names) != 2, f"--mount {shown(text)}: a pose, auto, or FILE:BODY:POINT")
+    return load_tree(file).lookup(names[0], names[1])
+
+
+def write_trajectory(output: Output, found: Trajectory) -> None:
+    """Write poses, or positions, in any format that holds them; frames are named if somebody called them something."""
+    from frametool.frames.trajectory import BODY, WORLD
+
+    world, body = (found.world, found.body) if (found.world, found.body) != (WORLD, BODY) else (None, None)
+    stamps = [None] * found.size if found.stamps_ns is None else found.stamps_ns.tolist()
+    if found.xyzw is not None:
+        from frametool.grammar.pose_algebra import result_at
+
+        rows = zip(zip(*(part.tolist() for part in found.poses.components), strict=True), stamps, strict=True)
+        output.poses_as_they_come(result_at(row, world, body, at) for row, at in rows)
+        return
+    points = zip(found.xyz.tolist(), stamps, strict=True)
+    output.points(
+        ({} if at is None else {"stamp_ns": at}) | ({} if world is None else {"frame": world}) | {"point": xyz}
+        for xyz, at in points
+    )

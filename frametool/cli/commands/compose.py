@@ -7,9 +7,9 @@ from functools import reduce
 import click
 
 from frametool.cli.command import Inputs, argument, command_named
-from frametool.cli.explaining import EXPLAIN, PoseTask, pose_stream_options
 from frametool.cli.options import offset_option, pose_result_options, scale_option
 from frametool.cli.poses import rows_among, without_inverse
+from frametool.cli.streaming import EXPLAIN, PoseTask, pose_stream_options
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import product
 
@@ -36,7 +36,7 @@ def command(inputs: Inputs) -> int:
     task, poses = PoseTask(inputs), inputs.poses
     if task.derives:
         return task.derive("compose", *map(task.written, poses))
-    if task.stream.path and not any(without_inverse(each)[0] == "-" for each in poses):
+    if task.path and not any(without_inverse(each)[0] == "-" for each in poses):
         raise click.UsageError("-i FILE is read where - stands among the poses")
     from frametool.stream.request import Operation
 

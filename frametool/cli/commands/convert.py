@@ -9,8 +9,9 @@ import click
 
 from frametool.cli import options, poses
 from frametool.cli.command import Command, Inputs, argument, command_named, misuse, option, refuse
-from frametool.cli.explaining import EXPLAIN, ONE_RECORD, PoseTask, one_argument, pose_stream_options
-from frametool.cli.stderr import say
+from frametool.cli.output import QUATERNION
+from frametool.cli.sink import say
+from frametool.cli.streaming import EXPLAIN, ONE_RECORD, PoseTask, one_argument, pose_stream_options
 from frametool.documents.source import Source
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats
@@ -52,7 +53,7 @@ class ConvertCommand(Command):
 @options.frames_out_option
 @EXPLAIN
 @option("--unwrap", "continue angles beyond half a turn")
-@option("--time-column NAME", "column or key of the timestamps, for the next three", options.ColumnNames(),
+@option("--time-column NAME", "column or key of the timestamps, for the next three", options.COLUMN,
     requires=("time_offset", "start", "stop"), under="Time")  # fmt: skip
 @options.limit_options
 def command(inputs: Inputs) -> int:
@@ -67,9 +68,8 @@ def command(inputs: Inputs) -> int:
     VALUES are numbers in the order of the representation, after x y z when there is a position; an angle may carry
     its unit: 90deg, 1.57rad, pi/2. POSE is a mapping, what a tool printed (help pose), a file, or - for stdin.
     """
-    values, window, task = poses.rejoined(inputs.values), options.window_of(inputs), PoseTask(inputs, "poses", "points")
-    stream, output = task.stream, task.output
-    axes, world = inputs.axes, inputs.world
+    values, task = poses.rejoined(inputs.values), PoseTask(inputs, "poses", "points")
+    output, axes, world = task.output, inputs.axes, inputs.world
     if inputs.all_axes is not None:
         from frametool.geometry.conventions import sides_of
 
@@ -80,9 +80,9 @@ def command(inputs: Inputs) -> int:
     from frametool.stream.request import Operation
 
     operation = Operation() if axes is None and world is None else _change_of_axes(axes, world)
-    wanted = output.notations or (notation("quaternion"),)
-    request = task.request(operation=operation, notations=wanted, window=window, extra_column=inputs.time_column)
-    if operation.turns and (values or stream.path or stream.has_input()):
+    notations = output.notations or QUATERNION
+    request = task.request(operation=operation, extra_column=inputs.time_column, notations=notations)
+    if operation.turns and (values or task.path or task.has_input()):
         _say_other_side(axes, world)
         _say_of_engines(world, request.given, output, is_anew=bool(values) and values != ("-",))
     is_numbers = _are_numbers(values, has_from=request.given is not None or bool(request.given_place))
@@ -91,16 +91,15 @@ def command(inputs: Inputs) -> int:
 
         values, is_numbers = (mapping_of(values, request.given_place),), False
     bare, is_inverse = poses.without_inverse(values[0]) if len(values) == 1 and not is_numbers else ("", False)
-    if bare == "-" or (bare and not stream.path and task.has_table(bare)):
+    if bare == "-" or (bare and not task.path and task.has_table(bare)):
         refuse(task.derives, f"{values[0]} is a stream; {ONE_RECORD}")
         values, request = ("-",), request.of_inverses() if is_inverse else request
-    is_alone = operation.turns and not values and (task.derives or not stream.has_input())
+    is_alone = operation.turns and not values and (task.derives or not task.has_input())
+    if not (is_numbers or ((values or is_alone) and all(map(poses.is_inline, values)))):
+        request = request._replace(unwrap=inputs.unwrap)
     if values == ("-",) or not (values or is_alone):
-        request = request._replace(unwrap=inputs.unwrap)
-        return stream.run(request, output)
+        return task.run(request)
     task.only_arguments(values)
-    if not (is_numbers or all(map(poses.is_inline, values))):
-        request = request._replace(unwrap=inputs.unwrap)
     results: list[Any]
     sources: Sequence[str | Source] = ()
     if is_numbers or not values:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.options import at_ns, file_options, list_options, read_time
 from frametool.cli.output import Output
-from frametool.cli.stderr import say
+from frametool.cli.sink import say
 from frametool.cli.trees import FRAME, frame_name, load_sides
 from frametool.formats.load import EdgePlace, lines_of
 from frametool.lint.findings import github_command

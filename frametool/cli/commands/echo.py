@@ -9,18 +9,17 @@ from typing import TYPE_CHECKING
 import click
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse
-from frametool.cli.options import Skipped, read_limit, result_options, rules, tree_options
+from frametool.cli.options import Skipped, read_limit, read_rate, rules, tree_result_options
 from frametool.cli.output import Output
 from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.errors import NoDataAt, warn
-from frametool.frames.lookups import Replayed, checked_rate
 from frametool.grammar.pose import LEFT_OUT
 from frametool.grammar.pose_algebra import result_at
-from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from frametool.frames.lookups import Replayed
     from frametool.grammar.result import Result
 
 
@@ -29,14 +28,11 @@ if TYPE_CHECKING:
 @argument("tree", FILE)
 @argument("target", FRAME)
 @argument("source", FRAME)
-@option("--rate HZ", "blocks per second, in the time of the recording", lambda text: checked_rate(parse_number(text)),
-        default=1.0)
+@option("--rate HZ", "blocks per second, in the time of the recording", read_rate, default=1.0)
 @option("--start T", "begin there  [default: when all edges have data]", read_limit, under="Time")
 @option("--stop T", "end there  [default: when the first edge has no more]", read_limit, under="Time")
 @option("-l --limit N", "print at most N blocks", click.IntRange(1))
-@option("--with FILE", "merge this file too; may be repeated", name="more", multiple=True, under="Files")
-@tree_options
-@result_options("poses")
+@tree_result_options("poses")
 def command(inputs: Inputs) -> int:
     """Print the pose of SOURCE in TARGET over time, like tf2_echo on a running robot.
 

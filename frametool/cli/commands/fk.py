@@ -2,33 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from click import UsageError
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, refuse
-from frametool.cli.options import STREAMED, reading_options, result_options, whole_pose_options
+from frametool.cli.options import pose_result_options, reading_options
 from frametool.cli.output import Output
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.trees import FRAME, frame_name, opened, state
-from frametool.formats.detect import detect
 from frametool.formats.robots.urdf import robot_of
 from frametool.formats.table import holds_arrays
 from frametool.stream.joint_rows import JointRows, names_in
 from frametool.stream.request import Operation, Request
-
-if TYPE_CHECKING:
-    from frametool.formats.load import FrameFile
 
 
 @command_named("fk", own=("input_path", "joints"))
 @argument("tree", FILE, metavar="URDF")
 @argument("base", FRAME, metavar="BASE")
 @argument("tip", FRAME, metavar="TIP")
-@reading_options(streams=True)
 @stream_options
-@whole_pose_options
-@result_options("poses")
+@reading_options
+@pose_result_options("poses")
 def command(inputs: Inputs) -> int:
     """Add the pose of TIP in BASE to rows of joint values.
 
@@ -42,26 +35,20 @@ def command(inputs: Inputs) -> int:
     [deg], finger_mm. Other columns are unchanged. A joint of the chain without a column needs --joint or --joints; a
     mimic joint follows its leader. For a single posture use `frametool lookup arm.urdf arm_base tool -j elbow=30deg`.
     """
-    stream, output = Stream(inputs), Output(inputs, "poses")
+    stream = Stream(inputs, Output(inputs, "poses"))
     if (joints := inputs.peek("joints")) and not stream.path and not stream.has_input():
         words = " ".join((inputs.tree, inputs.base, inputs.tip, *(f"-j {each}" for each in joints)))
         raise UsageError(f"no rows of joint values: give -i FILE; for one posture, frametool lookup {words}")
     (file,) = opened((inputs.tree,), streams=True)
     robot, posture = robot_of(file)
     rows = JointRows(robot, posture, frame_name(inputs.base, robot), frame_name(inputs.tip, robot))
-    with stream.opened():
-        return _added(stream, output, rows, file)
-
-
-def _added(stream: Stream, output: Output, rows: JointRows, file: FrameFile) -> int:
-    """Write the rows of a stream with their poses; the file is that of the robot."""
-    inputs, name = stream.inputs, stream.path or "stdin"
-    begin = stream.opened().peek()
-    fmt = stream.chosen_format() or detect(begin, *STREAMED, name=stream.path or "")
-    refuse(holds_arrays(fmt), f"rows of joints are a table of text, records or messages, not {fmt}")
-    names = names_in(begin, fmt, name, "a key for each joint, or JointState messages", header=inputs.header)
-    rows.bind(names, name, fixed=frozenset(file.answers.joints))
-    file.tally.assumed = ""  # rows say where each joint on the way is
-    state([file])
-    operation = Operation(moves=True, formula=rows)
-    return stream.run(Request(operation, poses=0, degrees=inputs.deg, normalize=inputs.normalize), output)
+    with stream.opened() as source:
+        begin = source.peek()
+        fmt = stream.chosen_format() or stream.detected(begin)
+        refuse(holds_arrays(fmt), f"rows of joints are a table of text, records or messages, not {fmt}")
+        names = names_in(begin, fmt, stream.name, "a key for each joint, or JointState messages", header=inputs.header)
+        rows.bind(names, stream.name, fixed=frozenset(file.answers.joints))
+        file.tally.assumed = ""  # rows say where each joint on the way is
+        state([file])
+        operation = Operation(moves=True, formula=rows)
+        return stream.run(Request(operation, poses=0, degrees=inputs.deg, normalize=inputs.normalize))

@@ -13,7 +13,7 @@ import click
 from frametool import __version__
 from frametool.cli import command as shared
 from frametool.cli.command import EXIT_CODES, Inputs, Text, argument, command_named, option, option_groups, refuse
-from frametool.cli.commands import COMMANDS
+from frametool.cli.commands import COMMANDS, group
 from frametool.cli.commands.examples import example
 from frametool.cli.sink import show
 from frametool.errors import any_near, shown
@@ -101,8 +101,6 @@ def cookbook(words: tuple[str, ...]) -> str:
 
 def _commands(ctx: click.Context) -> dict[str, click.Command]:
     """Return all commands and subcommands by their names."""
-    from frametool.cli.commands import group
-
     found: dict[str, click.Command] = {}
     for name in COMMANDS:
         found[name] = group.get_command(ctx, name)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from frametool.cli.command import Inputs, argument, command_named, refuse
-from frametool.cli.explaining import EXPLAIN, PoseTask
 from frametool.cli.options import pose_result_options
 from frametool.cli.poses import combinations
+from frametool.cli.streaming import EXPLAIN, PoseTask
 from frametool.errors import warn
 from frametool.grammar.pose import LEFT_OUT
 from frametool.grammar.pose_algebra import interpolated, shared_stamp

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from frametool.cli.command import Inputs, argument, command_named
-from frametool.cli.explaining import EXPLAIN, PoseTask, pose_stream_options
 from frametool.cli.options import offset_option, pose_result_options, scale_option
+from frametool.cli.streaming import EXPLAIN, PoseTask, pose_stream_options
 
 
 @command_named("invert")

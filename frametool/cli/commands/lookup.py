@@ -8,12 +8,11 @@ import click
 
 from frametool.cli import options
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, together
-from frametool.cli.explaining import EXPLAIN, PoseTask
-from frametool.cli.streaming import stream_options
+from frametool.cli.output import QUATERNION
+from frametool.cli.streaming import EXPLAIN, PoseTask, stream_options
 from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, report_granted
 from frametool.errors import NoDataAt, UnknownFrame
 from frametool.formats.table import holds_arrays
-from frametool.geometry.representations import notation
 from frametool.geometry.rigid import EXACT, UNCERTAIN
 from frametool.grammar.edges import stop
 from frametool.grammar.pose_algebra import Lookups, looked_up_across, looked_up_many, sample_stamps, why_missing
@@ -31,14 +30,13 @@ MANY = ("times", "start", "stop")
 def _column_option(end: str, *excludes: str) -> Adds:
     about, under = f"column with the {end} of each row of -i or stdin", "Time" if end == "time" else "Rows"
     excluded = (*excludes, "times", "source_at", "fixed", "explain")  # a table has many look-ups
-    return option(f"--{end.lower()}-column NAME", about, options.ColumnNames(), excludes=excluded, under=under)
+    return option(f"--{end.lower()}-column NAME", about, options.COLUMN, excludes=excluded, under=under)
 
 
 @command_named("lookup", own=("times", "notations"))
 @argument("tree", FILE)
 @argument("target", FRAME, required=False, metavar="TARGET")
 @argument("source", FRAME, required=False, metavar="SOURCE")
-@option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files")
 @option("--at TIME", "seconds, nanoseconds with ns  [default: latest]", options.read_time, excludes=MANY)
 @option("--source-at TIME", "the time at SOURCE, with --fixed; --at: at TARGET", options.read_time, requires=("fixed",),
         excludes=MANY)  # fmt: skip
@@ -47,10 +45,9 @@ def _column_option(end: str, *excludes: str) -> Adds:
 @options.times_option
 @options.limit_options
 @options.rules_options
-@options.reading_options(streams=True)
 @stream_options
-@options.whole_pose_options
-@options.result_options("poses")
+@options.reading_options
+@options.pose_result_options("poses")
 @EXPLAIN
 @together(_column_option("TARGET"), _column_option("SOURCE"), _column_option("time", "at"))
 def command(inputs: Inputs) -> int:
@@ -64,20 +61,20 @@ def command(inputs: Inputs) -> int:
     TREE is a file, -, or . for FRAMETOOL_TREE's (help time).
     Trajectories and tables (-f tum, csv ..) hold all samples, those from --start to --stop.
     """
-    window, task = options.window_of(inputs), PoseTask(inputs)
+    task = PoseTask(inputs)
     columns = inputs.target_column, inputs.source_column
     output, target, source = task.output, inputs.target, inputs.source
     by_row = {*columns, inputs.time_column} != {None}
     refuse(not by_row and source is None, f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
     if target is not None and columns[0] is None:
         output.check_target(target)
-    covariance = not task.derives and inputs.covariance
+    covariance = inputs.covariance
     if covariance:
         _check_covariance(output, by_row=by_row)
     tree = load_tree(inputs.tree, inputs.more, options.rules(inputs), streams=by_row)
     lookups, at = lookups_in(tree, carried=covariance), options.at_ns(inputs.at)
     if by_row:
-        status = _by_row(task, lookups, target, source, window)
+        status = _by_row(task, lookups, target, source)
         report_granted(lookups)
         return status
     target, source = frame_name(target, tree), frame_name(source, tree)
@@ -86,10 +83,10 @@ def command(inputs: Inputs) -> int:
         return task.derive("lookup", tree, target, source, at_ns=at, source_at_ns=source_at, fixed=fixed)
     output.take_axes_in(tree, source)
     output.mark_frames(target, source)
-    status, every = 0, output.holds_all or window is not None
+    status, every = 0, output.holds_all or task.window is not None
     every = every and inputs.at is None and fixed is None and tree.latest(target, source) is not None
     if inputs.times is not None or every:
-        status = _many(task, lookups, target, source, window)
+        status = _many(task, lookups, target, source)
     elif fixed is not None:
         output.values([looked_up_across(tree, target, at, source, source_at, fixed)])
     else:
@@ -108,9 +105,9 @@ def _check_covariance(output: Output, *, by_row: bool) -> None:
         raise click.UsageError(f"{fmt} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")
 
 
-def _many(task: PoseTask, lookups: Lookups, target: str, source: str, window: tuple[int, int] | None) -> int:
+def _many(task: PoseTask, lookups: Lookups, target: str, source: str) -> int:
     """Print the results at --times, or at those of all samples; with --on-error skip report the others."""
-    inputs, tree = task.inputs, lookups.tree
+    inputs, tree, window = task.inputs, lookups.tree, task.window
     times, skipped = inputs.times, options.Skipped(in_json=task.output.chosen == "json")
     skip = times is not None and inputs.on_error == SKIP
     if times is not None and inputs.on_error == NULL:
@@ -132,9 +129,7 @@ def _many(task: PoseTask, lookups: Lookups, target: str, source: str, window: tu
     return skipped.finish()
 
 
-def _by_row(
-    task: PoseTask, lookups: Lookups, target: str | None, source: str | None, window: tuple[int, int] | None
-) -> int:
+def _by_row(task: PoseTask, lookups: Lookups, target: str | None, source: str | None) -> int:
     """Add the pose of SOURCE in TARGET to every row; a frame named on the command line is every row's."""
     from frametool.stream.request import Operation
     from frametool.stream.stamp_source import Timed
@@ -169,7 +164,7 @@ def _by_row(
     width = UNCERTAIN if lookups.carried else EXACT
     timed = None if inputs.time_column is None else Timed(inputs.time_column, many, edge_of, width=width)
     request = task.request(
-        poses=0, frames=frames, pose_from_frame=edge_of, notations=task.output.notations or (notation("quaternion"),),
-        operation=Operation(uncertain=lookups.carried), timed=timed, window=window,
+        poses=0, frames=frames, pose_from_frame=edge_of, notations=task.output.notations or QUATERNION,
+        operation=Operation(uncertain=lookups.carried), timed=timed,
     )  # fmt: skip
-    return task.stream.run(request, task.output, tables_only=True)
+    return task.run(request, tables_only=True)

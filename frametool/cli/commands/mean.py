@@ -5,9 +5,10 @@ from __future__ import annotations
 import click
 
 from frametool.cli.command import Inputs, argument, command_named, option, refuse
-from frametool.cli.explaining import PoseTask, pose_stream_options
-from frametool.cli.options import ColumnNames, pose_result_options
+from frametool.cli.options import COLUMN, pose_result_options
 from frametool.cli.poses import is_inline, is_pasted, poses_from, without_inverse
+from frametool.cli.sink import say_first
+from frametool.cli.streaming import PoseTask, pose_stream_options
 from frametool.errors import ValueInvalid, warn
 from frametool.stream.faults import MOST
 from frametool.text.numbers import parse_number
@@ -15,8 +16,8 @@ from frametool.text.numbers import parse_number
 
 @command_named("mean")
 @argument("poses", nargs=-1, metavar="[POSE.. | FILE]")
-@option("--weights NAME | W,W,..", "column or key with weights, or the weights of the POSEs", ColumnNames())
-@option("--by NAME", "one mean per value of this column or key", ColumnNames(), excludes=("weights",))
+@option("--weights NAME | W,W,..", "column or key with weights, or the weights of the POSEs", COLUMN)
+@option("--by NAME", "one mean per value of this column or key", COLUMN, excludes=("weights",))
 @option("--robust", "reject outliers, and list them")
 @pose_stream_options
 @pose_result_options("poses")
@@ -40,7 +41,7 @@ def command(inputs: Inputs) -> int:
     numbers are those of the plain mean. Weights are in proportion to 1 / variance.
     """
     task = PoseTask(inputs)
-    stream, poses, weights, robust = task.stream, inputs.poses, inputs.weights, inputs.robust
+    poses, weights, robust = inputs.poses, inputs.weights, inputs.robust
     from frametool.grammar.result import Result
     from frametool.stream.gathering import Gathered
 
@@ -48,11 +49,11 @@ def command(inputs: Inputs) -> int:
     request = task.request(extra_column=inputs.by or weights, gathered=gathered)
     status, numbers = 0, None
     bare, is_inverse = without_inverse(poses[0]) if len(poses) == 1 else ("", False)
-    if bare == "-" or (bare and not stream.path and not is_pasted(bare, stream.notation)):
-        stream.path, poses = stream.path if bare == "-" else bare, ()
+    if bare == "-" or (bare and not task.path and not is_pasted(bare, task.notation)):
+        task.path, poses = task.path if bare == "-" else bare, ()
         request = request.of_inverses() if is_inverse else request
     if not poses:
-        status = stream.run(request, task.output)
+        status = task.run(request)
     else:
         task.only_arguments(poses)
         for number, each in enumerate(poses, 1):
@@ -74,11 +75,7 @@ def command(inputs: Inputs) -> int:
         found = [(label, *mean_of_rows(each, None, robust=robust)) for label, each in gathered.groups()]
         task.output.values([Result(each.pose, {inputs.by: label, **each.extras}) for label, each, _ in found])
         left_out = [line for _, _, lines in found for line in lines]
-    most = MOST + (len(left_out) == MOST + 1)
-    for line in left_out[:most]:
-        warn(line)
-    if len(left_out) > most:
-        warn(f"{len(left_out) - most} more poses left out")
+    say_first(left_out, MOST, "poses left out", warn, warn)
     return status
 
 

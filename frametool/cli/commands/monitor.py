@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from frametool.cli.command import Inputs, argument, command_named, option, refuse
 from frametool.cli.options import file_options, offset_option, result_options
 from frametool.cli.output import Output
-from frametool.cli.stderr import say, say_error
+from frametool.cli.sink import say, say_error, say_first
 from frametool.cli.trees import opened, state
 from frametool.lint.monitor_report import clocks_differ, monitor
 
@@ -49,11 +50,8 @@ def command(inputs: Inputs) -> int:
     report = monitor(files, *frames, normalize=inputs.normalize, clashing=clashes.append)
     inputs.ask("time_offset")
     state(files)
-    most = MOST_TOLD + (len(clashes) == MOST_TOLD + 1)
-    for error in clashes[:most]:
-        say_error(error, in_json=output.chosen == "json")
-    if len(clashes) > most:
-        say(f"{len(clashes) - most} more frames come by two topics")
+    tell = partial(say_error, in_json=output.chosen == "json")
+    say_first(clashes, MOST_TOLD, "frames come by two topics", tell)
     if clocks_differ(report):
         say("note: stamps and the recorder's clock are years apart (simulated time?): the delays say nothing")
     output.report(report)

@@ -9,11 +9,11 @@ import click
 
 from frametool.cli import options
 from frametool.cli.command import Inputs, Text, argument, command_named, option, together
-from frametool.cli.commands.apply import Way, begins_number, is_record, sources_of, way_by_tree
+from frametool.cli.commands import apply
+from frametool.cli.commands.apply import begins_number, is_record
 from frametool.cli.output import Output
 from frametool.cli.poses import is_inline, values_of
-from frametool.cli.sink import refuse_existing, writing
-from frametool.cli.stderr import say
+from frametool.cli.sink import refuse_existing, say, writing
 from frametool.cli.streaming import Stream, is_bag, stream_options
 from frametool.cli.trees import FRAME
 from frametool.errors import ValueInvalid, shown
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
     from frametool.cli.sink import Write
     from frametool.documents.source import Source
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.lookups import FrameTree
     from frametool.geometry.camera import Camera
     from frametool.stream.pixels import Seen
     from frametool.stream.request import Formula, Request, Shown
@@ -56,7 +54,6 @@ def parse_size(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
-_AXES = option("--camera-axes AXES", "of CAMERA: optical, opengl or flu  [default: as TREE says]", AXES)
 camera_options = together(
     option("--camera FILE[:NAME]", "intrinsics from this file, or inline, not from TREE", CameraFile()),
     option("--model NAME", "distortion model of --camera", requires=("camera",)),
@@ -64,16 +61,12 @@ camera_options = together(
     option("--rectified", "use the rectified image: R, then P, no distortion"),
     option("--from-first", "points are in the rectified frame of the first camera", requires=("rectified",)),
     option("--first-pixel C", "centre of the first pixel; 0.5: COLMAP", parse_number, default=0.0),
-    option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files"),
     stream_options,
     options.pose_options,
     options.result_options("points"),
-    option("--time-column NAME", "column or key with the time of each row", options.ColumnNames(), excludes=("at",),
-           under="Time"),
-    option("--at TIME", "one time for all  [default: latest]", options.read_time, under="Time"),
-    options.rules_options,
-    options.offset_option,
-    options.reading_options(streams=True, camera_axes=_AXES),
+    apply.moving_row_options,
+    option("--camera-axes AXES", "of CAMERA: optical, opengl or flu  [default: as TREE says]", AXES),
+    options.reading_options,
 )
 
 
@@ -81,7 +74,7 @@ camera_options = together(
 @argument("arguments", FRAME, nargs=-1, metavar="[TREE CAMERA [SOURCE]] [X Y Z | RECORD]..")
 @option("--range", "add range, the distance from the camera", name="ranged")
 @option("--image FILE", "draw over this image: -o FILE.svg, .html, .png", requires=("output",))
-@option("--frame-column NAME", "column with the frame of each row, without SOURCE", options.ColumnNames())
+@apply.frame_column_option
 @camera_options
 def command(inputs: Inputs) -> int:
     """Add to points the pixels at which a camera sees them.
@@ -96,26 +89,25 @@ def command(inputs: Inputs) -> int:
     """
     from frametool.stream.pixels import PixelsOfPoints
 
-    task = CameraTask(inputs, "TREE CAMERA")
-    overlay = None
-    if inputs.image is not None:
+    overlay, image, path = None, inputs.image, inputs.output
+    output = Output(inputs, "points", otherwise="yaml") if image is None else Undrawn(inputs.but(output=None), "points")
+    task = CameraTask(inputs, output, "TREE CAMERA")
+    if image is not None:
         from frametool.formats.cameras import resized
         from frametool.view.pictures import Overlay
 
-        refuse_existing(inputs.output, force=inputs.force)
-        overlay = Overlay(inputs.image, inputs.output)
-        task.camera = resized(task.camera, overlay.size, inputs.image)
+        refuse_existing(path, force=inputs.force)
+        overlay = Overlay(image, path)
+        task.camera = resized(task.camera, overlay.size, image)
     task.camera = task.rectified()
-    if task.camera.size is None and not inputs.quiet:
-        say("note: the camera has no size, in_image is empty; --size W,H gives it one")
-    output = Output(inputs, "points", otherwise="yaml") if overlay is None else Undrawn(inputs)
+    no_size = "note: the camera has no size, in_image is empty; --size W,H gives it one"
+    inputs.note(no_size if task.camera.size is None else None)
     take = None if overlay is None else overlay.take
     seen = PixelsOfPoints(task.camera, inputs.first_pixel, ranged=bool(inputs.ranged), take=take)
-    request = task.request(inputs.frame_column if task.is_stream else None, seen, seen.shown(task.name))
-    records = () if task.is_stream else [*sources_of(task.rest, None)]
-    status = task.run(request, output, records, seen)
+    request = task.request(inputs.frame_column if task.is_stream else None, seen, seen.shown(task.camera_name))
+    status = task.answer(request, () if task.is_stream else [*apply.sources_of(task.rest, None)], seen)
     if overlay is not None:
-        with writing(overlay.path, force=output.force) as write:
+        with writing(overlay.path, force=inputs.force) as write:
             write(overlay.drawn())
         say(overlay.summary())
     return status
@@ -124,36 +116,29 @@ def command(inputs: Inputs) -> int:
 class Undrawn(Output):
     """The rows of an overlay, which are not written."""
 
-    def __init__(self, inputs: Inputs) -> None:
-        """Take no path: it is that of the drawing."""
-        super().__init__(inputs, "points", otherwise="yaml")
-        self.path = None
-
     def opened(self) -> AbstractContextManager[Write]:
         """Open no place."""
         return nullcontext(lambda _: None)
 
 
-class CameraTask:
+class CameraTask(Stream):
     """What the arguments and options of both commands say: the camera, how rows move, which records there are."""
 
-    def __init__(self, inputs: Inputs, named: str) -> None:
+    def __init__(self, inputs: Inputs, output: Output, named: str) -> None:
         """Read tree and camera; named: the arguments that lead to the camera, if there is a tree."""
-        self.inputs = inputs
-        self.stream = Stream(inputs)
-        path = self.stream.path  # of a bag, --topic is what is streamed
-        if self.stream.messages() is None and path and is_bag(path):
-            raise click.UsageError(f"write the clouds of {path} as files first: apply -o '{{stamp_ns}}.pcd'")
-        self.way: Way | None = None
+        super().__init__(inputs, output)
+        if self.messages() is None and self.path and is_bag(self.path):  # of a bag, --topic is what is streamed
+            raise click.UsageError(f"write the clouds of {self.path} as files first: apply -o '{{stamp_ns}}.pcd'")
+        self.way: apply.Way | None = None
         self.rest: tuple[str, ...] = inputs.arguments
         _, colon, name = (inputs.camera or "").rpartition(":")
-        self.name = name if colon and not is_inline(inputs.camera) else ""
+        self.camera_name = name if colon and not is_inline(inputs.camera) else ""
         if inputs.camera is None or _names_tree(self.rest):
             *before, _ = names = named.split()
             if len(self.rest) < len(names) or begins_number(self.rest[0]):
                 raise click.UsageError(f"name {', '.join(before)} and CAMERA, or give --camera FILE[:NAME]")
-            self.name = self.rest[len(before)]
-            self.way, self.rest = way_by_tree(inputs, numbers=True)
+            self.camera_name = self.rest[len(before)]
+            self.way, self.rest = apply.way_by_tree(inputs, numbers=True)
         self.is_stream = self.rest in ((), ("-",))
         self.camera = self._camera()
 
@@ -163,21 +148,15 @@ class CameraTask:
         from frametool.formats.cameras import load_camera, resized
 
         if tree is not None and inputs.camera is None:
-            camera = resized(tree.camera(self.name, inputs.size), inputs.size, inputs.arguments[0])
+            camera = resized(tree.camera(self.camera_name, inputs.size), inputs.size, inputs.arguments[0])
         else:
             camera = load_camera(inputs.camera, model=inputs.model, size=inputs.size)
-            if not (is_inline(inputs.camera) and "axes" in inputs.camera):
-                camera = camera.changed(axes=self._axes_in(tree))  # those of a file are of its own frame
-        if inputs.camera_axes:
-            camera = camera.changed(axes=inputs.camera_axes)
-        return camera
-
-    def _axes_in(self, tree: FrameTree | TransformBuffer | None) -> str:
-        """Return the axes of the camera's frame as the tree says, optical where it says nothing."""
-        if tree is None:
-            return "optical"
-        own = tree.cameras.get(self.name)
-        return tree.camera_axes.get(self.name, "optical" if own is None else own.axes)
+            if not (is_inline(inputs.camera) and "axes" in inputs.camera):  # those of a file are of its own frame
+                own = None if tree is None else tree.cameras.get(self.camera_name)
+                axes = "optical" if own is None else own.axes
+                axes = axes if tree is None else tree.camera_axes.get(self.camera_name, axes)
+                camera = camera.changed(axes=axes)
+        return camera.changed(axes=inputs.camera_axes) if inputs.camera_axes else camera
 
     def rectified(self) -> Camera:
         """Return the camera of the rectified picture, if that is wanted."""
@@ -196,20 +175,20 @@ class CameraTask:
         inputs.ask("keep")
         return asked._replace(operation=operation, rename=None, normalize=bool(inputs.normalize))
 
-    def run(self, request: Request, output: Output, records: Sequence[Source | str], seen: Seen) -> int:
+    def answer(self, request: Request, records: Sequence[Source | str], seen: Seen) -> int:
         """Write the rows of the stream, or the results of records; then say what became of them."""
+        status, output = 0, self.output
         if self.is_stream:
-            self.stream.read_clouds_as_rows()
-            status = self.stream.run(request, output)
+            self.read_clouds_as_rows()
+            status = self.run(request)
         else:
-            status = 0
             if output.style.format == "text":
                 output.style = output.style.changed(format="yaml")
             request = request._replace(prefix=self.inputs.prefix, precision=output.style.precision)
             output.values(values_of(records, request, output))
-        if not self.inputs.quiet and (self.is_stream or seen.lost) and (summary := seen.summary()):
+        if (self.is_stream or seen.lost) and (summary := seen.summary()):
             is_wrong = seen.is_mostly_behind and not self.inputs.camera_axes
-            say(f"{summary}{'; most are behind: --camera-axes flu or opengl?' * is_wrong}")
+            self.inputs.note(f"{summary}{'; most are behind: --camera-axes flu or opengl?' * is_wrong}")
         return status
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.options import pose_options, reading_options, verbose_option
 from frametool.cli.output import copied_as, folder_of, opened_place
-from frametool.cli.stderr import say, say_error
+from frametool.cli.sink import say, say_error
 from frametool.cli.trees import FRAME, load_tree, tree_file
 from frametool.errors import BadAnswer, FileProblem, FormatError, ValueInvalid, listing, printable, shown, warn
 from frametool.formats.load import FrameFile, Rules
@@ -50,7 +50,7 @@ def _between(text: str) -> tuple[int, int]:
 @option("--between START,STOP", "drop messages before and after", _between)
 @option("-f --format", "format of the copy  [default: by --output]", writers("recording"), name="format_name")
 @option("--force", "let --output overwrite a file", requires=("output",), under="Result")
-@reading_options(topics=False)
+@reading_options
 @verbose_option
 @pose_options
 def command(inputs: Inputs) -> int:
@@ -87,8 +87,7 @@ def command(inputs: Inputs) -> int:
         raise BadAnswer(f"joints without a value would be static: {listing(resting)}; --joint NAME=VALUE gives it")
     if edges is not None and edges.covariances:
         warn(f"{copy}: covariances left out")
-    if more or into:
-        inputs.ask("normalize")
+    inputs.ask(*["normalize"] * bool(more or into))
     on_error = inputs.on_error if into else STOP
     bad = BadRows(path, on_error, tell=lambda error: say_error(error, in_json=False), counted="message")
     request = RecordRequest(bad, edges, inputs.replace, _bare(into or ""), topics, inputs.between, normalize)

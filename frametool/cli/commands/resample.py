@@ -6,16 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.cli import options
 from frametool.cli.command import Inputs, argument, command_named, option, refuse
-from frametool.cli.comparing import read_delta, read_span, trajectory, trajectory_options, write_trajectory
-from frametool.cli.options import limit_options, read_times, reading_options, result_options, rotation_options
+from frametool.cli.commands.compare import gap_option, read_delta, trajectory, trajectory_options, write_trajectory
 from frametool.cli.output import Output
-from frametool.cli.stderr import say
+from frametool.cli.sink import say
 from frametool.errors import FormatError, warn
 from frametool.formats.table import by_name, writers
 from frametool.frames.path import seconds
 from frametool.grammar.edges import stop
 from frametool.stream.faults import ROWS_SKIPPED
-from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from frametool.frames.trajectory import Trajectory
@@ -23,15 +21,14 @@ if TYPE_CHECKING:
 
 @command_named("resample")
 @argument("path", metavar="TRAJ")
-@option("--rate HZ", "poses per second, from the first on", parse_number)
+@option("--rate HZ", "poses per second, from the first on", options.read_rate)
 @option("--at FILE|TIMES", "at the timestamps of a file; T,T,.., START:STOP:STEP", name="times")
 @option("--every 1m|5deg", "at even steps of distance or rotation", lambda text: read_delta(text, "m", "deg"))
-@option("--max-gap TIME", "longest gap to interpolate  [default: 3 medians]", read_span, name="max_gap_ns")
+@gap_option
 @trajectory_options
-@limit_options
-@reading_options()
-@rotation_options
-@result_options("poses")
+@options.limit_options
+@options.rotation_options
+@options.result_options("poses")
 def command(inputs: Inputs) -> int:
     """Interpolate a trajectory at other times: positions along the line, rotations by slerp.
 
@@ -45,9 +42,9 @@ def command(inputs: Inputs) -> int:
     """
     path, rate, times, every = inputs.path, inputs.rate, inputs.times, inputs.every
     refuse(sum(each is not None for each in (rate, times, every)) != 1, "give one of --rate, --at and --every")
-    refuse(rate is not None and rate <= 0, "--rate is more than 0")
     output = Output(inputs, "poses", otherwise=by_name(path, writers("poses")) or "csv")
-    found, name, skipped = trajectory(path, inputs.on_error, options.for_each(inputs.input_formats, 1)[0])
+    (fmt,) = options.for_each(inputs.input_formats, 1)
+    found, name, skipped = trajectory(inputs, path, fmt, inputs.on_error)
     from frametool.fit.alignment import resampled, stamps_at_rate, stamps_every
 
     found = _in_order(found, name)
@@ -55,7 +52,10 @@ def command(inputs: Inputs) -> int:
     if counted:
         refuse(every is None, f"{name} has no stamps; give them with --stamps FILE")
         found = found.numbered()
-    stamps = stamps_at_rate(found, rate) if rate else stamps_every(found, every) if every else _stamps(times or "")
+    if every:
+        stamps = stamps_every(found, every)
+    else:
+        stamps = stamps_at_rate(found, rate) if rate else _stamps(inputs, times or "")
     if not counted and (window := options.window_of(inputs)):
         inputs.ask("start", "stop")
         stamps = stamps[(window[0] <= stamps) & (stamps <= window[1])]
@@ -70,16 +70,16 @@ def command(inputs: Inputs) -> int:
     return ROWS_SKIPPED if skipped else 0
 
 
-def _stamps(text: str) -> Any:
+def _stamps(inputs: Inputs, text: str) -> Any:
     """Read the stamps of a trajectory, or a list of times."""
     import numpy as np
 
     from frametool.errors import FileProblem
 
     try:
-        found, name, _ = trajectory(text, "stop")
+        found, name, _ = trajectory(inputs, text)
     except (FormatError, FileProblem):
-        return np.array(read_times(text, stop), np.int64)
+        return np.array(options.read_times(text, stop), np.int64)
     refuse(found.stamps_ns is None, f"--at {text}: the poses there have no stamps")
     return _in_order(found, name).stamps_ns
 

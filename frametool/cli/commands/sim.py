@@ -14,13 +14,12 @@ import click
 
 from frametool.cli.command import EXIT_CODES, Command, Inputs, argument, misuse, option, refuse, say_if_typed, together
 from frametool.cli.commands import Group
-from frametool.cli.explaining import explain_option, significant
 from frametool.cli.options import PRECISION, file_with, suffix_of
 from frametool.cli.output import Output
 from frametool.cli.poses import inline_misuse, source_of
 from frametool.cli.signals import clean_up
-from frametool.cli.sink import refuse_existing, writing
-from frametool.cli.stderr import say
+from frametool.cli.sink import refuse_existing, say, writing
+from frametool.cli.streaming import explain_option, significant
 from frametool.documents.source import Source, read_text
 from frametool.errors import FileProblem, alternatives, shown
 from frametool.frames.stamps import BILLION
@@ -222,9 +221,9 @@ def _from_stdin(*, paced: bool) -> MakeLeader:
 
 INSTEAD = "pipe key names into frametool sim follow --leader -"
 SUBCOMMANDS = {
-    "follow": "a leader, and one or more turtles that follow",
-    "run": "a whole scene from one file",
-    "teleop": "drive turtle1 with the arrow keys, drawn in the terminal",
+    "follow": (__name__, "a leader, and one or more turtles that follow"),
+    "run": (__name__, "a whole scene from one file"),
+    "teleop": (__name__, "drive turtle1 with the arrow keys, drawn in the terminal"),
 }
 HELP = """Replay turtlesim and the turtle-follow tutorial, without ROS and without a screen.
 
@@ -237,17 +236,7 @@ of transforms, as `lookup` does. A summary goes to stderr.
 """
 
 
-class SimGroup(Group):
-    """The subcommands of the turtles, which are below."""
-
-    table = {name: (__name__, about) for name, about in SUBCOMMANDS.items()}  # noqa: RUF012 - as the group's own
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
-        """Return one of them, or say which there are."""
-        return self.commands.get(cmd_name) or super().get_command(ctx, cmd_name)
-
-
-@click.group("sim", cls=SimGroup, help=HELP, epilog=EXIT_CODES)
+@click.group("sim", cls=Group, table=SUBCOMMANDS, help=HELP, epilog=EXIT_CODES)
 def command() -> None:
     """Hold the subcommands."""
 

@@ -6,22 +6,11 @@ import os
 from math import degrees, hypot, sqrt
 from typing import TYPE_CHECKING, Any
 
-import click
-
+from frametool.cli import options
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, refuse_two_readers
-from frametool.cli.comparing import read_span, trajectory
-from frametool.cli.options import (
-    ColumnNames,
-    file_with,
-    for_each,
-    reading_options,
-    result_options,
-    suffix_of,
-    whole_pose_options,
-)
+from frametool.cli.commands.compare import trajectory
 from frametool.cli.output import Output
-from frametool.cli.sink import refuse_existing, writing
-from frametool.cli.stderr import say, say_error, tell
+from frametool.cli.sink import refuse_existing, say_error, tell, writing
 from frametool.cli.trees import answers, load_tree, opened, state
 from frametool.errors import ValueInvalid, alternatives, first_of, shown, warn
 from frametool.geometry.rigid import IDENTITY
@@ -33,7 +22,7 @@ if TYPE_CHECKING:
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.transform import Transform
-    from frametool.geometry.types import Array, Components
+    from frametool.geometry.types import Array
     from frametool.stream.measurements import Measurement
     from frametool.stream.samples import HandEyeSamples
 
@@ -62,17 +51,11 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
     unknown = [each.name for each in frames if each.parent and not each.fixed and not each.covariance]
     if unknown:
         warn(f"no covariance of {first_of(unknown, 5)}: neither loops nor sigmas say how sure that is")
-    if (alone := [m.place for m, checked in zip(found.measurements, found.checked, strict=True) if not checked]):
-        _report_taken(inputs, f"in no loop, cannot be cross-checked: {first_of(alone, 5)}")
+    alone = [m.place for m, checked in zip(found.measurements, found.checked, strict=True) if not checked]
+    inputs.note(f"in no loop, cannot be cross-checked: {first_of(alone, 5)}" if alone else None)
     labels = [(m.place, m.id, m.parent, m.child) for m in found.measurements]
     rows = _rows(found, labels, checked=list(map(bool, found.checked)), fits=found.fits)
     return Solution("tree", found.root, found.dof, found.rms_distance, found.rms_angle, found.sigma, frames, rows)
-
-
-def _report_taken(inputs: Inputs, *texts: str | None) -> None:
-    """Report how an input was taken, unless --quiet."""
-    for text in () if inputs.quiet else filter(None, texts):
-        say(text)
 
 
 def _fixed_tree(inputs: Inputs, measured: Collection[str]) -> Frames:
@@ -98,12 +81,8 @@ def _measurements(inputs: Inputs, files: Sequence[str]) -> list[Measurement]:
         own = [row for row in found if parted(row.place)[0] == each.name]
         first = f": {own[0].parent}<-{own[0].child} .." if own else ""
         rows = f"{len(own)} row{'s' * (len(own) != 1)}"
-        _report_taken(inputs, f"{each.name}: {rows}, each the pose of child in parent{first}")
+        inputs.note(f"{each.name}: {rows}, each the pose of child in parent{first}")
     return without(found, inputs.without)
-
-
-def _listed(covariance: Array | None) -> Components | None:
-    return None if covariance is None else tuple(covariance.ravel().tolist())
 
 
 def _numbers(components: Iterable[Any]) -> Any:
@@ -114,7 +93,8 @@ def _numbers(components: Iterable[Any]) -> Any:
 def _side(parent: str, name: str, pose: Transform, covariance: Array | None, rows: int) -> list[SolvedFrame]:
     """Return a root and the one frame in it."""
     root = SolvedFrame(parent, None, IDENTITY, None, rows, checked=True)
-    return [root, SolvedFrame(name, parent, _numbers(pose.components), _listed(covariance), rows, checked=True)]
+    listed = None if covariance is None else tuple(covariance.ravel().tolist())
+    return [root, SolvedFrame(name, parent, _numbers(pose.components), listed, rows, checked=True)]
 
 
 def _rows(found: Any, labels: Iterable[tuple[str, str | None, str, str]], **more: Sequence[Any]) -> list[SolvedRow]:
@@ -137,7 +117,8 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
 
     eye_to_hand = inputs.eye_to_hand
     if len(files) == 1:
-        fmt, columns, normalize = for_each(inputs.input_formats, 1)[0], inputs.columns or (), inputs.normalize
+        (fmt,) = options.for_each(inputs.input_formats, 1)
+        columns, normalize = inputs.columns, inputs.normalize
         samples = read_samples(files[0], eye_to_hand=eye_to_hand, normalize=normalize, fmt=fmt, columns=columns)
     else:
         samples = _paired(inputs, files)
@@ -148,7 +129,7 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
     holder, other = (base, gripper) if eye_to_hand else (gripper, base)
     second, number = f"; {samples.files[1]}:" if len(files) > 1 else ",", len(samples.places)
     taken = f"{samples.files[0]}: {base}<-{gripper}{second} {camera}<-{target}; {number} sample{'s' * (number != 1)}"
-    _report_taken(inputs, taken, samples.taken, f"solving for {holder}<-{camera} and {other}<-{target}")
+    inputs.note(taken, samples.taken, f"solving for {holder}<-{camera} and {other}<-{target}")
     from frametool.fit.hand_eye import solve_hand_eye
 
     found = solve_hand_eye(samples.gripper, samples.target, eye_to_hand=eye_to_hand, robust=robust, names=called)
@@ -169,8 +150,8 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
 def _paired(inputs: Inputs, files: Sequence[str]) -> HandEyeSamples:
     from frametool.fit.alignment import paired_samples
 
-    named, gap = zip(files, for_each(inputs.input_formats, 2), strict=True), inputs.max_gap_ns
-    read = [trajectory(file, STOP, fmt, normalize=inputs.normalize)[:2] for file, fmt in named]
+    named, gap = zip(files, options.for_each(inputs.input_formats, 2), strict=True), inputs.max_gap_ns
+    read = [trajectory(inputs, file, fmt)[:2] for file, fmt in named]
     (gripper, first), (target, second) = read
     for each, name in read:
         refuse(gap is not None and each.stamps_ns is None, f"--max-gap is not used: {name} has no stamps")
@@ -185,14 +166,14 @@ def solved_points(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solu
     def policy(name: str) -> BadRows:
         return BadRows(name, STOP, tell=lambda error: say_error(error, in_json=False))
 
-    named = zip(files, for_each(inputs.input_formats, 2), strict=True)
+    named = zip(files, options.for_each(inputs.input_formats, 2), strict=True)
     a, b = (read_points(file, fmt=fmt, answers=answers(), policy=policy) for file, fmt in named)
     found_names = (a.frame, b.frame) if a.frame and b.frame and a.frame != b.frame else ("A", "B")
     names = target, source = tuple(inputs.names or found_names)
     pairs = matched(a, b)
     how, ids = "by row" if pairs.ids is None or a.ids is None or b.ids is None else "by id", pairs.ids
-    matched_as = f"{len(pairs.places)} matched {how}"
-    _report_taken(inputs, f"{a.file}: points in {target}; {b.file}: points in {source}; {matched_as}")
+    points = f"{a.file}: points in {target}; {b.file}: points in {source}"
+    inputs.note(f"{points}; {len(pairs.places)} matched {how}")
     weights, scale = pairs.weights, inputs.scale
     found = solve_points(pairs.target, pairs.source, weights=weights, scale=scale, robust=robust, names=names)
     frames = _side(target, source, found.transform, found.covariance, int(found.used.sum()))
@@ -208,13 +189,6 @@ SHAPES = ("hand_eye", "points")
 FORMATS_OF_SCALE = ("text", "yaml", "json", "csv")
 
 
-def _read_names(text: str) -> list[str]:
-    names = [name.strip() for name in text.split(",")]
-    if not all(names) or len({*names}) < len(names):
-        raise ValueInvalid(f"{shown(text)}: names stand with commas between them, each once")
-    return names
-
-
 @command_named("solve", epilog=EXIT_CODES)
 @argument("files", FILE, nargs=-1, required=True, metavar="FILE.. | GRIPPER TARGET | SAMPLES | A B")
 @option("--root FRAME", "root of the result  [default: a frame that is never a child]", excludes=SHAPES)
@@ -222,18 +196,17 @@ def _read_names(text: str) -> list[str]:
 @option("--without FILE:LINE", "ignore this row; may be repeated", excludes=SHAPES, multiple=True)
 @option("--hand-eye", "pose of a camera from poses of gripper and target", excludes=("points",))
 @option("--eye-to-hand", "the camera is static, the target moves", requires=("hand_eye",))
-@option("--max-gap TIME", "longest time between paired stamps  [default: 50ms]", read_span,
+@option("--max-gap TIME", "longest time between paired stamps  [default: 50ms]", options.read_span,
     name="max_gap_ns", requires=("hand_eye",))  # fmt: skip
-@option("--columns NAME,..", "columns of GRIPPER, then of TARGET, in one table", ColumnNames(),
+@option("--columns NAME,..", "columns of GRIPPER, then of TARGET, in one table", options.COLUMN,
     multiple=True, requires=("hand_eye",), under="Rows")  # fmt: skip
 @option("--points", "A<-B from matched points")
 @option("--scale", "estimate the scale from A to B too", requires=("points",))
-@option("--names NAME,..", "BASE,GRIPPER,CAMERA,TARGET, or A,B", _read_names, requires=("hand_eye", "points"))
+@option("--names NAME,..", "BASE,GRIPPER,CAMERA,TARGET, or A,B", options.read_names, requires=("hand_eye", "points"))
 @option("--no-robust", "use all rows, outliers too")
-@option("--report FILE.json|csv", "statistics of the fit and of each row", file_with(".json", ".csv"))
-@reading_options()
-@whole_pose_options
-@result_options("tree", "trajectory")
+@option("--report FILE.json|csv", "statistics of the fit and of each row", options.file_with(".json", ".csv"))
+@options.reading_options
+@options.pose_result_options("tree", "trajectory")
 def command(inputs: Inputs) -> None:
     """Estimate transforms from measurements, with sigmas; outliers are rejected and listed.
 
@@ -252,11 +225,11 @@ def command(inputs: Inputs) -> None:
         os.environ[f"{library}_NUM_THREADS"] = "1"
     hand_eye, points, files = inputs.hand_eye, inputs.points, inputs.files
     refuse_two_readers(files)
-    if hand_eye and len(files) > 2:
-        raise click.UsageError(f"--hand-eye takes GRIPPER TARGET, or one file of SAMPLES, found {len(files)} files")
-    refuse(points and len(files) != 2, f"--points takes two files, A B, found {len(files)}")
+    count = len(files)
+    refuse(hand_eye and count > 2, f"--hand-eye takes GRIPPER TARGET, or one file of SAMPLES, found {count} files")
+    refuse(points and count != 2, f"--points takes two files, A B, found {count}")
     wanted, named = (4, "four names, BASE,GRIPPER,CAMERA,TARGET") if hand_eye else (2, "two names, A,B")
-    refuse(len(inputs.peek("names") or ()) not in (0, wanted), f"--names takes {named}")
+    refuse(len({*(inputs.names or ())}) not in (0, wanted), f"--names takes {named}; no two may be the same")
     report, path, force = inputs.report, inputs.output, inputs.force
     refuse(report and path and os.path.realpath(report) == os.path.realpath(path), "--report and -o name one file")
     for name in filter(None, (report, path)):
@@ -309,7 +282,7 @@ def _write_report(found: Solution, path: str, *, force: bool) -> None:
     """Write the numbers of the fit as one document, or those of its rows as a table."""
     from frametool.view.reports import report, row_report
 
-    if suffix_of(path) == ".csv":
+    if options.suffix_of(path) == ".csv":
         from frametool.formats.rows.csv import write_points
         from frametool.grammar.result import Style
 

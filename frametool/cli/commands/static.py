@@ -30,7 +30,7 @@ def _flag(name: str) -> Callable[..., Any]:
 @command_named("static")
 @argument("arguments", nargs=-1, metavar="[TREE | X Y Z .. PARENT CHILD]")
 @together(*map(_flag, FLAGS))
-@reading_options()
+@reading_options
 @pose_result_options("tree")
 def command(inputs: Inputs) -> None:
     """Write the static_transform_publisher arguments of a TREE, or read such arguments into a tree.

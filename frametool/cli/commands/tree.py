@@ -5,18 +5,16 @@ from __future__ import annotations
 import click
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option
-from frametool.cli.options import at_ns, color_option, read_time, result_options, rules, tree_options
+from frametool.cli.options import at_ns, color_option, read_time, rules, tree_result_options
 from frametool.cli.output import Output
 from frametool.cli.trees import load_tree
 
 
 @command_named("tree", own=("notations", "joints"))
 @argument("tree", FILE)
-@option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files")
 @option("--at TIME", "seconds, nanoseconds with ns  [default: latest of each edge]", read_time)
 @color_option
-@tree_options
-@result_options("tree", "trajectory")
+@tree_result_options("tree", "trajectory")
 def command(inputs: Inputs) -> None:
     """Draw the frames of TREE with their poses in their parents; moving frames with rate and interval.
 

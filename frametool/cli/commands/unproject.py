@@ -9,12 +9,11 @@ import click
 from frametool.cli.command import Inputs, argument, command_named, option, refuse
 from frametool.cli.commands.apply import is_record
 from frametool.cli.commands.project import CameraTask, camera_options
-from frametool.cli.options import STREAMED, at_ns
+from frametool.cli.options import at_ns
 from frametool.cli.output import Output
 from frametool.cli.trees import FRAME, frame_name
 from frametool.documents.source import Source
 from frametool.errors import FormatError, listing
-from frametool.formats.detect import detect
 from frametool.geometry.rigid import EXACT
 from frametool.stream.joint_rows import names_in
 from frametool.text.numbers import parse_length, parse_number
@@ -52,12 +51,12 @@ def command(inputs: Inputs) -> int:
     """
     from frametool.stream.pixels import PointsOfPixels
 
-    task = CameraTask(inputs, "TREE TARGET CAMERA")
+    task = CameraTask(inputs, Output(inputs, "points", otherwise="yaml"), "TREE TARGET CAMERA")
     raw, rectified = task.camera, task.rectified()
     task.camera = raw if inputs.undistort else rectified
     into = None if not inputs.undistort else rectified if inputs.rectified else raw.flat()
     records = [] if task.is_stream else [*_records(task.rest)]
-    columns = _columns(inputs, _names(task, records), task.stream.name)
+    columns = _columns(inputs, _names(task, records), task.name)
     far = next(((name, value) for name in FAR if (value := getattr(inputs, name)) is not None), ("", None))
     if far[0] or inputs.ground or into:
         columns = columns[:2]
@@ -70,7 +69,7 @@ def command(inputs: Inputs) -> int:
     request = task.request(None, seen, seen.shown((task.way and task.way.target) or ""))
     if request.timed is not None and height is not None:
         request = request._replace(timed=request.timed._replace(width=2 * EXACT))
-    return task.run(request._replace(poses=0, frames=()), Output(inputs, "points", otherwise="yaml"), records, seen)
+    return task.answer(request._replace(poses=0, frames=()), records, seen)
 
 
 def _through(task: CameraTask, named: str) -> Way:
@@ -78,7 +77,7 @@ def _through(task: CameraTask, named: str) -> Way:
     way = task.way
     if way is None or way.tree is None or way.target is None:
         raise click.UsageError("--ground needs TREE, TARGET and CAMERA: the tree says where the ground is")
-    tree, chosen, target, camera = way.tree, task.inputs.at, way.target, frame_name(task.name, way.tree)
+    tree, chosen, target, camera = way.tree, task.inputs.at, way.target, frame_name(task.camera_name, way.tree)
     ground = frame_name(named, tree)
     pairs = ((target, ground), (ground, camera))
 
@@ -109,11 +108,10 @@ def _names(task: CameraTask, records: Sequence[Source]) -> Sequence[str]:
     """Return the names of the columns of the stream, or its keys; those of the first record where there are some."""
     if records:
         return names_in(records[0].text.encode(), "yaml", records[0].name, WANTED)
-    stream = task.stream
-    stream.read_clouds_as_rows()
-    begin = stream.opened().peek()
-    fmt = stream.within or stream.chosen_format() or detect(begin, *STREAMED, name=stream.name, otherwise="columns")
-    return names_in(begin, fmt, stream.name, WANTED, header=stream.inputs.header)
+    task.read_clouds_as_rows()
+    begin = task.opened().peek()
+    fmt = task.within or task.chosen_format() or task.detected(begin, is_table=True)
+    return names_in(begin, fmt, task.name, WANTED, header=task.inputs.header)
 
 
 def _columns(inputs: Inputs, names: Sequence[str], source: str) -> Sequence[str]:

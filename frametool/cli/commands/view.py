@@ -12,8 +12,7 @@ import click
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse
 from frametool.cli.options import at_ns, color_option, moving_options, read_time, rules
-from frametool.cli.sink import refuse_existing, writing
-from frametool.cli.stderr import say
+from frametool.cli.sink import refuse_existing, say, writing
 from frametool.cli.trees import FRAME, frame_name, load_tree, opened, tree_file
 from frametool.errors import FormatError, listing, shown
 from frametool.frames.stamps import format_stamp
@@ -40,7 +39,6 @@ def _eye(text: str) -> Eye:
 @argument("tree", FILE)
 @argument("target", FRAME, required=False)
 @argument("source", FRAME, required=False)
-@option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files")
 @option("--frame FIXED", "reference frame  [default: TARGET, or the root of most frames]", FRAME, name="fixed")
 @option("--at TIME", "seconds, nanoseconds with ns  [default: first time at which all edges have data]", read_time)
 @option("--below FRAME", "only this frame and its descendants", FRAME)
