@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.calc import operations
 from frametool.calc.operations import FUNCTIONS
 from frametool.calc.parser import PLAIN, RESERVED, UNITS, CalcError, NoTree, column_name, frame_text, parse_line
-from frametool.calc.values import LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TWIST, VECTOR, Term, Type
+from frametool.calc.values import LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TWIST, VECTOR, Term, Type, wanted
 from frametool.documents.document import parse_documents
 from frametool.documents.source import Source
 from frametool.errors import FormatError, FrametoolError, did_you_mean, shown, warn
@@ -185,7 +185,7 @@ class _Walk:
         """Return the value of a part that is neither a tree nor a list."""
         term = self.term(branch)
         try:
-            return operations.wanted(term)
+            return wanted(term)
         except CalcError as error:
             raise placed(error, branch.at) from None
 

@@ -10,22 +10,7 @@ from math import inf, nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.calc.parser import METRE, PLAIN, RADIAN, CalcError, frame_text
-from frametool.calc.values import (
-    ANGLES,
-    LIST,
-    NUMBER,
-    PLAIN_NUMBER,
-    POINT,
-    POSE,
-    TO_RADIANS,
-    TREE,
-    TWIST,
-    VECTOR,
-    Term,
-    Type,
-    made,
-    meet,
-)
+from frametool.calc.values import ANGLES, NUMBER, PLAIN_NUMBER, POINT, POSE, TWIST, VECTOR, Term, Type, made, meet
 from frametool.errors import first_of, shown
 from frametool.geometry import euler, floats, quaternion, rigid, validation
 
@@ -36,6 +21,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components, Namespace, Number, Rigid
 
 PLACED = (POINT, VECTOR)
+TO_RADIANS = 0.017453292519943295
 LENGTH, ANGLE = Type(NUMBER, unit=METRE), Type(NUMBER, unit=RADIAN)
 # the words in `Way.takes` that are no kinds
 FITS: dict[str, Callable[[Type], bool]] = {
@@ -451,15 +437,6 @@ def called(name: str, terms: Sequence[Term]) -> Term:
 
 
 # --- frames of a value ---
-
-
-def wanted(term: Term) -> Term:
-    """Refuse a tree or a list where one value is expected."""
-    if term.type.kind == TREE:
-        raise CalcError(f"{term.text} is a tree; ask it: {term.text}[TARGET<-SOURCE]")
-    if term.type.kind == LIST:
-        raise CalcError(f"{term.text} is a list of {len(term.items)}; only mean(..) takes one")
-    return term
 
 
 def as_frames(term: Term, target: str | None, source: str | None) -> Term:

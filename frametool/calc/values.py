@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 POSE, POINT, VECTOR, NUMBER = "pose", "point", "vector", "number"
 TWIST, ANGLES, LIST, TREE = "twist", "angles", "list", "tree"
-TO_RADIANS = 0.017453292519943295
 
 
 class Type(NamedTuple):
@@ -151,3 +150,12 @@ def _of_arrays(kernel: Kernel, numbers: Components, check: Check | None) -> Comp
 def meet(a: str | None, b: str | None) -> bool:
     """Return True if two frames may be the same."""
     return a is None or b is None or a == b or (a in EARTH_FRAMES and b in EARTH_FRAMES)
+
+
+def wanted(term: Term) -> Term:
+    """Refuse a tree or a list where one value is expected."""
+    if term.type.kind == TREE:
+        raise CalcError(f"{term.text} is a tree; ask it: {term.text}[TARGET<-SOURCE]")
+    if term.type.kind == LIST:
+        raise CalcError(f"{term.text} is a list of {len(term.items)}; only mean(..) takes one")
+    return term

@@ -19,7 +19,7 @@ from frametool.geometry.transform import Transform
 from frametool.stream.samples import HandEyeSamples
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from frametool.fit.comparison import Delta
     from frametool.frames.trajectory import Trajectory
@@ -416,51 +416,59 @@ def _rival(score: Array, best: int) -> int | None:
     return int(np.argmax(np.where(near, score, -np.inf))) if near.any() and score[best] > 0 else None
 
 
-def _refined_speeds(a: tuple[Array, Array], b: tuple[Array, Array], seconds: float, step: float) -> float:
-    """Refine a lag until the speeds a match the speeds b best (Gauss-Newton on one number)."""
-    found = seconds
+def _newton(seconds: float, step: float, change_of: Callable[[float], float]) -> float:
+    """Refine a lag until it does not change: Gauss-Newton on one number, at most a step of the grid at a time."""
     for _ in range(STEPS):
+        change = change_of(seconds)
+        seconds += min(max(change, -step), step)
+        if abs(change) < REFINED_S:
+            break
+    return seconds
+
+
+def _refined_speeds(a: tuple[Array, Array], b: tuple[Array, Array], seconds: float, step: float) -> float:
+    """Refine a lag until the speeds a match the speeds b best."""
+
+    def change_of(found: float) -> float:
         at = b[0] + found
         inside = (at >= a[0][0] + step) & (at <= a[0][-1] - step)
         sooner, here, later = (np.interp(at[inside] + lag, *a) for lag in (-step, 0.0, step))
         slope = (later - sooner) / (2.0 * step)
-        change = float(slope @ (b[1][inside] - here)) / max(float(slope @ slope), TINY)
-        found += min(max(change, -step), step)
-        if abs(change) < REFINED_S:
-            break
+        return float(slope @ (b[1][inside] - here)) / max(float(slope @ slope), TINY)
+
+    found = _newton(seconds, step, change_of)
     return found if abs(found - seconds) < NEARBY * step else seconds
 
 
 def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step: float, kind: str) -> float:
-    """Refine the offset from the residuals along the velocity after the fit: Gauss-Newton on one number.
+    """Refine the offset from the residuals along the velocity after the fit.
 
     Drift is along the velocity too, but correlated from pose to pose: if the residuals are so correlated that they are
     less accurate than the correlation, or require a lag outside of its uncertainty (as with a lever arm), it is
     unchanged.
     """
-    up = np.array([0.0, 0.0, 1.0])
-    plain = ref._replace(xyzw=None)
+    plain, doubt = ref._replace(xyzw=None), np.inf
     half, gap_ns = round(step * 1e9), GAP * interval(ref.stamps_ns)
-    found = seconds
-    for _ in range(STEPS):
+
+    def change_of(found: float) -> float:
+        nonlocal doubt
         at = est.stamps_ns + shift + round(found * 1e9)
         inside = np.logical_and.reduce([between(plain, at + lag, gap_ns)[1] for lag in (-half, 0, half)])
         own = est.at(inside)._replace(xyzw=None)
         sooner, here, later = (between(plain, at[inside] + lag, gap_ns)[0].xyz for lag in (-half, 0, half))
         velocity = (later - sooner) / (2e-9 * half)
-        try:
-            fit = fitted(kind, plain._replace(xyz=here), own, up)
-        except Unaligned:
-            return seconds
+        fit = fitted(kind, plain._replace(xyz=here), own, np.array([0.0, 0.0, 1.0]))
         left, unsteady = ((fit.moved(own).xyz - here) * velocity).sum(-1), velocity - centre(velocity)
         squared = max(float((unsteady**2).sum()), TINY)  # a constant velocity is equivalent to a shift of the fit
-        change = min(max(float(left.sum()) / squared, -step), step)
-        found += change
-        if abs(change) < REFINED_S:
-            break
-    centred = left - left.mean()
-    alike = float(centred[1:] @ centred[:-1]) / max(float(centred @ centred), TINY)
-    doubt = sqrt(float(left @ left) * (1 + alike) / max(1 - alike, TINY)) / squared
+        centred = left - left.mean()
+        alike = float(centred[1:] @ centred[:-1]) / max(float(centred @ centred), TINY)
+        doubt = sqrt(float(left @ left) * (1 + alike) / max(1 - alike, TINY)) / squared
+        return float(left.sum()) / squared
+
+    try:
+        found = _newton(seconds, step, change_of)
+    except Unaligned:
+        return seconds
     return found if doubt < DOUBT * step and abs(found - seconds) < NEARBY * step else seconds
 
 
@@ -479,11 +487,17 @@ def resampled(each: Trajectory, stamps_ns: Array, max_gap_ns: float | None = Non
 def stamps_at_rate(each: Trajectory, rate_hz: float) -> Array:
     """Return stamps from the first pose on at a rate, each rounded independently."""
     first, last = int(each.stamps_ns[0]), int(each.stamps_ns[-1])
-    count = int((last - first) * rate_hz / BILLION * (1 + 1e-12)) + 1
-    if count > MOST:
-        raise ValueInvalid(f"{count} poses are more than {MOST}; give a lower rate")
+    count = _count((last - first) * rate_hz / BILLION)
     stamps: Array = first + np.rint(np.arange(count) * (BILLION / rate_hz)).astype(np.int64)
     return stamps[stamps <= last]
+
+
+def _count(steps: float) -> int:
+    """Return the number of poses at whole steps."""
+    count = int(steps * (1 + 1e-12)) + 1
+    if count > MOST:
+        raise ValueInvalid(f"{count} poses are more than {MOST}; give a lower rate or longer steps")
+    return count
 
 
 def stamps_every(each: Trajectory, delta: Delta) -> Array:
@@ -491,9 +505,7 @@ def stamps_every(each: Trajectory, delta: Delta) -> Array:
     along = delta.along(each)
     if along is None:
         raise ValueInvalid(f"steps of {delta} need rotations")
-    count = int(along[-1] / delta.amount * (1 + 1e-12)) + 1
-    if count > MOST:
-        raise ValueInvalid(f"{count} poses are more than {MOST}; give longer steps")
+    count = _count(along[-1] / delta.amount)
     wanted = np.minimum(np.arange(count) * delta.amount, along[-1])
     after = np.searchsorted(along, wanted).clip(1, len(along) - 1)
     step = along[after] - along[after - 1]

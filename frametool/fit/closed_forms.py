@@ -3,26 +3,14 @@
 from __future__ import annotations
 
 from itertools import chain
-from math import degrees, hypot, log, sqrt
+from math import degrees, log, sqrt
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from frametool.errors import ValueInvalid, warn
+from frametool.fit import least_squares as lsq
 from frametool.fit.alignment import STILL, THIN, Fit, centre, principal_axes, umeyama
-from frametool.fit.least_squares import (
-    LEAST,
-    batch_of,
-    deviations,
-    draws,
-    errors,
-    fitted_sigmas,
-    inverse,
-    length,
-    require_near,
-    settled,
-    skew,
-)  # fmt: skip
 from frametool.geometry import validation
 from frametool.geometry.transform import Transform
 
@@ -103,19 +91,19 @@ def solve_mean(
     weights: (n,), proportional to 1 / variance; a pose of weight 0 is ignored
     Without outliers exactly the mean of `mean_and_spread`.  Raises ValueInvalid if there is no pose, or no mean.
     """
-    poses = batch_of(poses, "poses")
-    require_near(poses.xyz, "poses")
+    poses = lsq.batch_of(poses, "poses")
+    lsq.require_near(poses.xyz, "poses")
     mass = validation.masses(weights, poses.shape)
     counts = mass > 0.0
     used, roots = counts.copy(), np.sqrt(mass)[:, None]
     if robust and counts.sum() >= FEWEST_POSES:
         used[counts] = _agreeing(poses[counts], mass[counts])
     mean, spread = mean_and_spread(poses[used], None if weights is None else mass[used])
-    off = errors(poses, mean)
+    off = lsq.errors(poses, mean)
     count, kept = int(used.sum()), roots[used] * off[used]
-    s_t, s_r = fitted_sigmas(kept, np.ones(count), 3).tolist()
+    s_t, s_r = lsq.fitted_sigmas(kept, np.ones(count), 3).tolist()
     covariance = kept.T @ kept * (count / mass[used].sum() / (count - 1)) if count > 1 else None
-    u = deviations(roots * off, np.array([s_t, s_r]))
+    u = lsq.deviations(roots * off, np.array([s_t, s_r]))
     return MeanFit(mean, spread, used, counts & ~used, u, off, (s_t, s_r), 3 * count - 3, covariance)
 
 
@@ -124,22 +112,22 @@ def _agreeing(poses: Transform, mass: Array) -> Mask:
     roots = np.sqrt(mass)[:, None]
 
     def residuals(middle: Transform) -> Array:
-        found: Array = roots * errors(poses, middle)
+        found: Array = roots * lsq.errors(poses, middle)
         return found
 
     def mean(_: Transform, weights: Array) -> Transform:
         return poses.mean(weights * mass)
 
-    return settled(_middle(poses, roots), residuals, mean, mean, unknown=3, robust=True).kept
+    return lsq.settled(_middle(poses, roots), residuals, mean, mean, unknown=3, robust=True).kept
 
 
 def _middle(poses: Transform, roots: Array) -> Transform:
     """Return the pose closest to the others, by the medians of metres and radians."""
     count = len(poses)
-    tried = range(count) if count <= MOST_TRIED else next(draws(1, MOST_TRIED, count))
+    tried = range(count) if count <= MOST_TRIED else next(lsq.draws(1, MOST_TRIED, count))
 
     def apart(at: int) -> float:
-        return sum(log(max(np.median(roots[:, 0] * off), LEAST)) for off in poses[at].distance(poses))
+        return sum(log(max(np.median(roots[:, 0] * off), lsq.LEAST)) for off in poses[at].distance(poses))
 
     return poses[min(tried, key=apart)]
 
@@ -206,7 +194,7 @@ def solve_points(
         chosen.require_plane()
         return chosen.fitted(with_scale=scale, weights=kept[kept > 0.0])
 
-    found = settled(
+    found = lsq.settled(
         start, pairs.weighted_residuals, lambda _, first: pairs.fitted(with_scale=scale, weights=first), fit,
         unknown=6 + scale, robust=robust,
     )  # fmt: skip
@@ -220,7 +208,7 @@ def solve_points(
         warn(hint)
     return PointsFit(
         best.transform.canonical(), best.scale, scale_sigma, covariance, used, (mass > 0.0) & ~used, residuals,
-        np.sqrt(mass / 3.0) * length(residuals) / sigma, sigma, 3 * int(kept.sum()) - 6 - scale,
+        np.sqrt(mass / 3.0) * lsq.length(residuals) / sigma, sigma, 3 * int(kept.sum()) - 6 - scale,
         sqrt((residuals[used] ** 2).sum() / used.sum()), hints,
     )  # fmt: skip
 
@@ -248,10 +236,10 @@ class _Pairs(NamedTuple):
         The typical distance is the median, but at least the fourth: three always fit.  It is never below rounding.
         """
         count = len(self.mass)
-        seen = self.at(next(draws(1, MOST, count))) if count > MOST else self
+        seen = self.at(next(lsq.draws(1, MOST, count))) if count > MOST else self
         middle = min(max(len(seen.mass) // 2, 3), len(seen.mass) - 1)
         best = (np.inf, Fit(IDENTITY))
-        triples: Iterable[Rows] = draws(TRIPLES * robust, 3, count)
+        triples: Iterable[Rows] = lsq.draws(TRIPLES * robust, 3, count)
         for few in chain([slice(None)], triples):
             chosen = self.at(few)
             if chosen.is_line():
@@ -296,12 +284,12 @@ class _Pairs(NamedTuple):
         """
         middle = centre(self.source, self.mass)
         arms = fit.transform.rotation.apply(self.source - middle)
-        slopes = skew(fit.scale * arms).reshape(-1, 3)
-        of_turn = inverse(slopes.T @ (np.repeat(self.mass, 3)[:, None] * slopes))
+        slopes = lsq.skew(fit.scale * arms).reshape(-1, 3)
+        of_turn = lsq.inverse(slopes.T @ (np.repeat(self.mass, 3)[:, None] * slopes))
         of_scale = with_scale / (self.mass[:, None] * arms**2).sum()
         lever = fit.transform.rotation.apply(middle)
         levers = np.eye(6)
-        levers[:3, 3:] = skew(fit.scale * lever)
+        levers[:3, 3:] = lsq.skew(fit.scale * lever)
         found = levers[:, 3:] @ of_turn @ levers[:, 3:].T
         found[:3, :3] += np.eye(3) / self.mass.sum() + of_scale * np.outer(lever, lever)
         return sigma**2 / 2.0 * (found + found.T), sigma * sqrt(of_scale) if with_scale else None
@@ -317,7 +305,7 @@ def _points(values: Numbers, name: str) -> Array:
     if xyz.ndim != 2:
         raise ValueInvalid(f"{name}: expected shape (n, 3), got {xyz.shape}")
     validation.all_finite((xyz,), name)
-    require_near(xyz, name)
+    lsq.require_near(xyz, name)
     return xyz
 
 
@@ -332,8 +320,7 @@ def mean_of_rows(gathered: Gathered, values: list[float] | None, *, robust: bool
     extras: dict[str, Any] = {"count": len(found.used)} | ({"used": int(found.used.sum())} if robust else {})
     left_out: list[str] = []
     for row in found.left_out.nonzero()[0].tolist() if robust else ():
-        metres, radians = (hypot(*half) for half in (found.residuals[row, :3], found.residuals[row, 3:]))
-        off = f"{1e3 * metres:.1f} mm {degrees(radians):.2f} deg"
+        off = lsq.off_text(found.residuals[row], 2)
         left_out.append(f"{gathered.places[row]}: left out, {off} off (u {found.u[row]:.1f})")
     pose = Pose.of(found.transform.components)
     if gathered.placed:

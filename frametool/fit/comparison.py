@@ -12,7 +12,7 @@ from frametool.errors import ValueInvalid, shown
 from frametool.fit import alignment as pairing
 from frametool.fit.alignment import ALIGNMENTS, Fit, Unaligned, clock_offset, fitted, lever_arm, principal_axes
 from frametool.fit.least_squares import require_near
-from frametool.fit.numbers import absolute_errors, all_pairs, chained, is_lost, relative_errors, segment_errors
+from frametool.fit.numbers import ROUNDING, absolute_errors, all_pairs, chained, relative_errors, segment_errors
 from frametool.frames.stamps import format_stamp
 from frametool.frames.trajectory import way
 from frametool.geometry import earth, quaternion
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from frametool.fit.alignment import Pairs
     from frametool.fit.numbers import AbsoluteErrors, RelativeErrors, SegmentErrors
     from frametool.frames.trajectory import Trajectory
-    from frametool.geometry.types import Array, Rigid
+    from frametool.geometry.types import Array
 
 AUTO = "auto"
 CLEAR = 0.5  # score of a reliable clock offset
@@ -165,7 +165,9 @@ def compare(
     sizes = (ref.size, est.size)
     for each, name in zip((ref, est), names, strict=True):
         require_near(each.xyz, name)
-    ref, est = _on_the_ground(ref, est, names, hints)
+    on_earth = [each.world in EARTH_FRAMES and each.size > 0 for each in (ref, est)]
+    if any(on_earth):
+        ref, est = _on_the_ground((ref, est), names, on_earth, hints)
     if not settings.evo:
         hints += [*ref.disorder(names[0]), *est.disorder(names[1])]
         ref, est = ref.in_order(), est.in_order()
@@ -191,32 +193,25 @@ def compare(
 
 
 def _on_the_ground(
-    ref: Trajectory, est: Trajectory, names: tuple[str, str], hints: list[str]
-) -> tuple[Trajectory, Trajectory]:
+    both: tuple[Trajectory, Trajectory], names: tuple[str, str], on_earth: list[bool], hints: list[str]
+) -> list[Trajectory]:
     """Return trajectories of the Earth's frame along east, north, up of the first position, so that z is up."""
-    found = next(((each, name) for each, name in ((ref, names[0]), (est, names[1])) if _is_of_earth(each)), None)
-    if found is None:
-        return ref, est
+    first = on_earth.index(True)
     origin = Origin()
-    origin.settle(*found[0].xyz.T)
+    origin.settle(*both[first].xyz.T)
     pose = origin.pose(ENU)
     lat, lon, alt = origin.place or (0.0, 0.0, 0.0)
-    hints.append(f"compared along east, north, up of lat {lat!r}, lon {lon!r}, alt {alt!r}, the first of {found[1]}")
-    ref, est = (_seen_from(each, pose) if _is_of_earth(each) else each for each in (ref, est))
-    return ref, est
-
-
-def _is_of_earth(each: Trajectory) -> bool:
-    return each.world in EARTH_FRAMES and each.size > 0
-
-
-def _seen_from(each: Trajectory, pose: Rigid) -> Trajectory:
-    """Return a trajectory relative to a pose in its world."""
-    xyz = np.stack(earth.seen_from(*pose, *each.xyz.T), -1)
-    if each.xyzw is None:
-        return each._replace(xyz=xyz, world=ENU)
-    turned = quaternion.compose(*quaternion.conjugate(*pose[3:]), *each.xyzw.T)
-    return each._replace(xyz=xyz, xyzw=np.stack(turned, -1), world=ENU)
+    there = f"lat {lat!r}, lon {lon!r}, alt {alt!r}, the first of {names[first]}"
+    hints.append(f"compared along east, north, up of {there}")
+    found = list(both)
+    for at, each in enumerate(both):
+        if on_earth[at]:
+            xyz = np.stack(earth.seen_from(*pose, *each.xyz.T), -1)
+            found[at] = each._replace(xyz=xyz, world=ENU)
+            if each.xyzw is not None:
+                turned = quaternion.compose(*quaternion.conjugate(*pose[3:]), *each.xyzw.T)
+                found[at] = found[at]._replace(xyzw=np.stack(turned, -1))
+    return found
 
 
 def _paired(
@@ -282,7 +277,7 @@ def _warn_of_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]
 
 def _cut(pairs: Pairs, settings: Settings) -> Pairs:
     """Keep the pairs from the start to the end, both inclusive."""
-    if settings.start is None and settings.stop is None:
+    if settings.start is settings.stop is None:
         return pairs
     stamps = pairs.ref.stamps_ns
     if stamps is None:
@@ -389,7 +384,7 @@ def _relative(
         along = delta.along(walked)
         if along is None:
             why = "there are no rotations" if delta.unit == "deg" else "there are no stamps"
-        elif is_lost(along, delta.amount):
+        elif along[-1] + delta.amount * (1 - ROUNDING) == along[-1]:
             why = f"the delta is lost in rounding: the path is {along[-1]:g} {delta.unit} long"
             if settings.deltas:
                 raise ValueInvalid(f"rpe {delta}: {why}")

@@ -13,24 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from frametool.errors import ValueInvalid, warn
-from frametool.fit.least_squares import (
-    KEPT,
-    LEAST,
-    align_vectors,
-    batch_of,
-    deviations,
-    draws,
-    fitted_sigmas,
-    inverse,
-    inverse_left_jacobian,
-    length,
-    lengths,
-    require_near,
-    settled,
-    skew,
-    solve_normal,
-    stepped,
-)  # fmt: skip
+from frametool.fit import least_squares as lsq
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
@@ -99,13 +82,13 @@ def solve_hand_eye(
     .covariance_x, .covariance_z, .noise_at, .used and more: least squares with the most likely location of the noise.
     Raises ValueInvalid if the samples are too few, rotate about one axis only, or fit the inverse setting.
     """
-    gripper, target = batch_of(gripper, "gripper"), batch_of(target, "target")
+    gripper, target = lsq.batch_of(gripper, "gripper"), lsq.batch_of(target, "target")
     if len(gripper) != len(target):
         raise ValueInvalid(f"gripper has {len(gripper)} poses, target {len(target)}")
     if (count := len(gripper)) < FEWEST:
         raise ValueInvalid(f"{count} sample{'s'[: count != 1]}; hand-eye needs {FEWEST}, turned about two axes")
-    require_near(gripper.xyz, "gripper")
-    require_near(target.xyz, "target")
+    lsq.require_near(gripper.xyz, "gripper")
+    lsq.require_near(target.xyz, "target")
     hand = gripper.inverse() if eye_to_hand else gripper
     samples, other = _Samples(hand, target), _Samples(hand.inverse(), target)
     holder = names[0] if eye_to_hand else names[1]
@@ -123,40 +106,30 @@ def solve_hand_eye(
         models = (samples.fitted(begin._replace(cut=cut), weights, steps) for cut in CUTS)
         return min(models, key=lambda fit: fit.misfit)
 
-    found = settled(
+    found = lsq.settled(
         start, samples.residuals, lambda model,
         weights: samples.fitted(model._replace(cut="target"), weights, ROUGH_STEPS), likeliest, unknown=6,
         robust=robust,
     )  # fmt: skip
     model = found.model
     s_t, s_r = model.sigmas.tolist()
-    count, off = int(found.kept.sum()), lengths(found.residuals[found.kept]).T
+    count, off = int(found.kept.sum()), lsq.lengths(found.residuals[found.kept]).T
     rms = np.sqrt((off**2).mean(1))
     turns = _turns(hand[found.kept])
-    if turns.rms[0] < KEPT * s_r * sqrt(2.0):
+    if turns.rms[0] < lsq.KEPT * s_r * sqrt(2.0):
         raise _unfitting(rms)
     _require_two_axes(turns, s_r, holder, names[2])
-    covariance = inverse(model.hessian)
+    covariance = lsq.inverse(model.hessian)
     warnings = _way_warnings(medians, others, count, eye_to_hand=eye_to_hand) + _warnings(turns, count, holder)
     warnings += _scale_warnings(samples.at(found.kept), model.x)
     for warning in warnings:
         warn(warning)
+    noise_at = "base" if eye_to_hand and model.cut == "gripper" else model.cut
     return HandEye(
-        model.x.canonical(),
-        model.z.canonical(),
-        covariance[:6, :6],
-        covariance[6:, 6:],
-        None if s_t == s_r == LEAST else "base" if eye_to_hand and model.cut == "gripper" else model.cut,
-        found.kept,
-        deviations(found.residuals, model.sigmas),
-        found.residuals,
-        (s_t, s_r),
-        3 * count - 6,
-        float(rms[0]),
-        float(rms[1]),
-        turns.rms,
-        warnings,
-    )
+        model.x.canonical(), model.z.canonical(), covariance[:6, :6], covariance[6:, 6:],
+        None if s_t == s_r == lsq.LEAST else noise_at, found.kept, lsq.deviations(found.residuals, model.sigmas),
+        found.residuals, (s_t, s_r), 3 * count - 6, float(rms[0]), float(rms[1]), turns.rms, warnings,
+    )  # fmt: skip
 
 
 class _Model(NamedTuple):
@@ -208,8 +181,8 @@ class _Samples(NamedTuple):
         damping = UNDAMPED
         for _ in range(steps):
             bent = now.hessian + damping * np.diag(np.diag(now.hessian))
-            step = -solve_normal(bent, gradient[:, None])[:, 0]
-            moved = now._replace(x=stepped(now.x, step[:6]), z=stepped(now.z, step[6:]))
+            step = -lsq.solve_normal(bent, gradient[:, None])[:, 0]
+            moved = now._replace(x=lsq.stepped(now.x, step[:6]), z=lsq.stepped(now.z, step[6:]))
             tried, its_gradient = self._linear(moved, weights)
             if tried.misfit <= now.misfit + DONE:
                 now, gradient, damping = tried, its_gradient, max(damping / 10.0, UNDAMPED)
@@ -223,7 +196,7 @@ class _Samples(NamedTuple):
         """Return a model with its Hessian and its cost, and the gradient."""
         loop = CUTS[model.cut](*self, model.x, model.z)
         errors = _errors(loop, model.x)
-        sigmas = fitted_sigmas(errors, weights, 6)
+        sigmas = lsq.fitted_sigmas(errors, weights, 6)
         weighed = (weights[:, None] / np.repeat(sigmas**2, 3)).reshape(-1, 1)
         slopes = _jacobian(loop, model, errors[:, 3:]).reshape(-1, 12)
         gradient = slopes.T @ (weighed * errors.reshape(-1, 1))
@@ -240,13 +213,13 @@ def _jacobian(loop: _Loop, model: _Model, turned: Array) -> Array:
     """Return the derivatives of errors (n, 6) by steps of X and of Z: (n, 6, 12)."""
     left = loop.left.rotation.as_matrix()
     back = (loop.before.rotation @ model.z.rotation.inverse()).as_matrix()
-    bent = inverse_left_jacobian(turned)
+    bent = lsq.inverse_left_jacobian(turned)
     slopes = np.zeros((len(turned), 6, 12))
     slopes[:, :3, :3] = left
-    slopes[:, :3, 3:6] = -left @ skew(model.x.rotation.apply(loop.right.xyz))
+    slopes[:, :3, 3:6] = -left @ lsq.skew(model.x.rotation.apply(loop.right.xyz))
     slopes[:, 3:, 3:6] = bent @ left
     slopes[:, :3, 6:9] = -back
-    slopes[:, :3, 9:] = back @ skew(loop.after.xyz - model.z.xyz)
+    slopes[:, :3, 9:] = back @ lsq.skew(loop.after.xyz - model.z.xyz)
     slopes[:, 3:, 9:] = -bent @ back
     return slopes
 
@@ -255,14 +228,14 @@ def _start(samples: _Samples, *, robust: bool) -> tuple[_Model, Array]:
     """Return the best closed form of all samples and of small random subsets, with the medians of its errors."""
     count = len(samples.gripper)
     best = (np.inf, _Model(ONE, ONE), np.full(2, np.inf))
-    fives: Iterable[Rows] = draws(DRAWS * robust, min(DRAWN, count - 1), count)
+    fives: Iterable[Rows] = lsq.draws(DRAWS * robust, min(DRAWN, count - 1), count)
     for few in chain([slice(None)], fives):
         chosen = samples.at(few)
         if _turns(chosen.gripper).rms[1] < FLAT:
             continue
         x = park_martin(*chosen)
         z = (chosen.gripper @ x @ chosen.camera).mean()
-        medians = np.maximum(np.median(lengths(samples.residuals(_Model(x, z))), axis=0), LEAST)
+        medians = np.maximum(np.median(lsq.lengths(samples.residuals(_Model(x, z))), axis=0), lsq.LEAST)
         best = min(best, (log(medians[0]) + log(medians[1]), _Model(x, z), medians), key=lambda each: each[0])
     return best[1:]
 
@@ -275,10 +248,10 @@ def park_martin(gripper: Transform, camera: Transform) -> Transform:
     """
     a, b = _motions(gripper, camera)
     alpha, beta = a.rotation.as_rotvec(), b.rotation.as_rotvec()
-    angle = lengths(alpha)[:, 0]
+    angle = lsq.lengths(alpha)[:, 0]
     if (clear := (angle > CLEAR[0]) & (angle < CLEAR[1])).sum() > 1:
         a, b, alpha, beta = a[clear], b[clear], alpha[clear], beta[clear]
-    turn = align_vectors(beta, alpha)
+    turn = lsq.align_vectors(beta, alpha)
     wanted = (turn.apply(b.xyz) - a.xyz).reshape(-1)
     place, _ = _least_squares((a.rotation.as_matrix() - np.eye(3)).reshape(-1, 3), wanted)
     return Transform(turn, place)
@@ -295,7 +268,7 @@ def _scale_warnings(samples: _Samples, x: Transform) -> list[str]:
     lever, turned = (a.rotation.as_matrix() - np.eye(3)).reshape(-1, 3), x.rotation.apply(b.xyz).reshape(-1)
     place, plain = _least_squares(lever, turned - a.xyz.reshape(-1))
     place, scaled = _least_squares(np.column_stack([lever, -turned]), -a.xyz.reshape(-1))
-    if place[3] <= 0.0 or plain <= max(BETTER * scaled, LEAST):
+    if place[3] <= 0.0 or plain <= max(BETTER * scaled, lsq.LEAST):
         return []
     return [f"TARGET fits better with its places times {place[3]:.4g}: another unit, or the size of a marker?"]
 
@@ -303,14 +276,14 @@ def _scale_warnings(samples: _Samples, x: Transform) -> list[str]:
 def _least_squares(slopes: Array, wanted: Array) -> tuple[Array, float]:
     """Return the least-squares solution, and the norm of the residuals."""
     found: Any = np.linalg.lstsq(slopes, wanted, rcond=ROUNDING)[0]  # unobservable components are 0
-    return found, float(length(slopes @ found - wanted))
+    return found, float(lsq.length(slopes @ found - wanted))
 
 
 def _pairs(count: int) -> tuple[Indices, Indices]:
     """Return all pairs of samples; of many, each with others at some random distances."""
     if count * count <= 2 * MOST:
         return np.triu_indices(count, 1)
-    lags = np.array(next(draws(1, max(MOST // count, 1), count - 1))) + 1
+    lags = np.array(next(lsq.draws(1, max(MOST // count, 1), count - 1))) + 1
     i = np.tile(np.arange(count), len(lags))
     return i, (i + np.repeat(lags, count)) % count
 
@@ -335,7 +308,7 @@ def _require_two_axes(turns: _Turns, s_r: float, holder: str, camera: str) -> No
     first, second = turns.rms
     if first < FLAT:
         raise ValueInvalid(f"{holder} does not turn ({degrees(first):.2f} deg); hand-eye needs turns about two axes")
-    if second < max(FLAT, FLAT_SHARE * first, KEPT * s_r * sqrt(2.0)):
+    if second < max(FLAT, FLAT_SHARE * first, lsq.KEPT * s_r * sqrt(2.0)):
         raise ValueInvalid(
             f"all turns are about one axis ({turns.axis} in {holder}): where {camera} is along it cannot be known; "
             "turn about a second one"

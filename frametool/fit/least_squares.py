@@ -8,6 +8,7 @@ state are estimated from medians.
 
 from __future__ import annotations
 
+from math import degrees
 from random import Random
 from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
@@ -95,6 +96,12 @@ def errors(poses: Transform, measured: Transform) -> Array:
     """Return [t - measured t, Log(R measured R')], (.., 6)."""
     turned = (poses.rotation @ measured.rotation.inverse()).as_rotvec()
     return np.concatenate([poses.xyz - measured.xyz, turned], -1)
+
+
+def off_text(error: Array, digits: int = 1) -> str:
+    """Format the lengths of both halves of an error (6) for messages."""
+    metres, radians = length(error.reshape(2, 3)).tolist()
+    return f"{1e3 * metres:.1f} mm {degrees(radians):.{digits}f} deg"
 
 
 def skew(v: Array) -> Array:

@@ -14,17 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.errors import Finding, NotConnected, ValueInvalid, alternatives, first_of, printable, shown, warn
-from frametool.fit.least_squares import KEPT, NotSettled, applied, errors, inverse, length, stacked
-from frametool.fit.tree_problem import (
-    Noise,
-    TreeProblem,
-    bodies_of,
-    bridges,
-    jacobians,
-    of_body,
-    require_connected,
-    top_of,
-)
+from frametool.fit import least_squares as lsq
+from frametool.fit.tree_problem import Noise, TreeProblem, bodies_of, bridges, jacobians, of_body, top_of
 from frametool.frames.lookups import Frames, FrameTree
 from frametool.frames.topology import Groups
 from frametool.geometry.conventions import axes_change
@@ -86,7 +77,7 @@ def best_blunder(measurement: Measurement, pose: Transform, information: Array) 
     """
     meant = {words: made for words, blunder in BLUNDERS.items() if (made := blunder(measurement)) is not None}
     tried = [*meant.values(), measurement.transform]
-    off = errors(pose, stacked(tried))
+    off = lsq.errors(pose, lsq.stacked(tried))
     u = _sigmas(off, information)
     best = int(u[:-1].argmin())
     if u[best] > FITTING or u[best] >= u[-1] * (1 - TIE):
@@ -113,12 +104,12 @@ def loops(
         except NotConnected:
             apart += 1
             continue
-        error = errors(pose, each.transform)
-        metres, radians = map(float, length(error.reshape(2, 3)))
+        error = lsq.errors(pose, each.transform)
+        metres, radians = map(float, lsq.length(error.reshape(2, 3)))
         if tolerance is None and each.covariance is not None:
             information = np.linalg.pinv(np.reshape(each.covariance, (6, 6)), hermitian=True)
             u = _sigmas(error[None], information)[0]
-            agrees, sigmas = u <= KEPT, f" ({u:.1f} sigmas)"
+            agrees, sigmas = u <= lsq.KEPT, f" ({u:.1f} sigmas)"
         else:
             near = tolerance or NEAR
             agrees, sigmas = metres <= near.metres and radians <= near.radians, ""
@@ -127,20 +118,16 @@ def loops(
             information = np.diag(sigma**-2.0)
         if not agrees:
             words = best_blunder(each, pose, information)
-            off = f"{1e3 * metres:.1f} mm {math.degrees(radians):.1f} deg{sigmas} off the tree"
-            message = f"{printable(each.parent)}<-{printable(each.child)} is {off}"
+            message = f"{printable(each.parent)}<-{printable(each.child)} is {lsq.off_text(error)}{sigmas} off the tree"
             message += f"; fits when {words}" if words else ""
             findings.append(Finding("loop", message, *parted(each.place)))
     return findings, [*lacking], apart
 
 
 def _sigmas(errors: Array, information: Array) -> Array:
-    squares = (errors * applied(information, errors)).sum(-1)
+    squares = (errors * lsq.applied(information, errors)).sum(-1)
     found: Array = np.sqrt(np.maximum(squares, 0.0) / 6)
     return found
-
-
-ONE_LINE = 200  # characters
 
 
 class TreeFit:
@@ -154,7 +141,7 @@ class TreeFit:
         self.alone = bridges(self.tree, problem.pairs, kept)
         self.parents, self.children = problem.ends(found.bodies)
         self.poses = self.parents.inverse() @ self.children
-        self.errors = errors(self.poses, problem.measured)
+        self.errors = lsq.errors(self.poses, problem.measured)
         self._known = Groups[int]()
         for row in np.flatnonzero(found.kept & (problem.stated | found.estimated)).tolist():
             self._known.join(*problem.pairs[row])
@@ -182,7 +169,7 @@ class TreeFit:
         whole = np.zeros((problem.count, 6, problem.count, 6))
         if problem.unknown:
             normal = problem.normal_equations(found.bodies, information)[0]
-            whole[1:, :, 1:] = inverse(normal).reshape(problem.unknown, 6, problem.unknown, 6)
+            whole[1:, :, 1:] = lsq.inverse(normal).reshape(problem.unknown, 6, problem.unknown, 6)
         return whole
 
     def judged(self) -> tuple[TreeFit, list[str | None]]:
@@ -228,7 +215,7 @@ class TreeFit:
                 words[rival] = best_blunder(measurements[rival], pose, information[rival])
             blamed = [each for each, blunder in words.items() if blunder]
             unsure = self._with_doubt(row, least_information[row])
-            if not blamed and self.errors[row] @ unsure @ self.errors[row] <= 6 * KEPT**2:
+            if not blamed and self.errors[row] @ unsure @ self.errors[row] <= 6 * lsq.KEPT**2:
                 noise.append(row)
             if not rivals:
                 doubted = self._with_doubt(row, information[row])
@@ -245,7 +232,7 @@ class TreeFit:
         """Return the information of a row relative to the fit, whose own uncertainty between the frames is included."""
         parent, child = self.problem.pairs[row]
         doubt = self.covariance((parent, self.parents[row]), (child, self.children[row]))
-        return information if doubt is None else inverse(inverse(information) + doubt)
+        return information if doubt is None else lsq.inverse(lsq.inverse(information) + doubt)
 
     def _pose_without(self, rival: int, row: int) -> Transform:
         """Return the pose that a rival would measure if the rejected row placed the bodies below it."""
@@ -262,17 +249,10 @@ class TreeFit:
 
     def open_loop(self, row: int, rivals: list[int]) -> str:
         """Return the rows of a loop and its closure error, on one line."""
-        error = self.errors[row]
-        open_by = f"{1e3 * np.linalg.norm(error[:3]):.1f} mm {np.degrees(np.linalg.norm(error[3:])):.1f} deg"
-        places = [self.problem.place(each) for each in sorted([row, *rivals])]
-        advice = "measure again or leave one out"
-        if self.problem.measurements[row].place:
-            advice += f" (--without {self.problem.place(row)})"
-        for most in range(len(places), 0, -1):
-            text = f"undecided: {first_of(places, most)} form a loop open by {open_by}; {advice}"
-            if len(text) <= ONE_LINE:
-                break
-        return text
+        off = lsq.off_text(self.errors[row])
+        places = first_of([self.problem.place(each) for each in sorted([row, *rivals])], 2)
+        leave = f" (--without {self.problem.place(row)})" if self.problem.measurements[row].place else ""
+        return f"undecided: {places} form a loop open by {off}; measure again or leave one out{leave}"
 
 
 FEW_LOOPS = 6  # with fewer the sigmas are rough if rotations can close them
@@ -296,12 +276,11 @@ def solve_tree(
             raise ValueInvalid(f"{place}: {shown(each.child)} is measured from itself")
     fixed = fixed or FrameTree()
     bodies = bodies_of(measurements, root, fixed)
-    require_connected(bodies, [(bodies.number[each.parent], bodies.number[each.child]) for each in measurements])
     try:
         with np.errstate(over="raise", invalid="raise"):
             problem = TreeProblem(measurements, bodies)
             solution = TreeSolution(*TreeFit(problem, problem.fitted(robust=robust)).judged(), bodies, fixed)
-    except (NotSettled, FloatingPointError):
+    except (lsq.NotSettled, FloatingPointError):
         far = max(abs(part) for each in measurements for part in each.components[:3])
         raise ValueInvalid(f"translations (up to {far:.3g} m) or sigmas differ too much in size to be solved") from None
     for hint in solution.hints:
@@ -350,7 +329,7 @@ class TreeSolution:
         ends = Counter(name for each in used for name in each[:2])
         self.rows = {name: ends[name] for name in self.frames}
         number = np.array([bodies.number[name] for name in self.frames])
-        self._poses = found.bodies[number] @ stacked(bodies.pose[name] for name in self.frames)
+        self._poses = found.bodies[number] @ lsq.stacked(bodies.pose[name] for name in self.frames)
         self.poses = dict(zip(self.frames, self._poses.canonical(), strict=True))
         self.tree, top = FrameTree("the result"), top_of(fixed, self.root)
         for name in self.frames:

@@ -22,7 +22,7 @@ from frametool.geometry.floats import half_sincos
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.fit.comparison import Comparison
+    from frametool.fit.comparison import Comparison, Delta
     from frametool.frames.trajectory import Trajectory
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Array, Indices
@@ -32,8 +32,10 @@ CHORD = 0.1  # metres of path before and after a pose that define its direction
 ROUNDING = 1e-9  # of a delta
 
 
-def statistics(values: Array) -> dict[str, float]:
-    """Compute the statistics of numbers: std is the population's (n), p95 the linear percentile."""
+def statistics(values: Array | None) -> Any:
+    """Return the statistics of numbers, if any: std is the population's (n), p95 the linear percentile."""
+    if values is None:
+        return None
     sse = float((values**2).sum())
     return {
         "rmse": sqrt(sse / len(values)), "mean": float(values.mean()), "median": float(np.median(values)),
@@ -122,11 +124,6 @@ def chained(along: Array, delta: float) -> tuple[Indices, Indices]:
     return chain[:-1], chain[1:]
 
 
-def is_lost(along: Array, delta: float) -> bool:
-    """Return True if a delta is so short compared with the path that adding it changes nothing."""
-    return bool(along[-1] + delta * (1 - ROUNDING) == along[-1])
-
-
 def all_pairs(along: Array, delta: float, tolerance: float) -> tuple[Indices, Indices]:
     """Return for each i the j whose distance from there is the nearest to delta, within a share of it."""
     wanted = along + delta
@@ -191,10 +188,10 @@ def numbers(found: Comparison) -> dict[str, Any]:
         "transform": transform_entry(found),
         "ate_by_alignment": found.ate_by_alignment,
         "ate": {
-            **_errors(ate.m, ate.rad, evo=found.settings.evo), "along_m": _summed(ate.along),
-            "across_m": _summed(ate.across), "up_m": _summed(ate.up), "end_m": float(ate.m[-1]),
+            **_errors(ate.m, ate.rad, evo=found.settings.evo), "along_m": statistics(ate.along),
+            "across_m": statistics(ate.across), "up_m": statistics(ate.up), "end_m": float(ate.m[-1]),
         },
-        "rpe": [_relative(found, at) for at in range(len(found.relative))],
+        "rpe": [_relative(*each, evo=found.settings.evo) for each in found.relative],
         "kitti": _kitti(found),
         "hints": found.hints,
     }
@@ -247,27 +244,20 @@ def _limit(limit: tuple[bool, int] | None) -> str | None:
     return None if limit is None else "+" * limit[0] + f"{limit[1] / 1e9:.9f}"
 
 
-def _summed(values: Array | None) -> dict[str, float] | None:
-    return None if values is None else statistics(values)
-
-
 def _errors(m: Array | None, rad: Array | None, *, evo: bool) -> dict[str, Any]:
     """Return the statistics of distances and angles, and as evo does the norm of R - I and of the whole matrix."""
-    found = {"m": _summed(m), "deg": None if rad is None else _summed(np.degrees(rad))}
+    found = {"m": statistics(m), "deg": statistics(None if rad is None else np.degrees(rad))}
     if evo and m is not None and rad is not None:
         rot = SQRT8 * half_sincos(rad, arrays)[0]
-        found |= {"rot": _summed(rot), "full": _summed(np.sqrt(m * m + rot * rot))}
+        found |= {"rot": statistics(rot), "full": statistics(np.sqrt(m * m + rot * rot))}
     return found
 
 
-def _relative(found: Comparison, at: int) -> dict[str, Any]:
-    delta, errors = found.relative[at]
-    summed = _errors(errors.m, errors.rad, evo=found.settings.evo)
+def _relative(delta: Delta, errors: RelativeErrors, *, evo: bool) -> dict[str, Any]:
+    summed = _errors(errors.m, errors.rad, evo=evo)
     share = 100 * summed["m"]["rmse"] / delta.amount if summed["m"] and delta.unit == "m" else None
-    return {
-        "delta": str(delta), "pairs": len(errors.start), **summed, "percent": share,
-        "distance_m": _summed(errors.distance),
-    }  # fmt: skip
+    counted = {"delta": str(delta), "pairs": len(errors.start)}
+    return counted | summed | {"percent": share, "distance_m": statistics(errors.distance)}
 
 
 def _kitti(found: Comparison) -> dict[str, Any] | None:
@@ -292,10 +282,15 @@ def _kitti(found: Comparison) -> dict[str, Any] | None:
 
 def rows(found: Comparison, which: str = "ate") -> Iterator[dict[str, Any]]:
     """Yield one row per pair (`ate`), two poses of a delta (`rpe`) or path segment (`kitti`)."""
-    stamps = found.pairs.ref.stamps_ns
-    counted = np.arange(found.pairs.ref.size) if stamps is None else stamps
+    ref, est, ate = found.pairs.ref, found.moved, found.ate
+    counted: Any = np.arange(ref.size) if ref.stamps_ns is None else ref.stamps_ns
     if which == "ate":
-        yield from _rows(_ate_columns(found, counted))
+        yield from _rows({
+            "stamp_ns": counted, **dict(zip(("ref_x", "ref_y", "ref_z"), ref.xyz.T, strict=True)),
+            **dict(zip("xyz", est.xyz.T, strict=True)), "path_m": way(ref.xyz), "ate_m": ate.m,
+            "ate_deg": None if ate.rad is None else np.degrees(ate.rad),
+            "along_m": ate.along, "across_m": ate.across, "up_m": ate.up,
+        })  # fmt: skip
     elif which == "rpe":
         for delta, errors in found.relative:
             yield from _rows({
@@ -311,16 +306,6 @@ def rows(found: Comparison, which: str = "ate") -> Iterator[dict[str, Any]]:
         })  # fmt: skip
 
 
-def _ate_columns(found: Comparison, counted: Any) -> dict[str, Any]:
-    ref, est, ate = found.pairs.ref, found.moved, found.ate
-    return {
-        "stamp_ns": counted, "ref_x": ref.xyz[:, 0], "ref_y": ref.xyz[:, 1], "ref_z": ref.xyz[:, 2],
-        "x": est.xyz[:, 0], "y": est.xyz[:, 1], "z": est.xyz[:, 2], "path_m": way(ref.xyz), "ate_m": ate.m,
-        "ate_deg": None if ate.rad is None else np.degrees(ate.rad), "along_m": ate.along, "across_m": ate.across,
-        "up_m": ate.up,
-    }  # fmt: skip
-
-
 def _rows(columns: dict[str, Any]) -> Iterator[dict[str, Any]]:
     size = len(columns["stamp_ns"])
     cells = [[None] * size if column is None else np.asarray(column).tolist() for column in columns.values()]
@@ -334,9 +319,7 @@ SHORT = {
 }  # fmt: skip
 UNITS = {"": 1.0, "m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "deg": 1.0, "rad": 57.29577951308232, "s": 1.0,
          "ms": 0.001, "%": 1.0}  # fmt: skip
-SIGNS: dict[str, Callable[[float, float], bool]] = {
-    ">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt,
-}  # fmt: skip
+SIGNS: dict[str, Callable[..., bool]] = {">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt}
 _LIMIT = r"([\w:.]+?)\s*(>=|<=|>|<)\s*([-+]?(?:\d++\.?\d*+|\.\d++)(?:e[-+]?\d+)?)\s*([a-z]*|%)"
 
 

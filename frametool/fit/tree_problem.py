@@ -12,24 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.errors import ValueInvalid, alternatives, listing, printable, shown
-from frametool.fit.least_squares import (
-    LEAST,
-    MEDIAN_OF_SIX,
-    applied,
-    errors,
-    first_inliers,
-    inverse,
-    inverse_left_jacobian,
-    length,
-    median_sigma,
-    reselected,
-    rms_sigma,
-    skew,
-    solve_normal,
-    stacked,
-    stepped,
-)  # fmt: skip
+from frametool.errors import ValueInvalid, alternatives, first_of, listing, printable, shown
+from frametool.fit import least_squares as lsq
 from frametool.frames.topology import Groups
 from frametool.geometry.rigid import IDENTITY
 from frametool.geometry.transform import Transform
@@ -109,7 +93,6 @@ def bridges(tree: SpanningTree, pairs: Pairs, rows: Iterable[int]) -> set[int]:
 
 
 MOST = 1000  # frames
-LISTED = 150  # characters of names in the message about unconnected frames
 
 
 class Bodies(NamedTuple):
@@ -131,7 +114,7 @@ class Bodies(NamedTuple):
 
 
 def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Frames) -> Bodies:
-    """Group frames into bodies; raises ValueInvalid for an unknown root."""
+    """Group frames into bodies; raises ValueInvalid for an unknown root, and if frames are not connected."""
     edges = [*((m.parent, m.child) for m in measurements), *((each.parent, each.child) for each in fixed.tracks())]
     frames = tuple(dict.fromkeys(name for edge in edges for name in edge))
     if len(frames) > MOST:
@@ -141,6 +124,7 @@ def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Fram
         root = next((name for name in frames if name not in children), frames[0])
     elif root not in frames:
         raise ValueInvalid(f"unknown root {shown(root)}{alternatives(root, frames, 'frames')}")
+    _require_connected(frames, edges)
     first: dict[str, str] = {}  # of each body, by the top of its tree
     for name in (root, *frames):
         first.setdefault(top_of(fixed, name), name)
@@ -157,23 +141,17 @@ def top_of(fixed: Frames, name: str) -> str:
     return name
 
 
-def require_connected(bodies: Bodies, pairs: Iterable[tuple[int, int]]) -> None:
-    """Raise ValueInvalid, with the groups of frames, if rows do not join all bodies."""
-    joined = Groups[int]()
-    for pair in pairs:
-        joined.join(*pair)
-    groups: dict[int, list[str]] = {}
-    for name in bodies.frames:
-        groups.setdefault(joined.of(bodies.number[name]), []).append(name)
+def _require_connected(names: Iterable[str], edges: Iterable[tuple[str, str]]) -> None:
+    """Raise ValueInvalid, with the groups of frames, if edges do not join all frames."""
+    joined = Groups[str]()
+    for edge in edges:
+        joined.join(*edge)
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault(joined.of(name), []).append(name)
     if len(groups) > 1:
-        most = next(most for most in (*range(20, 0, -1), 0) if not most or len(_grouped(groups, most)) <= LISTED)
-        raise ValueInvalid(f"no measurement connects {_grouped(groups, max(most, 1))[:LISTED]}")
-
-
-def _grouped(groups: dict[int, list[str]], most: int) -> str:
-    parts = [listing(names, most) for names in list(groups.values())[: most + (len(groups) == most + 1)]]
-    more = len(groups) - len(parts)
-    return " | ".join(parts) + (f" | {more} more groups" if more else "")
+        texts = [listing(group, 3) for group in groups.values()]
+        raise ValueInvalid(f"no measurement connects {first_of(texts, 3, gap=' | ')}")
 
 
 TREES = 200
@@ -218,18 +196,18 @@ class Fitted(NamedTuple):
 def jacobians(parent: Transform, child: Transform, turned: Array) -> tuple[Array, Array]:
     """Return dr/da, dr/db, (n, 6, 6), of rows between frames at a and b; turned: the errors of the rotations."""
     back = parent.rotation.inverse().as_matrix()
-    turn = inverse_left_jacobian(turned) @ back
+    turn = lsq.inverse_left_jacobian(turned) @ back
     by_parent, by_child = np.zeros((2, *turned.shape[:-1], 6, 6))
     by_child[..., :3, :3], by_child[..., 3:, 3:] = back, turn
     by_parent[..., :3, :3], by_parent[..., 3:, 3:] = -back, -turn
-    by_parent[..., :3, 3:] = back @ skew(child.xyz - parent.xyz)
+    by_parent[..., :3, 3:] = back @ lsq.skew(child.xyz - parent.xyz)
     return by_parent, by_child
 
 
 def of_body(jacobian: Array, body: Transform, frame: Transform) -> Array:
     """Return the Jacobian by the step of a body from that by the step of a frame in it, by its lever arm."""
     moved = jacobian.copy()
-    moved[..., 3:] -= jacobian[..., :3] @ skew(frame.xyz - body.xyz)
+    moved[..., 3:] -= jacobian[..., :3] @ lsq.skew(frame.xyz - body.xyz)
     return moved
 
 
@@ -242,12 +220,12 @@ class TreeProblem:
         self.unknown = self.count - 1
         sides = [[each.parent for each in measurements], [each.child for each in measurements]]
         self.parent, self.child = (np.array([bodies.number[name] for name in side]) for side in sides)
-        self.in_parent, self.in_child = (stacked(bodies.pose[name] for name in side) for side in sides)
-        self.measured = stacked(each.transform for each in measurements)
+        self.in_parent, self.in_child = (lsq.stacked(bodies.pose[name] for name in side) for side in sides)
+        self.measured = lsq.stacked(each.transform for each in measurements)
         self.stated = np.array([each.covariance is not None for each in measurements])
         self._stated = np.stack([_information(each, self.place(row)) for row, each in enumerate(measurements)])
         self.pairs = list(zip(self.parent.tolist(), self.child.tolist(), strict=True))
-        self.arm = max(float(np.median(length(self.measured.xyz))), LEAST)
+        self.arm = max(float(np.median(lsq.length(self.measured.xyz))), lsq.LEAST)
         self._moves = (self.parent != self.child)[:, None, None]  # a row within a body has no effect
 
     def place(self, row: int) -> str:
@@ -261,7 +239,7 @@ class TreeProblem:
     def errors(self, bodies: Transform) -> Array:
         """Return the residuals, (n, 6)."""
         parent, child = self.ends(bodies)
-        return errors(parent.inverse() @ child, self.measured)
+        return lsq.errors(parent.inverse() @ child, self.measured)
 
     def information(self, noise: Noise, factor: float = 1.0) -> Array:
         """Return the inverse covariances, (n, 6, 6); factor: of stated sigmas."""
@@ -270,7 +248,7 @@ class TreeProblem:
 
     def u(self, errors: Array, noise: Noise) -> Array:
         """Return the residual of each row in sigmas: the root mean square of its six numbers."""
-        squares = (errors * applied(self.information(noise, noise.factor), errors)).sum(-1)
+        squares = (errors * lsq.applied(self.information(noise, noise.factor), errors)).sum(-1)
         found: Array = np.sqrt(np.maximum(squares, 0.0) / 6)
         return found
 
@@ -288,7 +266,7 @@ class TreeProblem:
         """
         shuffled = random.Random(0)  # noqa: S311 - random() gives the same numbers in every Python
         rows = range(self.size)
-        best = stacked([Transform.identity()] * self.count)
+        best = lsq.stacked([Transform.identity()] * self.count)
         least, closest = math.inf, np.full(self.size, math.inf)
         orders = [rows, *(sorted(rows, key=[shuffled.random() for _ in rows].__getitem__) for _ in range(trees - 1))]
         at_once = max(1, ROWS_AT_ONCE // max(self.size, self.count))
@@ -326,16 +304,16 @@ class TreeProblem:
     def normal_equations(self, bodies: Transform, information: Array) -> tuple[Array, Array, float]:
         """Return J'LJ and J'Lr, six rows for each unknown body, and r'Lr."""
         (parent, child), count = self.ends(bodies), self.count
-        off = errors(parent.inverse() @ child, self.measured)
+        off = lsq.errors(parent.inverse() @ child, self.measured)
         by_parent, by_child = (self._moves * by for by in jacobians(parent, child, off[:, 3:]))
         sides = [
             (self.parent, of_body(by_parent, bodies[self.parent], parent)),
             (self.child, of_body(by_child, bodies[self.child], child)),
         ]
-        weighed = applied(information, off)
+        weighed = lsq.applied(information, off)
         normal, gradient = np.zeros((count, count, 6, 6)), np.zeros((count, 6))
         for body, by in sides:
-            np.add.at(gradient, body, applied(by.swapaxes(1, 2), weighed))
+            np.add.at(gradient, body, lsq.applied(by.swapaxes(1, 2), weighed))
             for other, by_other in sides:
                 np.add.at(normal, (body, other), by.swapaxes(1, 2) @ information @ by_other)
         size = 6 * self.unknown
@@ -346,14 +324,14 @@ class TreeProblem:
         """Take one step, damped until it helps; return the bodies, the size of the step and the damping."""
         normal, gradient, before = self.normal_equations(bodies, information)
         diagonal = np.diagonal(normal).copy()
-        extent = max(float(np.abs(bodies.xyz).max()), LEAST)
+        extent = max(float(np.abs(bodies.xyz).max()), lsq.LEAST)
         while damping < MOST_DAMPED:
             np.fill_diagonal(normal, diagonal * (1.0 + damping))
             step = np.zeros((self.count, 6))
-            step[1:] = -solve_normal(normal, gradient[:, None]).reshape(-1, 6)
-            moved, size = stepped(bodies, step), float(np.abs(step / ([extent] * 3 + [1.0] * 3)).max())
+            step[1:] = -lsq.solve_normal(normal, gradient[:, None]).reshape(-1, 6)
+            moved, size = lsq.stepped(bodies, step), float(np.abs(step / ([extent] * 3 + [1.0] * 3)).max())
             off = self.errors(moved)
-            after = float((off * applied(information, off)).sum())
+            after = float((off * lsq.applied(information, off)).sum())
             if size <= REST or after <= before * (1 + 1e-12):
                 return moved, size, damping / 10 if damping > 1e-9 else 0.0
             damping = max(damping * 10, 1e-6)
@@ -394,7 +372,7 @@ class TreeProblem:
             dofs = [BORROWED + each for each in self.redundancies(bodies, kept, noise)]
             squares[0] += BORROWED * (noise.turn * self.arm) ** 2
             squares[1] += BORROWED * (noise.place / self.arm) ** 2
-        place, turn = map(rms_sigma, squares, dofs)
+        place, turn = map(lsq.rms_sigma, squares, dofs)
         return Noise(place, turn, factor)
 
     def redundancies(self, bodies: Transform, kept: Any, noise: Noise) -> list[float]:
@@ -403,7 +381,7 @@ class TreeProblem:
         With these the sigmas converge to the maximum of the restricted likelihood (REML); source: Foerstner 1979.
         """
         information = self.information(noise) * kept[:, None, None]
-        covariance = inverse(self.normal_equations(bodies, information)[0])
+        covariance = lsq.inverse(self.normal_equations(bodies, information)[0])
         information *= ~self.stated[:, None, None]
         count, found = 3.0 * (kept & ~self.stated).sum(), []
         for half in np.kron(np.eye(2), np.ones(3)):
@@ -418,10 +396,10 @@ class TreeProblem:
         free, stated = looped & ~self.stated, looped & self.stated
         noise = Noise()
         if stated.any():
-            factor = float(np.median(_odd_count(self.u(errors, noise)[stated]))) / (MEDIAN_OF_SIX * share)
+            factor = float(np.median(_odd_count(self.u(errors, noise)[stated]))) / (lsq.MEDIAN_OF_SIX * share)
             noise = noise._replace(factor=max(1.0, factor))
         if free.any():
-            place, turn = (median_sigma(_odd_count(length(part[free])), share) for part in _halves(errors))
+            place, turn = (lsq.median_sigma(_odd_count(lsq.length(part[free])), share) for part in _halves(errors))
             noise = noise._replace(place=place, turn=turn)
         return noise.at_least(LOWEST) if looped.sum() <= 2 * unknown else noise
 
@@ -442,13 +420,13 @@ class TreeProblem:
             return self.improved(bodies, information * weights[:, None, None], 0.0)[0]
 
         if robust and looped.any():
-            bodies, kept = first_inliers(bodies, by_medians, rough)
+            bodies, kept = lsq.first_inliers(bodies, by_medians, rough)
             noise = self.medians(self.errors(bodies), looped)
         return self.selected(bodies, kept, noise, robust=robust)
 
     def selected(self, bodies: Transform, kept: Any, noise: Noise, *, robust: bool) -> Fitted:
         """Fit the used rows and test all of them again, until the set does not change."""
-        return reselected(Fitted(bodies, kept, noise), kept, self.refitted, robust=robust)
+        return lsq.reselected(Fitted(bodies, kept, noise), kept, self.refitted, robust=robust)
 
     def refitted(self, found: Fitted, kept: Any) -> tuple[Fitted, Any, Array]:
         """Fit the used rows, and the nearest of the others if frames would be disconnected."""
@@ -482,4 +460,4 @@ def _information(measurement: Measurement, place: str) -> Array:
     sigmas = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
     if not sigmas.all() or np.linalg.eigvalsh(covariance / np.outer(sigmas, sigmas))[0] < SINGULAR:
         raise ValueInvalid(f"{place}: the covariance is exact in some direction; exact: --fix")
-    return inverse(covariance)
+    return lsq.inverse(covariance)

@@ -164,14 +164,14 @@ class Mailbox:
         """Post commands from a separate thread, as they arrive."""
         from threading import Thread
 
-        Thread(target=self._fill, args=(commands,), daemon=True).start()
+        def fill() -> None:
+            try:
+                for t_ns, twist in commands:
+                    self.post(twist, t_ns)
+            except Exception as error:  # noqa: BLE001 - raised again where it is seen
+                self._failure = error
 
-    def _fill(self, commands: Iterable[TimedTwist]) -> None:
-        try:
-            for t_ns, twist in commands:
-                self.post(twist, t_ns)
-        except Exception as error:  # noqa: BLE001 - raised again where it is seen
-            self._failure = error
+        Thread(target=fill, daemon=True).start()
 
     def __call__(self, look: Look) -> Leader:  # noqa: ARG002 - whoever posts does the looking
         """Yield the newest command whose time has come, at each tick.

@@ -99,7 +99,6 @@ def _whole(text: str, most: int) -> int:
 read_number = text_reader(parse_number, "a number")
 read_byte = text_reader(partial(_whole, most=255), "a whole number 0 .. 255")
 read_angle = text_reader(partial(read_number_or_angle, degrees=False), "an angle in radians, or like 90deg")
-read_stamp = text_reader(parse_time, "a time in seconds")
 read_time = text_reader(_time, "a time in seconds")
 read_duration = text_reader(
     lambda text: None if text in ("inf", ".inf") else _time(text), "a duration in seconds, or inf"
@@ -173,15 +172,13 @@ def read_commands(lines: Iterable[str], name: str, *, period_ns: int = BILLION) 
 
 def _values(source: Source, columns: Sequence[str] | None) -> Iterator[tuple[Path, Any]]:
     """Yield the values of a piece of the input, each with its path; a row of CSV is a mapping."""
-    if columns is not None:
-        cells = split_line(source.text)
-        if len(cells) != len(columns):
-            raise Misfit(f"expected {len(columns)} cells, found {len(cells)}")
-        yield (), {name: cell.text for name, cell in zip(columns, cells, strict=True) if name}
-    elif _WORD(source.text):
-        yield (0,), source.text.strip()
-    else:
+    if columns is None:
         yield from (((document.index,), document.value) for document in parse_documents(source.text, source.name))
+        return
+    cells = split_line(source.text)
+    if len(cells) != len(columns):
+        raise Misfit(f"expected {len(columns)} cells, found {len(cells)}")
+    yield (), {name: cell.text for name, cell in zip(columns, cells, strict=True) if name}
 
 
 def _placed(misfit: Misfit, source: Source, is_row: bool, columns: Sequence[str]) -> FormatError:  # noqa: FBT001
@@ -200,13 +197,13 @@ def timed_commands(
 
     Raises Misfit.
     """
-    for own_ns, twist, place in _entries(value, path):
+    items = [((*path, at), item) for at, item in enumerate(value)] if type(value) is list else [(path, value)]
+    for place, item in items:
+        own_ns, twist = within(place, _entry, item)
         stamp_ns = own_ns if own_ns is not None else 0 if last_ns is None else last_ns + period_ns
-        if stamp_ns < 0:
-            raise Misfit("t is before the start, which is 0", place)
         if last_ns is not None and stamp_ns < last_ns:
             late = f"t {format_stamp(stamp_ns)} comes after {format_stamp(last_ns)}"
-            raise Misfit(f"{late}; sort the commands by time", place)
+            raise Misfit(f"{late}; sort the commands by time", (*place, "t"))
         last_ns = stamp_ns
         yield stamp_ns, twist
 
@@ -276,16 +273,6 @@ def _columns(header: str) -> list[str]:
     return columns
 
 
-def _entries(value: Any, path: Path) -> Iterator[tuple[int | None, Twist, Path]]:
-    """Read one command, or a list of them: nanoseconds or None, the command, and the place of its time."""
-    if type(value) is list:
-        for index, item in enumerate(value):
-            yield from _entries(item, (*path, index))
-    else:
-        stamp_ns, twist = within(path, _entry, value)
-        yield stamp_ns, twist, (*path, "t")
-
-
 def _entry(value: Any) -> tuple[int | None, Twist]:
     """Read {t, linear, angular, linear_y}, a Twist message, or the name of an arrow key."""
     if type(value) is str and _WORD(value):
@@ -299,7 +286,7 @@ def _entry(value: Any) -> tuple[int | None, Twist]:
     turning, _ = within(("angular",), _axes, entry.get("angular", "0"), 2, 2)
     if "linear_y" in entry:
         aside = within(("linear_y",), read_number, entry["linear_y"])
-    stamp_ns = within(("t",), read_stamp, entry["t"]) if "t" in entry else None
+    stamp_ns = within(("t",), read_time, entry["t"]) if "t" in entry else None
     return stamp_ns, Twist(ahead, turning, aside)
 
 

@@ -435,7 +435,7 @@ def test_small_and_large_worlds_are_solved(size: float) -> None:
 
 def test_many_groups_are_named_on_one_line() -> None:
     rows = [ONE._replace(parent=f"a_rather_long_name_{i}", child=f"another_rather_long_name_{i}") for i in range(50)]
-    with pytest.raises(ValueInvalid, match=r"no measurement connects a_rather_long_name_0, .* \| \d+ more groups") as error:
+    with pytest.raises(ValueInvalid, match=r"no measurement connects a_rather_long_name_0, .* \| .* and 47 more") as error:
         solve_tree(rows)
     assert len(str(error.value)) <= 200
 

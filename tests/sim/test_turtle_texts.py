@@ -69,7 +69,7 @@ def test_a_stream_is_read_one_command_at_a_time() -> None:
         ("t,linear,angular\n0,1,0\n1,foo,0\n", "bad:3:3: 'foo' is not a number"),
         ("t,linear,angular\n0,1\n", "bad:2:1: expected 3 cells, found 2"),
         ("t,linear,angular\n1,1,0\n0.5,1,0\n", "bad:3:1: t 0.500000000 comes after 1.000000000"),
-        ("t,linear,angular\n-1,1,0\n", "bad:2:1: t is before the start"),
+        ("t,linear,angular\n-1,1,0\n", "bad:2:1: -1 s is before the start"),
         ("t,linear,angular\n0,nan,0\n", "bad:2:3: 'nan' is not finite"),
         ("t,lin,angular\n", "bad:1:1: no column linear; columns: t, lin, angular"),
         ("t,linear,angular,linear_x\n", "bad:1:18: two columns for linear"),
