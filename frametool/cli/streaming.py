@@ -391,12 +391,9 @@ class Stream:
 
 
 def open_columns(file: InputFile, fmt: str) -> Any:
-    """Return the columns of numbers that a file of a format holds, read as the options say."""
-    from frametool.cli.trees import answers
-    from frametool.grammar.edges import Diagnostics, Options, Topics
-
+    """Return the columns of numbers that a file of a format holds."""
     file.format = fmt
-    return import_module(FORMATS[fmt].reader).open_columns(file, Options(Diagnostics(), Topics(), answers=answers()))
+    return import_module(FORMATS[fmt].reader).open_columns(file)
 
 
 def _then_closed(stream: Any, results: Iterable[Any]) -> Iterator[Any]:

@@ -184,7 +184,7 @@ class FormatConverter:
         """Yield the rows of columns of numbers; those that stand for no point have no place in a text."""
         from frametool.stream.column_stream import ColumnRows, move_along
 
-        opened = import_module(FORMATS[self.fmt].reader).open_columns(*self._opened(stream))
+        opened = import_module(FORMATS[self.fmt].reader).open_columns(self._opened(stream)[0])
         rows = ColumnRows(opened, self.request, self.source)
         move_along(opened, self.request)
         self._begin(rows)

@@ -279,7 +279,7 @@ def test_frames_that_move_are_not_written_as_static_but_as_they_stood_at_a_time(
     moving = "{frames: [{name: b, parent: a, samples: [{stamp: 0, xyz: [0, 0, 0]}, {stamp: 1, xyz: [1, 0, 0]}]}]}"
     done = run("tree", "a.yaml", "-f", "launch", files={"a.yaml": moving})
     assert (done.status, done.out) == (1, "")
-    assert done.err == "frametool: frames move and cannot be published as static: b; give --at TIME\n"
+    assert done.err == "frametool: a launch file holds no moving frames, and 'b' moves; give --at TIME\n"
     assert "--x 0.5 " in run("tree", "a.yaml", "-f", "launch", "--at", "0.5").out
 
 

@@ -83,7 +83,7 @@ def test_each_frame_is_a_link_and_each_edge_a_fixed_joint_of_its_child(run: Run)
         ("frames: {a: {b: {}}, c: {d: {}}}", "URDF holds one tree, and this has the roots a, c"),
         (
             "frames: [{name: b, parent: a, samples: [{stamp: 0, xyz: [0, 0, 0]}, {stamp: 1, xyz: [1, 0, 0]}]}]",
-            "URDF holds no motion, but these frames move: b; give --at TIME",
+            "URDF holds no moving frames, and 'b' moves; give --at TIME",
         ),
         ('frames: {"${a}": {b: {}}}', "frame '${a}' cannot be written in URDF: it reads as xacro"),
         ('frames: {"a\\e": {b: {}}}', "cannot be written in URDF: XML has no such characters"),

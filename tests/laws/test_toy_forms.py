@@ -46,9 +46,9 @@ def marked(writer):
     writer.head = lambda count: MARK + head(count)
     return writer
 
-def open_columns(file, options):
+def open_columns(file):
     assert file.stream.read(len(MARK)) == MARK
-    opened = npy.open_columns(file, options)
+    opened = npy.open_columns(file)
     rewriter = opened.rewriter
     opened.rewriter = lambda *columns, **drops: marked(rewriter(*columns, **drops))
     return opened

@@ -244,8 +244,9 @@ def write_tree(tree: Frames, style: Style) -> str:
     Raises ValueInvalid for what URDF cannot hold: moving frames, several roots, names with characters not allowed in
     XML.
     """
-    if moving := [track.child for track in tree.tracks() if not track.is_static]:
-        raise ValueInvalid(f"URDF holds no motion, but these frames move: {listing(moving)}; give --at TIME")
+    from frametool.formats.trees.written_poses import refuse_motion
+
+    refuse_motion(tree, "URDF")
     if len(tree.roots) > 1:
         message = "URDF holds one tree, and this has the roots"
         raise ValueInvalid(f"{message} {listing(tree.roots)}; --with FILE adds what connects them")

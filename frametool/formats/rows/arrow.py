@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Kind, Made, OutColumn
-    from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
     from frametool.text.spans import Flags, Ints
 
@@ -426,7 +425,7 @@ class GroupWriter:
         return require_pyarrow("Parquet", "parquet").ParquetWriter(file, self.schema, **how)
 
 
-def open_columns(file: InputFile, _options: Options) -> ArrowFile:
+def open_columns(file: InputFile) -> ArrowFile:
     """Open a file of either format; raises FileProblem without pyarrow, FormatError for a broken file."""
     require_pyarrow(file.name)
     head = file.head()

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Batch, Made, OutColumn
-    from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
     from frametool.text.spans import Ints
 
@@ -104,11 +103,9 @@ class PointsWriter:
         return iter(())
 
 
-def open_columns(file: InputFile, _options: Options) -> BinCloud:
-    """Open a cloud; raises FormatError."""
-    return BinCloud(file)
-
-
 def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> PointsWriter:
     """Return a writer for new points."""
     return PointsWriter(columns, style.format)
+
+
+open_columns = BinCloud

@@ -1,6 +1,6 @@
 """Files of columns of numbers, read without text: the interface of formats, and what their files share.
 
-The module of a format that is read as `arrays` has `open_columns(file, options) -> ColumnFile`; if it is written,
+The module of a format that is read as `arrays` has `open_columns(file) -> ColumnFile`; if it is written,
 `create(columns, count, style) -> ColumnWriter`.  Rows are counted from 1, batches follow one another.
 
 Records in a file have numpy's layout, one field after another.  Headers are checked against the file before data are

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Made, OutColumn
     from frametool.geometry.types import Components
-    from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
     from frametool.text.spans import Floats, Ints
 
@@ -242,11 +241,6 @@ class LasWriter:
         yield from column_file.pieces(self.kept)
 
 
-def open_columns(file: InputFile, _options: Options) -> LasFile:
-    """Open a scan; raises FormatError, FileProblem if the extra is missing."""
-    return LasFile(file)
-
-
 def misfit(column: OutColumn) -> str:
     """Return why LAS cannot hold a column, "" if it can."""
     if column.name in STORED or len(column.name.encode()) > LONGEST_NAME:
@@ -269,3 +263,6 @@ def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> La
             with column_file.translated(style.format, REFUSED):
                 header.add_extra_dim(laspy.ExtraBytesParams(name=column.name, type=column.kind.newbyteorder("<")))
     return LasWriter(header, columns, packed=style.format == LAZ)
+
+
+open_columns = LasFile

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Batch, ColumnWriter, Kind, OutColumn
-    from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
 
 MAGIC = b"\x93NUMPY"
@@ -132,12 +131,10 @@ def _record_type(columns: Sequence[OutColumn], of_input: Kind) -> Kind:
     return of_input if same else np.dtype(fields)
 
 
-def open_columns(file: InputFile, _options: Options) -> NpyFile:
-    """Open an array; raises FormatError."""
-    return NpyFile(file)
-
-
 def create(columns: Sequence[OutColumn], count: int | None, _style: Style) -> ColumnWriter:
     """Return a writer for new rows: n x 3 for points alone, else records with fields."""
     names = tuple(column.name for column in columns)
     return _writer(columns, np.dtype([]), count, () if names == column_file.XYZ else None)
+
+
+open_columns = NpyFile

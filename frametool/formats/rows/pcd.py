@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Batch, Kind, OutColumn
     from frametool.geometry.types import Components, Rigid
-    from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
 
 DATA = ("ascii", "binary", "binary_compressed")
@@ -374,11 +373,6 @@ def misfit(column: OutColumn) -> str:
     return misfit_of(CODES, column, PADDING)
 
 
-def open_columns(file: InputFile, _options: Options) -> PcdFile:
-    """Open a cloud; raises FormatError."""
-    return PcdFile(file)
-
-
 def create(
     columns: Sequence[OutColumn], count: int | None, _style: Style, *, grid: tuple[int, int] | None = None,
     sensor: Rigid | None = None,
@@ -399,3 +393,6 @@ def create(
 
     encode = partial(column_file.encode_records, columns, layout_of(fields).record)
     return column_file.CountedWriter(encode, head, count)
+
+
+open_columns = PcdFile

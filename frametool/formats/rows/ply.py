@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Batch, Kind, OutColumn
     from frametool.geometry.types import Components
-    from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
 
     Fail = Callable[[str], FormatError]
@@ -279,11 +278,6 @@ def misfit(column: OutColumn) -> str:
     return clouds.misfit_of(NEW_NAMES, column)
 
 
-def open_columns(file: InputFile, _options: Options) -> PlyFile:
-    """Open a cloud; raises FormatError."""
-    return PlyFile(file)
-
-
 def create(columns: Sequence[OutColumn], count: int | None, _style: Style) -> column_file.CountedWriter:
     """Return a writer for new points, with numbers of their own types."""
     record = column_file.record_of(f"<{TYPES[_type_of(column)]}" for column in columns)
@@ -293,3 +287,6 @@ def create(columns: Sequence[OutColumn], count: int | None, _style: Style) -> co
         return b"ply\nformat binary_little_endian 1.0\nelement vertex %d\n%send_header\n" % (vertices, lines)
 
     return column_file.CountedWriter(partial(column_file.encode_records, columns, record), head, count)
+
+
+open_columns = PlyFile

@@ -25,6 +25,7 @@ from frametool.documents.document import format_error, locate_many, parse_docume
 from frametool.documents.xml import Element, read_xml
 from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.formats.detect import Beginning
+from frametool.formats.trees.written_poses import refuse_motion
 from frametool.grammar.readers import Misfit, kind
 from frametool.ros import publisher
 from frametool.ros.publisher import CALL
@@ -262,8 +263,7 @@ def write_tree(tree: Frames, style: Style) -> str:
     """
     from html import escape
 
-    if moving := [track.child for track in tree.tracks() if not track.is_static]:
-        raise ValueInvalid(f"{publisher.moving_frames(moving[:10])}; give --at TIME")
+    refuse_motion(tree, "a launch file")
     lines = publisher.write_tree(tree, style.changed(format="static2")).splitlines()
     if unsafe := next((line for line in lines if "$(" in line), None):
         names = unsafe[unsafe.index("--frame-id") :]

@@ -50,11 +50,16 @@ def write_tree(tree: Frames, style: Style) -> str:
 MOST_DECIMALS = 17
 
 
+def refuse_motion(tree: Frames, fmt: str) -> None:
+    """Raise ValueInvalid for a tree that moves, which a format cannot hold."""
+    if moving := next((track.child for track in tree.tracks() if not track.is_static), None):
+        raise ValueInvalid(f"{fmt} holds no moving frames, and {shown(moving)} moves; give --at TIME")
+
+
 def static_edges(tree: Frames, fmt: str) -> list[tuple[str, str, Rigid]]:
     """Return parent, child and pose of the edges of a tree; raises ValueInvalid if it moves, or has none."""
+    refuse_motion(tree, fmt)
     tracks = list(tree.tracks())
-    if moving := next((track.child for track in tracks if not track.is_static), None):
-        raise ValueInvalid(f"{fmt} holds no moving frames, and {shown(moving)} moves; give --at TIME")
     if not tracks:
         raise ValueInvalid(f"{fmt} holds poses, and the tree has none: {listing(tree.frames)}")
     return [(track.parent, track.child, track.components) for track in tracks]
