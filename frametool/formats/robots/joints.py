@@ -215,9 +215,9 @@ class JointState:
         if name in self.series:
             return
         leader = mimic.joint if mimic else ""
-        rest = followed(joint, JointValue(0.0)) if mimic else joint.start
-        series = self.series.get(leader)
-        self.series[name] = {at: followed(joint, value) for at, value in series.items()} if series else {None: rest}
+        self.series[name] = {None: joint.start}
+        if leader in self.series:
+            self.series[name] = {at: followed(joint, value) for at, value in self.series[leader].items()}
         if leader in self.known:
             self.known.add(name)
 

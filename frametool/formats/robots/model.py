@@ -99,7 +99,9 @@ class Joint(NamedTuple):
 
     @property
     def start(self) -> Value:
-        """Return the default value."""
+        """Return the value without one of its own or of a leader; of a mimic the one that follows 0."""
+        if self.mimic:
+            return followed(self, JointValue(0.0))
         return self.rest_pose if self.posed else JointValue(self.rest)
 
 
@@ -397,8 +399,6 @@ class Chain:
         """Return the value of a joint: set, mimicked, or at rest."""
         *followers, leader = self._followed(name, values)
         value = values[leader] if leader in values else self._joints[leader].start
-        if leader not in values and self._joints[leader].mimic:  # of a fixed joint
-            value = followed(self._joints[leader], JointValue(0.0))
         for each in reversed(followers):
             value = followed(self._joints[each], value)
         return value

@@ -272,33 +272,32 @@ class SdfJoint(NamedTuple):
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the edges of a world or model, with joint values from options, default as in the file."""
-    yield from _SdfTree(SdfFrames(read_xml(file, "sdf"), options)).edges()
+    yield from _SdfTree(read_xml(file, "sdf"), options).edges()
 
 
-class _SdfTree:
-    """Builds the tree of the frames of a file.
+class _SdfTree(SdfFrames):
+    """The tree of the frames of a file.
 
     names: the names of joints for their values, without scopes if these are unique
     """
 
-    def __init__(self, frames: SdfFrames) -> None:
-        self.frames = frames
-        self.options = frames.options
-        of_joints = [frame for frame in frames.all.values() if frame.kind == "joint"]
+    def __init__(self, root: Element, options: Options) -> None:
+        super().__init__(root, options)
+        of_joints = [frame for frame in self.all.values() if frame.kind == "joint"]
         counts = Counter(frame.holder.attribute("name") for frame in of_joints)
         self.names = {
             frame.name: local if counts[local := frame.holder.attribute("name")] == 1 else frame.name
             for frame in of_joints
         }
-        self.joints = [self._read(frame) for frame in of_joints]
+        self.joints = [self._joint(frame) for frame in of_joints]
         self.hung: dict[str, SdfJoint] = {}  # link -> the joint above it
         self._groups = Groups[str]()  # of connected links
         for joint in self.joints:
-            self._hang(joint)
+            self._hang_link(joint)
         ends = [end for joint in self.joints for end in (joint.parent, joint.child)]
-        self.in_world = frames.top.holder.tag == "world" or frames.top in ends
+        self.in_world = self.top.holder.tag == "world" or self.top in ends
         self.carried: dict[str, SdfFrame] = {}  # model -> the link above its frame, if it is not the other way round
-        for model in frames.all.values():
+        for model in self.all.values():
             link = self.body(model) if model.kind == "model" else None
             if link is not None and link.name in self.hung:
                 self.carried[model.name] = link
@@ -321,22 +320,22 @@ class _SdfTree:
     def canonical(self, model: SdfFrame) -> SdfFrame | None:
         """Return the link that a model's frame is attached to: the named one, or the first, also of nested models."""
         if name := model.holder.attribute("canonical_link"):
-            return self.frames.find(name, model, model.holder, "canonical_link")
-        inside = [frame for frame in self.frames.all.values() if frame.scope is model]
+            return self.find(name, model, model.holder, "canonical_link")
+        inside = [frame for frame in self.all.values() if frame.scope is model]
         return next((frame for kind in ("link", "model") for frame in inside if frame.kind == kind), None)
 
-    def _read(self, frame: SdfFrame) -> SdfJoint:
+    def _joint(self, frame: SdfFrame) -> SdfJoint:
         holder = frame.holder
         kind = holder.attribute("type")
         if kind not in KINDS:
             message = f"joint {shown(frame.local)} has the type {shown(kind)}{alternatives(kind, KINDS, 'types')}"
             raise holder.error(message, "type")
-        parent, child = (self.body(self.frames.end(frame, which)) for which in ("parent", "child"))
+        parent, child = (self.body(self.end(frame, which)) for which in ("parent", "child"))
         if parent is None or child is None or parent is child:
             raise holder.error(f"joint {shown(frame.local)} does not connect two links")
         if kind in STILL:
             named = f"joint {shown(frame.local)} is a {kind}"
-            self.frames.note(holder, f"{named}: it is fixed as in the file and takes no value")
+            self.note(holder, f"{named}: it is fixed as in the file and takes no value")
         return SdfJoint(frame, parent, child, self._motions(frame, kind))
 
     def _motions(self, frame: SdfFrame, kind: str) -> tuple[Joint, ...]:
@@ -353,7 +352,7 @@ class _SdfTree:
                 direction, mimic = self._direction(frame, axis), self._mimic(frame, axis)
                 motions.append(Joint(called, plain, direction, lower, upper, mimic, line=line))
             else:
-                self.frames.note(frame.holder, f"joint {shown(frame.local)} has no <{tag}>: it takes no value there")
+                self.note(frame.holder, f"joint {shown(frame.local)} has no <{tag}>: it takes no value there")
         return tuple(motions)
 
     def _direction(self, frame: SdfFrame, axis: Element) -> Vector:
@@ -364,13 +363,13 @@ class _SdfTree:
         x, y, z = xyz.numbers(3)
         if not (x or y or z):
             raise xyz.error(f"joint {shown(frame.local)} has the axis 0 0 0, which is not a direction")
-        outer, version = frame, self.frames.version
+        outer = frame
         if name := xyz.attribute("expressed_in"):
-            outer = self.frames.find(name, frame.scope, xyz, "expressed_in")
-        elif version < (1, 5) or (version < (1, 7) and axis.text_of("use_parent_model_frame").lower() in TRUE):
+            outer = self.find(name, frame.scope, xyz, "expressed_in")
+        elif axis.text_of("use_parent_model_frame").lower() in TRUE * (self.version < (1, 7)) or self.version < (1, 5):
             outer = frame.scope  # before 1.5 an axis is relative to the model, until 1.6 if it says so
         if outer is not frame:
-            x, y, z = quaternion.rotate(*self.frames.relative(frame, outer)[3:], x, y, z)
+            x, y, z = quaternion.rotate(*self.relative(frame, outer)[3:], x, y, z)
         return unit_vector(x, y, z, floats)
 
     def _limit(self, limit: Element | None, which: str) -> float | None:
@@ -386,19 +385,15 @@ class _SdfTree:
         mimic = axis.first("mimic")
         if mimic is None:
             return None
-        leader = self.frames.find(mimic.attribute("joint"), frame.scope, mimic, "joint")
+        leader = self.find(mimic.attribute("joint"), frame.scope, mimic, "joint")
         if leader.kind != "joint":
             raise mimic.error(f"{shown(leader.name)} is a {leader.kind}, no joint", "joint")
         name = self.names[leader.name] + (":2" if mimic.attribute("axis") == "axis2" else "")
-        multiplier = self._number(mimic, "multiplier", 1.0)
-        offset, reference = self._number(mimic, "offset", 0.0), self._number(mimic, "reference", 0.0)
+        held = ((mimic.first(tag), usual) for tag, usual in (("multiplier", 1.0), ("offset", 0.0), ("reference", 0.0)))
+        multiplier, offset, reference = (usual if part is None else part.numbers(1)[0] for part, usual in held)
         return Mimic(name, multiplier, offset - multiplier * reference)
 
-    def _number(self, holder: Element, tag: str, default: float) -> float:
-        held = holder.first(tag)
-        return default if held is None else held.numbers(1)[0]
-
-    def _hang(self, joint: SdfJoint) -> None:
+    def _hang_link(self, joint: SdfJoint) -> None:
         """Make a joint the parent of a link; one that would close a loop is omitted, with a note."""
         link, outer = (end.name for end in joint.ends)
         if link in self.hung:
@@ -408,22 +403,26 @@ class _SdfTree:
         else:
             self.hung[link] = joint
             return
-        message = f"joint {shown(joint.frame.local)} closes a loop and is left out: {where}"
-        self.options.tally.note_each(message, joint.frame.holder.line)
+        self.note(joint.frame.holder, f"joint {shown(joint.frame.local)} closes a loop and is left out: {where}")
 
     def edges(self) -> Iterator[Edge]:
         """Yield every edge, and the root if there is no world."""
-        links = [self._link(frame) for frame in self.frames.all.values() if frame is not self.frames.top]
-        for sensor in self.frames.sensors:
+        links = [self._link(frame) for frame in self.all.values() if frame is not self.top]
+        for sensor in self.sensors:
             holder = sensor.scope
-            pose = rigid.compose(*self.frames.relative(holder, sensor.relative_to), *sensor.pose)
+            pose = rigid.compose(*self.relative(holder, sensor.relative_to), *sensor.pose)
             links.append(Link(holder.name, sensor.name, pose, line=sensor.holder.line))
-        return self._posture().edges(links)
+        moving = [motion for joint in self.joints for motion in joint.motions]
+        fixed = [self.names[joint.frame.name] for joint in self.joints if not joint.motions]
+        answers = self.options.answers  # joints may be named with their scopes
+        values = {self.names.get(name, name): value for name, value in answers.joints.items()}
+        options = self.options._replace(answers=answers._replace(joints=values))
+        return JointState(moving, options, self.top.holder.file.name, fixed=fixed).edges(links)
 
     def _link(self, frame: SdfFrame) -> Link:
         """Return the connection of a frame: through its joint, if there is one."""
         line = frame.holder.line
-        relative = self.frames.relative
+        relative = self.relative
         if joint := self.hung.get(frame.name):
             line = joint.frame.holder.line
             origin, after = relative(joint.parent, joint.frame), relative(joint.frame, joint.child)
@@ -431,8 +430,8 @@ class _SdfTree:
             rest, inverted = relative(outer, frame), frame is joint.parent
             return Link(outer.name, frame.name, origin, joint.motions, line, after, rest, inverted)
         outer = self._outer(frame)
-        model = frame.below(self.frames.top)[-1]
-        stays = outer is self.frames.top and model.kind == "model" and relative(outer, model) == IDENTITY
+        model = frame.below(self.top)[-1]
+        stays = outer is self.top and model.kind == "model" and relative(outer, model) == IDENTITY
         if stays and not self.in_world:
             return Link(None, frame.name, line=line)  # outside of any world, in a model without a pose in one
         return Link(outer.name, frame.name, relative(outer, frame), line=line)
@@ -447,12 +446,3 @@ class _SdfTree:
         while scope.name in self.carried:
             scope = scope.scope
         return scope
-
-    def _posture(self) -> JointState:
-        """Return the joint values; their names are those of the joints here: `tip` for `arm::tip`."""
-        moving = [motion for joint in self.joints for motion in joint.motions]
-        fixed = [self.names[joint.frame.name] for joint in self.joints if not joint.motions]
-        answers = self.options.answers
-        values = {self.names.get(name, name): value for name, value in answers.joints.items()}
-        options = self.options._replace(answers=answers._replace(joints=values))
-        return JointState(moving, options, self.frames.top.holder.file.name, fixed=fixed)
