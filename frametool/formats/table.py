@@ -155,7 +155,7 @@ _ECHO = Format("", writes=("poses", "points", "tree"), writer="frametool.ros.ech
 _CALLS = Format("", writes=("poses", "tree"), writer="frametool.ros.publisher")
 _LAS = _arrays("", "frametool.formats.rows.las", writes=("points", "arrays"), conventions="metres")
 _BIN = _arrays(
-    "", "frametool.formats.rows.bin_cloud", writes=("points", "arrays"),
+    "", "frametool.formats.rows.clouds", writes=("points", "arrays"),
     conventions="float32, metres, frame of the lidar; only --in tells it from other .bin",
 )  # fmt: skip
 _XYZI = ("x", "y", "z", "intensity")

@@ -1,7 +1,14 @@
-"""Point clouds with a header, as in PCD and PLY: binary records, or lines of numbers between blanks.
+"""Point clouds: what those with a header share, PCD and PLY; and those without, of KITTI and nuScenes.
 
-Unchanged data are preserved byte for byte: in text, blanks, line ends and the digits of other columns too.
-Knows no format: they parse and write the headers.
+Records are binary, or lines of numbers between blanks.  Unchanged data are preserved byte for byte: in text, blanks,
+line ends and the digits of other columns too.  Headers are parsed and written by their formats.
+
+A cloud without a header is consecutive points, four or five float32 (little-endian) each:
+
+    x y z intensity            KITTI, velodyne/000000.bin
+    x y z intensity ring       nuScenes, LIDAR_TOP/*.pcd.bin
+
+Metres, in the frame of the lidar.  The file does not state which of the two it is: `--in` does.
 """
 
 from __future__ import annotations
@@ -12,8 +19,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from frametool.errors import FormatError, ValueInvalid, shown
+from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
 from frametool.formats.rows import column_file
+from frametool.formats.table import FORMATS
 from frametool.grammar.names import NORMALS
 from frametool.text.cells import split_blank
 from frametool.text.lines import read_blocks
@@ -26,6 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
     from typing import BinaryIO
 
+    from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Kind, Made, OutColumn
     from frametool.grammar.result import Style
     from frametool.text.cells import Cells
@@ -36,7 +45,7 @@ Code = TypeVar("Code")
 LONGEST_HEAD = 1 << 20  # bytes of a header: a hundred times the longest known
 _MOST_POINTS = 1 << 62
 _NOT_FINITE = {"nan": np.nan, "inf": np.inf, "infinity": np.inf}
-_SINGLE = np.dtype(np.float32)
+_SINGLE = np.dtype("<f4")
 
 
 class CloudFile(column_file.RecordFile):
@@ -278,3 +287,89 @@ def _written(numbers: Any, column: OutColumn, style: Style) -> Spans:
     else:
         spans = shortest_spans(rounded_to_single(values) if column.kind == _SINGLE else values, b" ")
     return Spans(spans.data, spans.starts[:, 0], spans.ends[:, 0] - 1)
+
+
+# --- points without a header ---
+
+
+class BinCloud(column_file.RecordFile):
+    """The points of a file without a header."""
+
+    def __init__(self, file: InputFile) -> None:
+        """Count the points; raises FormatError if the last one is incomplete."""
+        names = FORMATS[file.format].columns
+        record = column_file.record_of([_SINGLE] * len(names))
+        file.stream = column_file.seekable(file, self)
+        size = column_file.bytes_left(file.stream) or 0
+        if size % record.itemsize:
+            others = [name for name, row in FORMATS.items() if row.reader == __name__ and name != file.format]
+            fits = [name for name in others if size % (_SINGLE.itemsize * len(FORMATS[name].columns)) == 0]
+            hint = f"; --in {fits[0]} fits" if fits else "; is it whole?"
+            points = f"points of {record.itemsize} bytes (float32 {' '.join(names)})"
+            raise FormatError(f"{size} bytes are no whole number of {points}{hint}", source=file.name)
+        super().__init__(file, names, record, size // record.itemsize)
+
+    def batches(self) -> Iterator[column_file.Batch]:
+        """Yield the points; raises FormatError for invalid rings."""
+        done = 0
+        for batch in super().batches():
+            rings = batch.column(self.width - 1) if "ring" in FORMATS[self.file.format].columns else np.zeros(0)
+            bad = np.flatnonzero((rings != np.rint(rings)) | (rings < 0))
+            if len(bad):
+                found = f"ring: {rings[bad[0]]:g} is not a ring number; is it --in kitti-bin?"
+                raise FormatError(found, source=self.file.name, line=done + int(bad[0]) + 1)
+            done += batch.size
+            yield batch
+
+    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> PointsWriter:
+        """Return a writer for a cloud of either format."""
+        del drops
+        return PointsWriter(columns, style.format)
+
+
+class PointsWriter:
+    """Writes points without a header; `off` is the largest rounding error of float32."""
+
+    def __init__(self, columns: Sequence[OutColumn], fmt: str) -> None:
+        """Find the columns; raises ValueInvalid if one is missing, and warns about those that are omitted."""
+        self.columns, self.format = columns, fmt
+        self.names = FORMATS[fmt].columns
+        self.off = 0.0
+        at_input = [column.name for column in columns if column.kind is not None]
+        if missing := [name for name in self.names if name not in at_input]:
+            raise ValueInvalid(f"{fmt} holds {' '.join(self.names)}; there is no {listing(missing)}")
+        if others := [column.name for column in columns if column.name not in self.names]:
+            warn(f"{fmt}: {listing(others)} left out: it holds {' '.join(self.names)} alone")
+
+    def of_rows(self, batch: column_file.Batch | None, rows: Ints | None, made: Sequence[Made]) -> bytes:
+        """Return the bytes of some points."""
+        new, found = iter(made), {}
+        for column in self.columns:
+            if column.passed is None or batch is None:
+                found[column.name] = next(new).values
+            else:
+                passed = batch.column(column.passed)
+                found[column.name] = passed if rows is None else passed[rows]
+        points = np.empty((len(found[self.names[0]]), len(self.names)), _SINGLE)
+        for at, name in enumerate(self.names):
+            with np.errstate(over="ignore", invalid="ignore"):
+                points[:, at] = found[name]
+                far = abs(points[:, at] - found[name])
+            if np.isinf(far).any():
+                raise ValueInvalid(f"column {name}: {found[name][np.isinf(far)][0]:g} is too large for float32")
+            self.off = max(self.off, float(np.nanmax(far, initial=0.0)))
+        return points.tobytes()
+
+    def end(self) -> Iterator[bytes]:
+        """Warn about rounding."""
+        if self.off:
+            warn(f"{self.format}: numbers are float32; they were rounded by up to {self.off:.1g}")
+        return iter(())
+
+
+def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> PointsWriter:
+    """Return a writer for new points."""
+    return PointsWriter(columns, style.format)
+
+
+open_columns = BinCloud
