@@ -6,7 +6,7 @@ Kinds of signs in the table, the strongest first.  Signs with priority over the 
     folder     a file in the folder
     xml text   a pattern found in XML, outside comments
     xml        the root element
-    json path  the path to a nested key: keys separated by slashes, * for any; lists do not count
+    json path  a pattern of the path to a nested key: keys separated by slashes; lists do not count
     json key   a key of the outermost object, or of the objects in the outermost list
     own key    a pattern of a key at the beginning of a line that makes YAML a frametool tree, whatever its value
     yaml key   a pattern of a key at the beginning of a line
@@ -79,18 +79,18 @@ class Beginning:
         return not is_prose and re.search(_DATA, self.text[:LOOKED_AT]) is not None
 
     @cached_property
-    def json_paths(self) -> set[tuple[str, ...]]:
+    def json_paths(self) -> set[str]:
         """Return the paths of the keys of JSON; lists on the path do not count."""
         from frametool.documents.json import looks_like_json
 
-        found: set[tuple[str, ...]] = set()
-        inner: list[tuple[tuple[str, ...], Any]] = [((), self.value)] if looks_like_json(self.text[:LOOKED_AT]) else []
+        found: set[str] = set()
+        inner: list[tuple[str, Any]] = [("", self.value)] if looks_like_json(self.text[:LOOKED_AT]) else []
         for path, value in inner:  # grows during the loop
             if isinstance(value, list):
                 inner += [(path, each) for each in value]
             elif isinstance(value, dict):
-                found |= {(*path, key) for key in value}
-                inner += [((*path, key), each) for key, each in value.items()]
+                found |= {path + key for key in value}
+                inner += [(f"{path}{key}/", each) for key, each in value.items()]
         return found
 
     @cached_property
@@ -203,8 +203,8 @@ _STRONG: dict[str, Shows] = {
     "magic": lambda begin, what: re.match(what, begin.head, re.DOTALL) is not None,
     "xml text": lambda begin, what: bool(begin.xml) and re.search(what, begin.xml) is not None,
     "xml": lambda begin, what: begin.elements[:1] == [what],
-    "json path": lambda begin, what: any(_leads(path, what.split("/")) for path in begin.json_paths),
-    "json key": lambda begin, what: (what,) in begin.json_paths,
+    "json path": lambda begin, what: _count(begin.json_paths, what) > 0,
+    "json key": lambda begin, what: what in begin.json_paths,
     "own key": lambda begin, what: _count(begin.yaml_keys, what) > 0,
     "yaml key": lambda begin, what: _count(begin.yaml_keys, what) > 0,
     "yaml inner": lambda begin, what: _count(begin.yaml_inner_keys, what) > 0,
@@ -217,10 +217,6 @@ _WEAK: dict[str, Shows] = {
     "begin": lambda begin, what: re.match(what, begin.text) is not None,
     "header": lambda begin, what: re.match(what, begin.first_line) is not None,
 }
-
-
-def _leads(path: tuple[str, ...], way: list[str]) -> bool:
-    return len(path) == len(way) and all(step in (key, "*") for key, step in zip(path, way, strict=True))
 
 
 def _count(keys: set[str], pattern: str) -> int:
@@ -242,15 +238,12 @@ def _signs(fmt: str) -> tuple[tuple[str, str | bytes], ...]:
     return (UNSUPPORTED[fmt] if fmt in UNSUPPORTED else FORMATS[fmt]).magic
 
 
-def by_sign(head: bytes, *reads: str, name: str = "") -> str | None:
+def by_sign(head: bytes | Beginning, *reads: str, name: str = "") -> str | None:
     """Return the format, among those from which `reads` is read, that matches the first bytes; None if none does.
 
     Supported formats have priority.  Raises FormatError if two formats fit, or an unsupported one.
     """
-    return _by_sign(Beginning(head), *reads, name=name)
-
-
-def _by_sign(begin: Beginning, *reads: str, name: str) -> str | None:
+    begin = head if isinstance(head, Beginning) else Beginning(head)
     fitting, kind = _fitting(begin, _STRONG, (*readers(*reads), *UNSUPPORTED, *readers("drawing")))
     if fitting and kind != "magic" and not begin.head.startswith(UTF16) and not_text(begin.head):
         return None  # bytes that resemble a line of some format by chance
@@ -279,11 +272,8 @@ def not_read(fmt: str, name: str) -> FormatError:
 
 def of_folder(path: str) -> str | None:
     """Return the format of a folder; None for a file, and for any other folder."""
-    for fmt, row in FORMATS.items():
-        for kind, what in row.magic:
-            if kind == "folder" and os.path.isdir(path) and os.path.exists(os.path.join(path, str(what))):
-                return fmt
-    return None
+    signs = ((fmt, str(what)) for fmt, row in FORMATS.items() for kind, what in row.magic if kind == "folder")
+    return next((fmt for fmt, what in signs if os.path.exists(os.path.join(path, what))), None)
 
 
 def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty: str = "") -> str:
@@ -294,7 +284,7 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
     Raises FormatError if nothing matches and there is no default, or two formats fit.
     """
     begin = Beginning(head)
-    if fmt := _by_sign(begin, *reads, name=name):
+    if fmt := by_sign(begin, *reads, name=name):
         return fmt
     if "tree" not in reads and (what := not_text(head)):
         raise _no_text(what, name)
@@ -400,7 +390,7 @@ def with_hint(error: FormatError, text: bytes, name: str, *, chosen: bool = Fals
 def _points_to_lookup(text: bytes, name: str) -> FormatError | None:
     begin = Beginning(text[:HEAD])
     try:
-        fmt = _by_sign(begin, "tree", name=name)
+        fmt = by_sign(begin, "tree", name=name)
     except FormatError as error:
         return error
     if fmt in (None, "yaml", "json"):

@@ -300,7 +300,7 @@ FORMATS = {
         "camera chain of Kalibr, OpenVINS or okvis; matrices by name", "frametool.formats.trees.matrix_files",
         magic=(
             ("yaml inner", r"T_cam_\w+|T_\w+_cam|T_cn_cnm1|T_i_b|T_SC|T_BS"),
-            ("json path", "*/T_BS/data"),
+            ("json path", "[^/]+/T_BS/data"),
             ("line", r"(?=\w+: *(?:\[|$))(?:T_[A-Za-z]\w*_\w|[A-Za-z]\w*_T_\w)"),
             ("text", r'(?m)^(?:\{\s*|[ \t]+)"(?=\w+":\s*\[)(?:T_[A-Za-z]\w*_\w|[A-Za-z]\w*_T_\w)'),
             ("text", rf"(?m)^(?:\{{\s*|[ \t]+(?=\"))?[\"']?(?:{_TWO_FRAMES})[\"']?:\s*(?:\[|-)\s*[\[-]\s*[-+.\d]"),
@@ -321,7 +321,7 @@ FORMATS = {
         "OpenCV FileStorage", "frametool.formats.trees.matrix_files",
         magic=(
             ("xml", "opencv_storage"),
-            ("json path", "*/type_id"),
+            ("json path", "[^/]+/type_id"),
             ("magic", rb"(?:\xef\xbb\xbf)?\s*%YAML:1\.0(?!.*\bT_(?:cam_imu|imu_cam|cn_cnm1|i_b|SC|BS) *:)"),
             ("text", ": *!!opencv-"),
             ("yaml key", "trans_matrix"),  # of OpenLORIS-Scene

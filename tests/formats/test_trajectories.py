@@ -427,12 +427,12 @@ def test_a_bad_line_is_named_with_its_place(name: str, run: Run) -> None:
 
 
 @pytest.mark.parametrize("tag", ["VERTEX_SE3:QUAT", "EDGE_SE3:QUAT 0"])
-def test_lines_of_g2o_with_unknown_tags_are_told_with_their_count(tag: str, run: Run) -> None:
+def test_lines_of_g2o_with_unknown_tags_are_told(tag: str, run: Run) -> None:
     text = f"{tag} 0 1 2 3 0 0 0 1\n" + "VERTEX_SE3:QUIT 1 1 2 3 0 0 0 1\nFIX 0\nPARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n" * 2 + f"{tag} 2 1 2 3 0 0 0 1\n"
     options = ("--edges",) * tag.startswith("EDGE")
     done = run("convert", "-i", "a.g2o", *options, files={"a.g2o": text})
     assert (done.status, done.out.count("\n")) == (0, 2)
-    assert "a.g2o:2: lines of unknown tags left out: 2 VERTEX_SE3:QUIT" in done.err
+    assert "a.g2o:2: lines of unknown tags left out: VERTEX_SE3:QUIT" in done.err
 
     assert "FIX" not in done.err
 
@@ -815,10 +815,3 @@ def test_a_damaged_line_is_refused_or_told_and_never_shifts_a_pose(form: str, ru
             found = poses_in(done.out)
             assert set(found) <= set(whole), made
             assert len(found) == len(whole) or "left out" in done.err, made
-
-
-@pytest.mark.parametrize("kind", ["VERTEX", "EDGE"])
-def test_a_g2o_tag_that_is_cut_short_is_the_one_it_begins(run: Run, kind: str) -> None:
-    edges = ["--edges"] * (kind == "EDGE")
-    text = f"{kind}_SE3 1 1 2 3 0 0 0 1\n{kind}_SE2 {'0 ' * len(edges)}1 1 2 3\n"
-    assert f"1 {kind}_SE3; did you mean '{kind}_SE3:QUAT'?" in run("convert", "-i", "a.g2o", *edges, files={"a.g2o": text}).err

@@ -323,9 +323,6 @@ def stamp_column(names: Sequence[str], joints: Mapping[str, Joint]) -> tuple[int
     return None if place is None else (place, SUFFIXES.get(known.in_nanoseconds(names[place].strip()), ""))
 
 
-DELIMITERS = {"tsv": "\t", "semicolon": ";"}  # of tables other than CSV
-
-
 class JointSample(NamedTuple):
     """One value of a joint in a file: its text, and its stamp; `refuse` returns the error for its place."""
 
@@ -460,7 +457,7 @@ def _columns_of(names: Sequence[str], joints: Mapping[str, Joint]) -> list[Joint
 def _cells(fmt: str, line: str) -> list[str]:
     if fmt == "csv":
         return [cell.text for cell in split_line(line)]
-    return [cell.strip().strip('"') for cell in line.split(DELIMITERS.get(fmt))]
+    return [cell.strip().strip('"') for cell in line.split(FORMATS[fmt].delimiter or None)]
 
 
 def _refused(message: TextMessage, path: Path, problem: str, below: Path) -> FormatError:

@@ -27,12 +27,11 @@ z backward.  Matrices of three rows occur (Nerfstudio), and `applied_transform`,
 from __future__ import annotations
 
 import re
-from collections import Counter
 from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import format_error, lines, parse_documents
-from frametool.errors import FormatError, ValueInvalid, did_you_mean, listing, shown
+from frametool.errors import FormatError, ValueInvalid, listing, shown
 from frametool.formats.rows.pose_rows import StampFile, describe
 from frametool.formats.table import FORMATS, Poses
 from frametool.frames.stamps import BILLION
@@ -236,7 +235,7 @@ def _g2o(file: InputFile, options: Options) -> Iterator[Written]:
     edges = options.answers.edges
     kinds, others = (MEASURED, VERTICES) if edges else (VERTICES, MEASURED)
     only_others = 0
-    unknown, first = Counter[str](), 0
+    unknown: dict[str, int] = {}  # tag -> its first line
     for number, line in text_lines(file):
         words = line.split()
         if not words or words[0].startswith("#"):
@@ -250,14 +249,9 @@ def _g2o(file: InputFile, options: Options) -> Iterator[Written]:
             message = f"expected a tag as {next(iter(kinds))}, found {shown(words[0])}"
             raise FormatError(message, source=file.name, line=number)
         elif not re.fullmatch(NO_POSE, words[0]):
-            unknown[words[0]] += 1
-            first = first or number
+            unknown.setdefault(words[0], number)
     if unknown:
-        tag = next(iter(unknown))
-        near = did_you_mean(tag, [each for each in kinds if each.startswith(tag)] or kinds)
-        counts = listing((f"{count} {each}" for each, count in unknown.items()), 3)
-        message = f"lines of unknown tags left out: {counts}{near}"
-        options.tally.note(message, first)
+        options.tally.note(f"lines of unknown tags left out: {listing(unknown, 3)}", min(unknown.values()))
     if only_others > 0:
         as_poses = "edges in it, which measure and are no tree; as poses: frametool convert FILE --edges"
         found = "vertices in it; leave --edges out" if edges else as_poses
