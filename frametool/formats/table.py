@@ -261,7 +261,7 @@ FORMATS = {
         delimiter=",", columns=_EUROC, widths=(8, 17), poses=Poses("wxyz", counted=""),
     ),
     "colmap": _trajectory(
-        "COLMAP images.txt", "frametool.formats.rows.pose_lists", names=("images.txt",),
+        "COLMAP images.txt", "frametool.formats.rows.pose_rows", names=("images.txt",),
         poses=Poses("wxyz", inverse=True, axes="optical", frames=_CAMERA, counted="image ids"),
         magic=(
             ("text", r"\A\ufeff?(?:\s*#[^\n]*\n)*?# *(?:Image|Frame) list with"),
@@ -270,7 +270,7 @@ FORMATS = {
         conventions="the file holds camera<-world, quaternion w x y z",
     ),
     "nerf": _trajectory(
-        "NeRF transforms.json", "frametool.formats.rows.pose_lists", names=("transforms.json",), cameras=True,
+        "NeRF transforms.json", "frametool.formats.rows.pose_rows", names=("transforms.json",), cameras=True,
         poses=Poses("matrix", axes="opengl", frames=_CAMERA, counted="places in its list"),
         magic=(("json path", "frames/transform_matrix"),), conventions="world<-camera; opengl (y up, z back)",
     ),
@@ -281,7 +281,7 @@ FORMATS = {
         poses=Poses("matrix", axes="optical", frames=("world", "cam0"), counted="numbers of pictures"),
     ),
     "g2o": _trajectory(
-        "g2o pose graph", "frametool.formats.rows.pose_lists", suffixes=(".g2o",),
+        "g2o pose graph", "frametool.formats.rows.pose_rows", suffixes=(".g2o",),
         magic=(("line", r"(?:VERTEX|EDGE|PARAMS)_[A-Z0-9_]+(?::[A-Z_]+)?\s+\d|FIX\s+\d"),),
         conventions="world<-vertex or vertex<-vertex (--edges), quaternion x y z w",
         poses=Poses("quaternion", counted="ids of vertices"), required_options=("frames", "stamps", "edges"),

@@ -1,26 +1,56 @@
-"""How formats write poses, one after another: the text around the numbers, and what they cannot store.
+"""How formats write poses, one after another, and how COLMAP, g2o and NeRF list them.
 
 `("seconds", b" ", Numbers(7), b"\\n")` is a row of a TUM trajectory, 1305031102.175800000 1.0 2.0 3.0 0.0 0.0 0.0 1.0.
 `frametool.stream.writers` fills in the table, for one pose or a million.
+
+COLMAP's images.txt has two lines per image, the second its points (which may be empty, but must be there):
+
+    # Image list with two lines of data per image:
+    #   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME
+    1 0.8517 0.0165 0.5035 -0.1431 -0.7376 1.0240 3.7463 1 P1180141.JPG
+    2362.39 248.498 58396 1784.7 268.254 59027
+
+It has the pose of the world in the camera, camera<-world: the camera is at -R't.  Optical axes.  Since 2025 frames.txt,
+the list of frames of a rig, has the pose of the world in the rig: FRAME_ID RIG_ID QW .. TZ ..
+
+A pose graph of g2o has vertices, poses in the world, metres, quaternion w last; edges are relative to the first vertex:
+
+    VERTEX_SE3:QUAT 0 1.0 2.0 0.5 0.0 0.0 0.0 1.0
+    VERTEX_SE2 1 1.0 2.0 0.5
+    EDGE_SE3:QUAT 0 1 1.0 0.0 0.0 0.0 0.0 0.0 1.0 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1
+
+Edges are measurements and may contradict each other, so they are not a tree; the vertices are the estimate.
+
+NeRF's transforms.json has the pose of each camera in the world as 4x4 rows, any scale; axes of OpenGL: x right, y up,
+z backward.  Matrices of three rows occur (Nerfstudio), and `applied_transform`, which is already included in them:
+
+    {"camera_angle_x": 0.69, "frames": [{"file_path": "1.png", "transform_matrix": [[..], [..], [..], [0, 0, 0, 1]]}]}
 """
 
 from __future__ import annotations
 
+import re
 from importlib import import_module
-from itertools import chain
-from typing import TYPE_CHECKING, NamedTuple
+from itertools import chain, islice
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import FormatError, ValueInvalid, listing, warn
-from frametool.formats.table import FORMATS
-from frametool.frames.stamps import format_stamp, parse_stamp, whole_stamp
-from frametool.geometry import quaternion, rigid
+from frametool.documents.document import format_error, lines, parse_documents
+from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
+from frametool.formats.table import FORMATS, Poses
+from frametool.frames.stamps import BILLION, format_stamp, parse_stamp, whole_stamp
+from frametool.geometry import euler, floats, quaternion, rigid
+from frametool.geometry.representations import notation
+from frametool.grammar.edges import Samples
+from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
+from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from frametool.formats.table import Poses
+    from frametool.documents.source import InputFile
     from frametool.geometry.types import Components
     from frametool.grammar.edges import Options
+    from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
 
 
@@ -205,3 +235,266 @@ class StampFile:
         """Check that there was one time per pose."""
         if count != len(self.stamps):
             raise FormatError(f"{len(self.stamps)} times for the {count} poses of {name}", source=self.path)
+
+
+# --- lists of poses ---
+
+BLOCK = 1 << 12  # poses
+NUMBERED = 1 << 33  # above this, a number times a second exceeds a stamp
+
+
+class Written(NamedTuple):
+    """One pose as written.
+
+    numbers: x, y, z, then those of the rotation
+    number: its number in the file
+    line: its line; path: its path, in a document
+    image: the name of its image, if it has one
+    names: of its reference frame and its body, if each has its own
+    """
+
+    numbers: tuple[float, ...]
+    number: int
+    line: int = 0
+    image: str = ""
+    path: Path = ()
+    names: tuple[str, str] | None = None
+
+
+class PoseBlock(NamedTuple):
+    """Checked poses of a body in the world: tx, ty, tz, x, y, z, w, arrays of n; int64 of n; and as written."""
+
+    poses: Components
+    stamps_ns: Any
+    rows: Sequence[Written]
+
+
+def form_of(file: InputFile, options: Options) -> Poses:
+    """Return the meaning of the poses of a file."""
+    return EDGES if options.answers.edges else FORMATS[file.format].poses
+
+
+def read(file: InputFile, options: Options) -> Iterator[Samples]:
+    """Yield the poses of a file as samples of one frame; assumptions are reported with the file's name."""
+    spec = FORMATS[file.format].poses
+    parent, child = options.answers.names(*spec.frames)
+    for block in blocks(file, options):
+        columns = [part.tolist() for part in block.poses]
+        places = [row.line for row in block.rows]
+        yield Samples(parent, child, block.stamps_ns.tolist(), list(zip(*columns, strict=True)), places)
+    options.tally.axes[child] = options.answers.camera_axes or spec.axes
+
+
+def blocks(file: InputFile, options: Options, *, named: bool = True) -> Iterator[PoseBlock]:
+    """Yield the poses of a file, checked, block by block.
+
+    named: the two frames have the names of the format or --frames, with a note
+    Raises or reports FormatError with the place of an invalid rotation.
+    """
+    import numpy as np
+
+    spec, rows = form_of(file, options), READERS[file.format](file, options)
+    stamps = StampFile(options.answers.stamps) if options.answers.stamps else None
+    count = 0
+    while some := list(islice(rows, BLOCK)):
+        good, poses = _checked(some, spec, file, options)
+        times = [stamps.at(count + at) if stamps else _counted(some[at], file) for at in range(len(some))]
+        count += len(some)
+        found = tuple(part[good] for part in poses)
+        yield PoseBlock(found, np.array(times, np.int64)[good], [some[at] for at in good])
+    if stamps:
+        stamps.finish(count, file.name)
+    describe(options, spec, count, named=named)
+
+
+def _checked(some: Sequence[Written], spec: Poses, file: InputFile, options: Options) -> tuple[list[int], Components]:
+    """Return the valid rows, and the poses of the body in the world."""
+    import numpy as np
+
+    from frametool.geometry.batch_validation import read_rotations
+
+    columns = np.array([row.numbers for row in some], np.float64).T
+    found = read_rotations(notation(spec.rotation), list(columns[3:]), normalize=options.normalize)
+    for at, reason in sorted(found.reasons.items()):
+        options.report(error_at(file, some[at], reason))
+    if spec.rotation == "matrix":
+        options.tally.projected = max(options.tally.projected, found.off)
+    else:
+        options.tally.rough += [some[at].line for at in found.mended.tolist()]
+    poses: Components = (*columns[:3], *found.quaternions)
+    if spec.inverse:
+        poses = rigid.inverse(*poses)
+    return [at for at in range(len(some)) if at not in found.reasons], poses
+
+
+def _counted(row: Written, file: InputFile) -> int:
+    """Return the number of a pose as seconds."""
+    if row.number >= NUMBERED:
+        raise error_at(file, row, f"{row.number} is too large to count seconds; give --stamps FILE")
+    return row.number * BILLION
+
+
+def error_at(file: InputFile, row: Written, message: str) -> FormatError:
+    """Return the error for a pose of a file."""
+    if row.path:
+        return format_error(file.source, row.path, message)
+    return FormatError(message, source=file.name, line=row.line)
+
+
+def text_lines(file: InputFile) -> Iterator[tuple[int, str]]:
+    """Yield the lines of a file with their numbers, in bounded memory."""
+    for piece in lines(file.stream, file.name):
+        yield from enumerate(piece.text.removesuffix("\n").split("\n"), piece.line)
+
+
+def whole_in(file: InputFile, line: int, word: str, what: str) -> int:
+    """Read a word as an integer, which errors call `what`; raises FormatError."""
+    if not re.fullmatch("[0-9]{1,18}", word):
+        raise FormatError(f"expected {what}, a whole number, found {shown(word)}", source=file.name, line=line)
+    return int(word)
+
+
+def numbers_in(file: InputFile, line: int, words: Sequence[str]) -> list[float]:
+    """Read the words of a line as numbers; raises FormatError."""
+    try:
+        return [parse_number(word) for word in words]
+    except ValueInvalid as error:
+        raise FormatError(str(error), source=file.name, line=line) from None
+
+
+# --- COLMAP ---
+
+IMAGE_LINE = "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME"
+NUMBER_BEFORE = r"[-+.\d]+(?:[eE][-+]?\d+)?\s"
+FRAME_LINE = "FRAME_ID RIG_ID QW QX QY QZ TX TY TZ NUM_DATA_IDS .."
+
+
+def _colmap(file: InputFile, _options: Options) -> Iterator[Written]:
+    """Yield the poses of images.txt, or of frames.txt, as written."""
+    comments, lines = True, text_lines(file)
+    of_frames = False
+    numbered = set[bool]()  # whether names of images begin with a number and a blank
+    for number, line in lines:
+        bare = line.strip()
+        if not bare or bare.startswith("#"):
+            of_frames |= comments and "Frame list" in bare
+            continue
+        comments = False
+        pose = _colmap_pose(file, number, bare, of_frame=of_frames)
+        numbered.add(re.match(NUMBER_BEFORE, pose.image) is not None)
+        if len(numbered) > 1:
+            message = f"only some pictures are called as {shown(pose.image)}; a number too many or too few in the line?"
+            raise FormatError(message, source=file.name, line=number)
+        yield pose
+        if not of_frames:
+            below, points = next(lines, (0, ""))
+            words = points.split()
+            if len(words) % 3 or not all(re.fullmatch("-1|[0-9]+", word) for word in words[2::3]):
+                message = f"expected points (X Y POINT3D_ID each) or an empty line, found {len(words)} words"
+                raise FormatError(message, source=file.name, line=below)
+
+
+def _colmap_pose(file: InputFile, line: int, text: str, *, of_frame: bool) -> Written:
+    words = text.split(maxsplit=9)  # the name of an image may contain blanks
+    data = text.split()[9:] if of_frame else []  # a count, and three words per item
+    expected = FRAME_LINE if of_frame else f"10 words ({IMAGE_LINE})"
+    if len(words) < 9 or (len(words) < 10 and not of_frame):
+        raise FormatError(f"expected {expected}, found {len(words)} words", source=file.name, line=line)
+    number = whole_in(file, line, words[0], "an id")
+    whole_in(file, line, *((words[1], "RIG_ID") if of_frame else (words[8], "CAMERA_ID")))
+    if data and len(data) != 1 + 3 * whole_in(file, line, data[0], "NUM_DATA_IDS"):
+        raise FormatError(f"expected {expected}, three words of each, found {len(data)}", source=file.name, line=line)
+    w, x, y, z, *position = numbers_in(file, line, words[1 + of_frame : 8 + of_frame])
+    return Written((*position, w, x, y, z), number, line, "" if of_frame else words[9])
+
+
+# --- g2o ---
+
+EDGES = Poses("quaternion", counted="")
+# other tags of g2o: landmarks, parameters, other measurements
+NO_POSE = r"FIX|PARAMS_\w+|ROBOTLASER\d|VERTEX_(?:XY|\w+XYZ?|CAM|SW\w*)|EDGE_(?:SE[23]|PRIOR|BEARING|PR|SW|PO)\w+"
+IN_SPACE, IN_PLANE = "x y z qx qy qz qw", "x y theta"
+VERTICES = {"VERTEX_SE3:QUAT": IN_SPACE, "VERTEX_SE2": IN_PLANE}
+MEASURED = {"EDGE_SE3:QUAT": IN_SPACE, "EDGE_SE2": IN_PLANE}
+INFORMATION = {IN_SPACE: 21, IN_PLANE: 6}  # numbers after an edge
+
+
+def _g2o(file: InputFile, options: Options) -> Iterator[Written]:
+    """Yield the vertices of a pose graph as written, or its edges."""
+    edges = options.answers.edges
+    kinds, others = (MEASURED, VERTICES) if edges else (VERTICES, MEASURED)
+    only_others = 0
+    unknown: dict[str, int] = {}  # tag -> its first line
+    for number, line in text_lines(file):
+        words = line.split()
+        if not words or words[0].startswith("#"):
+            continue
+        if words[0] in others:
+            only_others = only_others or number
+        elif words[0] in kinds:
+            only_others = -1
+            yield _g2o_pose(file, number, words, kinds[words[0]], ids=1 + edges)
+        elif not words[0][0].isupper():
+            message = f"expected a tag as {next(iter(kinds))}, found {shown(words[0])}"
+            raise FormatError(message, source=file.name, line=number)
+        elif not re.fullmatch(NO_POSE, words[0]):
+            unknown.setdefault(words[0], number)
+    if unknown:
+        options.tally.note(f"lines of unknown tags left out: {listing(unknown, 3)}", min(unknown.values()))
+    if only_others > 0:
+        as_poses = "edges in it, which measure and are no tree; as poses: frametool convert FILE --edges"
+        found = "vertices in it; leave --edges out" if edges else as_poses
+        raise FormatError(f"only {found}", source=file.name, line=only_others)
+
+
+def _g2o_pose(file: InputFile, line: int, words: list[str], layout: str, *, ids: int) -> Written:
+    """Read a vertex with its id, or an edge with its two vertices and its information matrix."""
+    expected = f"{'id' if ids == 1 else 'i j'} {layout}"
+    size = len(expected.split())
+    kind, *rest = words
+    if len(rest) != size and (ids == 1 or len(rest) != size + INFORMATION[layout]):
+        raise FormatError(f"expected {kind} {expected}, found {len(words)} words", source=file.name, line=line)
+    number, *_ = (whole_in(file, line, word, "the id of a vertex") for word in rest[:ids])
+    numbers = numbers_in(file, line, rest[ids:size])
+    if layout == IN_PLANE:
+        x, y, theta = numbers
+        numbers = [x, y, 0.0, *euler.to_quaternion(0.0, 0.0, theta, "sxyz", floats)]
+    return Written(tuple(numbers), number, line, names=(rest[0], rest[1]) if ids > 1 else None)
+
+
+# --- NeRF ---
+
+MATRIX = "transform_matrix"
+LAST_ROW = (0.0, 0.0, 0.0, 1.0)
+
+
+def _nerf(file: InputFile, options: Options) -> Iterator[Written]:
+    """Yield the poses of the cameras as written."""
+    for document in parse_documents(file.text, file.name):
+        try:
+            whole = as_mapping(document.value, "transforms.json")
+            if "applied_transform" in whole:
+                options.tally.note("the poses contain its applied_transform; it is not taken out", 1)
+            for index, entry in enumerate(whole.get("frames") or ()):
+                yield within(("frames", index), _nerf_pose, entry, index)._replace(
+                    path=(document.index, "frames", index, MATRIX)
+                )
+        except Misfit as misfit:
+            raise misfit.placed(file.source, document.index) from None
+
+
+def _nerf_pose(entry: Any, index: int) -> Written:
+    """Read one of the frames."""
+    frame = as_mapping(entry, "a frame {file_path, transform_matrix}")
+    matrix = frame.get(MATRIX)
+    if type(matrix) is not list or len(matrix) not in (3, 4):
+        raise Misfit(f"expected {MATRIX} as 4 rows, found {kind(matrix) if type(matrix) is not list else len(matrix)}")
+    rows = [within((MATRIX, at), read_numbers, row, "1234") for at, row in enumerate(matrix)]
+    if rows[3:] not in ([], [LAST_ROW]):
+        raise Misfit("the last row of a pose is 0 0 0 1", (MATRIX, 3))
+    image = frame.get("file_path")
+    position, turn = [row[3] for row in rows[:3]], [number for row in rows[:3] for number in row[:3]]
+    return Written((*position, *turn), index, image=image if type(image) is str else "")
+
+
+READERS = {"colmap": _colmap, "g2o": _g2o, "nerf": _nerf}
