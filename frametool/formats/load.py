@@ -242,34 +242,32 @@ class TreeBuilder:
         """Add a frame that has no parent (yet)."""
         (self.tree if self.buffer is None else self.buffer).add_root(frame)
 
-    def renames(self, *names: str | None) -> bool:
-        """Return True if names include the second of the two names of the Earth's frame."""
-        if not self.earth:
-            self.earth = next((name for name in names if name and name in EARTH_FRAMES), "")
-        return any(name in EARTH_FRAMES and name != self.earth for name in names)
-
     def one_name(self, frame: str) -> str:
-        """Return a name, that of the Earth's frame as in this tree."""
-        return self.earth if frame in EARTH_FRAMES else frame
+        """Return a name; for the Earth's frame that of its two names which was used first."""
+        if frame not in EARTH_FRAMES:
+            return frame
+        self.earth = self.earth or frame
+        return self.earth
+
+    def renames(self, *names: str) -> bool:
+        """Return True if names include the second of the two names of the Earth's frame."""
+        return any(self.one_name(name) != name for name in names)
 
     def add_edge(self, edge: Edge, place: EdgePlace) -> None:
         """Add an edge, or a root; an edge between the two names of the Earth's frame must be the identity."""
-        parent, child = edge.parent, edge.child
-        if (parent in EARTH_FRAMES or child in EARTH_FRAMES) and self.renames(parent, child):
-            parent, child = parent and self.one_name(parent), self.one_name(child)
-            if parent == child:
-                if any(edge.components[:6]):
-                    what = "'earth' and 'ecef' are one frame, this edge puts one elsewhere in the other; rename one"
-                    raise place.error(what, BadTopology)
-                if not self._one_earth:
-                    warn(f"{self.name}: 'earth' and 'ecef' are one frame; the edge between them is left out")
-                self._one_earth = True
-                return self.add_root(self.earth)
+        parent, child = edge.parent and self.one_name(edge.parent), self.one_name(edge.child)
         if parent is None:
             self.add_root(child)
-        else:
+        elif parent != child or edge.parent == edge.child:
             self.add(parent, child, edge.components, edge.stamp_ns, place)
-        return None
+        elif any(edge.components[:6]):
+            what = "'earth' and 'ecef' are one frame, this edge puts one elsewhere in the other; rename one"
+            raise place.error(what, BadTopology)
+        else:
+            if not self._one_earth:
+                warn(f"{self.name}: 'earth' and 'ecef' are one frame; the edge between them is left out")
+            self._one_earth = True
+            self.add_root(child)
 
     def add(self, parent: str, child: str, components: Rigid, stamp_ns: int | None, place: EdgePlace) -> None:
         """Add one edge, or one sample of it.

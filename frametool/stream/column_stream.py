@@ -74,7 +74,7 @@ class ColumnRows(PlannedRows):
             error.line = 0  # the names of columns are in no line here
             raise
         for at, place in enumerate(self.layout.places):
-            if file.kind(place) is None and at not in self.plan.words:
+            if file.kinds[place] is None and at not in self.plan.words:
                 raise Misused(f"column {table.name(place)} holds no numbers", source=source)
         self.faults: list[Fault] = []
         self.notes: list[RowNote] = []
@@ -97,7 +97,7 @@ class ColumnRows(PlannedRows):
                 name = usual[column.number]
             else:
                 name = ours.get(-1 if place is None else place, f"column_{at}")
-            kind = self.file.kind(column.place) if isinstance(column, Kept) else None
+            kind = self.file.kinds[column.place] if isinstance(column, Kept) else None
             if isinstance(column, New) and not column.words:
                 kind = self._kind_of(column)
             found.append(OutColumn(name * bool(names or named), kind, place if isinstance(column, Kept) else None))
@@ -107,10 +107,10 @@ class ColumnRows(PlannedRows):
         """Return the type of a result's numbers: that of the column it replaces; raises Misused for integers."""
         names = self.table.names
         kind: Kind | None = DOUBLE
-        if names is None and getattr(self.file.kind(0), "kind", "") in FLOATS:  # an array of one type
-            kind = self.file.kind(0)
+        if names is None and getattr(self.file.kinds[0], "kind", "") in FLOATS:  # an array of one type
+            kind = self.file.kinds[0]
         elif names and column.name in names:
-            kind = self.file.kind(names.index(column.name))
+            kind = self.file.kinds[names.index(column.name)]
         if kind is None or kind.kind not in FLOATS:
             whole = f"column {column.name} holds {kind}, where the result would be rounded"
             raise Misused(f"{whole}; --keep puts it beside, -f csv writes text", source=self.source)

@@ -157,10 +157,6 @@ class ColumnFile(Protocol):
     vectors: tuple[tuple[str, ...], ...] = ()
     gaps: bool
 
-    def kind(self, place: int) -> Kind | None:
-        """Return the type of a column's numbers; None for other columns."""
-        return self.kinds[place]
-
     def moved_by(self, pose: Components | None) -> None:
         """Transform data about all points by the pose that transforms all of them, before any is read.
 
