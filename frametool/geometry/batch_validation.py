@@ -12,7 +12,7 @@ import numpy as np
 from frametool.errors import ValueInvalid, warn
 from frametool.geometry import arrays
 from frametool.geometry.quaternion import SILENT, TOLERATED
-from frametool.geometry.validation import all_finite, at_first, first_row
+from frametool.geometry.validation import at_row
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,12 +41,14 @@ def read_rotations(
 ) -> Rotations:
     """Return the quaternions of rows of numbers in column order; invalid rows get the identity."""
     inputs = tuple(numbers)
-    quaternions = np.empty((4, int(np.prod(arrays.batch_shape(inputs)))))
+    shape = arrays.batch_shape(inputs)
+    quaternions = np.empty((4, int(np.prod(shape))))
     off, worst = _convert(notation, inputs, quaternions, degrees=degrees, normalize=normalize)
     if off is None:
         return Rotations(tuple(quaternions), {}, NONE, worst)
     refused = np.flatnonzero(off == np.inf)
-    reasons = {row: _reason(notation, [number[row] for number in numbers], normalize) for row in refused.tolist()}
+    flat = [np.broadcast_to(column, shape).reshape(-1) for column in inputs] if refused.size else []
+    reasons = {row: _reason(notation, [column[row] for column in flat], normalize) for row in refused.tolist()}
     quaternions[:, refused] = np.reshape(IDENTITY, (4, 1))
     return Rotations(tuple(quaternions), reasons, np.flatnonzero((off > SILENT) & (off < np.inf)), worst)
 
@@ -58,11 +60,14 @@ def require_rotations(notation: Notation, inputs: Components, name: str, *, norm
         ValueInvalid: rows are not rotations; names the first one and how many there are.
     """
     shape = arrays.batch_shape(inputs)
-    made = np.empty((4, *shape))
-    off, _ = _convert(notation, inputs, made.reshape(4, -1), degrees=False, normalize=normalize)
-    if off is not None:
-        _refuse_or_warn(notation, inputs, name, off.reshape(shape), normalize=normalize)
-    return tuple(made)
+    found = read_rotations(notation, inputs, normalize=normalize)
+    for row, reason in found.reasons.items():
+        more = f" ({len(found.reasons)} such rows)" if len(found.reasons) > 1 else ""
+        raise ValueInvalid(f"{at_row(name, row, shape)}: {reason}{more}")
+    if found.mended.size and (rule := notation.representation.batch):
+        share, first = f"{found.mended.size} of {np.prod(shape)} {rule.what}", at_row(name, found.mended[0], shape)
+        warn(f"{name}: {share} are off by up to {found.off:.2g} (first: {first}) and were normalised")
+    return tuple(part.reshape(shape) for part in found.quaternions)
 
 
 def _convert(
@@ -119,18 +124,3 @@ def _reason(notation: Notation, row: Sequence[float], normalize: bool) -> str:  
     except ValueInvalid as error:
         return str(error)
     return "the numbers are not a rotation"
-
-
-def _refuse_or_warn(notation: Notation, inputs: Components, name: str, off: Array, *, normalize: bool) -> None:
-    """Raise for the first row that is refused; warn once about those that deviate too much to be silent."""
-    rule = notation.representation.batch
-    bad, rough = off == np.inf, off > SILENT
-    if bad.any():
-        if rule is None:
-            all_finite(inputs, name)
-        count = int(bad.sum())
-        more = f" ({count} such rows)" if count > 1 else ""
-        raise ValueInvalid(f"{at_first(name, bad)}: {_reason(notation, first_row(inputs, bad), normalize)}{more}")
-    if rule is not None and rough.any():
-        share = f"{int(rough.sum())} of {rough.size} {rule.what}"
-        warn(f"{name}: {share} are off by up to {off.max():.2g} (first: {at_first(name, rough)}) and were normalised")

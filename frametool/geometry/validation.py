@@ -105,9 +105,14 @@ def all_finite(columns: Components, name: str) -> Components:
 
 def at_first(name: str, bad: Any) -> str:
     """Return the name of the first bad row: `xyzw[3]`."""
+    return at_row(name, bad.argmax(), bad.shape)
+
+
+def at_row(name: str, row: int, shape: tuple[int, ...]) -> str:
+    """Return the name of a row by its number: `xyzw[3]`, `xyzw[0, 3]`."""
     import numpy as np
 
-    place = np.unravel_index(int(np.argmax(bad)), bad.shape)
+    place = np.unravel_index(row, shape)
     return f"{name}[{', '.join(str(int(index)) for index in place)}]" if place else name
 
 

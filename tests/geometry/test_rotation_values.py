@@ -183,12 +183,12 @@ def test_the_sign_that_leaves_is_canonical() -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: Rotation.from_rotvec([[0.0, 0.0, 0.0], [0.0, math.nan, 0.0]]), r"rotvec\[1\]: 0 nan 0 is not finite"),
+        (lambda: Rotation.from_rotvec([[0.0, 0.0, 0.0], [0.0, math.nan, 0.0]]), r"rotvec\[1\]: rotation vector 0 nan 0 is not finite"),
         (lambda: Rotation.from_rotvec([[0.0] * 3, [1e200, 0.0, 0.0]]), r"rotvec\[1\]: rotation vector 1e\+200 0 0"),
         (lambda: Rotation.from_rotvec([1e200, 0, 0]), r"rotation vector 1e\+200 0 0"),
         (lambda: Rotation.from_axis_angle([0, 0, 0], 1.0), r"axis 0 0 0 has no direction"),
         (lambda: Rotation.from_axis_angle([[1, 0, 0], [0, 0, 0]], 1.0), r"axis\[1\]: axis 0 0 0 has no direction"),
-        (lambda: Rotation.from_euler("rzyx", [[0.0] * 3, [1.0, math.inf, 3.0]]), r"angles\[1\]: 1 inf 3 is not finite"),
+        (lambda: Rotation.from_euler("rzyx", [[0.0] * 3, [1.0, math.inf, 3.0]]), r"angles\[1\]: euler 1 inf 3 is not finite"),
         (lambda: Rotation.from_euler("zyx", [1, 2, 3]), r"unknown Euler axes 'zyx'; did you mean"),
         (lambda: Rotation.from_six_d([1, 0, 0, 2, 0, 0]), r"parallel"),
         (lambda: Rotation.from_mrp([math.nan, 0, 0]), r"mrp: nan 0 0 is not finite"),
@@ -210,7 +210,7 @@ def test_the_sign_that_leaves_is_canonical() -> None:
         (lambda: Transform.from_parts(euler=[0, 0, 1]), r"euler needs its axes: write euler:rzyx"),
         (lambda: Transform.from_parts(position=[0, 0, 1]), r"unknown representation 'position'"),
         (lambda: Transform.from_parts([1, 2]), r"xyz: expected shape \(\.\.\., 3\), got \(2,\)"),
-        (lambda: Transform.from_parts(rpy_deg=[[0.0] * 3, [0.0, 0.0, math.nan]]), r"rpy_deg\[1\]: 0 0 nan is not finite"),
+        (lambda: Transform.from_parts(rpy_deg=[[0.0] * 3, [0.0, 0.0, math.nan]]), r"rpy_deg\[1\]: rpy 0 0 nan is not finite"),
         (lambda: axes_change("opticl", "ned"), r"unknown axes 'opticl'; did you mean 'optical'"),
     ],
 )
