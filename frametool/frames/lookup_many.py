@@ -113,11 +113,12 @@ def _joined(query: Query, times: Stamps) -> Rigid:
     return *found[:3], *quaternion.unit(*found[3:], arrays)
 
 
-def carried_many(frames: Frames, target: str, source: str, at_ns: Any) -> Floats:
-    """Return the covariance of target_from_source, 36 columns, at times that have data."""
+def carried_many(frames: Frames, target: str, source: str, at_ns: Any, poses: Rigid) -> Floats:
+    """Return the covariance of target_from_source, 36 columns, at times whose poses were looked up; NaN as these."""
     times = as_stamps(at_ns)
-    order = np.argsort(times, kind="stable")
-    found = np.empty((times.size, 36))
+    there = np.flatnonzero(~np.isnan(poses[6]))
+    order = there[np.argsort(times[there], kind="stable")]
+    found = np.full((times.size, 36), np.nan)
     cuts = np.searchsorted(times[order], frames.changes())
     for rows in np.split(order, cuts):
         for start, stop in arrays.blocks(rows.size):

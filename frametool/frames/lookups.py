@@ -6,6 +6,7 @@ lookup while time advances.  Knows no files and no text.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import partial, reduce
 from itertools import chain, repeat
 from math import ceil, floor
@@ -391,18 +392,14 @@ class Frames:
 
     def _unconnected(self, error: NotConnected, target: str, source: str, at_ns: int | None) -> LookupFailed:
         """Return the error for two frames without a path: two trees, or a changing parent not known at that time."""
+        if at_ns is None or not self._varies:
+            return error
 
         def parent_near(frame: str) -> str | None:
-            track = self._tracks.get(frame)
-            return None if track is None or at_ns is None else track.parent_near(at_ns)
+            return track.parent_near(at_ns) if (track := self._tracks.get(frame)) else None
 
-        if at_ns is not None and self._varies:
-            try:
-                way = self._along(*edges_between(target, source, parent_near))
-            except NotConnected:
-                pass
-            else:
-                return no_data(target, source, at_ns, way)
+        with suppress(NotConnected):
+            return no_data(target, source, at_ns, self._along(*edges_between(target, source, parent_near)))
         return error
 
 

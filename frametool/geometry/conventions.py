@@ -59,7 +59,8 @@ def named_rotation(text: str) -> Rotation:
     change = named_change(text)
     if change.mirrors:
         both = f"--all-axes {text if '_from_' in text or ',' in text else f'{text}_from_ros'}"
-        raise ValueInvalid(f"{text} is left-handed (mirrored) and no rotation; convert changes both sides: {both}")
+        message = f"{text} is left-handed (mirrored) and no rotation; convert changes both sides: {both}"
+        raise ValueInvalid(message, rule="mirrored")
     return change.rotation.canonical()
 
 
@@ -102,13 +103,9 @@ def named_change(text: str, *, of_world: bool = False) -> AxesChange:
     target, joint, source = text.partition("_from_")
     if not joint:
         target, source = "flu", text
-    back, there = (_flu_from(_system(name)[not of_world]) for name in (target, source))
+    names = (_system(name)[not of_world] for name in (target, source))
+    back, there = (AxesChange({**AXES, **MIRRORED}[name][0], name in MIRRORED) for name in names)
     return back.inverse().after(there)
-
-
-def _flu_from(name: str) -> AxesChange:
-    """Return flu_from_NAME."""
-    return AxesChange({**AXES, **MIRRORED}[name][0], name in MIRRORED)
 
 
 def _own_axes(text: str) -> AxesChange:

@@ -184,14 +184,10 @@ class Place(NamedTuple):
             return self._by_row(numbers, rotation)
         if self.axes == ECEF:
             return tuple(rotation)
-        return quaternion.compose(*self._axes_at(numbers), *self.levelled(rotation))
-
-    def levelled(self, rotation: Components) -> Components:
-        """Return a rotation relative to the local axes, from a heading about down: yaw = 90 degrees - it for z up."""
-        if not self.level or self.axes == NED:
-            return tuple(rotation)
-        _, _, s, c = rotation
-        return quaternion.settled(0.0 * s, 0.0 * s, SQRT_HALF * (c - s), SQRT_HALF * (c + s))
+        if self.level and self.axes != NED:  # a heading is about down: yaw = 90 degrees - it where z is up
+            _, _, s, c = rotation
+            rotation = quaternion.settled(0.0 * s, 0.0 * s, SQRT_HALF * (c - s), SQRT_HALF * (c + s))
+        return quaternion.compose(*self._axes_at(numbers), *rotation)
 
     def _by_row(self, numbers: Sequence[Any], rotation: Components) -> Components:
         """Return rotations relative to the axes of each row."""

@@ -8,7 +8,7 @@ A lookup has such a result too: the pose of SOURCE in TARGET as an entry of a tr
 from __future__ import annotations
 
 import math
-from itertools import repeat
+from itertools import islice, repeat
 from math import isfinite
 
 from frametool.errors import LookupFailed, ValueInvalid, shown, warn
@@ -145,16 +145,15 @@ def looked_up_many(
     for begin in range(0, len(times), BLOCK):
         block = times[begin : begin + BLOCK]
         found = frames.lookup_many(target, source, block, missing="nan" if miss else "raise")
-        rows = [*zip(*(column.tolist() for column in found.components), strict=True)]
-        entries: Iterator[list[float] | None] = repeat(None)
+        rows = zip(*(column.tolist() for column in found.components), strict=True)
+        entries: Iterable[list[float] | None] = repeat(None)
         if covariance:
             from frametool.frames.lookup_many import carried_many
 
-            there = [at_ns for at_ns, row in zip(block, rows, strict=True) if isfinite(row[6])]
-            entries = iter(carried_many(frames, target, source, there).tolist())
-        for at_ns, row in zip(block, rows, strict=True):
+            entries = carried_many(frames, target, source, block, found.components).tolist()
+        for at_ns, row, each in zip(block, rows, entries, strict=False):
             if isfinite(row[6]):
-                yield result_at(row, target, source, at_ns, next(entries))
+                yield result_at(row, target, source, at_ns, each)
             elif miss:
                 miss(at_ns)
 
@@ -209,8 +208,14 @@ class Lookups:
 
     def many(self, target: str, source: str, times_ns: Any) -> Components:
         """Return the same at times, as columns; nan where there are no data."""
-        found = self.tree.lookup_many(target, source, times_ns, missing="nan").components
-        return self._with_covariance(found, target, source, times_ns) if self.carried else found
+        poses = self.tree.lookup_many(target, source, times_ns, missing="nan").components
+        if not self.carried:
+            return poses
+        from frametool.frames.lookup_many import carried_many
+
+        for at_ns in islice((at_ns for at_ns, w in zip(times_ns, poses[6], strict=True) if isfinite(w)), 1):
+            self.edges |= {track.child for track in self.tree.way(target, source, int(at_ns))}
+        return *poses, *carried_many(self.tree, target, source, times_ns, poses).T
 
     def noted(self, result: Result) -> Result:
         """Record a result of a lookup."""
@@ -225,20 +230,6 @@ class Lookups:
             if (width := widest_turn(each)) > self.width:
                 self.widest, self.width = each, width
         return result
-
-    def _with_covariance(self, poses: Components, target: str, source: str, times_ns: Any) -> Components:
-        """Return columns of poses with those of their covariance."""
-        import numpy as np
-
-        from frametool.frames.lookup_many import carried_many
-
-        times = np.asarray(times_ns)
-        there = np.flatnonzero(~np.isnan(poses[0]))
-        entries = np.full((len(times), 36), np.nan)
-        if len(there):
-            entries[there] = carried_many(self.tree, target, source, times[there])
-            self.edges |= {track.child for track in self.tree.way(target, source, int(times[there[0]]))}
-        return (*poses, *entries.T)
 
     def granted(self) -> str:
         """Return the assumptions about covariances, or ""; warn about rotations too uncertain for the first order."""

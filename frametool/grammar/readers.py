@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import Finding, Unanswered, ValueInvalid, shown, warn
-from frametool.text.numbers import NotFinite, parse_number
+from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -155,7 +155,7 @@ def within(path: Path, read: Callable[..., Any], *arguments: Any, **options: Any
     except Misfit as misfit:
         raise misfit.below(*path) from None
     except ValueInvalid as error:
-        made = NotARotation if isinstance(error, NotFinite) else Misfit
+        made = NotARotation if error.rule else Misfit  # a rule of `check` about numbers
         raise made(str(error), path, rule=error.rule) from None
 
 

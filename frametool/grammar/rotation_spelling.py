@@ -52,16 +52,11 @@ TURN = 2.0 * math.pi
 AGREEMENT = 1e-6  # radians, metres: the largest difference between two notations in one entry
 
 
-def _rotation_keys() -> dict[str, Notation]:
-    """Return every key for a rotation, with and without a unit."""
-    keys = {}
-    for name, row in ROTATIONS.items():
-        for spelled in (name, f"{name}_deg", f"{name}_rad") if row.angles else (name,):
-            keys[spelled] = parse_notation(spelled)
-    return keys | {word: keys[name or "quaternion"] for word, name in ROTATION_WORDS.items()}
-
-
-ROTATION_KEYS = _rotation_keys()
+ROTATION_KEYS = {  # with and without a unit
+    key: parse_notation(key) for name, row in ROTATIONS.items()
+    for key in ((name, f"{name}_deg", f"{name}_rad") if row.angles else (name,))
+}  # fmt: skip
+ROTATION_KEYS |= {word: ROTATION_KEYS[name or "quaternion"] for word, name in ROTATION_WORDS.items()}
 
 
 def is_position(key: str, value: Any) -> bool:

@@ -247,11 +247,10 @@ class _Pair:
 
     def only(self) -> Iterator[Difference]:
         """Yield the frames that are only in one tree."""
-        in_a, in_b = frozenset(self.a.tree.frames), frozenset(self.b.tree.frames)
-        for frame in (each for each in self.a.tree.frames if each not in in_b):
-            yield Difference("only-in-a", frame, self.a.parent(frame), None)
-        for frame in (each for each in self.b.tree.frames if each not in in_a):
-            yield Difference("only-in-b", frame, None, self.b.parent(frame))
+        common = frozenset(self.common)
+        for kind, side in (("only-in-a", self.a), ("only-in-b", self.b)):
+            for frame in (each for each in side.tree.frames if each not in common):
+                yield Difference(kind, frame, self.a.parent(frame), self.b.parent(frame))
 
     def about(self, frame: str) -> Iterator[Difference]:
         """Yield the differences of a common frame; `same` if there are none."""
