@@ -57,7 +57,7 @@ def point(a: Transform, cov_a: Covariance, p: Numbers, cov_p: Covariance = None)
     def kernel(*parts: Any) -> Components | None:
         moved, numbers = parts[:end], parts[end : end + 3]
         of_pose = placed.covariance_of(moved)
-        return uncertainty.of_point(placed.pose_of(moved), of_pose, numbers, parts[end + 3 :] or None)
+        return uncertainty.of_three(placed.pose_of(moved), of_pose, numbers, parts[end + 3 :] or None)
 
     return _found(kernel, uncertainty.POINT, (*pose, *at, *own))
 

@@ -67,16 +67,13 @@ def propagate_inverse(pose: Rigid, entries: Entries) -> Components:
     return propagate(upper + [[0.0] * 3 + row for row in rows], entries)
 
 
-def of_point(pose: Rigid, entries: Entries | None, point: Components, of_point: Entries | None) -> Components | None:
-    """Return the 3 x 3 covariance of a transformed point: [I, -[R p]x] A [..]' + R C R'."""
-    jacobian = adjoint(*quaternion.rotate(*pose[3:], *point))[:3]
-    return total(entries and propagate(jacobian, entries), of_point and rotate_covariance(of_point, *pose[3:]))
-
-
-def of_vector(pose: Rigid, entries: Entries | None, vector: Components, of_vector: Entries | None) -> Components | None:
-    """Return the 3 x 3 covariance of a rotated vector: [0, -[R v]x] A [..]' + R C R'."""
-    jacobian = [[0.0] * 3 + row[3:] for row in adjoint(*quaternion.rotate(*pose[3:], *vector))[:3]]
-    return total(entries and propagate(jacobian, entries), of_vector and rotate_covariance(of_vector, *pose[3:]))
+def of_three(
+    pose: Rigid, entries: Entries | None, three: Components, own: Entries | None, *, is_vector: bool = False
+) -> Components | None:
+    """Return the 3 x 3 covariance of a transformed point, [I, -[R p]x] A [..]' + R C R'; of a vector 0 instead of I."""
+    jacobian = adjoint(*quaternion.rotate(*pose[3:], *three))[:3]
+    jacobian = [[0.0] * 3 + row[3:] for row in jacobian] if is_vector else jacobian
+    return total(entries and propagate(jacobian, entries), own and rotate_covariance(own, *pose[3:]))
 
 
 def adjoint(x: Number, y: Number, z: Number) -> Rows:

@@ -84,7 +84,7 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
     turn = _heading(own, axes)
     if turn is not None and inner.rotation is not None:
         raise Misfit("a heading is a rotation; keep one", (next(key for key in HEADINGS if key in own),), key=True)
-    (place, numbers), position = spots[0], _position(spots[0])
+    position = _position(spots[0])
     if AT not in own and inner.position is not None:
         _agree(position, inner.position)
         if not said:  # also stated in ecef: then the rotation is relative to it
@@ -97,7 +97,7 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
         raise Misfit(UNSAID)
     if not needs_axes:
         return inner._replace(position=position, parent=inner.parent or ECEF, read=spots[0])
-    place = place._replace(axes=axes)
+    place, numbers = spots[0].place._replace(axes=axes), spots[0].numbers
     within((next(iter(own)),), place.check, numbers)
     made = placed.compose(place.base(numbers), inner._replace(rotation=rotation, scale=1.0).placed)
     found = inner.of(made, inner.name, inner.parent or ECEF)
@@ -207,17 +207,15 @@ def coordinate(value: Any, field: str) -> float:
 def _utm(value: Any, reading: Reading) -> Spot:
     """Read a position in UTM."""
     if type(value) is not dict:
-        example = "{zone: 32N, easting: .., northing: .., alt: ..}"
-        raise Misfit(f"expected {example}, found {kind(value)}")
+        raise Misfit(f"expected {{zone: 32N, easting: .., northing: .., alt: ..}}, found {kind(value)}")
     _refuse_not_read(value)
-    known = {*POSITIONS[UTM].names, "utm_zone", *GEOID, *SEA_LEVEL, "altitude", "height", "hae", *GRIDDED}
-    if unknown := [key for key in value if key not in known]:
+    named = _by_field(value)
+    known = (*POSITIONS[UTM].names, "msl", "undulation", *GRIDDED)
+    if unknown := [key for field, key in named.items() if field not in known]:
         what = f"unknown key {shown(unknown[0])} of utm; it has zone, easting, northing, alt"
         raise Misfit(what, (unknown[0],), key=True)
-    named = _by_field(value)
-    zone = reading.earth.zone if reading.earth else None
-    if ZONE in named:
-        zone = within((named[ZONE],), _zone, value[named[ZONE]])
+    default = reading.earth.zone if reading.earth else None
+    zone = within((named[ZONE],), _zone, value[named[ZONE]]) if ZONE in named else default
     if zone is None:
         raise Misfit("utm needs its zone: 32N, or 32S south of the equator")
     if missing := [key for key in ("easting", "northing") if key not in value]:

@@ -193,7 +193,6 @@ class Lookups:
         self.tree, self.carried = tree, carried
         self.edges: set[str] = set()  # by their children
         self.widest: Sequence[float] = ()
-        self.width = 0.0
 
     def result(self, target: str, source: str, at_ns: int | None) -> Result:
         """Return the pose of a frame in another, as a result."""
@@ -226,9 +225,8 @@ class Lookups:
         target, source, found = result.pose.parent or "", result.pose.name or "", result.extras["covariance"]
         new = {track.child for track in self.tree.way(target, source, result.extras.get("stamp_ns"))} - self.edges
         self.edges |= new
-        for each in (found, *(self.tree.covariances.get(edge, ()) for edge in new)):
-            if (width := widest_turn(each)) > self.width:
-                self.widest, self.width = each, width
+        edges = (self.tree.covariances.get(edge, ()) for edge in new)
+        self.widest = max((self.widest, found, *edges), key=widest_turn)
         return result
 
     def granted(self) -> str:

@@ -302,9 +302,8 @@ def move(shape: Shape, own: Components, extra: Components, mover: Components, *,
     if len(mover) > EXACT:
         if kind not in (POINT, VECTOR):
             raise ValueInvalid(f"the covariance cannot be carried through to a {kind}; leave --covariance out")
-        carry = uncertainty.of_point if kind == POINT else uncertainty.of_vector
         size = sum(shape.covariance[:1])
-        found = carry(pose, mover[EXACT:], own, extra[:size] or None)
+        found = uncertainty.of_three(pose, mover[EXACT:], own, extra[:size] or None, is_vector=kind == VECTOR)
         return (*moved, *(found or ()), *extra[size:])
     for size in shape.covariance:
         if kind in (TWIST, WRENCH):

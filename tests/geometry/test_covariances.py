@@ -67,7 +67,7 @@ def test_operations_are_those_of_the_golden_numbers(golden: dict[str, Any]) -> N
     p, own = golden["point"], golden["point_covariance_in"]
     assert_near(covariance.point(a, of_a, p), golden["point_covariance"])
     assert_near(covariance.point(a, of_a, p, own), golden["point_covariance_both"])
-    of_vector = uncertainty.of_vector(a.components, of_a, p, None)
+    of_vector = uncertainty.of_three(a.components, of_a, p, None, is_vector=True)
     assert of_vector is not None
     assert_near(of_vector, golden["vector_covariance"])
 
