@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from itertools import zip_longest
+from itertools import pairwise, zip_longest
 from shutil import get_terminal_size
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.json import dump
@@ -27,8 +28,8 @@ OVERVIEW = [name + unit for name, row in ROTATIONS.items() for unit in row.overv
 
 
 WIDTH = 80
-WIDEST_SIGMAS = 62  # characters of six sigmas in one line of an overview
 DECIMALS = 6  # of an overview
+GLUE = "\0"
 ENDLESS = 1e9  # where that many decimals say nothing
 
 
@@ -159,10 +160,7 @@ def _extra_lines(extras: dict[str, Any]) -> Iterator[NumberLine]:
             unit = "deg" if key.endswith("_deg") else units.get(key) or units.get(key.partition("_")[0], "")
             yield NumberLine(key.removesuffix("_deg"), [("", value)], unit)
         elif sigmas := _sigmas(key, value):
-            whole = " ".join(sigmas)
-            yield NumberLine("sigma", [], whole if len(whole) <= WIDEST_SIGMAS else " ".join(sigmas[:3]))
-            if len(whole) > WIDEST_SIGMAS:
-                yield NumberLine("", [], " ".join(sigmas[3:]))
+            yield NumberLine("sigma", [], " ".join(each.replace(" ", GLUE) for each in sigmas))
         elif key not in TIMES and value is not None:
             yield NumberLine(key, [], _said(value))
 
@@ -214,48 +212,37 @@ def _said(value: Any) -> str:
     return printable(dump(value) if isinstance(value, (dict, list)) else "" if value is None else str(value))
 
 
-def _layout(lines: Sequence[NumberLine], style: Style) -> str:
-    """Align names and numbers in columns; where that is too wide each part, or each number, has a line."""
-    label = max(len(line.label) for line in lines)
-    width = get_terminal_size((WIDTH, 0)).columns
-    parts: list[list[NumberLine]] = []
-    for line in lines:
-        if line.label or not parts:
-            parts.append([])
-        parts[-1].append(line)
+def _layout(lines: Sequence[NumberLine], style: Style, label: int = 0) -> str:
+    """Align names and numbers in columns; where that is too wide each part by itself, and what is still too wide wraps.
+
+    label: width of the labels, at least
+    """
+    label, width = max(label, *(len(line.label) for line in lines)), get_terminal_size((WIDTH, 0)).columns
     texts = _columns(lines, label, style)
-    if max(map(len, texts)) <= width:
-        return "".join(texts)
-    found = []
-    for part in parts:
-        texts = _columns(part, label, style)
-        found += texts if max(map(len, texts)) <= width else _columns(_stacked(part), label, style)
-    return "".join(found)
+    begins = [at for at, line in enumerate(lines) if at and line.label]
+    if begins and max(map(len, texts)) > width:
+        parts = pairwise([0, *begins, len(lines)])
+        return "".join(_layout(lines[begin:end], style, label) for begin, end in parts)
+    indent = GLUE * (label + 4)
+    wrapped = (fill(text, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+               if len(text) > width else text for text in texts)  # fmt: skip
+    return "".join(f"{text.replace(GLUE, ' ')}\n" for text in wrapped)
 
 
 def _columns(lines: Sequence[NumberLine], label: int, style: Style) -> list[str]:
-    """Write lines with their names and numbers in columns."""
+    """Write lines with their names and numbers in columns, GLUE for blanks at which they must not be wrapped."""
     numbers = _aligned([[_number(value, style) for _, value in line.cells] for line in lines])
     columns = zip_longest(*(line.cells for line in lines), fillvalue=("", 0.0))
-    names = [max(len(name) for name, _ in column) for column in columns]
+    sizes = [max(len(name) for name, _ in column) for column in columns]
     texts = []
-    for line, texts_of in zip(lines, numbers, strict=True):
+    for line, row in zip(lines, numbers, strict=True):
         named = [
-            f"{name:>{width}} {text}" if width else text
-            for (name, _), text, width in zip(line.cells, texts_of, names, strict=False)
+            f"{name:>{size}} {text}".replace(" ", GLUE) if size else text
+            for (name, _), text, size in zip(line.cells, row, sizes, strict=False)
         ]
-        parts = f"  {line.label:<{label}}", " ".join(named), line.unit
-        texts.append("  ".join(parts).rstrip().replace("  ]", " ]") + "\n")
+        text = f"  {line.label:<{label}}  ".replace(" ", GLUE) + " ".join(named)
+        texts.append(f"{text}  {line.unit}".rstrip(f" {GLUE}").replace("  ]", " ]"))
     return texts
-
-
-def _stacked(lines: Sequence[NumberLine]) -> list[NumberLine]:
-    """Put each number on a line of its own; a line without any has a word to say."""
-    return [
-        NumberLine(line.label * (not at), cells, line.unit)
-        for line in lines
-        for at, cells in enumerate([[cell] for cell in line.cells] or [[]])
-    ]
 
 
 def _number(value: float, style: Style) -> str:

@@ -10,7 +10,7 @@ import math
 import re
 from collections import Counter
 from functools import cached_property
-from itertools import chain, pairwise, product
+from itertools import pairwise, product
 from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -93,7 +93,7 @@ class FrameScene:
     names: every frame, parents before children by the first parents; index: their numbers
     tracks: of the frames that move, by name
     fixed: the frame that everything is drawn in
-    at_ns: the time; None where nothing moves
+    at_ns: the time; None where nothing moves; span_ns: the first and the last stamp
     target, source: the two frames whose transform is asked for, if any
     chosen: the frames that are drawn
     path_only: whether only those between target and source are drawn
@@ -123,20 +123,12 @@ class FrameScene:
         self.names = _in_order(tree)
         self.index = {name: number for number, name in enumerate(self.names)}
         self.target, self.source, self.path_only = target, source, path_only
-        if self.tracks and at_ns is None:
-            at_ns = max(track.first_ns for track in self.tracks.values())
-        self.at_ns = at_ns if self.tracks else None
+        first = [track.first_ns for track in self.tracks.values()]
+        self.span_ns = min(first, default=0), max((track.last_ns for track in self.tracks.values()), default=0)
+        self.at_ns = (max(first) if at_ns is None else at_ns) if first else None
         roots = Counter(Snapshot(tree).roots.values())
         self.fixed = fixed or target or below or max(roots, key=roots.__getitem__)
         self.chosen = self._choice(below, only)
-
-    @property
-    def span_ns(self) -> tuple[int, int]:
-        """Return the first and the last stamp."""
-        return (
-            min((track.first_ns for track in self.tracks.values()), default=0),
-            max((track.last_ns for track in self.tracks.values()), default=0),
-        )
 
     def _choice(self, below: str | None, only: str | None) -> set[str]:
         """Return the names to draw."""
@@ -340,10 +332,9 @@ class Projection:
             return [(x, y, z) for x, y, z in places if math.dist((x, y, z), middle) <= reach]
         return [*self._points()]
 
-    def outside(self) -> list[str]:
-        """Return the frames beyond the edges of the picture."""
-        return [name for name, (x, y, _) in self.origins.items()
-                if not (0.0 <= x < self.size.width and 0.0 <= y < self.size.height)]  # fmt: skip
+    def holds(self, place: Flat) -> bool:
+        """Return True if a point is inside the picture."""
+        return 0.0 <= place.x < self.size.width and 0.0 <= place.y < self.size.height
 
     def turned(self, point: Sequence[float]) -> Point:
         """Return a point's metres to the right, up, and toward the eye."""
@@ -371,14 +362,6 @@ class Projection:
     def axes(self, name: str) -> list[tuple[int, Flat]]:
         """Return the axes 0, 1, 2 of a frame with their tips, from the farthest to the nearest."""
         return sorted(enumerate(self.tips(self.poses[name])), key=lambda each: each[1].depth)
-
-    def groups(self, near: float) -> list[tuple[Flat, list[str]]]:
-        """Group the frames within some pixels of each other, nearest first."""
-        spots: dict[tuple[int, int], tuple[Flat, list[str]]] = {}
-        for name in reversed(self.nearest_last()):
-            place = self.origins[name]
-            spots.setdefault((round(place.x / near), round(place.y / near)), (place, []))[1].append(name)
-        return list(spots.values())
 
     def crowded(self) -> int:
         """Return the number of frames in one small spot if that is most of them, else 0."""
@@ -450,19 +433,21 @@ class Labels:
 
     def place_all(self) -> None:
         """Place a name next to each group of frames on one point inside the picture, nearest first."""
-        outside = {*self._flat.outside()}
-        for point, everybody in self._flat.groups(SAME):
-            names = [name for name in everybody if name not in outside]
-            if names and not self.place(self._around(words_of(names), point)):
+        spots: dict[tuple[int, int], tuple[Flat, list[str]]] = {}
+        for name in reversed(self._flat.nearest_last()):
+            point = self._flat.origins[name]
+            if self._flat.holds(point):
+                spots.setdefault((round(point.x / SAME), round(point.y / SAME)), (point, []))[1].append(name)
+        for point, names in spots.values():
+            if not self.place(self._around(words_of(names), point)):
                 self.hidden += len(names)
 
     def place(self, spots: Iterable[Label]) -> bool:
         """Place a name at the first free spot, or else at the first that covers axes only; return False for none."""
-        free = (spot for spot in spots if self._taken.isdisjoint(self._cells(spot.box)))
-        first = next(free, None)
-        if first is None:
+        free = [spot for spot in spots if self._taken.isdisjoint(self._cells(spot.box))]
+        if not free:
             return False
-        found = next((spot for spot in chain([first], free) if self._axes.isdisjoint(self._cells(spot.box))), first)
+        found = next((spot for spot in free if self._axes.isdisjoint(self._cells(spot.box))), free[0])
         self._taken.update(self._cells(found.box))
         self.placed.append(found)
         return True

@@ -154,16 +154,14 @@ class Canvas:
     def __init__(self, lines: int, columns: int) -> None:
         """Create an empty one."""
         self.lines, self.columns = lines, columns
-        self.cells: dict[Spot, tuple[int, str, int]] = {}  # dots, colour and rank
+        self.cells: dict[Spot, tuple[int, str]] = {}  # dots and colour
 
-    def mark(self, across: int, down: int, colour: str, rank: int = 0) -> None:
-        """Set a dot by column and row; the highest rank in a cell gives its colour."""
-        if not (0 <= across < 2 * self.columns and 0 <= down < 4 * self.lines):
-            return
-        cell = down // 4, across // 2
-        bits, before, before_rank = self.cells.get(cell, (0, colour, rank))
-        shown = (colour, rank) if rank >= before_rank else (before, before_rank)
-        self.cells[cell] = bits | DOTS[down % 4][across % 2], *shown
+    def mark(self, across: int, down: int, colour: str) -> None:
+        """Set a dot by column and row; the last one in a cell gives its colour."""
+        if 0 <= across < 2 * self.columns and 0 <= down < 4 * self.lines:
+            cell = down // 4, across // 2
+            dots, _ = self.cells.get(cell, (0, ""))
+            self.cells[cell] = dots | DOTS[down % 4][across % 2], colour
 
     def runs(self, line: int, over: Mapping[Spot, Run]) -> list[Run]:
         """Return a line as runs of one colour; over: letters that replace cells."""
@@ -171,11 +169,10 @@ class Canvas:
         return [("".join(map(itemgetter(0), run)), colour) for colour, run in groupby(drawn, key=itemgetter(1))]
 
     def _character(self, cell: Spot) -> Run:
-        bits, colour, _ = self.cells.get(cell, (0, "", 0))
-        return chr(BRAILLE + bits) if bits else " ", colour
+        dots, colour = self.cells.get(cell, (0, ""))
+        return chr(BRAILLE + dots) if dots else " ", colour
 
 
-LINK, TRAIL, AXIS = range(3)  # ranks of dots
 COLOURS = ("red", "green", "blue")  # of axes
 ARROWS = "→↗↑↖←↙↓↘"
 LEAST_LINES, LEAST_COLUMNS = 4, 20
@@ -190,7 +187,8 @@ def terminal_lines(scene: FrameScene, columns: int, lines: int, eye: tuple[float
     size = Size(wide, high, margin, (6.0, 14.0), cell=(2, 4), line=4.0, measure=lambda words: 2.0 * cells(words))
     flat = Projection(scene, size, eye, most=True)
     _draw(canvas, flat)
-    labels, outside = Labels(flat), flat.outside()
+    labels = Labels(flat)
+    outside = [name for name, point in flat.origins.items() if not flat.holds(point)]
     pointed = sum(labels.place(_at_edge(labels, flat, name)) for name in outside[:MOST_OUTSIDE])
     arrows = len(labels.placed)
     labels.place_all()
@@ -225,28 +223,28 @@ def print_terminal(scene: FrameScene, eye: tuple[float, float] = SLANTED, color:
 def _draw(canvas: Canvas, flat: Projection) -> None:
     """Draw the links, the trails and the axes."""
     for parent, name in flat.links:
-        _mark_line(canvas, flat.origins[parent], flat.origins[name], "bright_black", LINK, 3)
+        _mark_line(canvas, flat, flat.origins[parent], flat.origins[name], "bright_black", 3)
     for stretch in (stretch for stretches in flat.trails.values() for stretch in stretches):
         for begin, end in pairwise(map(flat.at, stretch)):
-            _mark_line(canvas, begin, end, "magenta", TRAIL, 2)
+            _mark_line(canvas, flat, begin, end, "magenta", 2)
     for name in flat.nearest_last():
         for axis, tip in flat.axes(name):
-            _mark_line(canvas, flat.origins[name], tip, COLOURS[axis], AXIS)
+            _mark_line(canvas, flat, flat.origins[name], tip, COLOURS[axis])
 
 
-def _mark_line(canvas: Canvas, begin: Flat, end: Flat, colour: str, rank: int, gap: int = 1) -> None:
+def _mark_line(canvas: Canvas, flat: Projection, begin: Flat, end: Flat, colour: str, gap: int = 1) -> None:
     """Set every dot, or every second, third, .. of a line; a line that leaves the picture is cut."""
-    wide, high = 2.0 * canvas.columns, 4.0 * canvas.lines
-    if not (0.0 <= begin.x < wide and 0.0 <= begin.y < high):
+    if not flat.holds(begin):
         begin, end = end, begin
-    if not (0.0 <= begin.x < wide and 0.0 <= begin.y < high):
+    if not flat.holds(begin):
         return
     far = max(abs(end.x - begin.x), abs(end.y - begin.y))
-    count = max(1, math.ceil(min(far, 2.0 * wide + high)))  # the rest is outside
-    part = min(1.0, (2.0 * wide + high) / max(far, 1.0)) / count
+    most = 2.0 * flat.size.width + flat.size.height  # the rest is outside
+    count = max(1, math.ceil(min(far, most)))
+    part = min(1.0, most / max(far, 1.0)) / count
     for number in range(0, count + 1, gap):
         across, down = (a + (b - a) * part * number for a, b in zip(begin[:2], end[:2], strict=True))
-        canvas.mark(math.floor(across), math.floor(down), colour, rank)
+        canvas.mark(math.floor(across), math.floor(down), colour)
 
 
 def _at_edge(labels: Labels, flat: Projection, name: str) -> Iterator[Label]:

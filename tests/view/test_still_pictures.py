@@ -185,12 +185,12 @@ def test_a_wide_letter_takes_two_cells() -> None:
     assert "界界" in line
 
 
-def test_the_dot_of_the_highest_rank_colours_a_cell() -> None:
+def test_the_last_dot_colours_a_cell() -> None:
     canvas = Canvas(1, 3)
-    canvas.mark(0, 0, "red", 2)
-    canvas.mark(1, 0, "grey", 0)
-    canvas.mark(6, 0, "out", 0)
-    canvas.mark(-1, 0, "out", 0)
+    canvas.mark(0, 0, "grey")
+    canvas.mark(1, 0, "red")
+    canvas.mark(6, 0, "out")
+    canvas.mark(-1, 0, "out")
     assert canvas.runs(0, {}) == [("⠉", "red"), ("  ", "")]
 
 
