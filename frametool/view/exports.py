@@ -162,8 +162,7 @@ def write_page(
     head, blob = _data(scene)
     head |= {"title": title, "file": file or title, "made": f"frametool {__version__}"}
     head["show"] = _shown(scene, eye)
-    joints = joint_sliders(scene) if sliders else {}
-    if joints.get("joints"):
+    if sliders and (joints := joint_sliders(scene))["joints"]:
         head |= joints
     if solids:
         head |= _drawn_solids(scene, solids)

@@ -5,18 +5,16 @@ from __future__ import annotations
 import os
 import sys
 import time
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from typing import Self
-
     from rich.console import Console
 
 PATIENCE = 2.0  # seconds before anything is shown
 
 
-class ProgressBar:
+class ProgressBar(AbstractContextManager["ProgressBar"]):
     """Show the progress of a job, if stderr is a terminal and it takes longer than two seconds."""
 
     def __init__(self, total: int | None, *, quiet: bool, counted: str = "rows") -> None:
@@ -26,10 +24,6 @@ class ProgressBar:
         self._hidden = quiet or sys.stderr is None or not sys.stderr.isatty()
         self._start = time.monotonic()
         self._bar: Any = None
-
-    def __enter__(self) -> Self:
-        """Wait for the first block."""
-        return self
 
     def __exit__(self, *_: object) -> None:
         """Clear the line."""
@@ -44,11 +38,11 @@ class ProgressBar:
         seconds = time.monotonic() - self._start
         if self._hidden or seconds < PATIENCE:
             return
-        if self._bar is None:
-            self._bar = _bar(self.total, self._counted)
-            self._bar.start()
-            self._task = self._bar.add_task("", total=self.total, rows="0", rate="")
         with suppress(OSError):
+            if self._bar is None:
+                self._bar = _bar(self.total, self._counted)
+                self._bar.start()
+                self._task = self._bar.add_task("", total=self.total, rows="0", rate="")
             self._bar.update(self._task, completed=self.size, rows=f"{self.rows:,}", rate=f"{self.rows / seconds:,.0f}")
 
 

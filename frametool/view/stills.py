@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from frametool.geometry.types import Rigid
-    from frametool.view.pictures import Shape
+    from frametool.view.pictures import Point, Shape
     from frametool.view.scene import Flat, Label
 
     Run = tuple[str, str]  # text and its style
@@ -71,15 +71,12 @@ def _frame(flat: Projection, name: str) -> Iterator[Shape]:
     yield dot(x, y, 2.2, "ink", name)
 
 
-def _trail(frame: str, stretches: Sequence[Sequence[tuple[float, float]]]) -> Iterator[Shape]:
-    """Draw the trail of a frame, coloured by time."""
-    steps = max(sum(len(stretch) - 1 for stretch in stretches), 1)
-    size, done = -(-steps // PIECES), 0
-    for stretch in stretches:
-        for begin in range(0, max(len(stretch) - 1, 1), size):
-            shade = shade_of(LAST_SHADE * (done + begin) / steps)
-            yield line(stretch[begin : begin + size + 1], shade, 1.5, 0.8, title=frame)
-        done += len(stretch) - 1
+def _trail(frame: str, stretches: Sequence[Sequence[Point]]) -> Iterator[Shape]:
+    """Draw the trail of a frame in pieces, coloured by time."""
+    size = -(-sum(map(len, stretches)) // PIECES)
+    pieces = [each[at : at + size + 1] for each in stretches for at in range(0, max(len(each) - 1, 1), size)]
+    for number, piece in enumerate(pieces):
+        yield line(piece, shade_of(LAST_SHADE * number / len(pieces)), 1.5, 0.8, title=frame)
 
 
 def _other(flat: Projection, name: str, pose: Rigid) -> Iterator[Shape]:

@@ -16,7 +16,7 @@ from frametool.view.progress import coloured_console
 from frametool.view.stills import ARROWS, Canvas
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
     from typing import Self
 
     from rich.console import Console
@@ -215,21 +215,15 @@ class Screen:
         return Panel(text, title=f"{self._tick.t_ns / BILLION:.1f} s", width=self._canvas.columns + 4)
 
 
-class RunPage:
-    """Collect all transforms of a run for a page."""
+def run_page() -> tuple[Callable[[SimulationStep], None], Callable[[], str]]:
+    """Return what collects the transforms of a run step by step, and what then makes a page of them, seen from above."""
+    from frametool.view.exports import write_page
+    from frametool.view.scene import EYES, FrameScene
 
-    def __init__(self) -> None:
-        """Create an empty page."""
-        self.buffer = TransformBuffer(name="run")
+    buffer = TransformBuffer(name="run")
 
-    def watch(self, step: SimulationStep) -> None:
-        """Add the transforms of a step."""
+    def watch(step: SimulationStep) -> None:
         for stamp_ns, parent, child, transform in step.broadcasts:
-            self.buffer.insert(parent, child, transform, stamp_ns)
+            buffer.insert(parent, child, transform, stamp_ns)
 
-    def content(self) -> str:
-        """Return the page, seen from above."""
-        from frametool.view.exports import write_page
-        from frametool.view.scene import EYES, FrameScene
-
-        return write_page(FrameScene(self.buffer), title="turtles", file="tf.yaml", eye=EYES["top"])
+    return watch, lambda: write_page(FrameScene(buffer), title="turtles", file="tf.yaml", eye=EYES["top"])

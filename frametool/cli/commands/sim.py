@@ -145,10 +145,9 @@ class SimOutput:
             run, suffix = Drawing(scene), suffix_of(self.plot)
             pictures[self.plot] = run.watch, lambda: write_picture(run_picture(run), suffix)
         if self.view:
-            from frametool.view.turtles import RunPage
+            from frametool.view.turtles import run_page
 
-            page = RunPage()
-            pictures[self.view] = page.watch, page.content
+            pictures[self.view] = run_page()
         return pictures
 
     def _watchers(self, scene: Scene, stack: ExitStack) -> Iterator[Watch]:
