@@ -216,7 +216,7 @@ class Screen:
 
 
 def run_page() -> tuple[Callable[[SimulationStep], None], Callable[[], str]]:
-    """Return what collects the transforms of a run step by step, and what then makes a page of them, seen from above."""
+    """Return what collects the transforms of a run by steps, and what then makes a page of them, seen from above."""
     from frametool.view.exports import write_page
     from frametool.view.scene import EYES, FrameScene
 
