@@ -9,7 +9,7 @@ import os
 import re
 import sys
 from importlib import import_module
-from itertools import chain, islice
+from itertools import islice
 from os.path import splitext
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,7 @@ from click import UsageError
 from frametool.cli.command import refuse
 from frametool.cli.options import FULL
 from frametool.cli.sink import filling, in_colour, is_special, say, writing
-from frametool.errors import FrametoolError, ValueInvalid, first_of, listing, printable, shown, warn
+from frametool.errors import ValueInvalid, first_of, listing, printable, shown, warn
 from frametool.formats import table
 from frametool.formats.table import FORMATS, by_name, is_folder, writers
 from frametool.geometry.representations import EARTH_FRAMES, Notation, notation
@@ -30,10 +30,11 @@ if TYPE_CHECKING:
 
     from frametool.cli.command import Inputs
     from frametool.cli.sink import Write
+    from frametool.errors import FrametoolError
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.lookups import Frames, FrameTree
     from frametool.grammar.pose import Pose
-    from frametool.stream.record_results import BlockResults
+    from frametool.stream.record_results import BlockResults, ResultWriter
     from frametool.stream.record_values import Value
     from frametool.stream.request import Operation
     from frametool.stream.row_poses import RowPoses
@@ -95,7 +96,7 @@ class Output:
     """Where results go and how they look: what the options of a command say."""
 
     marks: tuple[str, ...] = (ZEROS,)  # patterns of what has a style in text on a terminal
-    _fault: FrametoolError | None = None  # ends a stream behind its good rows
+    fault: FrametoolError | None = None  # ends a stream behind its good rows
 
     def __init__(self, inputs: Inputs, *what: str, otherwise: str | None = None) -> None:
         """Choose the format: as chosen, else by the file's suffix, else text for a terminal and YAML for a pipe.
@@ -119,11 +120,11 @@ class Output:
         self.notations: tuple[Notation, ...] = notations
         self._format_is_default = not (self.chosen or otherwise)
         fmt = self.chosen or otherwise or ("text" if self.path is None and sys.stdout.isatty() else "yaml")
-        self._holds_arrays = table.holds_arrays(fmt)
+        self.holds_arrays = table.holds_arrays(fmt)
         self.is_trajectory = table.is_trajectory(fmt)  # of the poses of one frame over time
-        self._in_blocks = self.is_trajectory or self._holds_arrays or table.is_recording(fmt)
+        self._in_blocks = self.is_trajectory or self.holds_arrays or table.is_recording(fmt)
         self.holds_all = self._in_blocks or fmt == "csv"  # rows, of which there may be many
-        if self._holds_arrays and self.path is None and sys.stdout.isatty():
+        if self.holds_arrays and self.path is None and sys.stdout.isatty():
             raise ValueInvalid(f"{fmt} is no text for a terminal; give -o FILE, or pipe it")
         usual = () if fmt in ("text", "dot", "mermaid") else QUATERNION  # drawings choose their own
         digits = inputs.peek("precision")
@@ -220,25 +221,13 @@ class Output:
             yield write_poses([begin[0], *batch], self.style)[known:]
             size = min(2 * size, BATCH)
 
-    def _blocks(self, batches: Iterator[list[Value] | RowPoses]) -> Iterator[bytes]:
+    def _blocks(self, batches: Iterator[list[Value]]) -> Iterator[bytes]:
         """Yield a trajectory, columns of numbers or a recording, block after block of things of one kind."""
-        from frametool.stream.as_poses import writer_for
-
-        first = next(batches, [])
-        turns = [each for each in first if isinstance(each, Result) and each.pose.position is None]
-        placed = not (self._holds_arrays and len(turns) == len(first))
-        known, block = self._block(first, placed=placed)
-        writer = writer_for(self.style, known, placed=placed)
-        if len(block.numbers):
-            yield writer.of_block(block)
-        for batch in batches:
-            kind, block = self._block(batch, placed=placed)
-            if kind != known:
-                raise ValueInvalid(f"{self.style.format} holds things of one kind, found {known} and {kind}")
-            yield writer.of_block(block)
+        writer = Blocks(self)
+        yield from map(writer.of, batches)
         yield from writer.end()
 
-    def _block(self, batch: list[Value] | RowPoses, *, placed: bool) -> tuple[str, RowPoses]:
+    def block(self, batch: list[Value] | RowPoses, *, placed: bool) -> tuple[str, RowPoses]:
         """Return some results as a block, and what they are: poses, or points, vectors, .."""
         from frametool.stream.row_layout import POSE
         from frametool.stream.row_poses import block_of, block_of_points
@@ -255,32 +244,14 @@ class Output:
             raise ValueInvalid(f"{self.style.format} holds things of one kind, found poses among others")
         return block_of_points([each for each in found if not isinstance(each, Result)])
 
-    def rows(self, blocks: Iterator[BlockResults]) -> None:
-        """Write the results of a stream of records as they come, up to a bad one that ends the stream."""
-        good = self._before_a_fault(blocks)
+    def writer(self) -> ResultWriter:
+        """Return what writes the results of a stream of records."""
+        from frametool.stream.record_results import Collected, CsvTable, Documents
+
         if self.style.format in ("csv", "json", "yaml"):
-            from frametool.stream.record_results import CsvTable, documents
-
-            is_table = self.style.format == "csv"
-            self.pieces(CsvTable(self.style).pieces(good) if is_table else documents(good, self.style))
-            return
-        in_blocks = self._in_blocks
-        values: Iterator[Any] = chain.from_iterable(_in_blocks(each) if in_blocks else each.in_order() for each in good)
-        first = list(islice(values, 1))
-        if self._fault is not None and not first:
-            raise self._fault
-        if in_blocks:
-            self._refuse_place()
-            self.pieces(self._blocks(chain(first, values)))
-        else:
-            self.values(chain(first, values))
-
-    def _before_a_fault(self, blocks: Iterator[BlockResults]) -> Iterator[BlockResults]:
-        """Yield blocks up to an error, which is raised when they are written."""
-        try:
-            yield from blocks
-        except FrametoolError as error:
-            self._fault = error
+            return CsvTable(self.style) if self.style.format == "csv" else Documents(self.style)
+        self._refuse_place()
+        return Blocks(self) if self._in_blocks else Collected()
 
     def tree(self, tree: FrameTree | TransformBuffer, color: str = "auto") -> None:
         """Write a tree; on a terminal in colour, or as `color` says; in a format made of poses with every sample."""
@@ -356,8 +327,8 @@ class Output:
                 for_people = is_plain and isinstance(piece, str)
                 text = "\n".join(map(printable, str(piece).split("\n"))) if for_people else piece
                 write(in_colour(str(text), self.marks) if for_people and self.style.screen else text)
-            if self._fault is not None:
-                raise self._fault
+            if self.fault is not None:
+                raise self.fault
         if self.path:
             self.report_suffix()
 
@@ -396,10 +367,41 @@ def _batched(values: Iterator[Value]) -> Iterator[list[Value]]:
     return iter(lambda: list(islice(values, BLOCK)), [])
 
 
-def _in_blocks(rows: BlockResults) -> Iterator[list[Value] | RowPoses]:
-    """Yield the results of a block of records as one block of poses, or as values, many together."""
-    posed = rows.posed()
-    return _batched(rows.in_order()) if posed is None else iter([posed])
+class Blocks:
+    """Write a trajectory, columns of numbers or a recording: of things of one kind, those of the first block."""
+
+    def __init__(self, output: Output) -> None:
+        """Begin without any."""
+        self.output = output
+        self.kind, self.placed = "", True
+        self.writer: Any = None
+
+    def of(self, batch: list[Value] | RowPoses) -> bytes:
+        """Return the text of some results."""
+        from frametool.stream.as_poses import writer_for
+
+        output = self.output
+        if self.writer is None:
+            turns = [each for each in batch if isinstance(each, Result) and each.pose.position is None]
+            self.placed = not (output.holds_arrays and len(turns) == len(batch))
+        kind, block = output.block(batch, placed=self.placed)
+        if self.writer is None:
+            self.kind, self.writer = kind, writer_for(output.style, kind, placed=self.placed)
+        elif kind != self.kind:
+            raise ValueInvalid(f"{output.style.format} holds things of one kind, found {self.kind} and {kind}")
+        text: bytes = self.writer.of_block(block) if len(block.numbers) else b""
+        return text
+
+    def of_block(self, block: BlockResults) -> bytes:
+        """Return the text of a block of records: of one block of poses, or of values, many together."""
+        posed = block.posed()
+        return b"".join(map(self.of, _batched(block.in_order()) if posed is None else [posed]))
+
+    def end(self) -> Iterator[bytes]:
+        """Yield what comes behind the last."""
+        if self.writer is None:
+            self.of([])
+        yield from self.writer.end()
 
 
 def _only_mover(tree: FrameTree | TransformBuffer, fmt: str) -> str:

@@ -19,13 +19,13 @@ from frametool.cli.output import Output
 from frametool.cli.poses import inline_misuse, is_pasted, pasted_stream, pose_source, values_of, without_inverse
 from frametool.cli.sink import say, say_error
 from frametool.documents.source import HEAD, Source, has_line, has_record, opened
-from frametool.errors import FormatError, heard_by, warn
+from frametool.errors import FormatError, FrametoolError, heard_by, warn
 from frametool.formats import table
 from frametool.formats.table import BAG, FORMATS, has_no_text, holds_arrays, is_trajectory, readers
 from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRow, BadRows
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterable, Iterator, Sequence
+    from collections.abc import Generator, Iterator, Sequence
 
     from frametool.cli.command import Adds
     from frametool.documents.source import InputFile
@@ -235,25 +235,33 @@ class Stream:
 
     def _run_blocks(self, stream: BufferedReader, fmt: str, request: Request) -> int:
         """Write what becomes of each block as it comes, unless somebody gathers it; return the exit status."""
-        from frametool.stream.faults import run
-        from frametool.view.progress import ProgressBar
-
         output, gathered = self.output, request.gathered
         outcomes, written, tally = self._outcomes(stream, fmt, request)
         bad = self.policy(self.name, "row" if holds_arrays(fmt) else "line")
         outcomes = outcomes if gathered is None else gathered.placing(outcomes, bad.place)
-        with (
-            output.opened() if gathered is None else nullcontext(lambda _: None) as write,
-            ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.inputs.quiet) as progress,
-            self.opened(),  # closed before a file takes its place, which Windows asks for
-            closing(outcomes),
-        ):
-            status = run(outcomes, write, bad, progress.advance)
-        if output.path and gathered is None:
+        status = self._write(outcomes, bad, gathers=gathered is not None)
+        if gathered is None:
             output.report_suffix(written)
         if tally is not None and tally.assumed:
             self.inputs.note(f"{self.name}: {tally.assumed}")
         return status
+
+    def _write(self, outcomes: Generator[Outcome], bad: BadRows, *, gathers: bool = False) -> int:
+        """Write what becomes of each block as it comes, or nothing of it, and report its bad rows."""
+        from frametool.stream.faults import run
+
+        progress = None
+        if not self.inputs.quiet and sys.stderr is not None and sys.stderr.isatty():
+            from frametool.view.progress import ProgressBar
+
+            progress = ProgressBar(os.path.getsize(self.path) if self.path else None)
+        with (
+            nullcontext(lambda _: None) if gathers else self.output.opened() as write,
+            progress or nullcontext(),
+            self.opened(),  # closed before a file takes its place, which Windows asks for
+            closing(outcomes),
+        ):
+            return run(outcomes, write, bad, None if progress is None else progress.advance)
 
     def detected(self, begin: bytes, *, is_table: bool = False) -> str:
         """Find the format of the stream by what it begins with, and by its name."""
@@ -340,16 +348,29 @@ class Stream:
 
     def _run_as_values(self, stream: Any, fmt: str, request: Request) -> int:
         """Write the results of records in another format than theirs."""
-        from frametool.stream.record_results import stream_rows
+        from frametool.stream.record_results import Collected, written_by
+        from frametool.stream.record_stream import run_records
 
         chosen, output = self.output.chosen or "", self.output
         if self.inputs.on_error == NULL and chosen not in ("csv", *RECORDS):
             raise click.UsageError(f"--on-error null: {chosen} cannot hold a row without a result; give skip")
-        bad = self.policy(self.name)
         request = request._replace(by_default=has_no_text(chosen) and not output.notations)
         if table.is_recording(chosen):
             request = request._replace(place=None)  # a fix is made of ecef, unless of what was read
-        output.rows(_then_closed(self.opened(), stream_rows(stream, fmt, request, output.style, bad)))
+        bad, writer = self.policy(self.name), output.writer()
+        outcomes = run_records(stream, fmt, request, source=self.name, style=output.style)
+        outcomes = written_by(writer, outcomes, bad.on_error)
+        if not isinstance(writer, Collected):
+            status = self._write(outcomes, bad)
+            output.report_suffix()
+            return status
+        try:
+            self._write(outcomes, bad, gathers=True)
+        except FrametoolError as error:
+            output.fault = error
+            if not writer.values:
+                raise
+        output.values(writer.values)
         return ROWS_SKIPPED if bad.count else 0
 
     def policy(self, name: str, counted: str = "line") -> BadRows:
@@ -396,10 +417,6 @@ def open_columns(file: InputFile, fmt: str) -> Any:
     return import_module(FORMATS[fmt].reader).open_columns(file)
 
 
-def _then_closed(stream: Any, results: Iterable[Any]) -> Iterator[Any]:
-    """Yield the results of a stream, and close it behind them."""
-    with stream:
-        yield from results
 
 
 def _signed(begin: bytes, name: str) -> str:

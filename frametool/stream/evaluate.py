@@ -474,6 +474,11 @@ class Run:
             values = number_spans(shown, self.request.precision, after, yaml=plan.yaml, null=plan.null)
         return assemble(plan.pieces, self._parts(self.rows), values, self.locked[self.rows], results)
 
+    def parts_of(self, row: int) -> list[tuple[float, ...]]:
+        """Return the components of what became of each point or pose of a row."""
+        columns = ([np.broadcast_to(part, self.count) for part in parts] for parts in self.moved)
+        return [tuple(float(column[row]) for column in each) for each in columns]
+
     def faults(self) -> list[Fault]:
         """Return what is wrong, line by line."""
         found = [fault for _, fault in self.block.broken]

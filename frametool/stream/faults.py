@@ -9,6 +9,8 @@ from frametool.errors import FormatError, FrametoolError, UnknownFrame, shown, w
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
+    from frametool.stream.record_results import BlockResults
+
 STOP, SKIP, NULL = "stop", "skip", "null"
 ON_ERROR = (STOP, SKIP, NULL)
 MOST = 20
@@ -175,6 +177,7 @@ class Outcome(NamedTuple):
     notes: what is worth telling
     kept: how many rows are in the text
     is_open: whether an array goes on behind the block; None for what is no array
+    results: of records what is yet to be written
     """
 
     text: bytes | memoryview
@@ -186,13 +189,14 @@ class Outcome(NamedTuple):
     size: int = 0
     kept: int = 0
     is_open: bool | None = None
+    results: BlockResults | None = None
 
 
 def run(
     outcomes: Iterable[Outcome],
     write: Callable[[bytes | memoryview], None],
     bad: BadRows,
-    advance: Callable[[int, int], None],
+    advance: Callable[[int, int], None] | None = None,
 ) -> int:
     """Write what becomes of each block, report its faults, and return the exit status.
 
@@ -204,8 +208,9 @@ def run(
     for outcome in outcomes:
         if outcome.text:
             write(outcome.text)
-        advance(outcome.rows, outcome.size)
-        faults = [fault._replace(line=fault.line + line) for fault in outcome.faults]
+        if advance is not None:
+            advance(outcome.rows, outcome.size)
+        faults: Sequence[Fault] = outcome.faults and [each._replace(line=each.line + line) for each in outcome.faults]
         for note in outcome.notes:  # in the order of the lines
             if note.about == ZONES:
                 before, zone = zone or note.sentence, note.sentence
@@ -221,11 +226,6 @@ def run(
             warn(f"{bad.place(line + note.line, note.column)}: {note.sentence}")
         bad.take(faults)
         line, rows, mended = line + outcome.lines, rows + outcome.rows, mended + outcome.mended
-    tell_of_rounding(bad.source, mended, rows)
+    if mended > 1:  # the first was reported
+        warn(f"{bad.source}: {mended} of {rows} rotations were off by more than 1e-6 and were normalised")
     return bad.finish(rows)
-
-
-def tell_of_rounding(source: str, count: int, rows: int) -> None:
-    """Warn at the end of a stream how many rotations were normalised; the first was reported."""
-    if count > 1:
-        warn(f"{source}: {count} of {rows} rotations were off by more than 1e-6 and were normalised")

@@ -142,26 +142,10 @@ class RecordCutter:
 
     def singly(self, text: bytes, start: int, end: int) -> Iterator[tuple[Part, tuple[Template, Places] | None]]:
         """Yield the records of what is left one by one, each with the template that finds it alone, if one does."""
-        chunk = text[start:end]
-        matches: dict[int, tuple[Template, Places]] = {}
-
-        def match(at: int) -> int | None:
-            """Match the template used last, which most records follow."""
-            hit = self.templates[-1].pattern.match(chunk, at) if self.templates and clean else None
-            if hit is None or not self.templates[-1].fits_in(chunk, hit.regs[1:]):
-                return None
-            matches[at] = self.templates[-1], hit.regs[1:]
-            return hit.end()
-
-        clean = is_text(chunk)
-        parts, self.closed = self.splitter.parts(chunk, match)
-        for own in parts:
-            begin, first, last, after = (place + start for place in own[:4])
-            part = Part(begin, first, last, after, own.problem, own.final)
-            if not part.problem and (hit := matches.get(own.start)) is not None:
-                yield part, (hit[0], [(a + start, b + start) for a, b in hit[1]])
-            else:
-                yield part, None if part.problem else self.match(text, first, last)
+        parts, self.closed = self.splitter.parts(text[start:end])
+        for begin, first, last, after, problem, final in parts:
+            part = Part(begin + start, first + start, last + start, after + start, problem, final)
+            yield part, None if part.problem else self.match(text, part.start, part.end)
 
     def learned(self, known: RecordText | Fault, text: bytes, part: Part) -> tuple[Template, Places] | None:
         """Learn from a record; return the template, and where its stretches are in it."""

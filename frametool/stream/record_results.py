@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from itertools import chain, count
+from itertools import chain
 from operator import itemgetter
 from tempfile import SpooledTemporaryFile
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from frametool import sizes
 from frametool.documents.document import parse_nodes
@@ -15,22 +15,18 @@ from frametool.formats.rows.csv import cells_of, row
 from frametool.formats.trees.written_poses import write_poses
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import NoResult
-from frametool.stream.faults import NULL, STOP, Fault, tell_of_rounding
-from frametool.stream.record_text import RecordText, attempt, fault_at, nulled
-from frametool.stream.record_values import ROUNDED, Teller, plain, values_of_text
-from frametool.stream.splitter import ARRAY, NO_END, Splitter
-from frametool.text.lines import read_blocks
+from frametool.stream.faults import STOP, Outcome
+from frametool.stream.record_text import nulled
+from frametool.stream.record_values import plain
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Generator, Iterable, Iterator, Sequence
 
     from frametool.grammar.result import Style
-    from frametool.stream.faults import BadRows
-    from frametool.stream.record_rows import RecordBatch, RecordRows
+    from frametool.stream.record_rows import RecordBatch
     from frametool.stream.record_values import Value
-    from frametool.stream.request import Request
     from frametool.stream.row_poses import RowPoses
-    from frametool.text.lines import ByteStream
+    from frametool.text.spans import Ints, Spans
 
 
 class BlockResults(NamedTuple):
@@ -51,64 +47,14 @@ class BlockResults(NamedTuple):
         """Yield all results as values, in the order of their records."""
         found = self.values
         if self.batches:
-            from frametool.stream.record_rows import values_of
+            from frametool.stream.record_rows import rows_as_values
 
-            rows = (zip(batch.places.tolist(), values_of(batch), strict=True) for batch in self.batches)
+            rows = (zip(batch.places.tolist(), rows_as_values(batch), strict=True) for batch in self.batches)
             found = sorted(chain(found, *rows), key=itemgetter(0))
         yield from map(itemgetter(1), found)
 
 
-def stream_rows(stream: ByteStream, fmt: str, request: Request, style: Style, bad: BadRows) -> Iterator[BlockResults]:
-    """Yield the results of a stream of records, block by block; bad ones are reported as rows are."""
-    splitter = Splitter(fmt)
-    operation, request = request.operation, request._replace(canonical=True)
-    singly = operation.shown is not None or (request.place is not None and not operation.looks_back)
-    alike: RecordRows | None = None
-    line, rows = 1, 0
-    teller = Teller(most=1)
-    for block in read_blocks(stream, whole=splitter.whole):
-        at = 0
-        batches: Sequence[RecordBatch] = ()
-        few = splitter.parts(block).parts if singly or (len(block) < sizes.SMALL and not request.in_order) else []
-        alone: Iterable[tuple[Any, Any, Any]] = ((part, None, None) for part in few)
-        mended = 0
-        if not singly and not 0 < len(few) <= sizes.FEW:
-            from frametool.stream.record_rows import RecordRows
-
-            alike = alike or RecordRows(splitter, fmt, request, style, bad.source)
-            batches, alone, mended = alike.of_block(block, teller.counts)
-        values: list[tuple[int, Value]] = []
-        rows += len({*chain.from_iterable(each.cut.starts[:, 0].tolist() for each in batches)})
-        for part, parts, reason in alone:
-            rows += 1
-            line, at = line + block.count(b"\n", at, part.start), part.start
-            before = bad.count
-            known = attempt(block, part, fmt, request, bad.source, line - 1, teller.tell)
-            fault = known if isinstance(known, Fault) else reason and Fault.of(line - 1, *reason)
-            if isinstance(known, RecordText) and not fault:
-                try:
-                    found = values_of_text(known, style, teller, parts)
-                    values += zip(count(part.start), found, strict=False)
-                except FormatError as error:
-                    fault = fault_at(known.source, error)
-                except FrametoolError as error:
-                    fault = Fault.of(line - 1, "", error)
-            fault = fault and fault._replace(line=fault.line + 1)
-            if fault is not None and (fault.final or bad.on_error == STOP):
-                yield BlockResults([each.take((each.places < part.start).nonzero()[0]) for each in batches], values)
-            bad.take([fault] if fault else [])
-            if bad.count > before and bad.on_error == NULL:
-                values.append((part.start, _no_result(block[part.start : part.end], fmt, style)))
-        teller.counts[ROUNDED] += mended
-        yield BlockResults(batches, values)
-        line += block.count(b"\n", at)
-    if splitter.layout == ARRAY and splitter.is_open:
-        bad.take([Fault(line - block.endswith(b"\n"), "", NO_END)])
-    tell_of_rounding(bad.source, teller.counts[ROUNDED], rows)
-    bad.finish(rows)
-
-
-def _no_result(record: bytes, fmt: str, style: Style) -> NoResult:
+def no_result(record: bytes, fmt: str, style: Style) -> NoResult:
     """Return what a bad record says besides its numbers; in a table those are empty cells under names of their own."""
     try:
         text = record.decode()
@@ -128,35 +74,72 @@ def _says(value: Any) -> bool:
 LINE = re.compile(rb'((?:[^"\n]|"[^"]*")*+)\n')
 
 
-def text_of(singles: Sequence[tuple[int, str]], batches: Sequence[RecordBatch], rows: Sequence[Any]) -> bytes:
-    """Return single results and the rows of batches in the order of their places."""
-    lines = [(place, text.encode()) for place, text in singles]
-    if not batches:
-        return b"".join(text for _, text in lines)
+def text_of(lines: Sequence[tuple[int, bytes]], groups: Sequence[tuple[Ints, list[Spans]]]) -> bytes:
+    """Return lines of single results and groups of rows in the order of their places."""
+    if not groups:
+        return b"".join(map(itemgetter(1), lines))
     from frametool.stream.rows import texts_as_rows, written
 
-    groups = [(batch.places, spans) for batch, spans in zip(batches, rows, strict=True)]
     return written([*groups, texts_as_rows(lines)] if lines else groups)
 
 
-def documents(blocks: Iterable[BlockResults], style: Style) -> Iterator[bytes]:
-    """Yield results as lines of JSON or as documents of YAML."""
-    parting, begun = "---\n" if style.format == "yaml" else "", False
-    exact = style.changed(precision=None, screen=False)
-    for block in blocks:
-        singles = [(place, parting + write_poses([value], style)) for place, value in block.values]
-        rows = []
+class ResultWriter(Protocol):
+    """Writes the results of blocks: some text at once, the rest at the end."""
+
+    def of_block(self, block: BlockResults) -> bytes:
+        """Return what is written of a block at once."""
+
+    def end(self) -> Iterable[bytes]:
+        """Yield what comes behind the last block."""
+
+
+def written_by(writer: ResultWriter, outcomes: Iterator[Outcome], on_error: str) -> Generator[Outcome]:
+    """Let a writer write the results of blocks; what it holds back comes before the error that ends a stream."""
+    while True:
+        try:
+            outcome = next(outcomes, None)
+        except FrametoolError:
+            yield from map(Outcome, writer.end())
+            raise
+        if outcome is None:
+            yield from map(Outcome, writer.end())
+            return
+        text = b"" if outcome.results is None else writer.of_block(outcome.results)
+        if outcome.faults and any(on_error == STOP or fault.final for fault in outcome.faults):
+            yield from map(Outcome, (text, *writer.end()))
+            text = b""
+        yield outcome._replace(text=text)
+
+
+class Documents:
+    """Write results as lines of JSON or as documents of YAML."""
+
+    def __init__(self, style: Style) -> None:
+        """Begin without any."""
+        self.style, self.exact = style, style.changed(precision=None, screen=False)
+        self.parting = "---\n" if style.format == "yaml" else ""
+        self.begun = False
+
+    def of_block(self, block: BlockResults) -> bytes:
+        """Return the text of a block."""
+        lines = [(place, (self.parting + write_poses([value], self.style)).encode()) for place, value in block.values]
+        groups = []
         for batch in block.batches:
             from frametool.stream.text_rows import in_document
 
-            rows.append(batch.text(in_document(parting + write_poses([batch.marked.value], exact), style), style))
-        text = text_of(singles, block.batches, rows)
-        yield text if begun else text[len(parting) :]
-        begun = begun or bool(text)
+            text = in_document(self.parting + write_poses([batch.marked.value], self.exact), self.style)
+            groups.append((batch.places, batch.text(text, self.style)))
+        found = text_of(lines, groups)
+        begun, self.begun = self.begun, self.begun or bool(found)
+        return found if begun else found[len(self.parting) :]
+
+    def end(self) -> Iterable[bytes]:
+        """Yield nothing more."""
+        return ()
 
 
 class CsvTable:
-    """Put results together as one table."""
+    """Put results together as one table, which is written at the end, when its columns are known."""
 
     def __init__(self, style: Style) -> None:
         """Begin without columns."""
@@ -165,11 +148,9 @@ class CsvTable:
         self.waiting = SpooledTemporaryFile(sizes.TABLE)  # noqa: SIM115 - closed with the table
         self.sizes: list[tuple[int, int]] = []  # of each block the columns that it has, and its bytes
 
-    def pieces(self, blocks: Iterable[BlockResults]) -> Iterator[bytes]:
+    def end(self) -> Iterator[bytes]:
         """Yield the table of all blocks."""
         with self.waiting:
-            for block in blocks:
-                self._add(block)
             if not self.columns:
                 return
             yield row(self.columns, self.style).encode()
@@ -179,19 +160,43 @@ class CsvTable:
                 missing = len(self.columns) - max(count, 1)  # a row without cells is a line all the same
                 yield LINE.sub(rb"\1" + b"," * missing + b"\n", text) if missing else text
 
-    def _add(self, block: BlockResults) -> None:
-        """Add the rows of a block."""
-        singles = [(place, cells_of(value, self.style)) for place, value in block.values]
-        marked = [cells_of(batch.marked.value, self.style) for batch in block.batches]
-        firsts = [(int(batch.places[0]), cells) for batch, cells in zip(block.batches, marked, strict=True)]
-        for _, names in sorted([*singles, *firsts], key=itemgetter(0)):
-            self.columns |= dict.fromkeys(names)
-        lines = [(place, row([cells.get(name, "") for name in self.columns], self.style)) for place, cells in singles]
-        rows = []
-        for batch, cells in zip(block.batches, marked, strict=True):
-            from frametool.stream.text_rows import in_table
+    def of_block(self, block: BlockResults) -> bytes:
+        """Add the rows of a block; nothing is written yet."""
+        rows: list[tuple[int, dict[str, Any], RecordBatch | None]] = [
+            (place, cells_of(value, self.style), None) for place, value in block.values
+        ]
+        for batch in block.batches:
+            first = int(batch.places[0])
+            rows.append((first, cells_of(batch.marked.value, self.style), batch))
+        rows.sort(key=itemgetter(0))
+        for _, cells, _ in rows:
+            self.columns |= dict.fromkeys(cells)
+        lines, groups = list[tuple[int, bytes]](), []
+        for place, cells, alike in rows:
+            if alike is None:
+                lines.append((place, row([cells.get(name, "") for name in self.columns], self.style).encode()))
+            else:
+                from frametool.stream.text_rows import in_table
 
-            rows.append(batch.text(in_table(cells, self.columns, self.style), self.style))
-        text = text_of(lines, block.batches, rows)
+                groups.append((alike.places, alike.text(in_table(cells, self.columns, self.style), self.style)))
+        text = text_of(lines, groups)
         self.waiting.write(text)
         self.sizes.append((len(self.columns), len(text)))
+        return b""
+
+
+class Collected:
+    """Keep results, for formats that are written of all of them at once."""
+
+    def __init__(self) -> None:
+        """Begin without any."""
+        self.values: list[Value] = []
+
+    def of_block(self, block: BlockResults) -> bytes:
+        """Keep those of a block; nothing is written."""
+        self.values += block.in_order()
+        return b""
+
+    def end(self) -> Iterable[bytes]:
+        """Yield nothing more."""
+        return ()

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool import sizes
 from frametool.documents.document import Node, parse_nodes
 from frametool.errors import FrametoolError
 from frametool.formats.rows.csv import cells_of
@@ -18,13 +17,9 @@ from frametool.geometry import floats
 from frametool.geometry.representations import notation
 from frametool.grammar.names import in_nanoseconds
 from frametool.grammar.result import Result
-from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import DEGREES, Fault
-from frametool.stream.record_cuts import Cut, RecordCutter, block_of, names_of, plan_of
-from frametool.stream.record_cuts import in_order as in_cut_order
+from frametool.stream.record_cuts import Cut, names_of, plan_of
 from frametool.stream.record_text import Answer
 from frametool.stream.record_values import (
-    ROUNDED,
     SPELLED,
     plain,
     plain_scalar,
@@ -35,7 +30,6 @@ from frametool.stream.record_values import (
 from frametool.stream.row_layout import AS_READ, POINT, POSE, ROTATION, VECTOR, Target
 from frametool.stream.row_poses import RowPoses, objects
 from frametool.stream.rows import spans_of
-from frametool.stream.splitter import Part
 from frametool.stream.stamp_columns import read_stamps
 from frametool.stream.text_rows import (
     CELL,
@@ -49,17 +43,15 @@ from frametool.stream.text_rows import (
     leaf_mark,
     words,
 )
-from frametool.text.spans import MARGIN, Spans, framed
+from frametool.text.spans import MARGIN, Spans
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from frametool.geometry.types import Components
     from frametool.grammar.result import Style
-    from frametool.stream.evaluate import Plan
+    from frametool.stream.evaluate import Plan, Run
     from frametool.stream.record_values import Value
     from frametool.stream.request import Request
-    from frametool.stream.splitter import Splitter
     from frametool.stream.template import Template
     from frametool.stream.text_rows import Syntax
     from frametool.text.spans import Bytes, Floats, Ints
@@ -128,6 +120,8 @@ class RecordBatch(NamedTuple):
     def take(self, rows: Ints) -> RecordBatch:
         """Return some of the rows."""
         size = len(self.places)
+        if len(rows) == size:
+            return self
         parents, names = ([each[row] for row in rows.tolist()] if len(each) == size else each for each in self[5:7])
         cut = Cut(self.cut.template, self.cut.starts[rows], self.cut.ends[rows])
         stamps = None if self.stamps_ns is None else self.stamps_ns[rows]
@@ -140,73 +134,25 @@ def _holds(cells: Spans, characters: bytes) -> bool:
     return bool((counts[cells.ends] > counts[cells.starts]).any())
 
 
-class Alone(NamedTuple):
-    """A record that is no row of a batch: what became of it as a row, or why it has no result, if that is known."""
-
-    part: Part
-    parts: Sequence[Components] | None = None
-    reason: tuple[str, str | FrametoolError] | None = None
-
-
 class RecordRows:
-    """Make rows of one block of records after the other, of those that are written alike."""
+    """Make rows of records that are written alike."""
 
-    def __init__(self, splitter: Splitter, fmt: str, request: Request, style: Style, source: str) -> None:
+    def __init__(self, request: Request, style: Style, *, is_yaml: bool) -> None:
         """Begin without templates."""
-        self.request = request._replace(canonical=True)
-        self.style = style
-        self.cutter = RecordCutter(splitter, fmt, self.request, source)
-        self.is_yaml = fmt == "yaml"
-        self.left = sizes.LEARNED  # where no records are alike, learning is lost time
-        self.state = State()
+        self.request, self.style, self.is_yaml = request, style, is_yaml
         self._plans: dict[Template, tuple[Plan, list[Marked]]] = {}
 
-    def of_block(self, text: bytes, reported: Mapping[str, int]) -> tuple[list[RecordBatch], list[Alone], int]:
-        """Return the rows of a block, the records that are none, and how many rotations of rows were normalised.
+    def plan(self, template: Template) -> Plan:
+        """Return what is done to the records of a template."""
+        if template not in self._plans:
+            self._plans[template] = self._planned(template)
+        return self._plans[template][0]
 
-        reported: how often things were reported, by their rules
-        """
-        records, rest = self.cutter.cut(text)
-        in_order = self.request.in_order
-        alone: list[Alone] = []
-        for start, end in rest:
-            for part, known in self.cutter.singly(text, start, end):
-                hit = known
-                if hit is None and (self.left or in_order) and not part.problem:
-                    self.left -= not in_order
-                    first = self.cutter.read(text, part)
-                    if in_order or isinstance(first, Fault) or len(first.entries) <= MOST_ENTRIES:
-                        hit = self.cutter.learned(first, text, part)
-                if hit is None:
-                    alone.append(Alone(part))
-                else:
-                    records.add(part, *hit)
-        data = framed(text)
-        batches: list[RecordBatch] = []
-        mended = 0
-        cuts = records.by_template()
-        for cut in in_cut_order(cuts) if in_order else cuts:
-            made, others, count = self._of_cut(cut, data, text, reported)
-            batches += made
-            alone += others
-            mended += count
-        return batches, sorted(alone, key=lambda each: each.part.start), mended
-
-    def _of_cut(
-        self, cut: Cut, data: Bytes, text: bytes, reported: Mapping[str, int]
-    ) -> tuple[list[RecordBatch], list[Alone], int]:
-        """Return the rows of one template; those that are unclear, and the first that tells something, stay alone."""
+    def take(self, cut: Cut, run: Run, data: Bytes, text: bytes) -> tuple[list[RecordBatch], set[int]]:
+        """Return the rows of a run in batches, and which of them are unclear."""
         template = cut.template
-        is_new = template not in self._plans
-        if is_new:
-            self._plans[template] = self._plan(template)
-        plan, marked = self._plans[template]
-        run = Run(plan, block_of(cut, data, text, plan.request), self.state)
-        tells = template.notes or template.own_notes or any(map(self.request.operation.carried, template.shapes))
-        left = {0} if is_new and tells else set()
-        left |= run.doubted if not reported[DEGREES] else set()
-        left |= {*run.mended[:1]} if not reported[ROUNDED] else set()
-        left |= {*run.rows[run.locked[run.rows] != 0].tolist()} if marked else {*run.rows.tolist()}
+        _, marked = self._plans[template]
+        left = {*run.rows[run.locked[run.rows] != 0].tolist()} if marked else {*run.rows.tolist()}
         if self.style.format == "yaml":  # in which a null has lines of its own
             left |= {row for at, node in template.leaves if not node.quote for row in _nulls(cut, at, data)}
         stamps = []
@@ -219,31 +165,16 @@ class RecordRows:
         own = Cut(template, cut.starts[rows], cut.ends[rows])
         batches: list[RecordBatch] = []
         first = 0
-        for at, each in enumerate(marked if len(rows) else ()):
+        for at, (each, times) in enumerate(zip(marked, stamps, strict=True) if len(rows) else ()):
             last = first + each.size
             becomes = [named.names for pair in names_of(own, at, text) if (named := template.named(at, pair))]
             parents, names = ([pair[role] for pair in becomes] for role in (0, 1))
-            times = stamps[at]
-            batch = RecordBatch(
-                each, own, data, own.starts[:, 0] + at, run.results[rows, first:last], parents, names,
-                None if times is None else times[rows],
-            )  # fmt: skip
-            batches.append(batch)
+            results, stamps_ns = run.results[rows, first:last], None if times is None else times[rows]
+            batches.append(RecordBatch(each, own, data, own.starts[:, 0] + at, results, parents, names, stamps_ns))
             first = last
-        alone = [self._alone(cut, row, run) for row in sorted({*run.reasons, *left.intersection(run.rows.tolist())})]
-        return batches, alone, len({*run.mended} - left)
+        return batches, left.intersection(run.rows.tolist())
 
-    def _alone(self, cut: Cut, row: int, run: Run) -> Alone:
-        """Return a record as it is taken alone: where rows depend on those before, with what became of this one."""
-        start, end = int(cut.starts[row, 0]), int(cut.ends[row, -3])
-        part = Part(start, start, end, end)
-        if not self.request.in_order:
-            return Alone(part)
-        columns = [[np.broadcast_to(part, run.count) for part in parts] for parts in run.moved]
-        parts = [tuple(float(column[row]) for column in each) for each in columns]
-        return Alone(part, parts, run.reasons.get(row))
-
-    def _plan(self, template: Template) -> tuple[Plan, list[Marked]]:
+    def _planned(self, template: Template) -> tuple[Plan, list[Marked]]:
         """Plan the records of a template; without marks where they are not simple."""
         plan = plan_of(template, self.request, yaml=self.is_yaml)
         targets, found = [], []
@@ -417,7 +348,7 @@ class Filling:
         return self.leaves[mark][row]
 
 
-def values_of(batch: RecordBatch) -> Iterator[Value]:
+def rows_as_values(batch: RecordBatch) -> Iterator[Value]:
     """Yield the rows of a batch as single results; their numbers are position and quaternion."""
     value = batch.marked.value
     filling = Filling(batch)
@@ -431,14 +362,17 @@ def values_of(batch: RecordBatch) -> Iterator[Value]:
             rotation=None if pose.rotation is None else tuple(numbers[3:7]),
             name=filling.filled(pose.name, row),
             parent=filling.filled(pose.parent, row),
+            scale=pose.scale if pose.scale == 1.0 else filling.filled(pose.scale, row),
         )
         yield Result(own, filling.filled(value.extras, row))
 
 
 def poses_of(batch: RecordBatch) -> RowPoses | None:
-    """Return the rows of a batch as a block of poses; None where they are points, or on the Earth."""
+    """Return the rows of a batch as a block of poses; None where they are points, on the Earth, or scaled."""
     value, rows = batch.marked.value, range(len(batch.places))
     if not isinstance(value, Result) or None in (value.pose.position, value.pose.rotation) or AS_READ in value.extras:
+        return None
+    if value.pose.scale != 1.0:
         return None
     filling = Filling(batch)
     named = (filling.known.get(each or "") or [filling.filled(each, row) for row in rows] for each in value.pose[2:4])

@@ -9,39 +9,53 @@ import re
 from contextlib import suppress
 from functools import cached_property
 from io import BufferedReader
-from itertools import chain
-from typing import TYPE_CHECKING
+from itertools import chain, count, repeat
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
 
 from frametool import sizes
 from frametool.errors import FormatError, FrametoolError
 from frametool.stream import stamp_source
 from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote
-from frametool.stream.record_text import Outside, RecordText, attempt, column_in, null_of
-from frametool.stream.splitter import ARRAY, NO_END, Part, Splitter
+from frametool.stream.record_results import BlockResults, no_result
+from frametool.stream.record_text import ROUNDED, Outside, RecordText, attempt, column_in, fault_at, null_of
+from frametool.stream.record_values import values_of_text
+from frametool.stream.splitter import ARRAY, NO_END, Splitter
 from frametool.text.lines import Pieces, read_blocks
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterable, Iterator, Sequence
 
-    from frametool.stream.evaluate import Run, State
+    from frametool.geometry.types import Components
+    from frametool.grammar.result import Style
+    from frametool.stream.evaluate import Plan, Run, State
     from frametool.stream.record_cuts import Cut, FoundRecords, Places, RecordCutter
+    from frametool.stream.record_rows import RecordBatch, RecordRows
+    from frametool.stream.record_text import Answer
     from frametool.stream.request import Request
+    from frametool.stream.splitter import Part
     from frametool.stream.template import Template
     from frametool.text.lines import ByteStream
+    from frametool.text.spans import Bytes
 
     Hit = tuple[Template, Places]
 
 _LEADING_COMMA = re.compile(rb"\A((?:\xef\xbb\xbf)?\s*\[?\s*),\s*")
+NO_FAULT = Fault(0, "", "")
 MOST_EXACT = 100  # bad records of one template in a block whose place is looked for
 
 
-def run_records(stream: ByteStream, fmt: str, request: Request, *, source: str) -> Generator[Outcome]:
-    """Yield the outcomes of a stream of records."""
-    outcomes = _outcomes(stream, RecordBlocks(fmt, request, source))
-    yield from _as_array(outcomes, request.on_error) if fmt == "json" else outcomes
+def run_records(
+    stream: ByteStream, fmt: str, request: Request, *, source: str, style: Style | None = None
+) -> Generator[Outcome]:
+    """Yield the outcomes of a stream of records: as text in place, or as results to be written in a style."""
+    work = RecordBlocks(fmt, request, source) if style is None else RecordResults(fmt, request, source, style)
+    outcomes = _outcomes(stream, work)
+    yield from _as_array(outcomes, request.on_error) if fmt == "json" and style is None else outcomes
 
 
 def _outcomes(stream: ByteStream, work: RecordBlocks) -> Generator[Outcome]:
+    """Yield the outcomes of the blocks of a stream; the lack of the closing bracket of an array is a fault."""
     blocks = read_blocks(stream, whole=work.splitter.whole)
     first = next(blocks, None)
     if first is None:
@@ -52,12 +66,14 @@ def _outcomes(stream: ByteStream, work: RecordBlocks) -> Generator[Outcome]:
             second = next(blocks, None)
         except FormatError as error:  # comes behind the results of what is whole
             blocks = _raising(error)
-    few = second is None and not work.request.in_order
-    if few and len((found := work.splitter.parts(first)).parts) <= sizes.FEW:
-        yield work.few(first, found.parts, closed=found.closed)
-        return
-    begun = [first, second] if second else [first]
-    yield from map(work.many, chain(begun, blocks))
+    are_few = second is None and not work.request.in_order and len(work.splitter.parts(first).parts) <= sizes.FEW
+    is_open: bool | None = True
+    for block in chain([first, second] if second else [first], blocks):
+        outcome = work.few(block) if are_few else work.many(block)
+        is_open = is_open and outcome.is_open
+        yield outcome
+    if is_open:
+        yield Outcome(b"", (Fault(-1 if work.ended else 0, "", NO_END),), is_open=True)
 
 
 def _raising(error: FormatError) -> Iterator[bytes]:
@@ -95,57 +111,65 @@ def _has_ended(stream: ByteStream) -> bool:
 
 
 def _as_array(outcomes: Iterable[Outcome], on_error: str) -> Iterator[Outcome]:
-    """Allow no comma before the first record that is left, and make the lack of the closing bracket a fault.
+    """Allow no comma before the first record that is left, and close an array that does not end.
 
     What is before that record is held back: where the first one is an error nothing is written.
     """
-    any_kept, is_open, ended = False, None, True
-    held = b""
+    any_kept, held = False, b""
     for outcome in outcomes:
-        is_open = outcome.is_open if is_open is not False else False
         text = held + outcome.text
         if outcome.is_open is not None and not any_kept and outcome.kept:
             text = _LEADING_COMMA.sub(rb"\1", text)
-        if ends := outcome.is_open and on_error != STOP and any(fault.final for fault in outcome.faults):
-            text += b"]\n"
+        broken = any(each.final or each.reason == NO_END for each in outcome.faults)
+        ends = on_error != STOP and outcome.is_open and broken
+        text += b"]\n" if ends else b""
         any_kept = any_kept or bool(outcome.kept or ends)
-        ended = text.endswith(b"\n") if text else ended
         held = b"" if any_kept or outcome.is_open is None else text
         yield outcome._replace(text=text[len(held) :])
-    if held and not (is_open and on_error == STOP):
+    if held:
         yield Outcome(held, ())
-    if is_open:
-        fault = Fault(-1 if ended else 0, "", NO_END)
-        yield Outcome(b"" if on_error == STOP else b"]\n", (fault,))
 
 
 class Found:
-    """What one block holds besides the records that templates find: texts and faults by place, warnings, counts."""
+    """What one block holds: what becomes of records alone and faults, by place, rows of many, warnings, counts.
+
+    kept: how many records have a result, or null in the place of one
+    """
 
     def __init__(self) -> None:
         """Create an empty one."""
-        self.texts: list[tuple[int, bytes]] = []
+        self.items: list[tuple[int, Any]] = []
         self.faults: list[tuple[int, Fault]] = []
+        self.runs: list[Run] = []
+        self.batches: list[RecordBatch] = []
         self.notes: list[RowNote] = []
-        self.alone = self.mended = self.nulls = 0  # records that were rendered one by one, and rotations in them
+        self.rows = self.kept = self.mended = 0
 
 
 class RecordBlocks:
-    """Process one block of records after the other."""
+    """Process one block of records after the other: results take the places of numbers, all else stays."""
+
+    keeps_text = True
+    is_singly = False  # whether records are only taken one by one
+    most_entries = 1 << 30  # of a record that others may be alike
 
     def __init__(self, fmt: str, request: Request, source: str) -> None:
         """Start without templates."""
         self.fmt, self.request, self.source = fmt, request, source
         self.splitter = Splitter(fmt)
+        self.left = sizes.LEARNED  # where no records are alike, learning is lost time
+        self.ended = True  # whether the last block ended with a line
 
-    def few(self, text: bytes, parts: Sequence[Part], *, closed: bool) -> Outcome:
-        """Return the outcome of the few records of a whole stream."""
+    def few(self, text: bytes) -> Outcome:
+        """Return the outcome of records that are taken one by one."""
         found = Found()
-        self._take(text, 0, len(text), ((part, None) for part in parts), found)
+        parts, closed = self.splitter.parts(text)
+        self._take(text, 0, len(text), zip(parts, repeat(None)), found)
         return self._outcome(text, [], found, closed=closed)
 
     @cached_property
-    def _bulk(self) -> tuple[RecordCutter, State]:
+    def bulk(self) -> tuple[RecordCutter, State]:
+        """Return what finds records that are alike, and what one block leaves for the next."""
         from frametool.stream.evaluate import State
         from frametool.stream.record_cuts import RecordCutter
 
@@ -155,7 +179,9 @@ class RecordBlocks:
         """Return the outcome of a block."""
         from frametool.stream.record_cuts import in_order
 
-        cutter, _ = self._bulk
+        if self.is_singly or not (sizes.LEARNED or self.request.in_order):
+            return self.few(text)
+        cutter, _ = self.bulk
         found = Found()
         records, rest = cutter.cut(text)
         for start, end in rest:
@@ -170,8 +196,8 @@ class RecordBlocks:
         """Take records one by one, learning new templates if there are many; what is between them passes."""
         at, line, counted = start, 0, 0
         for part, known in parts:
-            if part.begin > at:
-                found.texts.append((at, text[at : part.begin]))
+            if part.begin > at and self.keeps_text:
+                found.items.append((at, text[at : part.begin]))
             at = part.after
             line, counted = line + text.count(b"\n", counted, part.start), part.start
             if records is not None and (hit := known or self._learned(text, part, line, found)) is not None:
@@ -180,78 +206,170 @@ class RecordBlocks:
                 self._alone(text, part, attempt(text, part, self.fmt, self.request, self.source, line), line, found)
             if found.faults and self.request.on_error == STOP:
                 return
-        if at < end:
-            found.texts.append((at, text[at:end]))
+        if at < end and self.keeps_text:
+            found.items.append((at, text[at:end]))
 
     def _learned(self, text: bytes, part: Part, line: int, found: Found) -> Hit | None:
         """Return a template that is learned from a record; None for one that is taken alone."""
-        cutter, _ = self._bulk
-        made = cutter.read(text, part, line)
-        is_alone = isinstance(made, Fault) or (made.is_long and not self.request.in_order)
-        hit = None if is_alone else cutter.learned(made, text, part)
+        cutter, _ = self.bulk
+        made, hit = cutter.read(text, part, line), None
+        if not isinstance(made, Fault):
+            is_alike = self.left and not made.is_long and len(made.entries) <= self.most_entries
+            self.left -= bool(is_alike)
+            hit = cutter.learned(made, text, part) if is_alike or self.request.in_order else None
         if hit is None:
             self._alone(text, part, made, line, found)
         return hit
 
-    def _alone(self, text: bytes, part: Part, made: RecordText | Fault, line: int, found: Found) -> None:
-        """Take what a record becomes, itself where nothing is in it, or why it becomes nothing."""
-        row = text[part.start : part.end]
-        done = made.rendered(line, column_in(text, part.start)) if isinstance(made, RecordText) else made
-        if not isinstance(done, Fault):
-            found.notes += done.notes
-            found.mended += done.mended
-            found.alone += 1
-            row = done.text or row
-        elif done.kind == Outside.kind:
-            return
-        else:
-            found.faults.append((part.begin, done))
-            if self.request.on_error != NULL or done.final:
+    def _alone(
+        self, text: bytes, part: Part, made: RecordText | Fault, line: int, found: Found,
+        parts: Sequence[Components] | None = None,
+    ) -> None:  # fmt: skip
+        """Take what a record becomes, or why it becomes nothing; parts: the numbers of its results, if known."""
+        if isinstance(made, RecordText):
+            try:
+                answers = made.answers(parts)
+                items = self.results(made, answers, text, part)
+                notes = made.notes_at(line, column_in(text, part.start), answers)
+            except FormatError as error:
+                made = fault_at(made.source, error)
+            except FrametoolError as error:
+                made = Fault.of(line + made.line, getattr(error, "column_name", ""), error)
+            else:
+                found.notes += notes
+                found.mended += [note.rule for note in made.notes].count(ROUNDED) if made.notes else 0
+                found.rows, found.kept = found.rows + 1, found.kept + 1
+                found.items += items
                 return
-            found.nulls += 1
-            row = null_of(row, json=self.fmt == "json")
-        found.texts.append((part.begin, text[part.begin : part.start] + row + text[part.end : part.after]))
+        if made.kind == Outside.kind:
+            return
+        found.rows += 1
+        found.faults.append((part.begin, made))
+        if self.request.on_error == NULL and not made.final:
+            found.kept += 1
+            found.items += self.without(text, part)
 
     def _outcome(self, text: bytes, cuts: Sequence[Cut], found: Found, *, closed: bool) -> Outcome:
         """Run every template's records, and put all of it in order."""
-        rows = sum(len(cut.starts) for cut in cuts) + len(found.faults) + found.alone
-        runs = self._runs(text, cuts, found) if cuts else []
+        self.ended = text.endswith(b"\n")
+        if cuts:
+            self._run(text, cuts, found)
+        found.faults.sort()
         stops = self.request.on_error == STOP and found.faults
-        end = min(place for place, _ in found.faults) if stops else len(text) + 1
-        texts = sorted(each for each in found.texts if each[0] < end)
-        if runs:
-            from frametool.stream.rows import texts_as_rows, written
-
-            groups = [group for run in runs for group in run.groups(end)]
-            out = written([*groups, texts_as_rows(texts)] if texts else groups)
-        else:
-            out = b"".join(piece for _, piece in texts)
-        mended = found.mended + sum(len(run.mended) for run in runs)
-        kept = found.alone + found.nulls + sum(len(run.rows) for run in runs)
-        faults = [fault for _, fault in sorted(found.faults)]
+        end = found.faults[0][0] if stops else len(text) + 1
+        faults = [*map(itemgetter(1), found.faults)]
         is_open = None if self.splitter.layout != ARRAY else not closed
         lines, notes = text.count(b"\n"), sorted(found.notes, key=RowNote.place)
-        return Outcome(out, faults, rows, lines, mended, notes, len(text), kept, is_open)
+        outcome = Outcome(b"", faults, found.rows, lines, found.mended, notes, len(text), found.kept, is_open)
+        return self.put_together(outcome, found, end)
 
-    def _runs(self, text: bytes, cuts: Sequence[Cut], found: Found) -> list[Run]:
+    def _run(self, text: bytes, cuts: Sequence[Cut], found: Found) -> None:
         """Run the records of all templates; one that is bad is taken alone, which says where it is wrong."""
         from frametool.stream.evaluate import Run
-        from frametool.stream.record_cuts import block_of, plan_of
+        from frametool.stream.record_cuts import block_of
         from frametool.text.spans import framed
 
-        _, state = self._bulk
-        data, runs = framed(text), []
+        data = framed(text)
         for cut in cuts:
-            plan = plan_of(cut.template, self.request, yaml=self.fmt == "yaml")
-            run = Run(plan, block_of(cut, data, text, plan.request), state)
-            runs.append(run)
-            for at, row in enumerate(run.reasons):
-                fault = Fault.of(run.block.line_of(row), *run.reasons[row])
-                part = cut.part(row)
-                line = text.count(b"\n", 0, part.start) if at < MOST_EXACT else 0
-                made = attempt(text, part, self.fmt, self.request, self.source, line) if at < MOST_EXACT else fault
-                self._alone(text, part, made if isinstance(made, Fault) else fault, line, found)
+            plan = self.plan(cut.template)
+            run = Run(plan, block_of(cut, data, text, plan.request), self.bulk[1])
+            left = self.alone_of(cut, run, data, text, found)
+            alone = sorted({*run.reasons, *left})
+            found.rows += len(cut.starts) - len(alone)
+            found.kept += len(run.rows) - len(left)
+            found.mended += len({*run.mended} - left)
+            found.runs.append(run)
+            line = counted = 0
+            for at, row in enumerate(alone):
+                part, reason = cut.part(row), run.reasons.get(row)
+                line, counted = line + text.count(b"\n", counted, part.start), part.start
+                made: RecordText | Fault = Fault.of(run.block.line_of(row), *reason) if reason else NO_FAULT
+                if reason is None or at < MOST_EXACT:
+                    read = attempt(text, part, self.fmt, self.request, self.source, line)
+                    made = read if reason is None or isinstance(read, Fault) else made
+                self._alone(text, part, made, line, found, run.parts_of(row) if self.request.in_order else None)
             found.notes += run.notes
             own = [*cut.template.notes, *cut.template.of_places]
             found.notes += [each._replace(line=run.block.line_of(0)) for each in own if len(cut.starts)]
-        return runs
+
+    # --- what differs where results are written in another format ---
+
+    def results(self, known: RecordText, answers: list[Answer], text: bytes, part: Part) -> Iterable[tuple[int, Any]]:
+        """Return what a record becomes, and its place: its text."""
+        return [_put(text, part, known.rendered(answers) or text[part.start : part.end])]
+
+    def without(self, text: bytes, part: Part) -> Iterable[tuple[int, Any]]:
+        """Return what replaces a record without a result: itself with null in the place of numbers."""
+        return [_put(text, part, null_of(text[part.start : part.end], json=self.fmt == "json"))]
+
+    def plan(self, template: Template) -> Plan:
+        """Return what is done to the records of a template."""
+        from frametool.stream.record_cuts import plan_of
+
+        return plan_of(template, self.request, yaml=self.fmt == "yaml")
+
+    def alone_of(self, cut: Cut, run: Run, data: Bytes, text: bytes, found: Found) -> set[int]:  # noqa: ARG002
+        """Return the rows of a run that are taken alone all the same: none."""
+        return set()
+
+    def put_together(self, outcome: Outcome, found: Found, end: int) -> Outcome:
+        """Return the outcome with the text of all records in order, up to a place."""
+        texts = sorted(each for each in found.items if each[0] < end)
+        if not found.runs:
+            return outcome._replace(text=b"".join([piece for _, piece in texts]))
+        from frametool.stream.rows import texts_as_rows, written
+
+        groups = [group for run in found.runs for group in run.groups(end)]
+        return outcome._replace(text=written([*groups, texts_as_rows(texts)] if texts else groups))
+
+
+def _put(text: bytes, part: Part, row: bytes) -> tuple[int, bytes]:
+    """Return a record with what goes with it, and its place."""
+    return part.begin, text[part.begin : part.start] + row + text[part.end : part.after]
+
+
+class RecordResults(RecordBlocks):
+    """Process one block of records after the other: results are written in another format."""
+
+    keeps_text = False
+    most_entries = 8  # each is looked at for itself
+
+    def __init__(self, fmt: str, request: Request, source: str, style: Style) -> None:
+        """Start without templates."""
+        super().__init__(fmt, request._replace(canonical=True), source)
+        self.style = style
+        operation = request.operation
+        self.is_singly = operation.shown is not None or (request.place is not None and not operation.looks_back)
+
+    @cached_property
+    def rows(self) -> RecordRows:
+        """Return what makes rows of records that are alike."""
+        from frametool.stream.record_rows import RecordRows
+
+        return RecordRows(self.request, self.style, is_yaml=self.fmt == "yaml")
+
+    def results(self, known: RecordText, answers: list[Answer], text: bytes, part: Part) -> Iterable[tuple[int, Any]]:  # noqa: ARG002
+        """Return the values that a record becomes."""
+        return zip(count(part.start), [*values_of_text(known, answers, self.style)], strict=False)
+
+    def without(self, text: bytes, part: Part) -> Iterable[tuple[int, Any]]:
+        """Return what a bad record says besides its numbers; in a table those are empty cells under own names."""
+        return [(part.start, no_result(text[part.start : part.end], self.fmt, self.style))]
+
+    def plan(self, template: Template) -> Plan:
+        """Return what is done to the records of a template."""
+        return self.rows.plan(template)
+
+    def alone_of(self, cut: Cut, run: Run, data: Bytes, text: bytes, found: Found) -> set[int]:
+        """Keep the rows of a run; return those that are taken alone."""
+        batches, left = self.rows.take(cut, run, data, text)
+        found.batches += batches
+        return left
+
+    def put_together(self, outcome: Outcome, found: Found, end: int) -> Outcome:
+        """Return the outcome with all results up to a place."""
+        if outcome.faults and self.request.on_error == STOP:
+            batches = [each.take((each.places < end).nonzero()[0]) for each in found.batches]
+            found.batches = [each for each in batches if len(each.places)]
+            found.items = [each for each in found.items if each[0] < end]
+        return outcome._replace(results=BlockResults(found.batches, sorted(found.items, key=itemgetter(0))))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from functools import cached_property, partial
+from contextlib import suppress
+from functools import cached_property
 from itertools import islice
 from math import isfinite, isinf
 from typing import TYPE_CHECKING, NamedTuple
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 
 _OTHER_START = re.compile(r"^(?=[A-Z\t\[\d$^])", re.MULTILINE)  # no key that ROS prints begins so
 
+ROUNDED = "rounded"  # rule of the warning about rotations that were normalised
 MOST_LEAVES = 2000  # scalars of a record: an expression that cuts those written alike takes longer for more
 SIX_BY_SIX = 36  # entries of the covariance of a pose
 
@@ -73,17 +75,16 @@ class Answer(NamedTuple):
     has_gaps: bool = False
 
 
-def read_entries(
-    document: Document, request: Request, source: Source, note: Callable[[list[Finding]], object]
-) -> list[Entry]:
-    """Read the records of a document, and what each is asked; what is invalid about them goes to `note`.
+def read_entries(document: Document, request: Request, source: Source, notes: list[Finding]) -> list[Entry]:
+    """Read the records of a document, and what each is asked; what is invalid about them is added to notes.
 
     Raises FormatError with the place of a record that cannot be read.
     """
     reading = Reading(source, degrees=request.degrees, normalize=request.normalize, earth=request.earth)
     try:
         records = list(find_records(document.value, request, reading, (document.index,)))
-        note([_at_its_number(each, records) for each in reading.notes])
+        if reading.notes:
+            notes += [_at_its_number(each, records) for each in reading.notes]
         return [_entry(document, record, request) for record in records]
     except Misfit as misfit:
         error = misfit.placed(source)
@@ -93,7 +94,7 @@ def read_entries(
 
 def _at_its_number(note: Finding, records: Sequence[Record]) -> Finding:
     """Return a note about a rotation with the place of the first of its numbers, as blocks of rows have it."""
-    found = (each for each in records if note.rule == "rounded" and each.path == note.path and each.shape.notation)
+    found = (each for each in records if note.rule == ROUNDED and each.path == note.path and each.shape.notation)
     record = next(found, None)
     path = record and record.numbers[record.shape.rotation_at[0]]
     return note._replace(path=path) if path else note
@@ -208,33 +209,22 @@ def number_writer(precision: int | None, *, yaml: bool) -> Callable[[float], str
     return write
 
 
-class Rendered(NamedTuple):
-    """The text of a result, b"" where nothing is in it; how many rotations were normalised for it, and warnings."""
-
-    text: bytes
-    mended: int
-    notes: list[RowNote]
-
-
 class RecordText:
     """The records of a text, and what is asked of each.
 
     values: of its documents, by their number in the text; entries: its records
-    notes: warnings about them, unless `note` takes these
+    notes: warnings about them
     edits: what changes in the text
     """
 
-    def __init__(
-        self, source: Source, request: Request, *, json: bool, note: Callable[[list[Finding]], object] | None = None
-    ) -> None:
+    def __init__(self, source: Source, request: Request, *, json: bool) -> None:
         """Read the records; raises FormatError with the place."""
         self.source, self.text, self.request, self.json = source, source.text, request, json
         self.notes: list[Finding] = []
         self.edits: list[Edit] = []
         documents = json_documents(source) if json else parse_documents(source.text, source.name)
         self.values = {document.index: document.value for document in documents}
-        take = note or self.notes.extend
-        self.entries = [entry for each in documents for entry in read_entries(each, request, source, take)]
+        self.entries = [entry for each in documents for entry in read_entries(each, request, source, self.notes)]
 
     @property
     def records(self) -> list[Record]:
@@ -259,8 +249,23 @@ class RecordText:
 
     def answer(self, entry: Entry) -> Answer:
         """Return what becomes of a record."""
-        texts = [str(value_at(self.values, path)) for path in entry.stamp]
+        texts = [str(value_at(self.values, path)) for path in entry.stamp] if entry.stamp else ()
         return answer(entry, entry.record.values, texts, self.request)
+
+    def answers(self, parts: Sequence[Components] | None = None) -> list[Answer]:
+        """Return what becomes of the records but for those whose time is not wanted; raises Outside if none is.
+
+        parts: the components of each result, if known
+        """
+        if parts is not None:
+            return [Answer(*each) for each in zip(self.entries, parts, strict=True)]
+        found = []
+        for entry in self.entries:
+            with suppress(Outside):
+                found.append(self.answer(entry))
+        if len(found) < len(self.entries) and (not found or not self.request.canonical):
+            raise Outside("beyond --start or --stop")
+        return found
 
     def edits_for(self, entries: Sequence[Entry], request: Request) -> list[Edit]:
         """Return what changes in the text; a name that several records share changes once."""
@@ -288,28 +293,13 @@ class RecordText:
                 shown.append(piece.text.decode())
         return "".join(shown)
 
-    def rendered(self, line: int, column: int) -> Rendered | Fault:
-        """Return the text of the result, or why there is none.
-
-        line, column: where the text begins; lines count from 0
-        """
-        try:
-            answers = [*map(self.answer, self.entries)]
-            numbers = [number for each in answers for number in written(each)]
-        except FrametoolError as error:
-            return Fault.of(line + self.line, getattr(error, "column_name", ""), error)
+    def rendered(self, answers: Sequence[Answer]) -> bytes:
+        """Return the text with results in the place of numbers; b"" where nothing is in it."""
+        numbers = [number for each in answers for number in written(each)]
         write = number_writer(self.request.precision, yaml=not self.json)
         locked = any(each.entry.target.locked(each.parts) for each in answers)
         text = self.with_numbers(self.edits, [write(number) for number in numbers], numbers, locked=locked)
-        mended, notes = sum(note.rule == "rounded" for note in self.notes), self.notes_at(line, column)
-        wide = next(filter(None, (wide_turn(each, self.request.operation) for each in answers)), None)
-        notes += [RowNote(line + self.line, wide.rule, wide.message)] if wide else []
-        if (place := answers[0].entry.target.place if answers else None) is not None:
-            from frametool.geometry.transverse_mercator import ZONES as ZONE_NAMES
-
-            zones = (ZONE_NAMES[int(numbers[at])] for at in place.words)
-            notes += [RowNote(line + self.line, ZONES, zone) for zone in zones]
-        return Rendered(text.encode() if self.entries else b"", mended, notes)
+        return text.encode() if self.entries else b""
 
     def row_notes(self) -> Iterator[RowNote]:
         """Yield warnings that hold for all records that are written alike."""
@@ -319,15 +309,30 @@ class RecordText:
             if not entry.record.values and entry.record.shape.kind:
                 yield RowNote(0, "identity", "neither position nor rotation: taken as the identity")
 
-    def notes_at(self, line: int, column: int) -> list[RowNote]:
-        """Return all warnings about the records and their numbers, each with its place."""
-        begin = Source("", self.text, line, column)
-        places = [begin.place(*each) for each in locate_many(self.text, [note.path for note in self.notes])]
-        notes = zip(self.notes, places, strict=True)
-        found = [RowNote(at, note.rule, note.message, str(there)) for note, (at, there) in notes]
-        known = {note.about for note in found}
-        first = line + self.line
-        return sorted(found + [each._replace(line=first) for each in self.row_notes() if each.about not in known])
+    def notes_at(self, line: int, column: int, answers: Sequence[Answer] = ()) -> list[RowNote]:
+        """Return all warnings about the records, their numbers, and what became of them, each with its place.
+
+        line, column: where the text begins; lines count from 0
+        """
+        begin, found = Source("", self.text, line, column), list[RowNote]()
+        places = locate_many(self.text, [note.path for note in self.notes]) if self.notes else ()
+        for note, at_char in zip(self.notes, places, strict=True):
+            at, there = begin.place(*at_char)
+            found.append(RowNote(at, note.rule, note.message, str(there)))
+        for each in self.row_notes():
+            if all(each.about != other.about for other in found[: len(self.notes)]):
+                found.append(each._replace(line=line + self.line))
+        found.sort()
+        for answer in answers:
+            if wide := wide_turn(answer, self.request.operation):
+                found.append(RowNote(line + self.line, wide.rule, wide.message))
+                break
+        if answers and (place := answers[0].entry.target.place) is not None:
+            from frametool.geometry.transverse_mercator import ZONES as ZONE_NAMES
+
+            numbers = written(answers[0])
+            found += [RowNote(line + self.line, ZONES, ZONE_NAMES[int(numbers[at])]) for at in place.words]
+        return found
 
 
 def cut(
@@ -393,14 +398,8 @@ def column_in(text: bytes, place: int) -> int:
     return len(text[text.rfind(b"\n", 0, place) + 1 : place].decode("utf-8", "replace")) + 1
 
 
-def attempt(
-    text: bytes, part: Part, fmt: str, request: Request, name: str, line: int,
-    note: Callable[[Source, list[Finding]], object] | None = None,
-) -> RecordText | Fault:  # fmt: skip
-    """Read one record of a stream, or say what is wrong with it.
-
-    line: where the record begins, counted from 0; note: takes warnings about it
-    """
+def attempt(text: bytes, part: Part, fmt: str, request: Request, name: str, line: int) -> RecordText | Fault:
+    """Read one record of a stream, or say what is wrong with it; line: where it begins, counted from 0."""
     if part.problem:
         return Fault(line, "", part.problem, final=part.final)
     source = Source(name, "", line + 1, column_in(text, part.start))
@@ -409,7 +408,7 @@ def attempt(
         if fmt == "yaml" and _OTHER_START.search(decoded):
             decoded = without_noise(decoded)
         source = source._replace(text=decoded)
-        found = RecordText(source, request, json=fmt == "json", note=note and partial(note, source))
+        found = RecordText(source, request, json=fmt == "json")
         if not request.canonical:
             found.edits = found.edits_for(found.entries, request)
     except Aliased as error:

@@ -6,15 +6,15 @@ The records, the operation and what is said of them are those of streams; only t
 from __future__ import annotations
 
 import re
-from collections import Counter
+from contextlib import suppress
 from functools import partial
-from itertools import islice, repeat
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import NOTHING, Aliased, Node, refuse_alias
 from frametool.documents.json import JSON_NUMBER
 from frametool.documents.source import Source, Verbatim
-from frametool.errors import Finding, FormatError, Misused, ValueInvalid, shown, warn
+from frametool.errors import FormatError, Misused, ValueInvalid, shown, warn
 from frametool.formats.table import is_recording
 from frametool.geometry import floats
 from frametool.grammar.names import in_nanoseconds, stamp_column
@@ -31,7 +31,6 @@ from frametool.stream.stamp_source import read_stamp
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from frametool.geometry.types import Components
     from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
     from frametool.stream.record import Record
@@ -41,9 +40,6 @@ if TYPE_CHECKING:
 
 SPELLED = ("yaml", "json", "csv")  # formats in which other keys keep their names
 NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
-ROUNDED = "rounded"  # rule of the warning about rotations that were normalised
-LOST = "lost"  # rule of frames that results cannot name
-MOST_WARNED = 3  # of what is invalid by one rule in one text
 
 
 def read_poses(source: Source, asked: Request) -> list[Pose]:
@@ -109,34 +105,10 @@ def pose_of(record: Record, request: Request) -> Pose:
     return inverted(pose) if shape.inverse else pose
 
 
-class Teller:
-    """Report problems of documents, with their places: of one rule the first `most`, and at the end how many more."""
-
-    def __init__(self, most: int = MOST_WARNED) -> None:
-        """Begin without warnings."""
-        self.most = most
-        self.counts: Counter[str] = Counter()
-
-    def tell(self, source: Source, notes: Sequence[Finding]) -> None:
-        """Warn of notes that are new."""
-        new = []
-        for note in notes:
-            self.counts[note.rule] += 1
-            if self.counts[note.rule] <= self.most:
-                new.append(note)
-        tell(source, new)
-
-    def end(self, name: str) -> None:
-        """Count what was not reported."""
-        if more := sum(max(count - self.most, 0) for count in self.counts.values()):
-            warn(f"{name}: {more} more like these")
-
-
 def read_text(source: Source, request: Request) -> RecordText:
     """Read the records of a text, and warn of what is invalid in them, with its place."""
-    teller = Teller()
-    known = RecordText(source, request, json=False, note=partial(teller.tell, source))
-    teller.end(source.name)
+    known = RecordText(source, request, json=False)
+    tell(source, known.notes)
     return known
 
 
@@ -145,27 +117,33 @@ def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
 
     Raises FormatError with the place of a record that cannot be read or has no result.
     """
-    own = Teller()
     if request.operation.looks_back:
         raise Misused("rows are compared with those before them in streams; pipe them in as JSON lines, YAML or CSV")
-    known = RecordText(source, request._replace(canonical=True), json=False, note=partial(own.tell, source))
-    yield from values_of_text(known, style, own)
-    own.end(source.name)
+    known = read_text(source, request._replace(canonical=True))
+    if lost := next((entry.lost for entry in known.entries if entry.lost), ""):
+        warn(f"{source.name}: frame {shown(lost)} is left out: the frames of the result are not known")
+    answers = []
+    for entry in known.entries:
+        with suppress(Outside):
+            answers.append(_answer(known, entry))
+    if warning := next(filter(None, (wide_turn(each, request.operation) for each in answers)), None):
+        tell(source, [warning])
+    yield from values_of_text(known, answers, style)
 
 
-def values_of_text(
-    known: RecordText, style: Style, own: Teller, parts: Sequence[Components] | None = None
-) -> Iterator[Value]:
-    """Yield the results of the records of a text.
+def _answer(known: RecordText, entry: Entry) -> Answer:
+    """Apply the operation to one record; raises FormatError with its place, Outside if its time is not wanted."""
+    try:
+        return known.answer(entry)
+    except ValueInvalid as error:  # what was read well has no result
+        misfit = error if isinstance(error, Misfit) else NotARotation(str(error), entry.record.path)
+        raise misfit.placed(known.source) from misfit
 
-    own: reports what is invalid; parts: the components of each result, if known
-    Raises FormatError for a record without a result.
-    """
-    found = parts or repeat(None, len(known.entries))
-    answers = (_answer(known, *each, own) for each in zip(known.entries, found, strict=True))
-    made = [each for each in answers if each is not None]
+
+def values_of_text(known: RecordText, answers: Sequence[Answer], style: Style) -> Iterator[Value]:
+    """Yield the results of a text as values; raises FormatError for an alias, and where nothing is in it."""
     units: dict[Path, list[Answer]] = {}
-    for each in made:
+    for each in answers:
         record = each.entry.record
         units.setdefault(unit_of(record, value_at(known.values, record.path[:1])), []).append(each)
     for unit, ours in units.items():
@@ -182,26 +160,6 @@ def values_of_text(
 def unit_of(record: Record, document: Any) -> Path:
     """Return the path of the thing that a record's result is: the document, or an item of the list it is."""
     return record.path[: 1 + (type(document) is list and len(record.path) > 1)]
-
-
-def _answer(known: RecordText, entry: Entry, parts: Components | None, own: Teller) -> Answer | None:
-    """Apply the operation to one record; None for one whose time is not wanted."""
-    record, source = entry.record, known.source
-    own.counts[LOST] += bool(entry.lost)
-    if entry.lost and own.counts[LOST] == 1:
-        warn(f"{source.name}: frame {shown(entry.lost)} is left out: the frames of the result are not known")
-    try:
-        found = Answer(entry, parts) if parts else known.answer(entry)
-    except Outside:
-        return None
-    except Misfit as misfit:
-        raise misfit.placed(source) from misfit
-    except ValueInvalid as error:
-        bad = NotARotation(str(error), record.path)  # what was read well has no result
-        raise bad.placed(source) from bad
-    if (warning := wide_turn(found, known.request.operation)) and not own.counts[warning.rule]:
-        own.tell(source, [warning])
-    return found
 
 
 def values_of_unit(node: Node, unit: Path, answers: list[Answer], request: Request, style: Style) -> Iterator[Value]:

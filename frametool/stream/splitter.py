@@ -64,7 +64,6 @@ class Splitter:
         """Take `json` or `yaml`."""
         self.layout = DOCUMENTS if fmt == "yaml" else ""
         self._looked = 0
-        self.is_open = True  # whether the end of an array has yet to come
 
     def whole(self, text: bytes) -> int:
         """Return how many bytes of what has come are whole records; called with more until some are."""
@@ -91,19 +90,14 @@ class Splitter:
         self._looked = 0 if ends else len(text)
         return ends[-1] if ends else 0
 
-    def parts(self, text: bytes, match: Callable[[int], int | None] | None = None) -> Parts:
-        """Return the records of a block of whole records, or of the rest of a stream.
-
-        match: gives the end of a record that is known to begin at a place.
-        """
+    def parts(self, text: bytes) -> Parts:
+        """Return the records of a block of whole records, or of the rest of a stream."""
         if self.layout == DOCUMENTS:
             return Parts(list(_documents(text)))
         self.layout = self.layout or _layout_of(text, final=True)
         if self.layout == LINES:
             return Parts([part for line in _LINE.finditer(text) for part in self._line(text, *line.span())])
-        found = self._values(text, final=True, match=match)
-        self.is_open = self.is_open and not found.closed
-        return found
+        return self._values(text, final=True)
 
     def _line(self, text: bytes, start: int, end: int) -> list[Part]:
         """Return the record of a line, or several."""
@@ -119,11 +113,11 @@ class Splitter:
         kept = text.rfind(body[-1:], start, end) + 1  # the end of the line goes with none of several
         return [part._replace(after=min(part.after, kept)) for part in parts] if len(parts) > 1 else parts
 
-    def _values(self, text: bytes, *, final: bool, match: Callable[[int], int | None] | None = None) -> Parts:
+    def _values(self, text: bytes, *, final: bool) -> Parts:
         """Scan JSON values one after the other, in an array with commas between them."""
         opening = _OPENING.match(text) if self.layout == ARRAY else None
         start = opening.end() if opening else 3 if text.startswith(MARK) else 0
-        found = _scanned(text, start, array=self.layout == ARRAY, final=final, match=match, first=bool(opening))
+        found = _scanned(text, start, array=self.layout == ARRAY, final=final, first=bool(opening))
         if self.layout == ARRAY:
             return found
         return Parts([each if each.final else _with_separator(text, each.start, each.end) for each in found.parts])
@@ -193,10 +187,7 @@ def _decoder() -> Callable[[str, int], tuple[object, int]]:
 _decode: Callable[[str, int], tuple[object, int]] | None = None
 
 
-def _scanned(
-    data: bytes, at: int, *, array: bool, final: bool, match: Callable[[int], int | None] | None = None,
-    first: bool = True,
-) -> Parts:  # fmt: skip
+def _scanned(data: bytes, at: int, *, array: bool, final: bool, first: bool = True) -> Parts:
     """Scan values from a place on; one that may go on behind the text ends the scan, or is a part if it is final."""
     found: list[Part] = []
     text = data.decode("latin-1")  # keeps every offset; the syntax of JSON is ASCII
@@ -215,10 +206,7 @@ def _scanned(
             found.append(Part(at, start, start, start, "no record stands between two commas"))
             at, needs_comma = start, False
             continue
-        end = match(start) if match else None
-        wrong: str | None = ""
-        if end is None:
-            end, wrong = _value(text, start)
+        end, wrong = _value(text, start)
         if wrong is None and not final:
             return Parts(found)
         if wrong != "":

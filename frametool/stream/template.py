@@ -84,7 +84,7 @@ class Template:
     stamps: the stretches of each entry's stamp
     frames: the stretches of the names of each entry's frames, parent and name; None where they are the same in all
     pieces: what the result is made of
-    notes: what is worth telling about all of them; own_notes: about the record that was learned alone
+    notes: what is worth telling about all of them
     of_places: those of them that hold for all
     leaves: of what is written anew, the scalars that differ: the stretch of each, and where it was learned
     """
@@ -96,7 +96,6 @@ class Template:
         self.entries = tuple(known.entries)
         self.json, self.is_long = known.json, known.is_long
         self.notes = list(known.row_notes())
-        self.own_notes = known.notes
         self.of_places = [each for each in known.notes_at(0, known.source.first_column) if each.about in OF_PLACES]
         self._root = known.root
         self._request = known.request

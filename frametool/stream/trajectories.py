@@ -30,7 +30,7 @@ from frametool.stream import stamp_columns
 from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows, Outcome, run
 from frametool.stream.header import listed
-from frametool.stream.record_results import stream_rows
+from frametool.stream.record_stream import run_records
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_poses import RowPoses, block_of, objects, plain_cells
 from frametool.stream.table import open_table
@@ -219,7 +219,7 @@ def gathered(converter: FormatConverter, stream: ByteStream, bad: BadRows, colum
             line += outcome.lines
             yield outcome
 
-    run(outcomes(), lambda _: None, bad, lambda *_: None)
+    run(outcomes(), lambda _: None, bad)
     return _joined(found, converter.source, columns)
 
 
@@ -266,17 +266,27 @@ def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows, asked: R
 def _of_records(file: InputFile, fmt: str, bad: BadRows, asked: Request, body: str = BODY) -> Trajectory:
     """Gather records: poses, or points, with their stamps."""
     blocks, turned = list[RowPoses](), True
-    for rows in stream_rows(cast("ByteStream", file.stream), fmt, asked, Style("tum"), bad):
-        found = rows.posed()
-        if found is None:
-            results = [each for each in rows.in_order() if isinstance(each, Result) and each.pose.position is not None]
-            if len(results) != len(rows.values) + sum(len(each.places) for each in rows.batches):
-                raise FormatError("a trajectory is made of poses, or of points with stamps", source=file.name)
-            turned &= all(each.pose.rotation is not None for each in results)
-            whole = (Result(each.pose._replace(rotation=each.pose.components[3:]), each.extras) for each in results)
-            found = block_of([*whole]) if results else None
-        if found is not None:
-            blocks.append(found)
+
+    def outcomes() -> Iterator[Outcome]:
+        nonlocal turned
+        stream = cast("ByteStream", file.stream)
+        for outcome in run_records(stream, fmt, asked, source=file.name, style=Style("tum")):
+            yield outcome
+            if outcome.results is None:
+                continue
+            found = outcome.results.posed()
+            if found is None:
+                values = [*outcome.results.in_order()]
+                results = [each for each in values if isinstance(each, Result) and each.pose.position is not None]
+                if len(results) != len(values):
+                    raise FormatError("a trajectory is made of poses, or of points with stamps", source=file.name)
+                turned &= all(each.pose.rotation is not None for each in results)
+                whole = (Result(each.pose._replace(rotation=each.pose.components[3:]), each.extras) for each in results)
+                found = block_of([*whole]) if results else None
+            if found is not None:
+                blocks.append(found)
+
+    run(outcomes(), lambda _: None, bad)
     made = _trajectory(_joined(blocks, file.name), WORLD, body, turned=turned)
     return made._replace(world=Names().bare(made.world))
 

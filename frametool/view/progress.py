@@ -17,7 +17,7 @@ PATIENCE = 2.0  # seconds before anything is shown
 class ProgressBar(AbstractContextManager["ProgressBar"]):
     """Show the progress of a job, if stderr is a terminal and it takes longer than two seconds."""
 
-    def __init__(self, total: int | None, *, quiet: bool, counted: str = "rows") -> None:
+    def __init__(self, total: int | None, *, quiet: bool = False, counted: str = "rows") -> None:
         """Start the clock; total: bytes, if known; counted: the unit of the count."""
         self.total, self._counted = total, counted
         self.rows = self.size = 0

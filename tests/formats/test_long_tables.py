@@ -27,8 +27,10 @@ SEQUENCES: list[list[Any]] = [
 
 def table(values: list[Any], most: int) -> str:
     """Write values as a table, so many of them in a block."""
-    blocks = (values[first : first + most] for first in range(0, len(values), most))
-    return b"".join(CsvTable(STYLE).pieces(BlockResults((), [*enumerate(block)]) for block in blocks)).decode()
+    made = CsvTable(STYLE)
+    for first in range(0, len(values), most):
+        made.of_block(BlockResults((), [*enumerate(values[first : first + most])]))
+    return b"".join(made.end()).decode()
 
 
 @pytest.mark.parametrize("few", [1, 2, 4])
