@@ -50,7 +50,7 @@ class Cost(NamedTuple):
 MOST = {
     "one CSV point": Cost(functions=569, files=56, lines=3676),  # the aim: 320 functions, 30 files
     "40 JSON records": Cost(functions=541, files=49, lines=3350),  # 340, 32
-    "40 JSON records to CSV": Cost(functions=516, files=51, lines=3290),  # 340, 32
+    "40 JSON records to CSV": Cost(functions=519, files=50, lines=3301),  # 340, 32
     "TUM to KITTI": Cost(functions=478, files=46, lines=2914),  # 320, 30
     "YAML lookup": Cost(functions=347, files=39, lines=2013),  # 220, 28
     "convert of numbers": Cost(functions=160, files=24, lines=866),  # 120, 20
