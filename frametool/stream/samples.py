@@ -8,6 +8,7 @@ id,x,y,z,weight                                                        points, i
 
 from __future__ import annotations
 
+import re
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -20,16 +21,17 @@ from frametool.formats.detect import detect
 from frametool.formats.table import FORMATS
 from frametool.formats.trees.tree_reader import MOST_KEYS
 from frametool.geometry.transform import Transform
-from frametool.grammar.edges import Answers
-from frametool.grammar.pose import inverted, read_pose
+from frametool.grammar.pose import COVARIANCE_KEYS, Pose, inverted
 from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, tell, within
+from frametool.grammar.result import Result
 from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows
 from frametool.stream.header import listed
-from frametool.stream.record import value_at
+from frametool.stream.record import find_records, value_at
 from frametool.stream.record_values import pose_of, read_text
 from frametool.stream.request import Operation, Request
-from frametool.stream.row_poses import plain_cells
+from frametool.stream.row_layout import IDENTITY, POSE
+from frametool.stream.row_poses import RowPoses, block_of, plain_cells
 from frametool.stream.table import open_table
 from frametool.stream.trajectories import TREE, gathered
 from frametool.text.numbers import parse_number
@@ -39,7 +41,6 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Array
     from frametool.grammar.edges import Answers
-    from frametool.grammar.pose import Pose
     from frametool.grammar.readers import Path
     from frametool.text.lines import ByteStream
 
@@ -85,30 +86,27 @@ def read_samples(
     finally:
         file.close()
     reading = Reading(source, normalize=normalize)
-    found: list[tuple[Pose, Pose]] = []
-    paths: list[Path] = []
-    values: list[Any] = []
+    found: dict[Path, tuple[str, Pose, Pose]] = {}
     for document in parse_documents(source.text, source.name):
         try:
-            for path, value in _listed(document.value):
-                values.append(value)
-                reading.here = (document.index, *path)
-                found.append(within(path, _sample, value, reading, eye_to_hand=eye_to_hand))
-                paths.append(reading.here)
+            for path, value in _listed(document.value, (document.index,)):
+                found[path] = _sample(value, path, reading, eye_to_hand=eye_to_hand)
         except Misfit as misfit:
-            raise misfit.placed(source, document.index) from None
+            raise misfit.placed(source) from None
     if not found:
         raise FormatError(f"no samples in it; each is {LIKE}", source=source.name)
     tell(source, reading.notes)
-    places = [f"{source.name}:{line}" for line, _ in locate_many(source.text, paths)]
-    sides = [[*each] for each in zip(*found, strict=True)]
-    names = [_one_name(each, places) for side in sides for each in ([p.parent for p in side], [p.name for p in side])]
+    places = [f"{source.name}:{line}" for line, _ in locate_many(source.text, [*found])]
+    keys, *sides = zip(*found.values(), strict=True)
+    names = [
+        _one_name(each, places) for side in sides for each in ([p.parent for p in side], [p.name for p in side])
+    ]  # fmt: skip
     taken = ""
-    if any(ROBOT in value for value in values):
+    if ROBOT in keys:
         ways = ("gripper<-base, inverted", "with") if eye_to_hand else ("base<-gripper", "without")
         taken = f"robot is taken for {ways[0]}, as easy_handeye has it {ways[1]} --eye-to-hand"
     placed = any(pose.position is not None for side in sides for pose in side)
-    gripper, target = map(_batch, sides)
+    gripper, target = (Transform.of(*np.array([pose.components for pose in side]).T.copy()) for side in sides)
     return HandEyeSamples(gripper, target, places, tuple(names), (source.name,), taken, placed=placed)
 
 
@@ -135,57 +133,48 @@ def _of_table(file: InputFile, fmt: str, columns: Sequence[str], *, normalize: b
     return HandEyeSamples(sides[0], sides[1], places, (None,) * 4, (file.name,), placed=placed)
 
 
-def _listed(value: Any) -> Iterator[tuple[Path, Any]]:
+def _listed(value: Any, path: Path) -> Iterator[tuple[Path, Any]]:
     """Yield the samples of a document with their paths."""
-    path: Path = ()
-    if type(value) is dict and "samples" in value:
-        value, path = value["samples"], ("samples",)
-    elif type(value) is dict and not PARTNERS.keys().isdisjoint(value):
-        yield (), value
+    if type(value) is dict and not PARTNERS.keys().isdisjoint(value):
+        yield path, value
         return
+    if type(value) is dict and "samples" in value:
+        value, path = value["samples"], (*path, "samples")
     if type(value) is not list:
         found = f"the keys {first_of([*value], MOST_KEYS, quote=shown)}" if type(value) is dict else kind(value)
         raise Misfit(f"expected samples {LIKE}, found {found}; two files of poses are GRIPPER TARGET", path)
     yield from (((*path, at), each) for at, each in enumerate(value))
 
 
-def _sample(value: Any, reading: Reading, *, eye_to_hand: bool) -> tuple[Pose, Pose]:
-    """Read base_from_gripper and camera_from_target of one sample."""
-    sample = as_mapping(value, f"a sample {LIKE}")
+def _sample(value: Any, path: Path, reading: Reading, *, eye_to_hand: bool) -> tuple[str, Pose, Pose]:
+    """Return the key of a sample's first pose, base_from_gripper, and camera_from_target."""
+    sample = within(path, as_mapping, value, f"a sample {LIKE}")
     first = next((key for key in PARTNERS if key in sample), None)
     if first is None:
-        raise Misfit(f"no sample; expected {LIKE}, found the keys {first_of([*sample], MOST_KEYS, quote=shown)}")
+        found = first_of([*sample], MOST_KEYS, quote=shown)
+        raise Misfit(f"no sample; expected {LIKE}, found the keys {found}", path)
     second = next((key for key in PARTNERS[first] if key in sample), None)
     if second is None:
-        raise Misfit(f"missing {PARTNERS[first][0]} beside {first}")
-    gripper, target = (within((key,), _pose, sample[key], reading) for key in (first, second))
+        raise Misfit(f"missing {PARTNERS[first][0]} beside {first}", path)
+    gripper, target = (_pose(sample[key], (*path, key), reading) for key in (first, second))
     if first == ROBOT and eye_to_hand:
         gripper = inverted(gripper)._replace(name=gripper.parent, parent=gripper.name)
-    return gripper, target
+    return first, gripper, target
 
 
-def _pose(value: Any, reading: Reading) -> Pose:
-    """Read a pose in our grammar, as a matrix of 16 numbers, or as a message; it has a rotation."""
-    if type(value) is list:
-        if len(value) not in (4, 16):
-            raise Misfit(f"expected the 16 numbers of a 4x4 matrix, found {len(value)}")
-        rows = value if len(value) == 4 else [value[at : at + 4] for at in range(0, 16, 4)]
-        return read_pose({"matrix": rows}, reading)
-    pose = as_mapping(value, "a pose")
-    header = pose.get("header")
-    frames = {"parent": header.get("frame_id") if type(header) is dict else None, "name": pose.get("child_frame_id")}
-    inner = pose.get("transform", {key: each for key, each in pose.items() if key not in ("header", "child_frame_id")})
-    whole = as_mapping(inner, "a pose") | {key: name for key, name in frames.items() if type(name) is str and name}
-    found = within(("transform",), read_pose, whole, reading) if "transform" in pose else read_pose(whole, reading)
-    if found.rotation is None:
-        raise Misfit("the pose has no rotation")
-    if found.covariance is not None:
+def _pose(value: Any, path: Path, reading: Reading) -> Pose:
+    """Read a record that is a pose, or the 16 numbers of a matrix; it has a rotation."""
+    if type(value) is list and len(value) == 16:
+        value = [value[at : at + 4] for at in range(0, 16, 4)]
+    request = Request(kind=POSE, normalize=reading.normalize)
+    records = [*find_records(value, request, reading, path)]
+    found = pose_of(records[0], request)
+    if len(records) > 1 or found.rotation is None:
+        what = "the pose has no rotation" if len(records) == 1 else f"expected one pose, found {len(records)}"
+        raise Misfit(what, path)
+    if not {*COVARIANCE_KEYS}.isdisjoint(records[0].others) or records[0].shape.covariance:
         reading.note("the covariance of a sample is not used: all count alike", rule="left-out")
     return found
-
-
-def _batch(poses: Sequence[Pose]) -> Transform:
-    return Transform.of(*np.array([pose.components for pose in poses]).T.copy())
 
 
 def _one_name(names: Sequence[str | None], places: Sequence[str]) -> str | None:
@@ -215,90 +204,70 @@ def read_points(argument: str, *, fmt: str, answers: Answers, policy: Callable[[
 
     Raises FormatError with the place.
     """
-    import re
-
     file = InputFile(argument)
     try:
         fmt = fmt or detect(file.head(), "rows", "arrays", "records", name=file.path)
-        if "records" in FORMATS[fmt].reads and not re.search(TREE, file.head()):
-            return _of_documents(file)
-        return _of_rows(file, fmt, answers, policy(file.name))
+        is_record = "records" in FORMATS[fmt].reads and not re.search(TREE, file.head())
+        rows, places = _of_documents(file) if is_record else _of_rows(file, fmt, answers, policy(file.name))
     finally:
         file.close()
+    extras = {key: plain_cells(cells) for key, cells in rows.extras.items()}
+    if rows.names[0] is not None:
+        extras["name"] = [*rows.names]
+    key = next((key for key in IDS if any(each is not None for each in extras.get(key, ()))), "")
+    first: dict[str, str] = {}
+    for label, place in zip(extras.get(key, ()), places, strict=False):
+        if label is None:
+            raise ValueInvalid(f"{place}: no {key}, the others have one")
+        if (before := first.setdefault(str(label), place)) is not place:
+            raise ValueInvalid(f"{place}: {key} {shown(str(label))} appears twice, first at {before}")
+    weights = extras.get(WEIGHT, ())
+    is_weighed = any(each is not None for each in weights)
+    read = [_weight(each, place) for each, place in zip(weights, places, strict=True)] if is_weighed else None
+    frame = rows.parents[0] if len({*rows.parents}) == 1 else None
+    return Points(file.name, rows.numbers[:, :3], [*first] or None, read, places, frame)
 
 
-def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows) -> Points:
-    """Gather the points of a table, or of columns of numbers."""
+def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows) -> tuple[RowPoses, list[str]]:
+    """Gather the points of a table, or of columns of numbers, and where each is."""
     if {"rows", "arrays"}.isdisjoint(FORMATS[fmt].reads):
         raise FormatError(f"no points in it: {FORMATS[fmt].summary}", source=file.name)
     converter = FormatConverter(fmt, Request(Operation(moves=True)), file.name, answers=answers)
-    poses = gathered(converter, cast("ByteStream", file.stream), bad, (*IDS, WEIGHT))
-    if poses.numbers.shape[1] < 3 or not converter.placed:
+    rows = gathered(converter, cast("ByteStream", file.stream), bad, (*IDS, WEIGHT))
+    if rows.numbers.shape[1] < 3 or not converter.placed:
         raise FormatError("no positions in it: rotations alone are no points", source=file.name)
-    extra: dict[str, list[Any]] = dict.fromkeys((*IDS, WEIGHT), [None] * len(poses.numbers))
-    extra |= {key: plain_cells(cells) for key, cells in poses.extras.items()}
-    if poses.names[0] is not None:
-        extra[IDS[1]] = [*poses.names]
-    on_lines = "arrays" not in FORMATS[fmt].reads
-    lines = enumerate(poses.lines.tolist(), 1)
-    places = [f"{file.name}:{line}" if on_lines else f"{file.name} row {at}" for at, line in lines]
-    return _points(file.name, poses.numbers[:, :3], extra, places, {*poses.parents})
+    if "arrays" in FORMATS[fmt].reads:
+        return rows, [f"{file.name} row {at + 1}" for at in range(len(rows.numbers))]
+    return rows, [f"{file.name}:{line}" for line in rows.lines.tolist()]
 
 
-def _of_documents(file: InputFile) -> Points:
-    """Gather the points of YAML or JSON."""
+def _of_documents(file: InputFile) -> tuple[RowPoses, list[str]]:
+    """Gather the points of YAML or JSON, with the members of the mappings around each, and where each is."""
     source, request = file.source, Request()
-    xyz: list[Any] = []
-    extra: dict[str, list[Any]] = {key: [] for key in (*IDS, WEIGHT)}
-    paths: list[Path] = []
-    frames: set[str | None] = set()
     known = read_text(source, request)
+    results = []
     for record in known.records:
-        position = pose_of(record, request).position
-        if position is None:
+        pose = pose_of(record, request)
+        if pose.position is None:
             raise Misfit("expected a point {id: .., xyz: [x, y, z]}", record.path).placed(source)
-        xyz.append(position)
-        paths.append(record.path)
-        frames.add(record.parent.text)
         around = _around(known.values, record.path)
-        for key, cells in extra.items():
-            cells.append(around.get(key))
-    if not xyz:
+        said = {key: around[key] for key in (*IDS, WEIGHT) if key in around}
+        results.append(Result(Pose(pose.position, IDENTITY, parent=record.parent.text), said))
+    if not results:
         raise FormatError("no points in it; each is {id: .., xyz: [x, y, z]}", source=source.name)
-    places = [f"{source.name}:{line}" for line, _ in locate_many(source.text, paths)]
-    return _points(source.name, np.array(xyz, float), extra, places, frames)
+    places = [f"{source.name}:{line}" for line, _ in locate_many(source.text, [each.path for each in known.records])]
+    return block_of(results), places
 
 
 def _around(documents: dict[int, Any], path: Path) -> dict[str, Any]:
-    """Return the members of a record and of the mappings that hold it, up to the item of a list that it is."""
+    """Return the texts in a record and in the mappings that hold it, up to the item of a list that it is."""
+    first = max((at for at, step in enumerate(path) if at and type(step) is int), default=0)
     found: dict[str, Any] = {}
-    for depth in range(len(path), 0, -1):
-        value = value_at(documents, path[:depth])
+    for depth in range(first, len(path)):
+        value = value_at(documents, path[: depth + 1])
         if type(value) is dict:
-            found = {key: each for key, each in value.items() if type(each) is str} | found
-        if depth > 1 and type(path[depth - 1]) is int:
-            break
+            found |= {key: each for key, each in value.items() if type(each) is str}
     return found
-
-
-def _points(
-    file: str, xyz: Array, extra: dict[str, list[Any]], places: list[str], frames: set[str | None]
-) -> Points:
-    """Check ids and weights."""
-    key = next((key for key in IDS if any(each is not None for each in extra[key])), None)
-    ids = None if key is None else [str(each) for each in extra[key]]
-    if key is not None and ids is not None:
-        first: dict[str, str] = {}
-        for label, place in zip(extra[key], places, strict=True):
-            if label is None:
-                raise ValueInvalid(f"{place}: no {key}, the others have one")
-            if (before := first.setdefault(label, place)) is not place:
-                raise ValueInvalid(f"{place}: {key} {shown(str(label))} appears twice, first at {before}")
-    weights = None
-    if any(each is not None for each in extra[WEIGHT]):
-        weights = [_weight(each, place) for each, place in zip(extra[WEIGHT], places, strict=True)]
-    frame = frames.pop() if len(frames) == 1 else None
-    return Points(file, xyz, ids, weights, places, frame)
 
 
 def _weight(text: Any, place: str) -> float:
