@@ -56,7 +56,6 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
     from frametool.grammar.readers import Path
-    from frametool.stream.earth_records import Placed
     from frametool.stream.header import Columns, PoseColumns
     from frametool.stream.request import Formula, Request
 
@@ -476,8 +475,8 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
         def inner(rest: dict[str, Any]) -> tuple[Pose, list[str]]:
             return _pose_at_place(rest, path, reading, request)
 
-        if (found := placed_record(value, positions, inner, reading, request)) is not None:
-            return _placed(found, path)
+        if (found := placed_record(value, path, positions, inner, reading, request)) is not None:
+            return found
     rotations = _rotations(value)
     flat = _flat_pose(value, rotations)
     if flat and flat.position and flat.position.kind:
@@ -561,18 +560,6 @@ def _pose_at_place(rest: dict[str, Any], path: Path, reading: Reading, request: 
     position: Any = placed_at
     keys = [*rotations, *positions, *record.members, *record.flat, *(key for key in ("angles",) if key in bare)]
     return Pose(position, turned, covariance=covariance), keys
-
-
-def _placed(found: Placed, path: Path) -> Record:
-    """Return the record of what is placed on the Earth; where its keys are no numbers, none of them stays."""
-    first, *others = found.keys
-    if found.is_numbered:
-        numbers = tuple((*path, key) for key in found.keys)
-        return Record(path, found.shape, numbers, found.values, members=found.keys, parent=Name(EARTH_FRAMES[0]))
-    return Record(
-        path, found.shape, (None,) * len(found.values), found.values, members=(first,), others=tuple(others),
-        parent=Name(EARTH_FRAMES[0]), placed=found.keys,
-    )  # fmt: skip
 
 
 def _two_vectors(value: dict[str, Any], name: str, path: Path, request: Request) -> Record:

@@ -417,7 +417,7 @@ HAND_EYE: tuple[tuple[str, dict[str, str], str], ...] = (
     ("s.yaml", {"s.yaml": "- 5\n"}, "s.yaml:1:3: expected a sample {gripper: POSE, target: POSE}, found '5'"),
     ("s.yaml", {"s.yaml": "- {gripper: {rpy: [0, 0, 0]}}\n"}, "s.yaml:1:3: missing target beside gripper"),
     ("s.yaml", {"s.yaml": SAMPLE.format("{xyz: [1, 0, 0]}")}, "s.yaml:1:13: the pose has no rotation"),
-    ("s.yaml", {"s.yaml": SAMPLE.format("[1, 2, 3]")}, "s.yaml:1:13: expected the 16 numbers of a 4x4 matrix, found 3"),
+    ("s.yaml", {"s.yaml": SAMPLE.format("[1, 2, 3]")}, "s.yaml:1:13: a bare list of 3 numbers does not say what it is; write {rpy_deg: [..]}, {xyzw: [..]}, .."),
     ("s.yaml", {"s.yaml": SAMPLE.format("{rpy: [0, nan, 0]}")}, "s.yaml:1:23: 'nan' is not finite"),
     ("g.csv t.csv", {"g.csv": "x,y,z\n1,2,3\n", "t.csv": f"{HEAD}\n1,2,3,0,0,0,1\n"}, "g.csv: positions alone are not poses: rotations are needed here"),
     ("g.csv t.csv", {"g.csv": f"{HEAD}\n1,2,3,0,0,0,2\n", "t.csv": ""}, "g.csv:2:qx: quaternion 0 0 0 2 has norm 2; a rotation needs norm 1 (normalize it with --normalize)"),
