@@ -35,7 +35,7 @@ from frametool.stream.row_layout import POINT, VECTOR, place_of
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Collection, Iterable, Sequence
     from typing import TypeAlias
 
     from frametool.stream.request import Request
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from frametool.text.spans import Floats
 
     Reader: TypeAlias = Callable[[str], float]
+    Groups: TypeAlias = dict[str, dict[str, "NamedColumn"]]
 
 ECEF_COLUMNS = POSITIONS[ECEF].columns
 STATUS, DATUM, EPSG, PARENT = "status", "datum", "epsg", "parent"
@@ -66,13 +67,9 @@ class NamedColumn(NamedTuple):
     unit: str
 
 
-def find(names: Sequence[str], earth: Earth, expected: str = "") -> PoseColumns | None:
-    """Find the one position on the Earth among names, and a heading with it; None if absent.
-
-    expected: the representation that --from names.
-    Raises ValueInvalid for several, for heights that are not above the ellipsoid, and for units that are not known.
-    """
-    groups: dict[str, dict[str, NamedColumn]] = {}
+def _grouped(names: Sequence[str]) -> Groups:
+    """Return the columns that may say a position on the Earth by what is before their names, and by field."""
+    groups: Groups = {}
     for at, name in enumerate(names):
         if name and (match := PATTERN.fullmatch(name)):
             unit = (match[4] if match[4] is not None else match[3] or "").lower()
@@ -80,75 +77,71 @@ def find(names: Sequence[str], earth: Earth, expected: str = "") -> PoseColumns 
             if field == STATUS:  # of a NavSatFix: another may be anything
                 prefix = prefix.removesuffix("status.") if prefix.endswith("status.") else "another status"
             groups.setdefault(prefix, {}).setdefault(field, NamedColumn(at, name, unit))
+    return groups
+
+
+def _find(groups: Groups, earth: Earth, expected: str) -> PoseColumns | None:
+    """Find the one position on the Earth among columns, and a heading with it; None if absent.
+
+    expected: the representation that --from names.
+    Raises ValueInvalid for several, for heights that are not above the ellipsoid, and for units that are not known.
+    """
     found = [
-        (prefix, columns)
-        for prefix, spots in groups.items()
+        (spots, columns)
+        for spots in groups.values()
         for kind in ((expected,) if expected else POSITIONS)
         if (columns := _position(kind, spots, groups, earth)) is not None
     ]
-    if not found:
-        return None
-    plain = [each for each in found if not each[0]] or found
+    plain = [each for each in found if each[0] is groups.get("")] or found
     if len(plain) > 1:
         several = "; ".join(columns.shown for _, columns in plain)
         raise ValueInvalid(f"several positions on the Earth: {several}; choose with --columns NAMES --from lla")
-    prefix, columns = plain[0]
-    return PoseColumns(columns, _heading(groups[prefix], columns))
+    return PoseColumns(plain[0][1], _heading(*plain[0])) if plain else None
 
 
-def _position(
-    kind: str, spots: dict[str, NamedColumn], groups: dict[str, dict[str, NamedColumn]], earth: Earth
-) -> Columns | None:
+def _position(kind: str, spots: dict[str, NamedColumn], groups: Groups, earth: Earth) -> Columns | None:
     """Return the columns of a position of one kind, if they are there."""
     if kind in LOCAL and earth.origin is None:
         return None  # east and north are other data
-    if kind == ECEF or kind in FLAT:
-        names = ECEF_COLUMNS if kind == ECEF else POSITIONS[kind].names
-        axes = zip("xyz" if kind == ECEF else names, names, strict=True)
-        there = [(axis, spots[name]) for axis, name in axes if name in spots]
-        return _columns(kind, there, spots, earth) if len(there) == len(names) else None
-    fields: list[tuple[str, NamedColumn]] = [(name, spots[name]) for name in ("lat", "lon") if name in spots]
-    if kind == UTM:
-        zone = spots.get(ZONE) or groups.get("utm_", {}).get(ZONE) or groups.get("", {}).get(ZONE)
-        spots = {name: spot for name, spot in spots.items() if spot is not zone}
-        if zone is None and earth.zone is None and {"easting", "northing"} <= spots.keys():
+    row = POSITIONS[kind]
+    words = [words for words in zip(row.names, row.columns, strict=True) if words[0] != "alt"]
+    fields = {field: spot for field, column in words if (spot := spots.get(column) or spots.get(field))}
+    missing = {field for field, _ in words} - fields.keys()
+    if kind == UTM and missing <= {ZONE}:
+        zone = fields.get(ZONE) or groups.get("utm_", {}).get(ZONE) or groups.get("", {}).get(ZONE)
+        if zone is None and earth.zone is None:
             _refuse_not_read(spots)
             raise ValueInvalid("easting and northing do not say their zone; add a column utm_zone, or give --zone 32N")
-        fields = [(ZONE, zone)] if zone is not None else []
-        fields += [(name, spots[name]) for name in ("easting", "northing") if name in spots]
-        size = 2 + (zone is not None)
-    else:
-        fields = [(f"{name}_rad" if _in_radians(spot) else name, spot) for name, spot in fields]
-        size = 2
-    return None if len(fields) < size else _columns(kind, [*fields, *_height(spots)], spots, earth)
+        fields, missing = ({} if zone is None else {ZONE: zone}) | fields, set()
+    if missing:
+        return None
+    if kind == LLA:
+        fields = {f"{name}_rad" if _in_radians(spot) else name: spot for name, spot in fields.items()}
+    return _columns(kind, fields | (_height(spots) if "alt" in row.names else {}), spots, earth)
 
 
-def _height(spots: dict[str, NamedColumn]) -> list[tuple[str, NamedColumn]]:
+def _height(spots: dict[str, NamedColumn]) -> dict[str, NamedColumn]:
     """Return the height above the ellipsoid, or that above the sea and the geoid's; raise ValueInvalid without it."""
     if "alt" in spots:
-        return [("alt", spots["alt"])]
+        return {"alt": spots["alt"]}
     name = next((name for name in SEA_LEVEL if name in spots), "")
     if name and "undulation" not in spots:
         raise ValueInvalid(not_on_ellipsoid(spots[name].name))
-    return [("msl", spots[name]), ("undulation", spots["undulation"])] if name else []
+    return {"msl": spots[name], "undulation": spots["undulation"]} if name else {}
 
 
-def _columns(
-    kind: str, fields: Sequence[tuple[str, NamedColumn]], spots: dict[str, NamedColumn], earth: Earth
-) -> Columns:
-    """Put the columns together, with that of the axes."""
-    for field, spot in fields:
+def _columns(kind: str, fields: dict[str, NamedColumn], spots: dict[str, NamedColumn], earth: Earth) -> Columns:
+    """Put the columns together, with that of the axes, and those that are checked and stay."""
+    for field, spot in fields.items():
         if field[:3] not in ("lat", "lon") and spot.unit not in ("", "m"):
             what = f"column {shown(spot.name)}: unknown unit {shown(spot.unit)} of a length here; known is m"
             raise ValueInvalid(what)
     _refuse_not_read(spots)
-    axes = [(AXES, spots[AXES])] if AXES in spots else []
-    staying = [(name, spots[name]) for name in (STATUS, PARENT) if name in spots]
-    fields = [*fields, *axes, *staying]
-    zone = earth.zone if kind == UTM and fields[0][0] != ZONE else None
-    place = Place(kind, tuple(field for field, _ in fields), earth.axes or kind * (kind in LOCAL), zone,
-                  earth.origin if kind in LOCAL else None)  # fmt: skip
-    places, names = zip(*((spot.place, spot.name) for _, spot in fields), strict=True)
+    staying = {name: spots[name] for name in (STATUS, PARENT) if name in spots}
+    fields = fields | {name: spots[name] for name in (AXES,) if name in spots} | staying
+    axes, origin = (earth.axes or kind, earth.origin) if kind in LOCAL else (earth.axes, None)
+    place = Place(kind, (*fields,), axes, earth.zone if kind == UTM and ZONE not in fields else None, origin)
+    places, names, _ = zip(*fields.values(), strict=True)
     return Columns(places, names, unit=place, staying=len(staying))
 
 
@@ -174,73 +167,67 @@ def _heading(spots: dict[str, NamedColumn], position: Columns) -> Columns | None
     return Columns((spot.place,), (spot.name,), notation=notation, degrees=(not radians,))
 
 
-def unsaid_heading(names: Iterable[str]) -> str:
-    """Return the name of a heading whose unit nobody says, so that it stays data; "" without one."""
-    matches = ((name, PATTERN.fullmatch(name)) for name in names if name)
-    return next((name for name, match in matches if match and match[2].lower() == "heading" and not match[3]
-                 and match[4] is None), "")  # fmt: skip
-
-
 def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumns | None:
     """Find a position on the Earth and the rotation with it; None for rows that are expressed as x, y, z.
 
     Raises FormatError for half of one, for heights above the sea, and for a rotation whose axes nobody says.
     """
-    matches = {name: FIELDS[match[2].lower()] for name in names if name and (match := PATTERN.fullmatch(name))}
-    known = () if request.given_place else ECEF_COLUMNS
-    header = Header(["" if matches.get(name) in known else name for name in names])
+    groups = _grouped(names)
+    every = sorted((spot, field) for spots in groups.values() for field, spot in spots.items())
     earth, expected = request.earth or Earth(), request.given_place
-    if not expected and (others := find_positions(header)):
-        said = [name for name, field in matches.items() if may_be_on_earth(name) or field == "lon"]
+    in_ecef = {spot.place for spot, field in every if field in ECEF_COLUMNS and not expected}
+    positions = find_positions(Header(["" if at in in_ecef else name for at, name in enumerate(names)]))
+    if not expected and positions:
+        said = [spot.name for spot, field in every if may_be_on_earth(spot.name) or field == "lon"]
         if not request.operation.keeps_frames and said:
-            message = f"{', '.join(said[:2])} stay data: {others[0].shown} are the position"
+            message = f"{', '.join(said[:2])} stay data: {positions[0].shown} are the position"
             warn(f"{source}: {message}; --columns lat,lon,alt --from lla turns it round")
         return None
     try:
-        found = find(names, earth, expected)
-        if found is None and (place := Place.of_xyz(expected, earth)) and (positions := find_positions(header)):
+        found = _find(groups, earth, expected)
+        if found is None and (place := Place.of_xyz(expected, earth)) and positions:
             found = PoseColumns(positions[0]._replace(unit=place), None)
-        if problem := _problem(found, names, request):
+        if problem := _problem(found, names, {field for _, field in every}, request):
             raise ValueInvalid(problem)  # noqa: TRY301 - so that it gets its place as others do
     except ValueInvalid as error:
         raise FormatError(str(error), source=source, line=1) from None
     if found is None or found.position is None:
         return None
     taken = {*found.position.places, *(found.rotation.places if found.rotation else ())}
-    rest = Header(["" if at in taken else name for at, name in enumerate(names)])
-    turned = find_rotations(rest, request.given)
-    if len(turned) + (found.rotation is not None) > 1:
-        shown_ = " and ".join(each.shown for each in (*turned, *filter(None, [found.rotation])))
-        raise FormatError(f"expected one rotation, found {shown_}", source=source, line=1)
-    if found.rotation is None and (name := unsaid_heading(names)) and not turned:
-        warn(f"{source}: {shown(name)} has no unit and stays data; name it heading_deg")
-    return PoseColumns(found.position, found.rotation or next(iter(turned), None))
+    turned = find_rotations(Header(["" if at in taken else name for at, name in enumerate(names)]), request.given)
+    turned += [found.rotation] if found.rotation else []
+    if len(turned) > 1:
+        several = " and ".join(each.shown for each in turned)
+        raise FormatError(f"expected one rotation, found {several}", source=source, line=1)
+    unsaid = [spot.name for spot, field in every if field == "heading" and not spot.unit]
+    if unsaid and not turned:
+        warn(f"{source}: {shown(unsaid[0])} has no unit and stays data; name it heading_deg")
+    return PoseColumns(found.position, next(iter(turned), None))
 
 
-def _problem(found: PoseColumns | None, names: Sequence[str], request: Request) -> str:
+def _problem(found: PoseColumns | None, names: Sequence[str], fields: Collection[str], request: Request) -> str:
     """Return why the place of --from, or an incomplete one, cannot be read; "" where all is well."""
     expected = request.given_place
+    if found is None and (row := POSITIONS.get(expected)):
+        return f"no columns of {expected} ({' '.join(row.columns)}) among: {listed(names)}; name them with --columns"
     if found is None:
-        row = POSITIONS.get(expected)
-        missing = row and f"no columns of {expected} ({' '.join(row.columns)}) among: {listed(names)}"
-        return f"{missing}; name them with --columns" if missing else _half(names)
+        return _half(names, fields)
     place = place_of(found.position.unit) if found.position else None
     is_held = request.earth is not None and request.earth.zone is not None
-    asked = [each.name for each in (request.place, *request.place.more)] if request.place else []
+    asked = [each.name for each in request.place.all] if request.place else []
     if is_held and expected == UTM and place and ZONE in place.fields and UTM not in asked:
         return "--zone has no effect: each row says its zone"
     return ""
 
 
-def _half(names: Iterable[str]) -> str:
+def _half(names: Iterable[str], fields: Collection[str]) -> str:
     """Return what is missing of a position that is there by half; "" if absent."""
     if any(name.lower().rpartition(".")[2] == "mgrs" for name in names):
         return NOT_READ["mgrs"]
-    fields = {FIELDS[match[2].lower()] for name in names if name and (match := PATTERN.fullmatch(name))}
-    if len(fields & {"lat", "lon"}) == 1:
+    if ("lat" in fields) != ("lon" in fields):
         missing = "lon" if "lat" in fields else "lat"
         return f"half a place on the Earth: no {missing}; add it, or choose with --columns"
-    if {"east", "north"} <= fields:
+    if {"east", "north"} <= {*fields}:
         return "east, north and up or down are of an origin; give --origin '{lat: .., lon: ..}'"
     return ""
 
@@ -259,7 +246,7 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
         raise Misused(f"--columns: {kind} has {most} numbers ({' '.join(fields)}); found {len(own)}")
     spots = [NamedColumn(place, called[place], "") for place in own]
     try:
-        position = _columns(kind, [*zip(fields, spots, strict=False)], {}, earth)
+        position = _columns(kind, dict(zip(fields, spots, strict=False)), {}, earth)
     except ValueInvalid as error:
         raise Misused(f"--columns: {error}") from None
     behind = places[most:]
