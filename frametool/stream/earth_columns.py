@@ -1,23 +1,42 @@
-"""Find a position on the Earth among columns or keys by their names: lat lon alt, ecef_x .., utm_zone easting ..
+"""Positions on the Earth among the columns of a table or the keys of a record: lat lon alt, ecef_x, easting ..
 
-A common prefix is one that is set off (`field.latitude`, `gps_lat`); units follow names or in brackets.  Knows
-names only; loaded where one of them may say such a position.
+A common prefix is one that is set off (`field.latitude`, `gps_lat`); units follow names or in brackets.  Of records
+points of latitude and longitude stay where they are, anything else is read as a pose:
+
+    {"id": 7, "lat": 48.1, "lon": 11.5, "alt": 520}                     its numbers stay where they are, and are fast
+    {"utm": {..}}  {"at": {..}, "axes": "enu", ..}  {"lat": .., "heading_deg": 30, "axes": "ned"}     written anew
+    {"header": {"frame_id": "gps"}, "latitude": .., "position_covariance": [..]}                      a NavSatFix
+
+Loaded where one of the names may say such a position.
 """
 
 from __future__ import annotations
 
 import re
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from frametool.documents.json import JSON_NUMBER
 from frametool.errors import FormatError, Misused, ValueInvalid, shown, warn
+from frametool.geometry import uncertainty
 from frametool.geometry.earth import AXES as AXES_AT
 from frametool.geometry.place import AXES, ECEF, ENU, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Earth, Place, kernels
-from frametool.geometry.representations import HEADING, POSITIONS, Notation
+from frametool.geometry.representations import HEADING, POSITIONS, Notation, notation
 from frametool.geometry.transverse_mercator import ZONES as ZONE_NAMES
 from frametool.geometry.transverse_mercator import zone_number
-from frametool.grammar.names import FIX, FLAT, PARENT_COLUMNS, may_be_on_earth, may_be_uncertain
+from frametool.grammar.covariance import check, entries_of
+from frametool.grammar.names import (
+    EARTH_FRAMES,
+    FIX,
+    FLAT,
+    FLAT_KEYS,
+    PARENT_COLUMNS,
+    may_be_on_earth,
+    may_be_uncertain,
+)
 from frametool.grammar.place import (
+    AT,
+    EARTH_KEYS,
     GEOID,
     NO_ALT,
     NOT_READ,
@@ -28,21 +47,27 @@ from frametool.grammar.place import (
     check_parent,
     coordinate,
     not_on_ellipsoid,
+    placed_by,
+    without_place,
 )
+from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose
+from frametool.grammar.readers import Misfit, NotARotation, Reading, within
+from frametool.grammar.rotation_spelling import AXES_KEY
 from frametool.stream.faults import ZONES, RowNote
 from frametool.stream.header import Columns, Header, PoseColumns, find_positions, find_rotations, listed, places_named
-from frametool.stream.row_layout import POINT, VECTOR, place_of
+from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape, place_of
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
     from typing import TypeAlias
 
+    from frametool.stream.record import Record
     from frametool.stream.request import Request
-    from frametool.stream.row_layout import Shape
     from frametool.text.spans import Floats
 
     Reader: TypeAlias = Callable[[str], float]
+    Inner: TypeAlias = Callable[[dict[str, Any]], tuple[Pose, Sequence[str]]]
     Groups: TypeAlias = dict[str, dict[str, "NamedColumn"]]
 
 ECEF_COLUMNS = POSITIONS[ECEF].columns
@@ -56,6 +81,9 @@ PATTERN = re.compile(
     re.IGNORECASE,
 )
 FIX_ENTRY = re.compile(rf"(?:.*[./_])?{FIX}\[?_?([0-8])\]?")
+FIX_TYPE, NO_FIX = "position_covariance_type", "-1"
+STAYS = "{} stay data: x, y, z are the position; to read the place, leave these out"
+WHOLE = ("lat", "latitude", "lat_rad", AT, "ecef", "utm", "easting", *FLAT_KEYS)
 DEGREES = {"": False, "deg": False, "degrees": False, "°": False, "rad": True, "radians": True}
 
 
@@ -163,8 +191,8 @@ def _heading(spots: dict[str, NamedColumn], position: Columns) -> Columns | None
     if spot is None or spot.unit == "" or position.unit is None:
         return None
     radians = _in_radians(spot)
-    notation = Notation(f"heading_{'rad' if radians else 'deg'}", HEADING, NED, degrees=not radians)
-    return Columns((spot.place,), (spot.name,), notation=notation, degrees=(not radians,))
+    heading = Notation(f"heading_{'rad' if radians else 'deg'}", HEADING, NED, degrees=not radians)
+    return Columns((spot.place,), (spot.name,), notation=heading, degrees=(not radians,))
 
 
 def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumns | None:
@@ -393,3 +421,99 @@ def settle(
     except ValueInvalid as error:
         raise FormatError(str(error), source=source, line=1) from None
     return request, shapes
+
+
+# --- records ---
+
+
+def is_on_earth(value: dict[str, Any]) -> bool:
+    """Return True if a mapping says a position on the Earth, whole or by half."""
+    return not {*WHOLE, "mgrs", LLA}.isdisjoint(value) and not EARTH_KEYS.isdisjoint(value)
+
+
+def placed_record(
+    value: dict[str, Any], empty: Record, positions: Sequence[str], inner: Inner, reading: Reading, request: Request
+) -> Record | None:
+    """Read a record that is placed on the Earth; None for one that is expressed as x, y, z.
+
+    empty: the record without what it says; inner: reads the pose that comes with a place, and names its keys
+    The numbers of latitude, longitude and height stay members of the record; no other has a place of its own.
+    Raises Misfit for half a place, for a pose whose axes nobody says, and for what is no place.
+    """
+    if not is_on_earth(value):
+        return None
+    own = [key for key in value if key in EARTH_KEYS]
+    in_ecef = value.get("frame", value.get("parent")) in EARTH_FRAMES
+    if AT not in value and ((positions and not in_ecef) or {"x", "y", "z"} <= value.keys()):
+        if request.poses and not request.operation.keeps_frames:
+            reading.note(STAYS.format(", ".join(own)), own[0], rule="stays")
+        return None
+    if request.kind == VECTOR:
+        raise Misfit("a vector has no place on the Earth; leave --as vector out")
+    operation, gathered = request.operation, request.gathered
+    if gathered is not None:
+        gathered.frame = EARTH_FRAMES[0]
+    check_parent(value, value)
+    there, used = inner(without_place(value))
+    mapping = {key: value[key] for key in (*own, AXES_KEY, "parent", "frame", "inverse") if key in value}
+    covariance = _of_fix(value, mapping, reading, request) if "header" in value else ()
+    pose = placed_by(mapping, there, reading)
+    if pose.rotation is None and (operation.inverse or operation.similar) and gathered is None:
+        raise Misfit(UNSAID)  # as a factor it is a pose
+    takes_points = (operation.takes_points or operation.keeps_frames) and gathered is None
+    is_point = pose.rotation is None and request.kind != POSE and takes_points
+    numbers: tuple[float, ...] = pose.components[: 7 if pose.rotation is not None else 3]
+    shape = Shape(POINT if is_point else POSE, 1.0, None if pose.rotation is None else notation("quaternion"))
+    extra = covariance or _extra(pose, reading, request, is_point=is_point)
+    if extra:
+        shape = shape._replace(covariance=(len(extra),), rewritten=True)
+    keys = [*own, *used, *(key for key in (AXES_KEY, *COVARIANCE_KEYS) if key in value)]
+    keys += ["header", *[FIX, FIX_TYPE] * bool(covariance)] if "header" in value else []
+    stays = False
+    if pose.read and is_point and not extra:
+        place, named = pose.read.place, {SAME.get(key): key for key in keys}
+        stays = len(keys) == len(named) and named.keys() == {"lat", "lon", "alt"} and _are_numbers(value, keys)
+        if stays or operation.keeps_frames:
+            shape, numbers = Shape(POINT, place), tuple(pose.read.numbers)
+        keys = [named[field] for field in place.fields] if stays else keys
+    values = (*numbers, *extra)
+    record = empty._replace(shape=shape, values=values)
+    if stays:
+        return record._replace(numbers=tuple((*empty.path, key) for key in keys), members=tuple(keys))
+    first, *others = keys
+    return record._replace(
+        numbers=(None,) * len(values), members=(first,), others=tuple(others), placed=tuple(keys)
+    )  # fmt: skip
+
+
+def _are_numbers(value: dict[str, Any], keys: Iterable[str]) -> bool:
+    """Return True if members are plain numbers, without marks of degrees."""
+    return all(re.fullmatch(JSON_NUMBER, value[key]) for key in keys)
+
+
+def _extra(pose: Pose, reading: Reading, request: Request, *, is_point: bool) -> tuple[float, ...]:
+    """Return the covariance of a pose or point in ECEF where it counts; where it does not, that is noted."""
+    if pose.covariance is None:
+        return ()
+    if request.gathered is not None or request.operation.formula is not None or request.place is not None:
+        reading.note(LEFT_OUT.format("a result at a place" if request.place else "this"), rule="left-out")
+        return ()
+    entries = tuple(pose.covariance)
+    return tuple(entries[6 * i + j] for i in range(3) for j in range(3)) if is_point else entries
+
+
+def _of_fix(value: dict[str, Any], mapping: dict[str, Any], reading: Reading, request: Request) -> tuple[float, ...]:
+    """Return the covariance of a NavSatFix, east, north, up there, in ECEF; () where it has none, or where it stays.
+
+    Raises Misfit for a fix that was none.
+    """
+    status = value.get("status")
+    if type(status) is dict and status.get("status") == NO_FIX:
+        raise NotARotation("status -1: there was no fix", ("status", "status"))
+    if FIX not in value or value.get(FIX_TYPE, "1") == "0" or request.place is not None or request.gathered is not None:
+        return ()
+    entries = [number for _, number in within((FIX,), entries_of, value[FIX], (9,))]
+    within((FIX,), check, entries)
+    level = Pose(rotation=(0.0, 0.0, 0.0, 1.0))
+    at = placed_by(mapping | {AXES_KEY: ENU}, level, Reading(reading.source))
+    return tuple(uncertainty.rotate_covariance(tuple(entries), *at.components[3:]))

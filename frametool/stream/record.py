@@ -299,7 +299,7 @@ def _holds_numbers(value: dict[str, Any]) -> bool:
     if any(type(value.get(key)) in (dict, list) for key in INNER):
         return False
     if any(map(may_be_on_earth, value)):
-        from frametool.stream.earth_records import is_on_earth
+        from frametool.stream.earth_columns import is_on_earth
 
         if is_on_earth(value):
             return True
@@ -470,12 +470,13 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
         return _two_vectors(value, ACCEL if path[-1:] == (ACCEL,) else parts, path, request)
     positions = [key for key in value if _holds_position(key, value[key])]
     if any(map(may_be_on_earth, value)):
-        from frametool.stream.earth_records import placed_record
+        from frametool.stream.earth_columns import placed_record
 
         def inner(rest: dict[str, Any]) -> tuple[Pose, list[str]]:
             return _pose_at_place(rest, path, reading, request)
 
-        if (found := placed_record(value, path, positions, inner, reading, request)) is not None:
+        empty = Record(path, Shape("", None), parent=Name(EARTH_FRAMES[0]))
+        if (found := placed_record(value, empty, positions, inner, reading, request)) is not None:
             return found
     rotations = _rotations(value)
     flat = _flat_pose(value, rotations)
