@@ -111,7 +111,7 @@ CHOICES = {"direction": DIRECTIONS, "camera_axes": CAMERA_AXES, "dh": DH, "order
 _CAMERA = ("world", "camera")
 _TREE = "frametool.formats.trees.tree_reader"
 _MESSAGES = "frametool.ros.message_stream"
-_TABLE = "frametool.stream.table_samples"
+_TABLE = "frametool.stream.as_poses"
 BAG = "frametool.recordings.messages"
 _RECORDING: dict[str, Any] = {
     "writes": ("poses", "points", "tree", "recording"), "writer": "frametool.recordings.write", "cameras": True,

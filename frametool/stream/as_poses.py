@@ -1,26 +1,34 @@
 """Streams whose results come out in another format than theirs: rows of tables and listed poses, block by block.
 
 rows or listed poses -> the operation -> blocks of poses -> the text of the other format
+
+`read` makes of the rows of a table frames that move, of which each is a pose at its time:
+
+stamp,x,y,z,qx,qy,qz,qw                      frames as --frames says, `world` and `body` if it does not
+stamp_ns,parent,name,x,y,yaw_deg             each row names its frames
+parent,name,x,y,z,roll,pitch,yaw             no stamps: frames that are static
 """
 
 from __future__ import annotations
 
 from importlib import import_module
+from itertools import groupby
 from typing import TYPE_CHECKING, BinaryIO, TypeAlias, cast
 
 import numpy as np
 
-from frametool.documents.source import InputFile
+from frametool.documents.source import InputFile, not_text
 from frametool.errors import FormatError, Misused, ValueInvalid, warn
 from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, describe, rows_of
 from frametool.formats.table import FORMATS, is_recording, is_trajectory
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Answers, Diagnostics, Options, Topics, stop
+from frametool.grammar.edges import Answers, Diagnostics, Edge, Options, Samples, Topics, stop
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.result import Style
 from frametool.stream.evaluate import Plan, Run, State
-from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote
+from frametool.stream.faults import NULL, STOP, BadRow, Fault, Outcome, RowNote
+from frametool.stream.request import Request
 from frametool.stream.row_layout import POINT, POSE, Shape, Target
 from frametool.stream.row_poses import RowPoses, kept
 from frametool.stream.rows import Block, spans_of
@@ -32,9 +40,9 @@ if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Sequence
 
     from frametool.formats.table import Poses
+    from frametool.geometry.types import Components
     from frametool.stream.array_writer import ArrayWriter
     from frametool.stream.recording_writer import RecordingWriter
-    from frametool.stream.request import Request
     from frametool.stream.table_stream import PlannedRows
     from frametool.text.lines import ByteStream
     from frametool.text.spans import Ints
@@ -264,3 +272,80 @@ def _plan_listed(request: Request) -> Plan:
     target = Target(1.0, ((QUATERNION, False),), keep_sign=True)
     names = "x", "y", "z", *QUATERNION.columns
     return Plan((Shape(POSE, 1.0, QUATERNION),), (target,), request, names, edge_of=edge)
+
+
+# --- tables as frames ---
+
+
+def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
+    """Yield the rows of a table as poses of one frame, or of those that its columns name.
+
+    Raises or reports FormatError with the line of a row that is no pose.
+    """
+    fmt = FORMATS[file.format].poses
+    if what := not_text(file.head()):
+        raise FormatError(what, source=file.name)
+    converter = FormatConverter(file.format, Request(normalize=options.normalize), file.name, answers=options.answers)
+    line = count = 0
+    for block, outcome in converter.steps(cast("ByteStream", file.stream)):
+        if not line:
+            _check(converter.rows, fmt, file, options)
+            line = 1
+        for fault in outcome.faults:
+            options.report(BadRow(fault._replace(line=line + fault.line), fault.reason, source=file.name))
+        for row, column in _nameless(block, converter.rows).items():
+            fault = Fault(line + int(block.lines[row]), column, "no name of a frame")
+            options.report(BadRow(fault, fault.reason, source=file.name))
+        yield from _pieces(block, line, fmt, options)
+        line, count = line + outcome.lines, count + len(block.numbers)
+    rows = converter.rows
+    if len(rows.roles) < 2:
+        describe(options, fmt, count)
+    if fmt.rotation == "matrix":
+        options.tally.projected = rows.off
+    else:
+        options.tally.rough += [1] * rows.mended
+
+
+def _check(rows: PlannedRows, fmt: Poses, file: InputFile, options: Options) -> None:
+    """Refuse a table that is no poses, or poses without time and names."""
+    if rows.shape.notation is None:
+        message = f"no rotation among the columns {rows.columns}: points are no frames"
+        raise FormatError(message, source=file.name, line=1)
+    if rows.stamp_at is None and not fmt.counted and not options.answers.stamps and len(rows.roles) < 2:
+        lacking = ", ".join(name for role, name in enumerate(("parent", "name")) if role not in rows.roles)
+        wanted = "frames that stand still have parent and name, one that moves stamp or stamp_ns, or --stamps FILE"
+        raise FormatError(f"no column {lacking} nor stamp among {rows.columns}; {wanted}", source=file.name, line=1)
+
+
+def _nameless(block: RowPoses, rows: PlannedRows) -> dict[int, str]:
+    """Return the rows in which the cell of the parent (0) or of the name (1) is empty, and the name of its column."""
+    found: dict[int, str] = {}
+    for role in rows.roles:
+        names = block.for_each((block.parents, block.names)[role])
+        if not all(names):
+            column = rows.table.name(rows.naming.places[role] or 0)
+            found |= {row: column for row, name in enumerate(names) if not name}
+    return found
+
+
+def _pieces(block: RowPoses, line: int, fmt: Poses, options: Options) -> Iterator[Edge | Samples]:
+    """Yield the poses of a block: as samples of one frame after the other, or as edges that are static."""
+    columns: Components = tuple(block.numbers.T)
+    if len(columns) == len("xyzw"):
+        columns = (*[columns[0] * 0.0] * 3, *columns)
+    times = None if block.stamps_ns is None else block.stamps_ns.tolist()
+    poses = list(zip(*(column.tolist() for column in columns), strict=True))
+    lines = (block.lines + line).tolist()
+    world, body = options.answers.names(*fmt.frames)
+    parents = [name or world for name in block.for_each(block.parents)]
+    names = [name or body for name in block.for_each(block.names)]
+    bare = options.tally.names.bare
+    for (parent, name), group in groupby(range(len(poses)), key=lambda at: (bare(parents[at]), bare(names[at]))):
+        some = list(group)
+        part = slice(some[0], some[-1] + 1)
+        if times is not None:
+            yield Samples(parent, name, times[part], poses[part], lines[part])
+        else:
+            yield from (Edge(parent, name, poses[at], None, lines[at]) for at in some)
+    options.tally.axes |= dict.fromkeys(names, options.answers.camera_axes or fmt.axes)

@@ -72,7 +72,7 @@ def named(path: Path) -> set[str]:
     return {name for name in found if name.split(".")[1] in LAYERS}
 
 
-@pytest.mark.xfail(strict=True, reason="seam: FORMATS names frametool.stream.table_samples in a string")
+@pytest.mark.xfail(strict=True, reason="seam: FORMATS names frametool.stream.as_poses in a string")
 def test_a_string_names_only_modules_of_layers_before_its_own() -> None:
     assert {str(path): up for path in MODULES if (up := up_from(path, named(path)))} == {}
 
