@@ -118,12 +118,6 @@ def _follow(plan: DerivationStyle, steps: Any) -> Explanation:
 
 POSES = {"convert": 1, "compose": sys.maxsize, "invert": 1, "relative": 2, "interpolate": 2}  # operands that are poses
 OPERATIONS: dict[str, Callable[..., Explanation]] = {
-    "convert": derive.convert,
-    "compose": derive.compose,
-    "invert": derive.invert,
-    "relative": derive.relative,
-    "interpolate": derive.interpolate,
-    "lookup": derive.lookup,
-    "apply": _apply,
-    "follow": _follow,
-}
+    "convert": derive.convert, "compose": derive.compose, "invert": derive.invert, "relative": derive.relative,
+    "interpolate": derive.interpolate, "lookup": derive.lookup, "apply": _apply, "follow": _follow,
+}  # fmt: skip

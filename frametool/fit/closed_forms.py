@@ -37,35 +37,8 @@ class Spread(NamedTuple):
     angle_max: float
 
 
-def mean_and_spread(poses: Transform, weights: Numbers | None = None) -> tuple[Transform, Spread]:
-    """Return the weighted mean of transforms, as `Transform.mean`, and their distances from it.
-
-    Transforms with weight 0 have no effect.
-    Raises ValueInvalid for invalid weights, and if the rotations are so different that they have no mean.
-    """
-    mass = validation.masses(weights, poses.shape)
-    _refuse_no_mean(validation.second_moment(poses.components[3:], mass))
-    mean = poses.mean(weights)
-    metres, radians = mean.distance(poses)
-    counts = mass > 0.0
-    whole = mass.sum()
-    return mean, Spread(
-        float((mass * metres * metres).sum() / whole) ** 0.5,
-        float(metres[counts].max()),
-        float((mass * radians * radians).sum() / whole) ** 0.5,
-        float(radians[counts].max()),
-    )
-
-
-def _refuse_no_mean(moment: Any) -> None:
-    """Raise an error if two eigenvectors of sum(w q q^T) are equally good."""
-    *_, second, first = np.linalg.eigvalsh(np.array(moment))
-    if first - second <= LEAST_GAP * (first + second):
-        raise ValueInvalid("the rotations lie so far apart that none is their mean; leave some out, or give weights")
-
-
 class MeanFit(NamedTuple):
-    """The mean of the inliers and their spread, as `mean_and_spread` returns them.
+    """The mean of the inliers and their distances from it.
 
     used: the inliers; left_out: outliers with a weight; u: the residual of each in sigmas
     residuals: [t_i - t, Log(R_i R')], (n, 6); sigma: of each axis of a pose of weight 1, metres and radians
@@ -89,7 +62,8 @@ def solve_mean(
     """Return the mean of poses, transforms or matrices (n, 4, 4); outliers are rejected.
 
     weights: (n,), proportional to 1 / variance; a pose of weight 0 is ignored
-    Without outliers exactly the mean of `mean_and_spread`.  Raises ValueInvalid if there is no pose, or no mean.
+    Without outliers exactly the mean of `Transform.mean`.
+    Raises ValueInvalid if there is no pose, and if the rotations are so different that they have no mean.
     """
     poses = lsq.batch_of(poses, "poses")
     lsq.require_near(poses.xyz, "poses")
@@ -98,12 +72,19 @@ def solve_mean(
     used, roots = counts.copy(), np.sqrt(mass)[:, None]
     if robust and counts.sum() >= FEWEST_POSES:
         used[counts] = _agreeing(poses[counts], mass[counts])
-    mean, spread = mean_and_spread(poses[used], None if weights is None else mass[used])
+    inliers, shares = poses[used], mass[used]
+    *_, second, first = np.linalg.eigvalsh(np.array(validation.second_moment(inliers.components[3:], shares)))
+    if first - second <= LEAST_GAP * (first + second):  # two eigenvectors of sum(w q q^T) are equally good
+        raise ValueInvalid("the rotations lie so far apart that none is their mean; leave some out, or give weights")
+    mean = inliers.mean(None if weights is None else shares)
+    apart = np.stack(mean.distance(inliers))
+    rms, most = np.sqrt((shares * apart * apart).sum(1) / shares.sum()).tolist(), apart.max(1).tolist()
     off = lsq.errors(poses, mean)
     count, kept = int(used.sum()), roots[used] * off[used]
     s_t, s_r = lsq.fitted_sigmas(kept, np.ones(count), 3).tolist()
-    covariance = kept.T @ kept * (count / mass[used].sum() / (count - 1)) if count > 1 else None
+    covariance = kept.T @ kept * (count / shares.sum() / (count - 1)) if count > 1 else None
     u = lsq.deviations(roots * off, np.array([s_t, s_r]))
+    spread = Spread(rms[0], most[0], rms[1], most[1])
     return MeanFit(mean, spread, used, counts & ~used, u, off, (s_t, s_r), 3 * count - 3, covariance)
 
 
@@ -284,15 +265,15 @@ class _Pairs(NamedTuple):
         """
         middle = centre(self.source, self.mass)
         arms = fit.transform.rotation.apply(self.source - middle)
-        slopes = lsq.skew(fit.scale * arms).reshape(-1, 3)
-        of_turn = lsq.inverse(slopes.T @ (np.repeat(self.mass, 3)[:, None] * slopes))
-        of_scale = with_scale / (self.mass[:, None] * arms**2).sum()
+        unit = np.broadcast_to(np.eye(3), (len(arms), 3, 3))
+        slopes = np.concatenate([unit, -lsq.skew(fit.scale * arms), arms[:, :, None]], 2)[:, :, : 6 + with_scale]
+        about = lsq.inverse(np.einsum("n,nij,nik->jk", self.mass, slopes, slopes))
         lever = fit.transform.rotation.apply(middle)
-        levers = np.eye(6)
-        levers[:3, 3:] = lsq.skew(fit.scale * lever)
-        found = levers[:, 3:] @ of_turn @ levers[:, 3:].T
-        found[:3, :3] += np.eye(3) / self.mass.sum() + of_scale * np.outer(lever, lever)
-        return sigma**2 / 2.0 * (found + found.T), sigma * sqrt(of_scale) if with_scale else None
+        levers = np.eye(6 + with_scale)
+        levers[:3, 3:6], levers[:3, 6:] = lsq.skew(fit.scale * lever), -lever[:, None]
+        found = levers @ about @ levers.T
+        found = sigma**2 / 2.0 * (found + found.T)
+        return found[:6, :6], sqrt(found[6, 6]) if with_scale else None
 
 
 def _residuals(fit: Fit, target: Array, source: Array) -> Array:

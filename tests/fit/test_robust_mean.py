@@ -10,7 +10,7 @@ import pytest
 from rigs import replaced, small
 
 from frametool.errors import ValueInvalid
-from frametool.fit.closed_forms import mean_and_spread, solve_mean
+from frametool.fit.closed_forms import solve_mean
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 
@@ -43,7 +43,7 @@ def test_wrong_poses_are_left_out_and_told(count: int, wrong: int) -> None:
     assert set(rows) <= set(np.flatnonzero(found.left_out).tolist())
     assert found.used.sum() >= 0.99 * (count - wrong)
     assert (found.u[rows] > 3.0).all()
-    assert found.transform.components == mean_and_spread(poses[found.used])[0].components
+    assert found.transform.components == poses[found.used].mean().components
     assert found.dof == 3 * found.used.sum() - 3
     assert solve_mean(poses, robust=False).used.all()
 
@@ -53,12 +53,14 @@ def test_wrong_poses_are_left_out_and_told(count: int, wrong: int) -> None:
 def test_where_none_is_wrong_the_bits_are_those_of_the_plain_mean(count: int, weighted: bool) -> None:  # noqa: FBT001
     poses, _ = seen(count, seed=1)
     weights = np.linspace(1.0, 2.0, count) if weighted else None
-    plain, spread = mean_and_spread(poses, weights)
+    plain = poses.mean(weights)
+    metres, radians = plain.distance(poses)
+    farthest = (metres.max(), radians.max())
     for robust in (True, False):
         found = solve_mean(poses, weights=weights, robust=robust)
         assert found.used.all()
         assert found.transform.components == plain.components
-        assert found.spread == spread
+        assert (found.spread.distance_max, found.spread.angle_max) == farthest
 
 
 def test_two_poses_apart_are_both_kept() -> None:
