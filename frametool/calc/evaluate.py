@@ -12,6 +12,7 @@ vector or a twist in the notation of results.
 from __future__ import annotations
 
 import re
+from contextlib import contextmanager
 from copy import copy
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ from frametool.calc.operations import FUNCTIONS
 from frametool.calc.parser import PLAIN, RESERVED, UNITS, CalcError, NoTree, column_name, frame_text, parse_line
 from frametool.calc.values import LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TWIST, VECTOR, Term, Type, wanted
 from frametool.documents.document import parse_documents
-from frametool.documents.source import Source
+from frametool.documents.source import Source, error_at
 from frametool.errors import FormatError, FrametoolError, did_you_mean, shown, warn
 from frametool.geometry import floats
 from frametool.grammar.names import EARTH_FRAMES, may_be_on_earth
@@ -28,7 +29,7 @@ from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, read_pose
 from frametool.grammar.readers import Misfit, Reading, kind, read_numbers, slash_note, within
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from frametool.calc.parser import Branch, Line
     from frametool.calc.values import RowValues
@@ -120,24 +121,21 @@ def pointed(error: FrametoolError, text: str) -> FrametoolError:
     """Add the expression with a caret to an error with a position."""
     at = getattr(error, "at", None)
     if at is not None and not getattr(error, "snippet", ""):
-        from frametool.documents.source import line_of, places_of, pointer
-
-        if at < len(text):
-            ((row, column),) = places_of(f"{text}.", [at])
-        else:  # after the last visible character
-            lines = text.rstrip().splitlines() or [""]
-            row, column = len(lines), len(lines[-1]) + 1
-        error.fields = {**error.fields, "column": column}
-        lines = pointer(line_of(text, row), column).split("\n")
-        error.snippet = "\n".join(f"  {each}" for each in lines)  # type: ignore[attr-defined]
+        place = error_at(Source("", text), at, "")
+        error.fields = {**error.fields, "column": place.column}
+        error.snippet = "\n".join(f"  {each}" for each in place.snippet.split("\n"))  # type: ignore[attr-defined]
     return error
 
 
-def placed(error: FrametoolError, at: int) -> FrametoolError:
+@contextmanager
+def located(at: int) -> Iterator[None]:
     """Add the position in the expression to an error without one."""
-    if getattr(error, "at", None) is None:
-        error.at = at  # type: ignore[attr-defined]
-    return error
+    try:
+        yield
+    except FrametoolError as error:
+        if getattr(error, "at", None) is None:
+            error.at = at  # type: ignore[attr-defined]
+        raise
 
 
 def evaluate(text: str, scope: Scope) -> Term:
@@ -174,20 +172,15 @@ class _Walk:
 
     def term(self, branch: Branch) -> Term:
         """Return the value of a part, with its text; an error has the position."""
-        try:
+        with located(branch.at):
             found: Term = getattr(self, f"_{branch.kind}")(branch)
-        except FrametoolError as error:
-            raise placed(error, branch.at) from None
         self.scope.seen.update((found.type.target, found.type.source))
         return found._replace(text=self.text[branch.start : branch.end])
 
     def _value(self, branch: Branch) -> Term:
         """Return the value of a part that is neither a tree nor a list."""
-        term = self.term(branch)
-        try:
-            return wanted(term)
-        except CalcError as error:
-            raise placed(error, branch.at) from None
+        with located(branch.at):
+            return wanted(self.term(branch))
 
     def _number(self, branch: Branch) -> Term:
         text, unit = branch.value
@@ -269,10 +262,8 @@ class _Walk:
         left = self._value(branch.parts[0])
         for (operator, at), part in zip(branch.value, branch.parts[1:], strict=True):
             right = self._value(part)
-            try:
+            with located(at):
                 left = operations.operated(operator, left, right)
-            except FrametoolError as error:
-                raise placed(error, at) from None
         return left
 
     def _sign(self, branch: Branch) -> Term:
