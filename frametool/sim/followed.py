@@ -8,7 +8,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, printable
-from frametool.explain.derive import CLOSE, METRES, RADIANS, REPORT, DerivationWrong, explained, row
+from frametool.explain.derive import CLOSE, METRES, REPORT, DerivationWrong, explained, row
 from frametool.explain.operations import spans
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.sim.drivers import ARRIVED, frame_of
@@ -138,18 +138,11 @@ def _seen(sheet: Sheet, step: FollowStep) -> Values:
 
 def _add_place(sheet: Sheet, values: Values, seen: Sighting, name: str, index: str, *, turns: bool) -> None:
     """Add the position of a frame: as published, or between two samples."""
-    at, (begin_ns, *before) = format_stamp(seen.at_ns), seen.before
-    if seen.after is None:
-        units = {"x": METRES, "y": METRES} | ({"h": RADIANS} if turns else {})
-        values |= dict(zip((letter + index for letter in units), before, strict=False))
-        texts = (f"{letter}{index} {sheet.number(values[letter + index])} {unit}" for letter, unit in units.items())
-        sheet.say(f"{name} at {at} s: {', '.join(texts)}")
-        return
-    end_ns, *after = seen.after
+    (begin_ns, *before), (end_ns, *after) = seen.before, seen.after or seen.before
     values |= dict(zip(("ax", "ay", "ah", "bx", "by", "bh"), (*before, *after), strict=True))
-    values |= spans(begin_ns, end_ns, seen.at_ns) | {"turns": float(turns)}
-    begin, end = format_stamp(begin_ns), format_stamp(end_ns)
-    sheet.play("follow between", values, name=name, i=index, at=at, begin=begin, end=end)
+    values |= spans(begin_ns, end_ns, seen.at_ns) | {"turns": float(turns), "between": float(seen.after is not None)}
+    at, begin, end = map(format_stamp, (seen.at_ns, begin_ns, end_ns))
+    sheet.play("follow place", values, name=name, i=index, at=at, begin=begin, end=end)
 
 
 def _add_law(sheet: Sheet, step: FollowStep, values: Values) -> None:
