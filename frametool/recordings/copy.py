@@ -17,9 +17,10 @@ from frametool.frames.stamps import BILLION
 from frametool.frames.topology import resolve_name, static_and_moving, to_root, two_parents
 from frametool.geometry import floats, quaternion, rigid, uncertainty
 from frametool.grammar.edges import Diagnostics, Names, Topics
-from frametool.recordings.messages import checked_components, numbers_of
+from frametool.recordings.messages import numbers_of
 from frametool.recordings.types import POSE_ARRAY, posed_messages
 from frametool.ros.messages import PATH, STAMPS, stamp_problem
+from frametool.ros.plain_messages import unit_components
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -252,7 +253,7 @@ class MessageMover:
             put(part.point, [each + 0.0 for each in rigid.apply(*mover, *numbers)])
             return
         pose = getattr(part.pose, "pose", part.pose)
-        found = checked_components(numbers_of(pose.position, pose.orientation), 0, self.tally, self.normalize)
+        found = unit_components(numbers_of(pose.position, pose.orientation), 0, self.tally, self.normalize)
         tx, ty, tz, x, y, z, w = rigid.compose(*mover, *found)
         put(pose.position, (tx + 0.0, ty + 0.0, tz + 0.0))
         put(pose.orientation, [each + 0.0 for each in quaternion.unit(x, y, z, w, floats)])

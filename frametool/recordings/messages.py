@@ -16,11 +16,10 @@ import numpy as np
 
 from frametool.errors import FormatError, Unanswered, ValueInvalid, first_of, listing, shown
 from frametool.frames.stamps import BILLION
-from frametool.geometry import quaternion
 from frametool.grammar.edges import Edge, EdgeColumns
 from frametool.recordings.read import opened_recording
 from frametool.recordings.types import POSE_ARRAY, Layouts, posed_messages, text_of
-from frametool.ros.messages import PATH, POSES, STAMPS, body_of, stamp_problem
+from frametool.ros.messages import PATH, POSES, STAMPS, body_of, on_topic, stamp_problem
 from frametool.ros.plain_messages import unit_components, unit_rows
 from frametool.text.lines import Pieces
 
@@ -71,11 +70,13 @@ def cloud_topics(reader: RecordingReader, chosen: Collection[str]) -> list[str]:
     return sorted({each.topic for each in found})
 
 
-def _nothing(reader: RecordingReader, what: str, chosen: Collection[str]) -> FormatError:
+def _nothing(reader: RecordingReader, what: str, chosen: Collection[str] = ()) -> FormatError:
     """Return the error that nothing of a kind is on the chosen topics, or on any."""
     named = f" on {listing(chosen)}" if chosen else ""
-    known = listing({f"{each.topic} ({each.type})" for each in reader.channels}, near=next(iter(chosen), ""))
+    known = listing({f"{each.topic} ({each.type})" for each in reader.all}, near=next(iter(chosen), ""))
     remedy = f"; its frames: frametool lookup {reader.path} TARGET SOURCE" if reader.on_topics(TYPES) else ""
+    if poses := sorted(each.topic for each in reader.on_topics(POSES)):
+        remedy = remedy or f"; --topic {poses[0]} reads its poses"
     return FormatError(f"no {what}{named}; topics: {known or 'none'}{remedy}", source=reader.path)
 
 
@@ -245,14 +246,6 @@ def numbers_of(moved: Any, turned: Any) -> Rigid:
     return moved.x, moved.y, moved.z, turned.x, turned.y, turned.z, turned.w
 
 
-def checked_components(numbers: Rigid, line: int, tally: Diagnostics, normalize: bool) -> Rigid:  # noqa: FBT001 - fast
-    """Return `unit_components`; raises ValueInvalid if there are none."""
-    if (found := unit_components(numbers, line, tally, normalize)) is not None:
-        return found
-    problem = quaternion.complaint(*numbers[3:], normalize=normalize)
-    raise problem or ValueInvalid("its position is not finite", rule="not-finite")
-
-
 def read(file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
     """Yield the transforms of a bag in the order of the recording.
 
@@ -278,12 +271,7 @@ def _channels(reader: RecordingReader, options: Options) -> list[Channel]:
             what = f"{other.topic} holds {other.type} and no transforms; is it damaged?"
             raise FormatError(what, source=reader.path)
     if not with_frames and not (chosen and posed):
-        foreign = {f"{each.topic} ({each.encoding})" for each in reader.foreign}
-        known = ", ".join(sorted(options.topics.seen | foreign))
-        poses = sorted(each.topic for each in reader.on_topics(POSES))
-        hint = f"; --topic {poses[0]} reads its poses" if poses else ""
-        what = f"no transforms in the bag; its topics: {known}{hint}" if known else "no messages in the bag"
-        raise FormatError(what, source=reader.path)
+        raise _nothing(reader, "transforms")
     return reader.on_topics(TYPES | POSES, chosen) if chosen else with_frames
 
 
@@ -368,13 +356,11 @@ def _edge(said: RawTransform, number: int, message: Recorded, path: str, options
     parent, child = tally.names.bare(said.parent), tally.names.bare(said.child)
     problem = stamp_problem(*said.stamp, STAMPS[0]) if parent and child else ValueInvalid("an empty frame name")
     try:
-        components = checked_components(said.numbers, number, tally, options.normalize)
+        components = unit_components(said.numbers, number, tally, options.normalize)
     except ValueInvalid as error:
         problem = problem or error
     if problem:
         what = f"message {number}: {shown(parent)} -> {shown(child)}: {problem}"
         raise FormatError(what, source=path, rule=problem.rule)
-    if clash := options.topics.conflict(topic, child):
-        options.report(FormatError(clash, source=path, rule="two-topics"))
-    stamp_ns = None if message.channel.is_static else said.stamp[0] * BILLION + said.stamp[1]
-    return Edge(parent, child, components, stamp_ns, number, message.log_ns, topic=topic)
+    stamp_ns = said.stamp[0] * BILLION + said.stamp[1]
+    return on_topic(Edge(parent, child, components, stamp_ns, number, message.log_ns, topic=topic), path, options)

@@ -11,7 +11,7 @@ import struct
 from contextlib import contextmanager, suppress
 from functools import lru_cache
 from heapq import merge
-from itertools import groupby
+from itertools import chain, groupby
 from operator import itemgetter
 from pathlib import Path
 from shutil import rmtree
@@ -183,11 +183,13 @@ class RecordingFile:
         with suppress(OSError):  # Windows keeps the name of an open file
             rmtree(home)
 
-    def channel(self, kind: Kind, topic: str = "") -> Channel:
-        """Begin a topic, by default the usual one of its kind, and return the argument for `write`."""
-        made = new_channel(kind, topic or kind.topic, ros1=self.format == BAG1)
-        self.begin([made])
-        return made
+    def channel(self, name: str, topic: str = "") -> Channel:
+        """Return the channel of a kind of messages, by default on its usual topic."""
+        if name not in self._numbers:
+            self._numbers[name] = new_channel(KINDS[name], topic or KINDS[name].topic, ros1=self.format == BAG1)
+            self.begin([self._numbers[name]])
+        found: Channel = self._numbers[name]
+        return found
 
     def begin(self, channels: Iterable[Channel]) -> None:
         """Begin some channels."""
@@ -299,16 +301,12 @@ def tree_pieces(tree: Frames, style: Style) -> Iterator[bytes]:
     if not still and not moving:
         raise ValueInvalid(f"{fmt} holds transforms, and there is none in the tree")
     file = RecordingFile(fmt, asked.folder)
-    if still:
-        data = serialised(KINDS["tf_static"], fmt, [row for track in still for row in _samples(track, style)])
-        first = min((track.span[0] for track in moving), default=0)
-        file.write([(file.channel(KINDS["tf_static"], asked.topic), first, data)])
-    if moving:
-        channel = file.channel(KINDS["tf"], asked.topic)
-        samples = merge(*(_samples(track, style) for track in moving), key=itemgetter(0))
-        for stamp, rows in groupby(samples, itemgetter(0)):
-            check_stamps(np.array([stamp]), fmt)
-            file.write([(channel, stamp, serialised(KINDS["tf"], fmt, rows))])
+    first = min((track.span[0] for track in moving), default=0)
+    static = [("tf_static", first, [row for track in still for row in _samples(track, style)])] if still else []
+    samples = merge(*(_samples(track, style) for track in moving), key=itemgetter(0))
+    for name, stamp_ns, rows in chain(static, (("tf", *each) for each in groupby(samples, itemgetter(0)))):
+        check_stamps(np.array([stamp_ns]), fmt)
+        file.write([(file.channel(name, asked.topic), stamp_ns, serialised(KINDS[name], fmt, rows))])
     yield from file.pieces()
 
 

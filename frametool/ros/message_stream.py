@@ -25,7 +25,7 @@ from frametool.frames.stamps import BILLION
 from frametool.grammar.edges import Edge
 from frametool.grammar.readers import Misfit, Reading, as_mapping
 from frametool.ros import messages
-from frametool.ros.messages import body_of, is_pose
+from frametool.ros.messages import body_of, is_pose, on_topic
 from frametool.ros.plain_messages import plain_columns
 
 if TYPE_CHECKING:
@@ -251,7 +251,7 @@ def _plain(piece: Piece, end: str, file: InputFile, options: Options) -> Iterato
     elif found:
         for edge in found.edges():
             if options.topics.takes(edge.topic):
-                yield _on_topic(edge, file.name, options)
+                yield on_topic(edge, file.name, options)
     elif len(halves := [*_cut(piece, end, len(piece.text) // 2 + 1)]) > 1:
         for half in halves:
             yield from _plain(half, end, file, options)
@@ -284,14 +284,7 @@ def _message_edges(message: TextMessage | FormatError, options: Options) -> Iter
             continue
         options.tally.note_all(reading.notes, line)
         edge = Edge(parent, child, (*position, *rotation), stamp_ns, line, message.received_ns, (), topic)
-        yield _on_topic(edge, message.source.name, options) if topic else edge
-
-
-def _on_topic(edge: Edge, name: str, options: Options) -> Edge:
-    """Remove the stamp of an edge on tf_static; the same frame on two topics is an error."""
-    if problem := options.topics.conflict(edge.topic, edge.child):
-        options.report(FormatError(problem, source=name, line=edge.line, column=1, rule="two-topics"))
-    return edge._replace(stamp_ns=None) if edge.topic.endswith("tf_static") else edge
+        yield on_topic(edge, message.source.name, options) if topic else edge
 
 
 def _transforms(value: Any, path: Path, options: Options) -> Iterator[tuple[dict[str, Any], Path]]:

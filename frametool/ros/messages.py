@@ -16,7 +16,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import shown
+from frametool.errors import FormatError, shown
 from frametool.frames.stamps import BILLION
 from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import read_rotation
@@ -24,7 +24,7 @@ from frametool.grammar.rotation_spelling import read_rotation
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.grammar.edges import Answers
+    from frametool.grammar.edges import Answers, Edge, Options
     from frametool.grammar.readers import Path, Quaternion, Reading, Vector
 
 
@@ -65,6 +65,13 @@ def is_envelope(value: dict[str, Any]) -> bool:
 def topic_of(value: Any) -> str:
     """Return the topic named in an envelope, or ""."""
     return str(value.get("topic") or "") if type(value) is dict and is_envelope(value) else ""
+
+
+def on_topic(edge: Edge, name: str, options: Options) -> Edge:
+    """Remove the stamp of an edge on tf_static; the same frame on two topics is an error."""
+    if problem := options.topics.conflict(edge.topic, edge.child):
+        options.report(FormatError(problem, source=name, line=edge.line, column=1, rule="two-topics"))
+    return edge._replace(stamp_ns=None) if edge.topic.endswith("tf_static") else edge
 
 
 def messages(value: dict[str, Any], path: Path) -> Iterator[tuple[dict[str, Any], Path]]:

@@ -17,11 +17,11 @@ from __future__ import annotations
 
 import json
 import re
-from contextlib import suppress
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.json import JSON_NUMBER
+from frametool.errors import ValueInvalid
 from frametool.frames.stamps import BILLION
 from frametool.geometry import floats, quaternion
 from frametool.grammar.edges import EdgeColumns
@@ -167,32 +167,27 @@ def unit_rows(
 ) -> list[Rigid] | None:  # fmt: skip
     """Return the components of each row with a unit quaternion; None, and no warnings, if one of them is refused."""
     rough = len(tally.rough)
-    found: list[Rigid] = []
-    with suppress(ValueError):  # raised by float
-        for row, line in zip(rows, lines, strict=True):
-            if (components := unit_components(row, line, tally, normalize)) is None:
-                break
-            found.append(components)
-    if len(found) == len(lines):
-        return found
-    del tally.rough[rough:]
+    try:
+        return [unit_components(row, line, tally, normalize) for row, line in zip(rows, lines, strict=True)]
+    except ValueError:  # of numbers that are refused, or no numbers
+        del tally.rough[rough:]
     return None
 
 
-def unit_components(numbers: Rigid, line: int, tally: Diagnostics, normalize: bool) -> Rigid | None:  # noqa: FBT001 - fast
-    """Return tx, ty, tz, x, y, z, w with a unit quaternion; None for numbers that every reader refuses.
+def unit_components(numbers: Rigid, line: int, tally: Diagnostics, normalize: bool) -> Rigid:  # noqa: FBT001 - fast
+    """Return tx, ty, tz, x, y, z, w with a unit quaternion; raises ValueInvalid for numbers that every reader refuses.
 
     normalize: accept any non-zero quaternion.  The tally records the line of one that was off.
     """
     tx, ty, tz, x, y, z, w = numbers
     squared = x * x + y * y + z * z + w * w
-    if not abs(tx) + abs(ty) + abs(tz) < INFINITE:
-        return None
-    if abs(squared - 1.0) <= quaternion.UNIT:
-        return numbers
-    off = abs(squared**0.5 - 1.0)
-    if not off <= quaternion.TOLERATED and not (normalize and 0.0 < squared < INFINITE):
-        return None
-    if off > quaternion.SILENT and not normalize:
-        tally.rough.append(line)
-    return tx, ty, tz, *quaternion.normalized(x, y, z, w, floats)
+    if abs(tx) + abs(ty) + abs(tz) < INFINITE:
+        if abs(squared - 1.0) <= quaternion.UNIT:
+            return numbers
+        off = abs(squared**0.5 - 1.0)
+        if off <= quaternion.TOLERATED or (normalize and 0.0 < squared < INFINITE):
+            if off > quaternion.SILENT and not normalize:
+                tally.rough.append(line)
+            return tx, ty, tz, *quaternion.normalized(x, y, z, w, floats)
+    problem = quaternion.complaint(x, y, z, w, normalize=normalize)
+    raise problem or ValueInvalid("its position is not finite", rule="not-finite")

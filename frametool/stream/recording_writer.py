@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -58,7 +57,6 @@ class RecordingWriter:
         if asked.topic and len(self.kinds) > 1:
             raise ValueInvalid(f"there are {len(self.kinds)} topics ({', '.join(self.kinds)}); {asked.topic} names one")
         self.file = RecordingFile(style.format, asked.folder)
-        self.channel = cache(lambda name: self.file.channel(KINDS[name], asked.topic))
         self.dropped = dict.fromkeys(extras)
         self.path: list[tuple[str, Ints, Floats]] = []
         self.lost: dict[str, None] = {}  # names of frames that poses are of
@@ -86,7 +84,7 @@ class RecordingWriter:
         refuse_scale_in(self.style.format, self.dropped)
         frames = self._frames(block)
         numbers = self._places(block) if "fix" in self.kinds else self._numbers(block)
-        channels = {name: self.channel(name) for name in self.kinds}
+        channels = {name: self.file.channel(name, self.style.recording.topic) for name in self.kinds}
         if channels.pop("path", None):
             self.path += [(frames[0][0], stamps, numbers)]
         messages = [self._messages(name, frames, stamps, numbers) for name in channels]
@@ -180,4 +178,4 @@ class RecordingWriter:
         rows = (zip(stamps.tolist(), poses.tolist(), strict=True) for _, stamps, poses in self.path)
         samples = [(stamp, (min(parents), ""), pose) for each in rows for stamp, pose in each]
         data = serialised(KINDS["path"], self.style.format, samples)
-        self.file.write([(self.channel("path"), samples[-1][0], data)])
+        self.file.write([(self.file.channel("path", self.style.recording.topic), samples[-1][0], data)])

@@ -684,7 +684,7 @@ def test_the_odometry_of_a_bag_is_a_frame_that_moves(kind: str, run: Run, tmp_pa
     path = "a.bag" if kind == "ros1" else next(each.name for each in (tmp_path / "a.bag").glob("*.mcap"))
     where = path if kind == "ros1" else f"a.bag/{path}"
     refused = run("tree", where)
-    assert (refused.status, "no transforms in the bag; its topics: /odom; --topic /odom reads its poses" in refused.err) == (1, True)
+    assert (refused.status, "no transforms; topics: /odom (nav_msgs/msg/Odometry); --topic /odom reads its poses" in refused.err) == (1, True)
     done = run("lookup", where, "odom", "base", "--topic", "/odom", "-f", "tum")
     assert done.out.splitlines() == [f"{second}.000000007 {second}.0 2.0 3.0 0.0 0.0 0.0 1.0" for second in (1, 2)]
 
