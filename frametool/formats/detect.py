@@ -286,20 +286,21 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
     begin = Beginning(head)
     if fmt := by_sign(begin, *reads, name=name):
         return fmt
-    if "tree" not in reads and (what := not_text(head)):
+    what = not_text(head)
+    if what and "tree" not in reads:
         raise _no_text(what, name)
     if "tree" in reads and begin.xml and (begin.elements or not by_suffix(name, readers(*reads))):
         raise _unknown(begin, *reads, name=name)
     if others := _fitting(begin, {"magic": _STRONG["magic"]}, readers("arrays"))[0]:
-        what = f"{FORMATS[others[0]].summary}: no frames in it; frametool convert and apply read it"
-        raise FormatError(what, source=name or "stdin")
+        message = f"{FORMATS[others[0]].summary}: no frames in it; frametool convert and apply read it"
+        raise FormatError(message, source=name or "stdin")
     if fmt := by_suffix(name, readers(*reads)):
-        if (what := not_text(head)).startswith("not text but") and FORMATS[fmt].reader != BAG:
+        if what.startswith("not text but") and FORMATS[fmt].reader != BAG:
             raise _no_text(what, name)
         return fmt
     if fmt := unsupported_by_suffix(name):
         raise not_read(fmt, name)
-    if (what := not_text(head)) and not head.startswith(UTF16):
+    if what and not head.startswith(UTF16):
         raise _no_text(what, name)
     found, _ = _fitting(begin, _WEAK, readers(*reads))
     if found and (otherwise or begin.has_data):

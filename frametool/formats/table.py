@@ -87,6 +87,8 @@ def _read_tree(summary: str, module: str, **fields: Any) -> Format:
 
 
 _DRAWINGS = "frametool.formats.trees.drawings"
+_MESSAGES = "frametool.ros.message_stream"
+BAG = "frametool.recordings.messages"
 
 
 def _drawing(summary: str, **fields: Any) -> Format:
@@ -102,6 +104,17 @@ def _arrays(
     return Format(summary, reads=("arrays",), reader=module, writes=writes, writer=module, **fields)
 
 
+def _messages(summary: str, *magic: tuple[str, str | bytes], reader: str = _MESSAGES, **fields: Any) -> Format:
+    """Return the row of a format of messages."""
+    return Format(summary, reads=("tree",), reader=reader, magic=magic, required_options=("frames",), **fields)
+
+
+def _recording(summary: str, suffix: str, *magic: tuple[str, str | bytes]) -> Format:
+    """Return the row of a format of recorded messages."""
+    written = {"writes": ("poses", "points", "tree", "recording"), "writer": "frametool.recordings.write"}
+    return _messages(summary, *magic, reader=BAG, suffixes=(suffix,), cameras=True, **written)
+
+
 # options for what the format of a file does not specify
 DIRECTIONS = ("parent-from-child", "child-from-parent")
 CAMERA_AXES = ("optical", "opengl")
@@ -110,12 +123,7 @@ ORDERS = ("xyzw", "wxyz")
 CHOICES = {"direction": DIRECTIONS, "camera_axes": CAMERA_AXES, "dh": DH, "order": ORDERS}
 _CAMERA = ("world", "camera")
 _TREE = "frametool.formats.trees.tree_reader"
-_MESSAGES = "frametool.ros.message_stream"
 _TABLE = "frametool.stream.as_poses"
-BAG = "frametool.recordings.messages"
-_RECORDING: dict[str, Any] = {
-    "writes": ("poses", "points", "tree", "recording"), "writer": "frametool.recordings.write", "cameras": True,
-}  # fmt: skip
 NUMBER = r"[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?"
 _ONE_COLUMN = r"\ufeff?\"?[A-Za-z]\w*(?: ?[\[(][a-z]+[\])])?\"?[ \t]*\r?\n[-+.\d]"  # a name above numbers
 _MESSAGE_KEYS = (
@@ -203,22 +211,18 @@ FORMATS = {
         conventions="world<-body, seconds, metres, quaternion x y z w", required_options=("frames",), delimiter="",
         columns=("t", "x", "y", "z", "qx", "qy", "qz", "qw"), poses=Poses("xyzw", counted=""),
     ),
-    "echo": _read_tree(
-        "messages as `ros2 topic echo` or `rostopic echo` print them", _MESSAGES,
-        required_options=("frames",), magic=(("line", rf"(?:{_MESSAGE_KEYS}): *$|(?:transforms|header): *[\[{{]"),),
+    "echo": _messages(
+        "messages as `ros2 topic echo` or `rostopic echo` print them",
+        ("line", rf"(?:{_MESSAGE_KEYS}): *$|(?:transforms|header): *[\[{{]"),
     ),
-    "jsonl": _read_tree(
+    "jsonl": _messages(
         "messages as JSON, one a line (rosbridge, Foxglove)",
-        _MESSAGES,
-        required_options=("frames",),
-        magic=(("line", r'\{.*"(?:header|(?:static_)?transforms|parent_frame_id|op)".*\}\s*$'),),
+        ("line", r'\{.*"(?:header|(?:static_)?transforms|parent_frame_id|op)".*\}\s*$'),
     ),
-    "csv1": _read_tree(
-        "CSV of `rostopic echo -p`", _MESSAGES, required_options=("frames",), magic=(("line", "%time,"),)
-    ),
-    "csv2": _read_tree(
-        "CSV of `ros2 topic echo --csv`", _MESSAGES, required_options=("frames",),
-        magic=(("line", rf"-?\d{{1,12}},\d{{1,10}},(?!{NUMBER},)[^,]*,[^,]+,|[-+0-9.e]+(?:,[-+0-9.e]+){{5}}$"),),
+    "csv1": _messages("CSV of `rostopic echo -p`", ("line", "%time,")),
+    "csv2": _messages(
+        "CSV of `ros2 topic echo --csv`",
+        ("line", rf"-?\d{{1,12}},\d{{1,10}},(?!{NUMBER},)[^,]*,[^,]+,|[-+0-9.e]+(?:,[-+0-9.e]+){{5}}$"),
     ),
     "calls": _read_tree(
         "static_transform_publisher calls", "frametool.ros.publisher",
@@ -228,18 +232,11 @@ FORMATS = {
             ("line", r"[-+]?[\d.]+\s(?:\S+\s+){5,6}(?!-?[\d.])\S+\s+\S+\s*\d*\s*&?$"),
         ),
     ),
-    "bag1": _read_tree(
-        "ROS 1 bag", BAG, **_RECORDING, suffixes=(".bag",), required_options=("frames",),
-        magic=(("magic", rb"#ROSBAG V2\.0\n(?:..\0\0|.{0,3}\Z)"),),
+    "bag1": _recording("ROS 1 bag", ".bag", ("magic", rb"#ROSBAG V2\.0\n(?:..\0\0|.{0,3}\Z)")),
+    "bag2": _recording(
+        "ROS 2 bag: sqlite3, or a folder", ".db3", ("magic", rb"SQLite format 3\0"), ("folder", "metadata.yaml")
     ),
-    "bag2": _read_tree(
-        "ROS 2 bag: sqlite3, or a folder", BAG, **_RECORDING, suffixes=(".db3",), required_options=("frames",),
-        magic=(("magic", rb"SQLite format 3\0"), ("folder", "metadata.yaml")),
-    ),
-    "mcap": _read_tree(
-        "MCAP file", BAG, **_RECORDING, suffixes=(".mcap",), required_options=("frames",),
-        magic=(("magic", rb"\x89MCAP0\r\n"),),
-    ),
+    "mcap": _recording("MCAP file", ".mcap", ("magic", rb"\x89MCAP0\r\n")),
     "ros1": _ECHO._replace(summary="messages as `rostopic echo` prints them"),
     "ros2": _ECHO._replace(summary="messages as `ros2 topic echo` prints them"),
     "foxglove": _ECHO._replace(summary="FrameTransform as JSON, one a line", writes=("poses", "tree")),

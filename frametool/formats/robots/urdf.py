@@ -13,7 +13,7 @@ quat_xyzw is added, which URDF 1.0 tools ignore.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from frametool.documents.source import InputFile, paused_collector
 from frametool.documents.xml import Element, read_xml
@@ -34,7 +34,7 @@ from frametool.grammar.result import Style, rotation_numbers
 from frametool.grammar.rotation_spelling import TURN, agreeing_rotation
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
     from os import PathLike
 
     from frametool.frames.lookups import Frames
@@ -48,30 +48,22 @@ PARTS = ("origin", "parent", "child", "axis", "limit", "mimic")
 _XACRO = f"xacro, not yet URDF; {UNSUPPORTED['xacro'].remedy}"
 
 
-class RobotDescription(NamedTuple):
-    """The frames of a robot with their lines, and the links of those with a joint, in the order of the file."""
-
-    frames: dict[str, int]
-    links: list[Link]
-    posture: JointState
-
-    @property
-    def roots(self) -> list[str]:
-        """Return the frames without a parent."""
-        children = {link.child for link in self.links}
-        return [frame for frame in self.frames if frame not in children]
-
-
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the edges of a robot, with joint values from options, default 0."""
-    robot = describe(file, options)
-    for frame in robot.roots:
-        yield Edge(None, frame, IDENTITY, line=robot.frames[frame])
-    yield from robot.posture.edges(robot.links)
+    frames, links, posture = describe(file, options)
+    for frame in _roots(frames, links):
+        yield Edge(None, frame, IDENTITY, line=frames[frame])
+    yield from posture.edges(links)
 
 
-def describe(file: InputFile, options: Options) -> RobotDescription:
-    """Read the links and joints of a robot, and its joint values.
+def _roots(frames: Iterable[str], links: Iterable[Link]) -> list[str]:
+    """Return the frames without a parent."""
+    children = {link.child for link in links}
+    return [frame for frame in frames if frame not in children]
+
+
+def describe(file: InputFile, options: Options) -> tuple[dict[str, int], list[Link], JointState]:
+    """Return the frames of a robot with their lines, the links of those with a joint, and the joint values.
 
     Raises FormatError if it is not URDF; errors in one joint go to `options.report`.
     """
@@ -89,14 +81,14 @@ def describe(file: InputFile, options: Options) -> RobotDescription:
         except FormatError as error:
             options.report(error)
     links = list(_connected(joints, frames, options))
-    robot = RobotDescription(frames, links, JointState.of(links, options, file.name))
+    posture = JointState.of(links, options, file.name)
     if not frames:
         raise FormatError("no links in it", source=file.name)
-    if len(roots := robot.roots) > 1:
+    if len(roots := _roots(frames, links)) > 1:
         named = first_of(roots, 5, quote=bare)
         message = f"{len(roots)} roots, where a robot has one: {named}; they are not connected"
         options.tally.note(message, frames[roots[1]], "several-roots")
-    return robot
+    return frames, links, posture
 
 
 def _refuse_xacro(root: Element) -> None:
@@ -221,18 +213,18 @@ def robot_of(file: FrameFile) -> tuple[Robot, JointState]:
     options = Options(file.tally, file.topics, answers=file.answers)
     try:
         with paused_collector():
-            described = describe(file, options)
+            frames, described, posture = describe(file, options)
     finally:
         file.close()
     refuse_unknown_joints([file])
     links: dict[str, Link] = {}
-    for link in described.links:
+    for link in described:
         if link.child in links:
             error = two_parents(link.child, str(links[link.child].parent), str(link.parent))
             raise BadTopology(error.message, source=file.name, line=link.line, rule=error.rule)
         links[link.child] = link
     file.tell()
-    return Robot(file.name, links, described.frames), described.posture
+    return Robot(file.name, links, frames), posture
 
 
 _ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\t": "&#9;", "\n": "&#10;", "\r": "&#13;"}

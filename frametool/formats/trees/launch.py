@@ -118,8 +118,6 @@ def _arguments(action: Action) -> str | Sequence[str]:
     problem = ""
     if action.kind == "composable_node":
         problem = "it is a composable node, whose transform is in its parameters"
-    elif key not in action.fields:
-        problem = f"it has no {key}"
     elif isinstance(arguments, Misfit):
         problem = str(arguments)
     elif not isinstance(arguments, str | list):
