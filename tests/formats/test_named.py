@@ -106,6 +106,7 @@ def test_seven_numbers_are_position_and_quaternion(run: Run, entry: str) -> None
         "front: {frame_id: base, child_frame_id: lidar, xyz: [0.5, 2, -1], yaw_deg: 90}\n",
         "front: {parent_frame: base, child_frame: lidar, xyz: [0.5, 2, -1], yaw_deg: 90}\n",
         "transforms:\n- parent: base\n  child: lidar\n  xyz: [0.5, 2, -1]\n  yaw_deg: 90\n",
+        "transforms:\n- {child: lidar, xyz: [0.5, 2, -1], yaw_deg: 90}\n",
         "transforms:\n  lidar: {xyz: [0.5, 2, -1], yaw_deg: 90}\n",
         "extrinsics:\n  lidar: {xyz: [0.5, 2, -1], yaw_deg: 90}\n",
         "angles: deg\nlidar: {xyz: [0.5, 2, -1], yaw: 90}\n",
@@ -128,7 +129,7 @@ def test_an_entry_of_a_list_without_a_name_is_told_the_keys(run: Run) -> None:
 def test_what_was_assumed_is_told_and_changed_by_frames(run: Run) -> None:
     text = "lidar: {x: 1, y: 0, z: 0, topic: /scan}\ncam: {parent: lidar, x: 0, y: 1, z: 0}\n"
     done = run("lookup", "e.yaml", "base", "cam", files={"e.yaml": text})
-    assert done.err == "frametool: e.yaml: 2 poses in base (--frames says another); topic left out\n"
+    assert done.err == "frametool: e.yaml: 1 pose in base (--frames says another); topic left out\n"
     assert "xyz: [1.0, 1.0, 0.0]" in done.out
     assert run("lookup", "e.yaml", "chassis", "cam", "--frames", "chassis").err == "frametool: e.yaml: topic left out\n"
 

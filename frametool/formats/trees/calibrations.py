@@ -237,10 +237,9 @@ def _read_named(file: InputFile, options: Options) -> Iterator[Edge]:
             here: Path = (*path, name)
             reading.here = here
             try:
-                pose, ends = _entry(name, entry, reading, options, left)
-                in_base.append(ends is None)
+                pose, (target, source, child, is_said) = _entry(name, entry, reading, options, left)
+                in_base.append(not is_said)
                 said.append(type(entry) is dict and not {*PARENTS}.isdisjoint(entry))
-                target, source, child = ends or (base, str(name), str(name))
                 if child != source:
                     pose = rigid.inverse(*pose)
                 yield Edge(source if child == target else target, child, pose, path=here)
@@ -250,7 +249,7 @@ def _read_named(file: InputFile, options: Options) -> Iterator[Edge]:
     yield from document_edges(file, options, take)
     if frames and all(said):
         options.tally.note(f"--frames {','.join(frames)} has no effect: each pose names its parent", 1)
-    count = f"{len(said)} {'pose' if len(said) == 1 else 'poses'}"
+    count = f"{sum(in_base)} {'pose' if sum(in_base) == 1 else 'poses'}"
     assumed = f"{count} in {bare(base)} (--frames says another)" if any(in_base) and not frames else ""
     others = f"{', '.join(map(bare, left))} left out" if left else ""
     options.tally.assumed = "; ".join(filter(None, (assumed, others)))
@@ -258,11 +257,8 @@ def _read_named(file: InputFile, options: Options) -> Iterator[Edge]:
 
 def _entry(
     name: str | int, entry: Any, reading: Reading, options: Options, left: dict[str, None]
-) -> tuple[Rigid, tuple[str, str, str] | None]:
-    """Read one pose, and its frames: target, source and the child; None if only its own name is known.
-
-    Raises Misfit.
-    """
+) -> tuple[Rigid, Meaning]:
+    """Read one pose and its meaning, not `said` if only its own name is known; raises Misfit."""
     if type(entry) is list:
         entry = {"value": entry}
     fields = dict(as_mapping(entry, "a pose as {x: .., y: .., z: .., roll: .., pitch: .., yaw: ..}"))
@@ -277,7 +273,7 @@ def _entry(
     if read.position is None and read.rotation is None:
         raise Misfit("neither position nor rotation; a pose has x, y, z, or a key like translation, and a rotation")
     if parent is not None:
-        return read.components, (parent, child, child)
+        return read.components, Meaning(parent, child, child)
     meaning = meaning_of(child, dict.fromkeys(("before", "sensor"), "") | _SELF, options.answers.frames)
     if isinstance(meaning, Ambiguous):
         raise meaning.error(child)
@@ -286,8 +282,8 @@ def _entry(
     elif isinstance(meaning, Meaning) and not meaning.said:
         meaning = directed(child, (), meaning.target, meaning.source, options.answers)
     if meaning is None or not (meaning.target and meaning.source):
-        return read.components, None
-    return read.components, (meaning.target, meaning.source, meaning.child)
+        meaning = Meaning(options.answers.names("base")[0], child, child, said=False)
+    return read.components, meaning
 
 
 def _frame(fields: dict[str, Any], keys: tuple[str, ...]) -> str | None:
