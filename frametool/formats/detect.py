@@ -109,7 +109,7 @@ class Beginning:
 
         A list in between is a `[`.
         """
-        found, inner = set[str](), [("", self.document)]
+        found, inner = set[str](), [("", self.value)] if isinstance(self.value, dict) else []
         for way, mapping in inner:  # grows during the loop
             for key, each in mapping.items():
                 if isinstance(each, str) and re.match(r"[-+]?\.?\d", each):
@@ -119,11 +119,6 @@ class Beginning:
                 elif isinstance(each, list):
                     inner += [(f"{way}[/", entry) for entry in each if isinstance(entry, dict)]
         return found
-
-    @cached_property
-    def document(self) -> dict[str, Any]:
-        """Return the first YAML or JSON map as plain values, as far as the text is read; {} if there is no map."""
-        return self.value if isinstance(self.value, dict) else {}
 
     @cached_property
     def value(self) -> Any:
@@ -177,9 +172,9 @@ _NO_NAME = r"header|transform|pose|point|vector|twist|wrench|force|linear|angula
 
 def _are_poses(begin: Beginning, words: str) -> bool:
     """Return True for a map of names, or a list, whose entries are poses; the last one may be truncated."""
-    if not (begin.yaml_keys or begin.text.lstrip().startswith("{")):
+    if not (begin.yaml_keys or begin.text.lstrip().startswith("{")) or not isinstance(begin.value, dict):
         return False
-    top: dict[Any, Any] = {key: each for key, each in begin.document.items() if key != "angles"}
+    top: dict[Any, Any] = {key: each for key, each in begin.value.items() if key != "angles"}
     if len(top) == 1 and (inner := top.get("transforms", top.get("extrinsics"))):
         top = dict(enumerate(inner)) if isinstance(inner, list) else inner if isinstance(inner, dict) else {}
     entries = [*top.values()]

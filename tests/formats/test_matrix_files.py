@@ -11,7 +11,7 @@ from calibrations import matrix, read
 from scipy.spatial.transform import Rotation as Peer
 
 from frametool.errors import FormatError, Unanswered
-from frametool.formats.trees.matrices import Ambiguous, Meaning, meaning_of
+from frametool.formats.trees.matrices import Meaning, meaning_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -127,13 +127,17 @@ def test_the_sensor_of_okvis_is_the_imu_where_its_pose_is_told(tmp_path: Path) -
         ("lidar_to_cam", Meaning("lidar", "cam", "cam", said=False)),
         ("T_lidar_to_cam", Meaning("lidar", "cam", "cam", said=False)),
         ("lidar2cam", Meaning("lidar", "cam", "cam", said=False)),
-        ("T_velodyne_top_cam0", Ambiguous((("velodyne", "top_cam0"), ("velodyne_top", "cam0")))),
         ("extrinsic", None),
         ("transform", None),
     ],
 )
 def test_one_table_says_what_a_key_means(key: str, meaning: object) -> None:
     assert meaning_of(key, KNOWN) == meaning
+
+
+def test_a_key_that_names_two_frames_in_several_ways_is_an_error_with_these() -> None:
+    ways = "--frames velodyne,top_cam0 or velodyne_top,cam0"
+    assert str(meaning_of("T_velodyne_top_cam0", KNOWN)).endswith(f"in several ways; give {ways}")
 
 
 def test_names_that_were_told_part_a_key(tmp_path: Path) -> None:

@@ -413,7 +413,15 @@ def _of_table(
     first, header = next(rows, (1, ""))
     names = _cells(fmt, header.strip("\r\ufeff"))
     try:
-        columns = _columns_of(names, joints)
+        columns = find_joint_columns(names, joints)
+        if not columns:
+            named = first_of(names, 20, quote=bare)
+            raise ValueInvalid(f"no column is a joint; columns: {named}; joints: {listing(joints)}")
+        without = joints.keys() - {column.joint for column in columns}
+        for name in names:
+            own = _with_unit(name.strip(), joints)[0]
+            if own not in joints and (near := did_you_mean(own, [*without], cutoff=0.8)):
+                raise ValueInvalid(f"column {shown(name)} is not a joint{near}")
     except ValueInvalid as error:
         raise FormatError(str(error), source=file.name, line=first) from None
     stamp = stamp_column(names, joints)
@@ -438,20 +446,6 @@ def _of_table(
                 yield JointSample(joint, value, stamp_ns, refuse)
         except ValueInvalid as error:
             raise refuse(f"{at}: {error}") from None
-
-
-def _columns_of(names: Sequence[str], joints: Mapping[str, Joint]) -> list[JointColumn]:
-    """Return the columns of joints; raises ValueInvalid for none, and for a name that resembles a joint without one."""
-    columns = find_joint_columns(names, joints)
-    if not columns:
-        named = first_of(names, 20, quote=bare)
-        raise ValueInvalid(f"no column is a joint; columns: {named}; joints: {listing(joints)}")
-    without = joints.keys() - {column.joint for column in columns}
-    for name in names:
-        own = _with_unit(name.strip(), joints)[0]
-        if own not in joints and (near := did_you_mean(own, [*without], cutoff=0.8)):
-            raise ValueInvalid(f"column {shown(name)} is not a joint{near}")
-    return columns
 
 
 def _cells(fmt: str, line: str) -> list[str]:

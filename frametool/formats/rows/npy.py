@@ -101,7 +101,13 @@ def _writer(
 
     of_input: the type of the input's records; shape: of a row without fields
     """
-    record = _record_type(columns, of_input)
+    made = [column.kind or np.dtype(f"U{column.longest or LONGEST_TEXT}") for column in columns]
+    fields = [
+        (column.name or f"{at}", kind if column.passed is None else of_input[column.passed])
+        for at, (column, kind) in enumerate(zip(columns, made, strict=True))
+    ]
+    same = of_input.names is not None and fields == [(name, of_input[name]) for name in of_input.names]
+    record = of_input if same else np.dtype(fields)  # with the padding of the input
     kinds = {record[place] for place in range(len(columns))}
     element, row_shape = record, tuple[int, ...]()
     if shape is not None and len(kinds) == 1:
@@ -118,17 +124,6 @@ def _writer(
         return MAGIC + version + b"\0" + struct.pack(length, len(text)) + text
 
     return column_file.CountedWriter(partial(column_file.encode_records, columns, record), head, count)
-
-
-def _record_type(columns: Sequence[OutColumn], of_input: Kind) -> Kind:
-    """Return the type of the records of an output; that of the input, padding included, if its fields are unchanged."""
-    made = [column.kind or np.dtype(f"U{column.longest or LONGEST_TEXT}") for column in columns]
-    fields = [
-        (column.name or f"{at}", kind if column.passed is None else of_input[column.passed])
-        for at, (column, kind) in enumerate(zip(columns, made, strict=True))
-    ]
-    same = of_input.names is not None and fields == [(name, of_input[name]) for name in of_input.names]
-    return of_input if same else np.dtype(fields)
 
 
 def create(columns: Sequence[OutColumn], count: int | None, _style: Style) -> ColumnWriter:

@@ -40,7 +40,7 @@ from frametool.documents.document import parse_documents
 from frametool.documents.source import InputFile
 from frametool.documents.yaml_writer import flow, quoted
 from frametool.errors import FormatError, ValueInvalid, bare, listing, shown, warn
-from frametool.formats.trees.matrices import FRAME_KEYS, Ambiguous, Meaning, directed, meaning_of
+from frametool.formats.trees.matrices import FRAME_KEYS, Meaning, directed, meaning_of
 from frametool.formats.trees.tree_reader import XYZ, document_edges, named
 from frametool.formats.trees.written_poses import angles_of, static_edges, warn_lonely_roots
 from frametool.geometry import floats, quaternion, rigid
@@ -48,7 +48,7 @@ from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.loose import WORDS, read_loose_pose
 from frametool.grammar.pose import read_angle_unit
-from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, read_numbers, within
+from frametool.grammar.readers import Misfit, Reading, Unclear, as_mapping, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import read_rotation
 
 if TYPE_CHECKING:
@@ -275,11 +275,11 @@ def _entry(
     if parent is not None:
         return read.components, Meaning(parent, child, child)
     meaning = meaning_of(child, dict.fromkeys(("before", "sensor"), "") | _SELF, options.answers.frames)
-    if isinstance(meaning, Ambiguous):
-        raise meaning.error(child)
+    if isinstance(meaning, Unclear):
+        raise meaning
     if meaning is None and (pair := [key for key in fields if key in _OF_CAMERAS]) and len(pair) == len(fields) == 2:
         meaning = directed(" and ".join(pair), (), options.answers.names("base")[0], child, options.answers)
-    elif isinstance(meaning, Meaning) and not meaning.said:
+    elif meaning is not None and not meaning.said:
         meaning = directed(child, (), meaning.target, meaning.source, options.answers)
     if meaning is None or not (meaning.target and meaning.source):
         meaning = Meaning(options.answers.names("base")[0], child, child, said=False)

@@ -86,19 +86,8 @@ class Meaning(NamedTuple):
     said: bool = True
 
 
-class Ambiguous(NamedTuple):
-    """The ways to split a key into the names of two frames."""
-
-    names: tuple[tuple[str, str], ...]
-
-    def error(self, key: str, path: Path = ()) -> Unclear:
-        """Return the error that names must be set."""
-        ways = " or ".join(f"{bare(a)},{bare(b)}" for a, b in self.names)
-        return Unclear(f"{bare(key)} may name its two frames in several ways; give --frames {ways}", path, key=True)
-
-
-def meaning_of(key: str, known: Mapping[str, str], frames: Sequence[str] = ()) -> Meaning | Ambiguous | None:
-    """Return the meaning of a key; None if it is not in the table.
+def meaning_of(key: str, known: Mapping[str, str], frames: Sequence[str] = ()) -> Meaning | Unclear | None:
+    """Return the meaning of a key, or the error if it may name two frames in several ways; None if not in the table.
 
     key: without the part before its last point (`IMU.T_b_c1`).
     known: names for the braces; frames: names set by the user, which may be parts of the key.
@@ -108,7 +97,8 @@ def meaning_of(key: str, known: Mapping[str, str], frames: Sequence[str] = ()) -
         pattern, target, source = row
         if ways := _ways(pattern, last, frames):
             if len(ways) > 1:
-                return Ambiguous(tuple(ways))
+                said = " or ".join(f"{bare(a)},{bare(b)}" for a, b in ways)
+                return Unclear(f"{bare(key)} may name its two frames in several ways; give --frames {said}", key=True)
             names = {"<a>": ways[0][0], "<b>": ways[0][1]} | {f"{{{name}}}": frame for name, frame in known.items()}
             child = names["{me}" if "{me}" in (target, source) else source]
             return Meaning(names[target], names[source], child, said=row not in ASKED)

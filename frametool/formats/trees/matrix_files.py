@@ -29,7 +29,6 @@ from frametool.formats.trees.matrices import (
     MATRIX,
     NO_POSE,
     TAGS,
-    Ambiguous,
     Grid,
     Meaning,
     Stated,
@@ -155,8 +154,8 @@ class Matrices:
             if is_matrix or (type(value) is dict and value.get(TAG) in TAGS):
                 self.left.append(bare(dotted(path)))
             return None
-        if isinstance(meaning, Ambiguous):
-            raise meaning.error(key, path)
+        if isinstance(meaning, Unclear):
+            raise meaning.below(*path)
         if meaning is None or not meaning.said:
             meaning = self._named(block, path) or self._directed(block, key, path, meaning)
         if "" in (meaning.target, meaning.source):
