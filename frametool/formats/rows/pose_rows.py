@@ -35,6 +35,7 @@ from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import format_error, lines, parse_documents
+from frametool.documents.source import read_text
 from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
 from frametool.formats.table import FORMATS, Poses
 from frametool.frames.stamps import BILLION, format_stamp, parse_stamp, whole_stamp
@@ -212,8 +213,6 @@ class StampFile:
 
     def __init__(self, path: str) -> None:
         """Read the file; raises FileProblem, FormatError."""
-        from frametool.documents.source import read_text
-
         self.path = path
         self.stamps: list[int] = []
         for number, line in enumerate(read_text(path).splitlines(), 1):

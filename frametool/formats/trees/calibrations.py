@@ -42,7 +42,7 @@ from frametool.documents.yaml_writer import flow, quoted
 from frametool.errors import FormatError, ValueInvalid, bare, listing, shown, warn
 from frametool.formats.trees.matrices import FRAME_KEYS, Meaning, directed, meaning_of
 from frametool.formats.trees.tree_reader import XYZ, document_edges, named
-from frametool.formats.trees.written_poses import angles_of, static_edges, warn_lonely_roots
+from frametool.formats.trees.written_poses import angles_of, static_edges
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
@@ -305,7 +305,6 @@ def _is_remark(key: str, value: Any) -> bool:
 def write_tree(tree: Frames, style: Style) -> str:
     """Return the tree as Autoware or easy_handeye has it, or by names; raises ValueInvalid for what cannot be held."""
     edges = static_edges(tree, style.format)
-    warn_lonely_roots(tree, style.format)
     if style.format == "named":
         return "".join(_line_of(*edge, style) for edge in edges)
     if style.format == "handeye":

@@ -43,7 +43,7 @@ from frametool.formats.trees.matrices import (
     whole_pose,
 )
 from frametool.formats.trees.tree_reader import document_edges, dotted, named, remember
-from frametool.formats.trees.written_poses import rows_of, static_edges, warn_lonely_roots
+from frametool.formats.trees.written_poses import rows_of, static_edges
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.readers import Misfit, Reading, Unclear, answerable, as_mapping, kind, within
 from frametool.grammar.rotation_spelling import read_spelled
@@ -311,7 +311,6 @@ def _stored(tree: Frames, style: Style) -> str:
             )
         lines = ",\n       ".join(flow(row, style.number)[1:-1] for row in rows_of(pose))
         text += f"{key}: !!opencv-matrix\n   rows: 4\n   cols: 4\n   dt: d\n   data: [ {lines} ]\n"
-    warn_lonely_roots(tree, style.format)
     return text
 
 
@@ -321,10 +320,9 @@ def _chain(tree: Frames, style: Style) -> str:
     Cameras of an IMU get both directions: Kalibr reads T_cam_imu, OpenVINS T_imu_cam.  A tree of only cameras,
     cam0, cam1 .., gets T_cn_cnm1, the pose of each in the next.
     """
-    edges = static_edges(tree, style.format)
     if len(tree.roots) != 1:
         raise ValueInvalid(f"{style.format} holds one tree of cameras; the roots here: {listing(tree.roots)}")
-    root = tree.roots[0]
+    edges, root = static_edges(tree, style.format), tree.roots[0]
     cameras = [frame for frame in tree.frames if re.fullmatch(r"cam[0-9]+", frame)]
     if len(cameras) == len(tree.frames):
         cameras.sort(key=lambda name: int(name[3:]))

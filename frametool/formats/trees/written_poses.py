@@ -57,19 +57,18 @@ def refuse_motion(tree: Frames, fmt: str) -> None:
 
 
 def static_edges(tree: Frames, fmt: str) -> list[tuple[str, str, Rigid]]:
-    """Return parent, child and pose of the edges of a tree; raises ValueInvalid if it moves, or has none."""
+    """Return parent, child and pose of the edges of a tree; warns about frames that nothing is connected to.
+
+    Raises ValueInvalid if it moves, or has none.
+    """
     refuse_motion(tree, fmt)
-    tracks = list(tree.tracks())
-    if not tracks:
+    edges = [(track.parent, track.child, track.components) for track in tree.tracks()]
+    if not edges:
         raise ValueInvalid(f"{fmt} holds poses, and the tree has none: {listing(tree.frames)}")
-    return [(track.parent, track.child, track.components) for track in tracks]
-
-
-def warn_lonely_roots(tree: Frames, fmt: str) -> None:
-    """Warn about frames that a format cannot name because nothing is connected to them."""
-    parents = {track.parent for track in tree.tracks()}
+    parents = {parent for parent, _, _ in edges}
     if lonely := [frame for frame in tree.roots if frame not in parents]:
         warn(f"{fmt} cannot store frames without a pose: {', '.join(map(shown, lonely[:5]))} left out")
+    return edges
 
 
 def angles_of(rotation: Quaternion) -> Three[float]:
