@@ -11,7 +11,6 @@ Source: Khronos glTF 2.0, sections 3.6 (buffers), 3.11 (animation), 4.4 (binary)
 
 from __future__ import annotations
 
-import json
 import math
 import struct
 from base64 import b64encode
@@ -71,19 +70,17 @@ class BinaryPart:
 
 def write_glb(scene: FrameScene) -> bytes:
     """Return the scene as the bytes of a .glb."""
-    flat = Projection(scene, SIZE)
-    part = BinaryPart()
-    _add_axes(part)
+    flat, part = Projection(scene, SIZE), BinaryPart()
     index = {name: 1 + 2 * number for number, name in enumerate(flat.poses)}
+    _add_axes(part)
+    animation = _animation(scene, index, part)
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": f"frametool {__version__}"}, "extensionsUsed": ["KHR_materials_unlit"],
         "scene": 0, "scenes": [{"nodes": [0]}], "nodes": _nodes(scene, flat, index), "meshes": [MESH],
-        "materials": [MATERIAL],
+        "materials": [MATERIAL], **({"animations": [animation]} if animation else {}), "accessors": part.accessors,
+        "bufferViews": part.views, "buffers": [{"byteLength": len(part.data)}],
     }  # fmt: skip
-    if animation := _animation(scene, index, part):
-        document["animations"] = [animation]
-    document |= {"accessors": part.accessors, "bufferViews": part.views, "buffers": [{"byteLength": len(part.data)}]}
-    text = json.dumps(document, separators=(",", ":")).encode()
+    text = dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     head = struct.pack("<4sIII4s", b"glTF", 2, 28 + len(text) + len(part.data), len(text), b"JSON")
     return head + text + struct.pack("<I4s", len(part.data), b"BIN\0") + part.data
@@ -106,7 +103,7 @@ def _nodes(scene: FrameScene, flat: Projection, index: dict[str, int]) -> list[d
         nodes.append({"name": name, "children": [node + 1]})
         nodes.append({"name": f"{name} axes", "mesh": 0, "scale": [flat.axis] * 3})
     for name, pose in flat.poses.items():
-        parent, track = scene.parent(name), scene.tree.track(name)
+        parent, track = scene.tree.parent(name, scene.at_ns), scene.tree.track(name)
         edge = None if track is None else track.at(scene.at_ns or 0)
         above, place = (index[parent], edge) if parent in index and edge is not None else (0, pose)
         nodes[above]["children"].append(index[name])

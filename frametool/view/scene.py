@@ -144,10 +144,6 @@ class FrameScene:
             raise ValueInvalid(f"no frame is left to draw: nothing matches{f' {shown(only)}' * (only is not None)}")
         return chosen
 
-    def parent(self, name: str) -> str | None:
-        """Return the parent of a frame at the time; None for a root and where it is not known."""
-        return self.tree.parent(name, self.at_ns)
-
     def poses(self) -> dict[str, Rigid]:
         """Return the pose in `fixed` of every chosen frame that is connected to it at the time."""
         now = Snapshot(self.tree, self.at_ns)
@@ -297,7 +293,8 @@ class Projection:
         self.view = (-sa, ca, 0.0), (-se * ca, -se * sa, ce), (ce * ca, ce * sa, se)
         self.poses = {name: pose for name, pose in scene.poses().items() if can_be_drawn(pose[:3])}
         self.trails = scene.trails
-        self.links = [(parent, name) for name in self.poses if (parent := scene.parent(name)) in self.poses and parent]
+        parents = {name: scene.tree.parent(name, scene.at_ns) for name in self.poses}
+        self.links = [(parent, name) for name, parent in parents.items() if parent in self.poses and parent]
         lengths = sorted(math.dist(self.poses[parent][:3], self.poses[name][:3]) for parent, name in self.links)
         lengths = [length for length in lengths if length > LEAST]
         usual = lengths[len(lengths) // 2] if lengths else USUAL_LINK
