@@ -91,21 +91,15 @@ def _describe(result: Result, style: Style) -> str:
 
 
 def _place_lines(entry: dict[str, Any]) -> Iterator[NumberLine]:
-    """Yield the lines of a position on the Earth as a mapping has it."""
-    at = [(name, entry[name]) for name in ("lat", "lon") if name in entry]
-    if at:
-        yield NumberLine("lla", at, "deg")
-        yield NumberLine("", [("alt", entry["alt"])], "m")
-    if "xyz" in entry or "ecef" in entry:
-        yield NumberLine("ecef", list(zip("xyz", entry.get("xyz") or entry["ecef"], strict=True)), "m")
-    if utm := entry.get("utm"):
-        yield NumberLine("utm", [(name, utm[name]) for name in ("easting", "northing")], f"m in {utm['zone']}")
-        yield NumberLine("", [("alt", utm["alt"])], "m")
-        yield NumberLine("convergence", [("", utm["convergence_deg"])], "deg")
-        yield NumberLine("grid scale", [("", utm["grid_scale"])], "")
-    local = [(name, entry[name]) for name in ("east", "north", "up", "down") if name in entry]
-    if local:
-        yield NumberLine("enu" if "up" in entry else "ned", sorted(local, key=lambda at: [*entry].index(at[0])), "m")
+    """Yield the lines of a position on the Earth as a mapping has it, a number each."""
+    for key, value in (entry | entry.get("utm", {})).items():
+        if isinstance(value, float):
+            unit = "deg" if key in ("lat", "lon", "convergence_deg") else "m"
+            yield NumberLine(key.removesuffix("_deg").replace("_", " "), [("", value)], unit * (key != "grid_scale"))
+        elif key == "zone":
+            yield NumberLine("utm zone", [], value)
+        elif key in ("xyz", "ecef"):
+            yield NumberLine("ecef", list(zip("xyz", value, strict=True)), "m")
     if "axes" in entry:
         yield NumberLine("axes", [], f"{entry['axes']}: of what follows")
 
