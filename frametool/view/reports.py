@@ -263,7 +263,7 @@ def _described(entry: dict[str, Any], more: str = "") -> str:
     texts += [entry["states"] or "", *(f"asks for {option}" for option in entry["asks"]), more]
     lines = [line for text in texts for line in wrap(text, WIDTH - LIST_LABEL, break_on_hyphens=False)]
     label, apart = f"  {entry['name']:{LIST_LABEL - 2}}", "\n" + " " * LIST_LABEL
-    return f"{label if len(label) == LIST_LABEL else label + apart}{apart.join(lines)}\n"
+    return f"{label if len(entry['name']) < LIST_LABEL - 2 else label + apart}{apart.join(lines)}\n"
 
 
 def example_of(name: str) -> list[str]:
