@@ -26,9 +26,6 @@ from frametool.text.numbers import parse_number
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    import numpy as np
-    from numpy.typing import NDArray
-
     from frametool.frames.lookups import Frames
     from frametool.frames.track import MovingTrack
     from frametool.geometry.types import Rigid
@@ -172,7 +169,7 @@ class FrameScene:
         times = [a + (b - a) * part // parts for a, b in pairwise(stamps) for part in range(parts)] + stamps[-1:]
         with np.errstate(over="ignore", invalid="ignore"):  # what is too far is not drawn
             points = self.tree.lookup_many(self.fixed, name, times, missing="nan").xyz
-        known: NDArray[np.bool_] = np.max(np.abs(points), axis=1) < FURTHEST
+        known = np.abs(points).max(axis=1) < FURTHEST
         changes = sorted(stamp for mover in movers for stamp in self.tracks[mover].changes())
         epoch = np.searchsorted(changes, times, side="right")
         cuts = np.flatnonzero((known[1:] != known[:-1]) | (epoch[1:] != epoch[:-1])) + 1

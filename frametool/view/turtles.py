@@ -89,7 +89,7 @@ class Drawing:
             stroke.points.append((x, y))
 
 
-WINDOW, METRE = 500.0, 45.0  # pixels, as turtlesim's
+WINDOW, METRE, BACKGROUND = 500.0, 45.0, (69, 86, 255)  # pixels and colour, as turtlesim's
 MARGIN = 30.0
 LEFT = WINDOW + 110.0  # where the curves begin
 PANEL_WIDTH, PANEL_GAP = 420.0, 50.0
@@ -136,7 +136,6 @@ def _window(drawing: Drawing, colours: dict[str, str]) -> Iterator[Shape]:
 
 
 SCREEN_FRAME = 1.0 / 20.0  # seconds
-BACKGROUND = (69, 86, 255)  # turtlesim's
 TALK = 3  # lines of messages below the turtles
 
 
