@@ -10,7 +10,7 @@ import re
 import sys
 from contextlib import contextmanager, suppress
 from functools import reduce
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from frametool.geometry.place import Earth
 
+    Record = TypeVar("Record")
     Adds = Callable[[Any], Any]
 
 # an argument that begins like this is a number, whatever short options there are
@@ -158,6 +159,18 @@ def inputs() -> Inputs:
         return Inputs({"quiet": True})
     found: Inputs = context.meta.get(INPUTS) or Inputs(context.params)
     return found
+
+
+def asking(kind: type[Record], options: Mapping[str, Sequence[str]]) -> type[Record]:
+    """Return a kind of record whose fields, where they hold something, count options as asked for when looked at."""
+
+    def look_at(record: Record, name: str) -> Any:
+        value = kind.__getattribute__(record, name)
+        if value and name in options:
+            inputs().ask(*options[name])
+        return value
+
+    return type(kind.__name__, (kind,), {"__getattribute__": look_at, "__slots__": ()})
 
 
 def show_help(ctx: click.Context, *, everything: bool = False, paged: bool = False) -> None:

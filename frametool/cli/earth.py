@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import inputs, misuse, refuse
+from frametool.cli.command import asking, inputs, misuse, refuse
 from frametool.cli.sink import say
 from frametool.documents.source import Source
 from frametool.errors import FormatError, warn
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Vector
 
 FIRST = "first"
-ASKED = {"origin": "origin", "axes": "local_axes", "zone": "zone"}  # field -> option
+ASKED = {"origin": ("origin",), "axes": ("local_axes",), "zone": ("zone",)}  # field -> option
 
 
 def earth() -> Earth:
@@ -37,18 +37,9 @@ def earth() -> Earth:
         zone, origin = said.peek("zone"), said.peek("origin")
         with misuse("--zone: "):
             number = None if zone is None else zone_number(zone)
-        said.earth = SaidEarth(None if origin is None else _origin(origin), said.peek("local_axes") or "", number)
+        place = None if origin is None else _origin(origin)
+        said.earth = asking(Earth, ASKED)(place, said.peek("local_axes") or "", number)
     return said.earth
-
-
-class SaidEarth(Earth):
-    """What options say of places on the Earth; each counts as asked for where it is looked at."""
-
-    def __getattribute__(self, name: str) -> Any:
-        """Ask for the option of a field."""
-        if name in ASKED:
-            inputs().ask(ASKED[name])
-        return super().__getattribute__(name)
 
 
 def _origin(text: str) -> Origin:

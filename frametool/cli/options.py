@@ -101,17 +101,14 @@ class FormatName(Text):
 
     def read(self, text: str) -> str:
         """Refuse an unknown one with the nearest name; of one that is not supported, say what to do."""
-        if text not in self.choices:
-            raise ValueInvalid(self._refusal(text))
-        return text
-
-    def _refusal(self, text: str) -> str:
+        if text in self.choices:
+            return text
         from frametool.formats.unsupported import UNSUPPORTED
 
         if row := UNSUPPORTED.get(text):
-            return f"{text} ({row.summary}) is not supported: {row.remedy}"
+            raise ValueInvalid(f"{text} ({row.summary}) is not supported: {row.remedy}")
         near = did_you_mean(text, self.choices)
-        return f"no format {shown(text)} is {self.are} (`frametool formats` lists all){near}"
+        raise ValueInvalid(f"no format {shown(text)} is {self.are} (`frametool formats` lists all){near}")
 
     def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
         """Offer the formats."""
@@ -160,7 +157,7 @@ class ColumnNames(Text):
         with open(path, "rb") as file:
             head = file.read(HEAD)
         fmt = detect(head, "rows", "records", name=path)
-        names = sorted(map(".".join, Beginning(head).json_paths))
+        names = sorted(path.replace("/", ".") for path in Beginning(head).json_paths)
         if FORMATS[fmt].is_table:
             names = list(open_table(head, fmt, header=True, source=path)[0].names or ())
         done, comma, _ = incomplete.rpartition(",")

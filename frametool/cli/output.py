@@ -178,7 +178,7 @@ class Output:
         found = list(values)
         poses = [each for each in found if isinstance(each, Result)]
         if len(poses) < len(found) and self.style.format != "csv":
-            self.points([each.mapping(self.style) if isinstance(each, Result) else each for each in found])
+            self._points([each.mapping(self.style) if isinstance(each, Result) else each for each in found])
             return
         keys = {key for each in poses for key in each.said(self.style)}
         if len(poses) > 1 or "covariance" in keys:
@@ -286,14 +286,10 @@ class Output:
         if len(poses) == 1 and any(is_locked(poses[0], each) for each in self.style.notations):
             say("note: gimbal lock: the angles are not unique; the third was set to 0")
 
-    def points(self, records: Iterable[dict[str, Any]]) -> None:
+    def _points(self, found: list[dict[str, Any]]) -> None:
         """Write points; for a person one a line, but what has more than three numbers as a mapping."""
-        found = list(records)
         if self.style.format in table.FORMATS and "points" not in self._writes:
             raise ValueInvalid(f"{self.style.format} holds poses; a point has no rotation")
-        if self._in_blocks:
-            self.pieces(self._blocks(_batched(iter(found))))
-            return
         placed = [each for each in found if not {"point", "vector"}.isdisjoint(each) and "header" not in each]
         self._warn_dropped(key for each in placed for key in each)
         is_plain = all(any(isinstance(each.get(kind), list) for kind in ("point", "vector")) for each in found)

@@ -199,28 +199,23 @@ def pose_source(argument: str | Source, request: Request) -> Source:
     return rewritten(source, request.given, normalize=request.normalize, points=points) or source
 
 
-def poses_from(argument: str | Source, request: Request) -> list[Pose]:
-    """Read the poses of one argument: inline, `-` for standard input, or a file."""
-    from frametool.stream.record_values import read_poses
-
-    return list(_read(argument, request, partial(read_poses, asked=request)))
-
-
 def values_of(arguments: Sequence[str | Source], request: Request, output: Output) -> Iterator[Result | dict[str, Any]]:
     """Yield the results of the records of arguments."""
     from frametool.stream.record_values import results
 
     request = request._replace(notations=request.notations or output.notations)
     for argument in arguments:
-        yield from _read(argument, request, partial(results, request=request, style=output.style))
+        yield from read_with(argument, request, partial(results, style=output.style))
 
 
-def _read(argument: str | Source, request: Request, read: Callable[[Source], Iterable[Any]]) -> Iterator[Any]:
-    """Yield what is read of an argument; the error for a file of frames points to lookup."""
+def read_with(
+    argument: str | Source, request: Request, read: Callable[[Source, Request], Iterable[Any]]
+) -> Iterator[Any]:
+    """Yield what is read of an argument: inline, `-`, or a file; the error for a file of frames points to lookup."""
     with inline_misuse():
         source = pose_source(argument, request)
         try:
-            yield from read(source)
+            yield from read(source, request)
         except FormatError as error:
             if source.name == INLINE:
                 raise
@@ -269,10 +264,9 @@ def _read_argument(argument: str | Source, request: Request) -> ArgumentPoses:
     request = request._replace(operation=COMBINED._replace(similar=asked.similar, multiples=asked.multiples))
     warnings: list[tuple[Any, ...]] = []
     with heard_by(lambda *said: warnings.append(said)):
-        found: list[ArgumentPoses] = [
-            *_read(argument, request, lambda source: [ArgumentPoses(source, *read_given(source, request), warnings)])
-        ]
-    return found[0]
+        read = read_with(argument, request, lambda *asked: [ArgumentPoses(asked[0], *read_given(*asked), warnings)])
+        found: ArgumentPoses = next(read)
+    return found
 
 
 def _several(read: Sequence[ArgumentPoses | None]) -> list[int]:

@@ -336,14 +336,13 @@ class Stream:
 
     def _run_pasted(self, source: Source, request: Request) -> int:
         """Write the results of a text that was pasted."""
-        from frametool.stream.record_values import read_poses, results
-
         self.inputs.ask("from_rep")
-        if request.gathered is not None:
-            request.gathered.add(read_poses(source, request), source.name)
+        if request.gathered is None:
+            self.output.values(values_of([source], request, self.output))
             return 0
-        request = request._replace(notations=request.notations or self.output.notations)
-        self.output.values(results(source, request, self.output.style))
+        from frametool.stream.record_values import read_poses
+
+        request.gathered.add(read_poses(source, request), source.name)
         return 0
 
     def _run_as_values(self, stream: Any, fmt: str, request: Request) -> int:

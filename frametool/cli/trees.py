@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import os
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from frametool.cli.command import Text, inputs, refuse, refuse_two_readers, say_if_typed
+from frametool.cli.command import Text, asking, inputs, refuse, refuse_two_readers, say_if_typed
 from frametool.cli.options import input_formats, tree_on_the_line
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.sink import say
@@ -21,6 +21,7 @@ from frametool.formats.table import FORMATS, ORDERS
 from frametool.grammar.edges import Answers
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose_algebra import Lookups
+from frametool.grammar.readers import is_slashed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -207,18 +208,8 @@ def answers() -> Answers:
     named = {name: chosen.peek(name) for name in Answers._fields if name not in ("joints", "frames")}
     notations = chosen.peek("from_rep")
     named["order"] = named["order"] or next((each.spec for each in notations or () if each.spec in ORDERS), "")
-    return SaidAnswers(joints=_joints(chosen.peek("joints")), **{name: value for name, value in named.items() if value})
-
-
-class SaidAnswers(Answers):
-    """What options say of files whose format leaves it open; each counts as asked for where a reader looks at it."""
-
-    def __getattribute__(self, name: str) -> Any:
-        """Ask for the options of a field."""
-        value = super().__getattribute__(name)
-        if value and name in ANSWERED:
-            inputs().ask(*ANSWERED[name])
-        return value
+    said = asking(Answers, ANSWERED)
+    return said(joints=_joints(chosen.peek("joints")), **{name: value for name, value in named.items() if value})
 
 
 def _joints(texts: Sequence[str]) -> dict[str, str]:
@@ -259,7 +250,11 @@ def frame_name(name: str, tree: Frames | Robot) -> str:
     """Return what a tree calls a frame: without the leading `/` of old versions of tf2; the Earth's by either name."""
     if name in EARTH_FRAMES and name not in tree.frames:
         return next((other for other in EARTH_FRAMES if other in tree.frames), name)
-    if name.startswith("/") and name not in tree.frames:
+    return name if name in tree.frames else without_slash(name)
+
+
+def without_slash(name: str) -> str:
+    """Return a frame's name without a leading `/`; warn of one."""
+    if is_slashed(name):
         warn(f"frame {shown(name)}: the leading / is no part of a name and was left out")
-        return name[1:]
-    return name
+    return name[is_slashed(name) :]

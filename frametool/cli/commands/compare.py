@@ -24,7 +24,7 @@ from frametool.cli.sink import refuse_existing, say, say_error, writing
 from frametool.cli.trees import answers, load_tree
 from frametool.errors import FrametoolError, ValueInvalid, shown, warn
 from frametool.frames.stamps import parse_stamp, parse_time
-from frametool.stream.faults import MOST, ROWS_SKIPPED, STOP, BadRows
+from frametool.stream.faults import ROWS_SKIPPED, STOP, BadRows
 from frametool.text.numbers import parse_lengths, parse_share
 
 if TYPE_CHECKING:
@@ -198,7 +198,7 @@ def trajectory(inputs: Inputs, argument: str, fmt: str = "", on_error: str = STO
     made: list[BadRows] = []
 
     def policy(name: str) -> BadRows:
-        made.append(BadRows(name, on_error, most=MOST, tell=partial(say_error, in_json=False)))
+        made.append(BadRows(name, on_error, tell=partial(say_error, in_json=False)))
         return made[-1]
 
     known = answers()
@@ -279,7 +279,7 @@ def write_trajectory(output: Output, found: Trajectory) -> None:
         output.poses_as_they_come(result_at(row, world, body, at) for row, at in rows)
         return
     points = zip(found.xyz.tolist(), stamps, strict=True)
-    output.points(
+    output.values(
         ({} if at is None else {"stamp_ns": at}) | ({} if world is None else {"frame": world}) | {"point": xyz}
         for xyz, at in points
     )

@@ -6,7 +6,7 @@ import click
 
 from frametool.cli.command import Inputs, argument, command_named, option, refuse
 from frametool.cli.options import COLUMN, pose_result_options
-from frametool.cli.poses import is_inline, is_pasted, poses_from, without_inverse
+from frametool.cli.poses import is_inline, is_pasted, read_with, without_inverse
 from frametool.cli.sink import say_first
 from frametool.cli.streaming import PoseTask, pose_stream_options
 from frametool.errors import ValueInvalid, warn
@@ -44,6 +44,7 @@ def command(inputs: Inputs) -> int:
     poses, weights, robust = inputs.poses, inputs.weights, inputs.robust
     from frametool.grammar.result import Result
     from frametool.stream.gathering import Gathered
+    from frametool.stream.record_values import read_poses
 
     gathered = Gathered(named=robust, labelled=inputs.by is not None)
     request = task.request(extra_column=inputs.by or weights, gathered=gathered)
@@ -57,7 +58,7 @@ def command(inputs: Inputs) -> int:
     else:
         task.only_arguments(poses)
         for number, each in enumerate(poses, 1):
-            gathered.add(poses_from(each, request), f"argument {number}" if is_inline(each) else each)
+            gathered.add(list(read_with(each, request, read_poses)), f"argument {number}" if is_inline(each) else each)
         numbers = None if weights is None else _numbers(weights)
         if numbers is not None and len(numbers) != len(gathered.transforms):
             raise click.UsageError(f"--weights are {len(numbers)}, the poses {len(gathered.transforms)}")

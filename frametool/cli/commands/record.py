@@ -10,13 +10,12 @@ from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.options import pose_options, reading_options, verbose_option
 from frametool.cli.output import copied_as, folder_of, opened_place
 from frametool.cli.sink import say, say_error
-from frametool.cli.trees import FRAME, load_tree, tree_file
+from frametool.cli.trees import FRAME, load_tree, tree_file, without_slash
 from frametool.errors import BadAnswer, FileProblem, FormatError, ValueInvalid, listing, printable, shown, warn
 from frametool.formats.load import FrameFile, Rules
 from frametool.formats.table import FORMATS, is_recording, writers
 from frametool.frames.stamps import parse_time
 from frametool.grammar.edges import Diagnostics
-from frametool.grammar.readers import is_slashed
 from frametool.stream.faults import ON_ERROR, STOP, BadRows
 from frametool.view.progress import ProgressBar
 
@@ -90,7 +89,7 @@ def command(inputs: Inputs) -> int:
     inputs.ask(*["normalize"] * bool(more or into))
     on_error = inputs.on_error if into else STOP
     bad = BadRows(path, on_error, tell=lambda error: say_error(error, in_json=False), counted="message")
-    request = RecordRequest(bad, edges, inputs.replace, _bare(into or ""), topics, inputs.between, normalize)
+    request = RecordRequest(bad, edges, inputs.replace, without_slash(into or ""), topics, inputs.between, normalize)
     quiet, force = inputs.quiet, inputs.force
     inputs.refuse_idle()
     with opened_place(copy, place, force=force) as write, opened_recording(path, tally) as opened:
@@ -114,13 +113,6 @@ def _refuse_input(output: str, inputs: Iterable[str]) -> None:
         read = Path(path).resolve()
         if place in (read, *read.parents) or read in place.parents:
             raise FileProblem(f"{printable(output)}: would change {printable(path)}, which is read; give another name")
-
-
-def _bare(frame: str) -> str:
-    """Return a frame's name as messages have it."""
-    if is_slashed(frame):
-        warn(f"frame {shown(frame)}: the leading / is no part of a name and was left out")
-    return frame[is_slashed(frame) :]
 
 
 def _format_of(path: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from math import degrees, hypot, sqrt
 from typing import TYPE_CHECKING, Any
 
@@ -14,11 +15,11 @@ from frametool.cli.sink import refuse_existing, say_error, tell, writing
 from frametool.cli.trees import answers, load_tree, opened, state
 from frametool.errors import ValueInvalid, alternatives, first_of, shown, warn
 from frametool.geometry.rigid import IDENTITY
-from frametool.stream.faults import STOP, BadRows
+from frametool.stream.faults import BadRows
 from frametool.view.reports import Solution, SolvedFrame, SolvedRow
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.transform import Transform
@@ -54,8 +55,8 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
     alone = [m.place for m, checked in zip(found.measurements, found.checked, strict=True) if not checked]
     inputs.note(f"in no loop, cannot be cross-checked: {first_of(alone, 5)}" if alone else None)
     labels = [(m.place, m.id, m.parent, m.child) for m in found.measurements]
-    rows = _rows(found, labels, checked=list(map(bool, found.checked)), fits=found.fits)
-    return Solution("tree", found.root, found.dof, found.rms_distance, found.rms_angle, found.sigma, frames, rows)
+    own = [{"checked": bool(checked), "fits": fits} for checked, fits in zip(found.checked, found.fits, strict=True)]
+    return _solution("tree", found, frames, labels, own, root=found.root)
 
 
 def _fixed_tree(inputs: Inputs, measured: Collection[str]) -> Frames:
@@ -97,18 +98,22 @@ def _side(parent: str, name: str, pose: Transform, covariance: Array | None, row
     return [root, SolvedFrame(name, parent, _numbers(pose.components), listed, rows, checked=True)]
 
 
-def _rows(found: Any, labels: Iterable[tuple[str, str | None, str, str]], **more: Sequence[Any]) -> list[SolvedRow]:
-    """Return the rows of a report: how far each is off in metres, and in radians where it has turned.
+def _solution(
+    shape: str, found: Any, frames: list[SolvedFrame], labels: Iterable[tuple[str, str | None, str, str]],
+    own: Iterable[Mapping[str, Any]], *, sigma: Any = None, **more: Any,
+) -> Solution:  # fmt: skip
+    """Return what was found with its rows: how far each is off in metres, and in radians where it has turned.
 
-    labels: place, id, parent and child of each
+    labels: place, id, parent and child of each row; own: what else it says
     """
     rows = []
-    for at, (place, name, parent, child) in enumerate(labels):
-        parts, said = found.residuals[at].tolist(), {key: values[at] for key, values in more.items()}
-        metres, angle = hypot(*parts[:3]), hypot(*parts[3:]) if len(parts) > 3 else None
-        used = bool(found.used[at])
-        rows.append(SolvedRow(place, at + 1, name, parent, child, metres, angle, float(found.u[at]), used, **said))
-    return rows
+    parts = zip(labels, own, found.residuals.tolist(), found.u.tolist(), found.used.tolist(), strict=True)
+    for at, (label, said, off, u, used) in enumerate(parts, 1):
+        place, name, parent, child = label
+        angle = hypot(*off[3:]) if len(off) > 3 else None
+        rows.append(SolvedRow(place, at, name, parent, child, hypot(*off[:3]), angle, u, used, **said))
+    numbers = found.dof, found.rms_distance, getattr(found, "rms_angle", None), sigma or found.sigma
+    return Solution(shape, more.pop("root", None), *numbers, frames, rows, **more)
 
 
 def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
@@ -142,9 +147,8 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
     frames = _side(holder, camera, found.x, sigmas[0], count)
     frames += _side(other, target, found.z, sigmas[1], count)
     labels = [(place, None, camera, target) for place in samples.places]
-    rows = _rows(found, labels, checked=[found.dof > 0] * number)
-    numbers = found.dof, found.rms_distance, found.rms_angle, found.sigma
-    return Solution("hand-eye", None, *numbers, frames, rows, noise_at=found.noise_at, turns=found.turns)
+    own = [{"checked": found.dof > 0}] * number
+    return _solution("hand-eye", found, frames, labels, own, noise_at=found.noise_at, turns=found.turns)
 
 
 def _paired(inputs: Inputs, files: Sequence[str]) -> HandEyeSamples:
@@ -163,9 +167,7 @@ def solved_points(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solu
     from frametool.fit.closed_forms import solve_points
     from frametool.stream.samples import matched, read_points
 
-    def policy(name: str) -> BadRows:
-        return BadRows(name, STOP, tell=lambda error: say_error(error, in_json=False))
-
+    policy = partial(BadRows, tell=partial(say_error, in_json=False))
     named = zip(files, options.for_each(inputs.input_formats, 2), strict=True)
     a, b = (read_points(file, fmt=fmt, answers=answers(), policy=policy) for file, fmt in named)
     found_names = (a.frame, b.frame) if a.frame and b.frame and a.frame != b.frame else ("A", "B")
@@ -178,10 +180,9 @@ def solved_points(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solu
     found = solve_points(pairs.target, pairs.source, weights=weights, scale=scale, robust=robust, names=names)
     frames = _side(target, source, found.transform, found.covariance, int(found.used.sum()))
     labels = [(place, ids[at] if ids else None, target, source) for at, place in enumerate(pairs.places)]
-    counted = (found.used | found.left_out).tolist()
-    rows = _rows(found, labels, checked=[found.dof > 0] * len(labels), counted=counted)
-    numbers = found.dof, found.rms_distance, None, (found.sigma, None)
-    return Solution("points", target, *numbers, frames, rows, scale=found.scale, scale_sigma=found.scale_sigma)
+    own = [{"checked": found.dof > 0, "counted": counts} for counts in (found.used | found.left_out).tolist()]
+    more = {"root": target, "scale": found.scale, "scale_sigma": found.scale_sigma}
+    return _solution("points", found, frames, labels, own, sigma=(found.sigma, None), **more)
 
 
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, not solvable or undecided, 2 usage, 5 file."

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-from typing import TYPE_CHECKING, Any
 
 from frametool.cli.command import Inputs, argument, command_named, option, refuse, together
 from frametool.cli.options import pose_result_options, reading_options
@@ -17,19 +16,12 @@ from frametool.frames.lookups import FrameTree
 from frametool.grammar.readers import Reading
 from frametool.ros.publisher import FLAGS, moving_frames, read_flags, read_positional
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from frametool.grammar.pose import Pose
-
-
-def _flag(name: str) -> Callable[..., Any]:
-    return option(f"--{name} {'FRAME' if name.endswith('id') else 'N'}", "as static_transform_publisher has it")
+ABOUT = "as static_transform_publisher has it"
 
 
 @command_named("static")
 @argument("arguments", nargs=-1, metavar="[TREE | X Y Z .. PARENT CHILD]")
-@together(*map(_flag, FLAGS))
+@together(*(option(f"--{name} {'FRAME' if name.endswith('id') else 'N'}", ABOUT) for name in FLAGS))
 @reading_options
 @pose_result_options("tree")
 def command(inputs: Inputs) -> None:
@@ -59,13 +51,9 @@ def command(inputs: Inputs) -> None:
         return
     output = Output(inputs, "tree")
     tree = FrameTree("arguments")
-    pose = _pose(arguments, flags, Reading(Source("arguments", ""), normalize=inputs.normalize))
+    refuse(flags and arguments, f"extra arguments {shown(' '.join(arguments))} beside the flags")
+    reading = Reading(Source("arguments", ""), normalize=inputs.normalize)
+    with misuse_unless_rotations(reading):
+        pose = read_flags(flags, reading) if flags else read_positional(arguments, reading)
     tree.add_components(pose.parent or "", pose.name or "", pose.components)
     output.tree(tree)
-
-
-def _pose(arguments: Sequence[str], flags: dict[str, str], reading: Reading) -> Pose:
-    """Read the arguments of one call."""
-    refuse(flags and arguments, f"extra arguments {shown(' '.join(arguments))} beside the flags")
-    with misuse_unless_rotations(reading):
-        return read_flags(flags, reading) if flags else read_positional(arguments, reading)

@@ -75,9 +75,7 @@ def command(inputs: Inputs) -> None:
         from frametool.view.pictures import require_matplotlib
 
         require_matplotlib()
-    overlay, eye = inputs.overlay, inputs.peek("eye")
-    if chosen != "glb":  # which is seen from all sides
-        inputs.ask("eye")
+    overlay, eye = inputs.overlay, inputs.peek("eye") if chosen == "glb" else inputs.eye  # a glb is seen from anywhere
     refuse(overlay and (source or not target), "--overlay takes two trees: frametool view AFTER BEFORE --overlay")
     refuse(inputs.path_only and not (target and source), "--path draws the way between TARGET and SOURCE; name both")
     frames = load_tree(tree, inputs.more, rules(inputs))
