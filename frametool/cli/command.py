@@ -310,6 +310,8 @@ class File(Text):
 
 TEXT = Text()
 FILE = File()
+# options that may be without =VALUE, and their values: the first is what they mean then
+OPTIONAL = {"--explain": ("text", "markdown"), "--rows": ("ate", "rpe", "kitti")}
 
 
 def _kind(kind: Any) -> click.ParamType[Any]:
@@ -332,6 +334,7 @@ def option(spec: str, about: str, kind: Any = None, name: str = "", **more: Any)
     words = spec.split()
     names = [each for each in words if each.startswith("-")]
     taken = " ".join(words[len(names) :])
+    kind = kind or OPTIONAL.get(names[-1])
     if taken or kind:
         more["type"] = _kind(kind or (FILE if taken == "FILE" else TEXT))
     else:
@@ -449,10 +452,6 @@ def _without_others(message: str, command: click.Command) -> str:
     found = re.search(r"; (?:give|name them with) (--[\w-]+)$", message)
     has = {name for each in command.params for name in each.opts}
     return message if found is None or found[1] in has else message[: found.start()]
-
-
-# options that may be without =VALUE, and their values: the first is what they mean then
-OPTIONAL = {"--explain": ("text", "markdown"), "--rows": ("ate", "rpe", "kitti")}
 
 
 OF_POSES = ("compose", "convert", "interpolate", "invert", "mean", "relative")  # they have no other arguments

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Vector
 
 FIRST = "first"
-ASKED = {"origin": ("origin",), "axes": ("local_axes",), "zone": ("zone",)}  # field -> option
+SaidEarth = asking(Earth, {"origin": ("origin",), "axes": ("local_axes",), "zone": ("zone",)})
 
 
 def earth() -> Earth:
@@ -38,7 +38,7 @@ def earth() -> Earth:
         with misuse("--zone: "):
             number = None if zone is None else zone_number(zone)
         place = None if origin is None else _origin(origin)
-        said.earth = asking(Earth, ASKED)(place, said.peek("local_axes") or "", number)
+        said.earth = SaidEarth(place, said.peek("local_axes") or "", number)
     return said.earth
 
 

@@ -31,8 +31,7 @@ if TYPE_CHECKING:
     from frametool.cli.command import Inputs
     from frametool.cli.sink import Write
     from frametool.errors import FrametoolError
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.lookups import Frames, FrameTree
+    from frametool.frames.lookups import Frames
     from frametool.grammar.pose import Pose
     from frametool.stream.record_results import BlockResults, ResultWriter
     from frametool.stream.record_values import Value
@@ -253,7 +252,7 @@ class Output:
         self._refuse_place()
         return Blocks(self) if self._in_blocks else Collected()
 
-    def tree(self, tree: FrameTree | TransformBuffer, color: str = "auto") -> None:
+    def tree(self, tree: Frames, color: str = "auto") -> None:
         """Write a tree; on a terminal in colour, or as `color` says; in a format made of poses with every sample."""
         if tree.drawn and self._format_is_default:
             self.style = self.style.changed(format="text")
@@ -400,7 +399,7 @@ class Blocks:
         yield from self.writer.end()
 
 
-def _only_mover(tree: FrameTree | TransformBuffer, fmt: str) -> str:
+def _only_mover(tree: Frames, fmt: str) -> str:
     """Return the one frame of a tree that has a parent; raise ValueInvalid for several."""
     children = [track.child for track in tree.tracks()]
     if len(children) != 1:

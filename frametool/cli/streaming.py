@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli import options
-from frametool.cli.command import Inputs, option, refuse, say_if_typed, together
+from frametool.cli.command import OPTIONAL, Inputs, option, refuse, say_if_typed, together
 from frametool.cli.output import Output
 from frametool.cli.poses import inline_misuse, is_pasted, pasted_stream, pose_source, values_of, without_inverse
 from frametool.cli.sink import say, say_error
@@ -40,7 +40,7 @@ TOP = 2  # lines of a table up to its first row: what is bad there may be bad in
 BAGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
 _MAGICS: list[Any] = [what for name in BAGS for kind, what in FORMATS[name].magic if kind == "magic"]
 RECORDS = readers("records")
-FORMS = ("text", "markdown")
+FORMS = OPTIONAL["--explain"]
 ONE_RECORD = "--explain derives one record; write it as an argument"
 
 
@@ -67,7 +67,7 @@ pose_stream_options = together(stream_options, options.pose_reading_options)
 
 def explain_option(**rest: Any) -> Adds:
     """Return --explain, with what it says of other options."""
-    return option("--explain [=FORM]", "derive the result step by step (help explain)", FORMS, under="Result", **rest)
+    return option("--explain [=FORM]", "derive the result step by step (help explain)", under="Result", **rest)
 
 
 EXPLAIN = explain_option()

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
 
     from frametool.formats.load import EdgePlace, FrameFile, Rules
     from frametool.formats.robots.model import Robot
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.lookups import Frames, FrameTree
+    from frametool.frames.lookups import Frames
 
     Value = TypeVar("Value")
 
@@ -37,13 +36,14 @@ if TYPE_CHECKING:
 ASKED_OUTSIDE = ("time_offset", "frames", "camera_axes")
 ANSWERED: dict[str, tuple[str, ...]] = {name: (name,) for name in Answers._fields if name not in ASKED_OUTSIDE}
 ANSWERED["order"] = "order", "from_rep"
+SaidAnswers = asking(Answers, ANSWERED)
 OF_FILES = (*Answers._fields, "named_frames", "from_rep", "input_formats", "topics", "quiet", "verbose")
 
 
 def load_tree(
     argument: str, more: Sequence[str] = (), rules: Rules | None = None, *, streams: bool = False,
     drawings: bool = False,
-) -> FrameTree | TransformBuffer:  # fmt: skip
+) -> Frames:  # fmt: skip
     """Read the tree of an argument and merge further files into it; say what files of other formats were taken for.
 
     streams: `--in` is about what is streamed wherever that can be
@@ -56,7 +56,7 @@ def load_tree(
 
 def load_sides(
     a: Sequence[str], b: Sequence[str], *, normalize: bool
-) -> list[tuple[FrameTree | TransformBuffer, dict[str, EdgePlace]]]:
+) -> list[tuple[Frames, dict[str, EdgePlace]]]:
     """Read two trees that will be compared, each of several files, as `load_tree` does; with each frame's place."""
     from frametool.formats.load import Rules
 
@@ -66,12 +66,12 @@ def load_sides(
 
     def side(
         arguments: Sequence[str], behind: int, earth: str
-    ) -> tuple[FrameTree | TransformBuffer, dict[str, EdgePlace]]:
+    ) -> tuple[Frames, dict[str, EdgePlace]]:
         where: dict[str, EdgePlace] = {}
         every.extend(files := opened(arguments, behind=behind, of=count))
         return _loaded(files, Rules(normalize=normalize, earth=earth), where), where
 
-    sides: list[tuple[FrameTree | TransformBuffer, dict[str, EdgePlace]]] = []
+    sides: list[tuple[Frames, dict[str, EdgePlace]]] = []
     for arguments, behind in ((a, 0), (b, len(a))):
         earth = next((name for name in EARTH_FRAMES if sides and name in sides[0][0].frames), "")
         options = f"{normalize} {behind} of {count} {earth}"
@@ -83,7 +83,7 @@ def load_sides(
 
 def _loaded(
     files: Sequence[FrameFile], rules: Rules | None, places: dict[str, EdgePlace] | None = None
-) -> FrameTree | TransformBuffer:
+) -> Frames:
     """Merge files that are open, and say what they were taken for."""
     from frametool.formats.load import load_sources  # not every command that may read trees does
 
@@ -181,11 +181,7 @@ def opened(
         FrameFile.inline(source_of(each))
         if is_inline(each)
         else FrameFile(
-            tree_file(each),
-            fmt=next(format_of_next, None),
-            topics=chosen.topics,
-            answers=general,
-            reads=reads,
+            tree_file(each), fmt=next(format_of_next, None), topics=chosen.topics, answers=general, reads=reads
         )
         for each in arguments
     )
@@ -208,8 +204,7 @@ def answers() -> Answers:
     named = {name: chosen.peek(name) for name in Answers._fields if name not in ("joints", "frames")}
     notations = chosen.peek("from_rep")
     named["order"] = named["order"] or next((each.spec for each in notations or () if each.spec in ORDERS), "")
-    said = asking(Answers, ANSWERED)
-    return said(joints=_joints(chosen.peek("joints")), **{name: value for name, value in named.items() if value})
+    return SaidAnswers(joints=_joints(chosen.peek("joints")), **{name: value for name, value in named.items() if value})
 
 
 def _joints(texts: Sequence[str]) -> dict[str, str]:

@@ -32,8 +32,7 @@ if TYPE_CHECKING:
     from frametool.cli.streaming import PoseTask
     from frametool.explain.derive import DerivationStyle
     from frametool.explain.operations import WrittenPose
-    from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.lookups import FrameTree
+    from frametool.frames.lookups import Frames
     from frametool.geometry.types import Components
     from frametool.recordings.messages import PointCloud
     from frametool.stream.request import Request
@@ -298,7 +297,7 @@ class Way(NamedTuple):
     counters: bool = True
     uncertain: bool = False
     tell: Callable[[], None] = lambda: None
-    tree: FrameTree | TransformBuffer | None = None
+    tree: Frames | None = None
 
     @property
     def into(self) -> str:

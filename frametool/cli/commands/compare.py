@@ -9,16 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli import options, poses
-from frametool.cli.command import (
-    OPTIONAL,
-    Inputs,
-    argument,
-    command_named,
-    option,
-    refuse,
-    refuse_two_readers,
-    together,
-)
+from frametool.cli.command import Inputs, argument, command_named, option, refuse, refuse_two_readers, together
 from frametool.cli.output import Output
 from frametool.cli.sink import refuse_existing, say, say_error, writing
 from frametool.cli.trees import answers, load_tree
@@ -110,7 +101,7 @@ EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 5 file; -
 @option("--segments 100,200,..", "lengths of kitti, metres  [default: 100,..,800]", parse_lengths)
 @option("--segment-step N", "one for every N-th pair  [default: 10]", click.IntRange(1))
 @option("--as", "defaults of evo", ("evo",), name="like")
-@option("--rows [=ate|rpe|kitti]", "one row per pair, step or segment: CSV, JSON", OPTIONAL["--rows"])
+@option("--rows [=ate|rpe|kitti]", "one row per pair, step or segment: CSV, JSON")
 @option("--explain", "the formulas with this run's numbers", ("text",), under="Result", excludes=("rows",))
 @option("--fail LIMIT,..", "exit with 1 if a limit is exceeded: ate>5cm", _read_limits, name="limits")
 @option("--report FILE.html|svg", "also write a report in one file; with -o instead", options.file_with(*REPORTS))
