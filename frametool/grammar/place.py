@@ -58,11 +58,6 @@ DMS = re.compile(
 )
 
 
-def not_on_ellipsoid(name: str) -> str:
-    """Return the message that a height is not above the ellipsoid."""
-    return f"{shown(name)} is above sea level, alt above the ellipsoid; give undulation (the geoid there) too, or alt"
-
-
 def without_place(mapping: dict[str, Any]) -> dict[str, Any]:
     """Return the other keys of a mapping with a position on the Earth: the pose that begins there."""
     return {key: value for key, value in mapping.items() if key not in EARTH_KEYS and key != AXES_KEY}
@@ -107,7 +102,7 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
 
 def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
     """Read all positions in the keys of a mapping; they have to agree."""
-    _refuse_not_read(own)
+    refuse_not_read(own)
     found = []
     if AT in own:
         found.append(within((AT,), read_at, own[AT], reading))
@@ -156,16 +151,21 @@ def _by_field(own: dict[str, Any]) -> dict[str, str]:
     return named
 
 
-def _heights(named: dict[str, str], reading: Reading, *path: str) -> list[str]:
-    """Return the fields of a position that make its height above the ellipsoid; note that there is none."""
-    if "alt" in named:
-        return ["alt"]
-    if "msl" not in named:
-        reading.note(NO_ALT, *path, rule="no-alt")
-        return []
+def heights(named: dict[str, str]) -> tuple[str, ...]:
+    """Return the fields that make a height above the ellipsoid, of fields with their names; () if there is none."""
+    if "alt" in named or "msl" not in named:
+        return ("alt",) * ("alt" in named)
     if "undulation" not in named:
-        raise Misfit(not_on_ellipsoid(named["msl"]), (named["msl"],), key=True)
-    return ["msl", "undulation"]
+        above = f"{shown(named['msl'])} is above sea level, alt above the ellipsoid"
+        raise Misfit(f"{above}; give undulation (the geoid there) too, or alt", (named["msl"],), key=True)
+    return "msl", "undulation"
+
+
+def _heights(named: dict[str, str], reading: Reading, *path: str) -> tuple[str, ...]:
+    """Return the same; note that there is none."""
+    if not (found := heights(named)):
+        reading.note(NO_ALT, *path, rule="no-alt")
+    return found
 
 
 def _lla(own: dict[str, Any], reading: Reading) -> Spot:
@@ -208,7 +208,7 @@ def _utm(value: Any, reading: Reading) -> Spot:
     """Read a position in UTM."""
     if type(value) is not dict:
         raise Misfit(f"expected {{zone: 32N, easting: .., northing: .., alt: ..}}, found {kind(value)}")
-    _refuse_not_read(value)
+    refuse_not_read(value)
     named = _by_field(value)
     known = (*POSITIONS[UTM].names, "msl", "undulation", *GRIDDED)
     if unknown := [key for field, key in named.items() if field not in known]:
@@ -293,7 +293,7 @@ def _heading(own: dict[str, Any], axes: str) -> Quaternion | None:
     return HEADING.forward((angle,), floats, degrees, NED if axes == NED else ENU)  # type: ignore[no-any-return]
 
 
-def _refuse_not_read(own: dict[str, Any]) -> None:
+def refuse_not_read(own: dict[str, Any]) -> None:
     """Refuse keys that name another system than WGS84, and a bare `lla`."""
     if key := next((key for key in NOT_READ if key in own), None):
         raise Misfit(NOT_READ[key], (key,), key=True)

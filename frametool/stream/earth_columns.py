@@ -37,19 +37,19 @@ from frametool.grammar.names import (
 from frametool.grammar.place import (
     AT,
     EARTH_KEYS,
-    GEOID,
     NO_ALT,
     NOT_READ,
     SAME,
-    SEA_LEVEL,
     band_s,
     check_in_ecef,
     check_parent,
     coordinate,
-    not_on_ellipsoid,
+    heights,
     placed_by,
+    refuse_not_read,
     without_place,
 )
+from frametool.grammar.place import FIELDS as PLACE_FIELDS
 from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose
 from frametool.grammar.readers import Misfit, NotARotation, Reading, within
 from frametool.grammar.rotation_spelling import AXES_KEY
@@ -72,9 +72,9 @@ if TYPE_CHECKING:
 
 ECEF_COLUMNS = POSITIONS[ECEF].columns
 STATUS, DATUM, EPSG, PARENT = "status", "datum", "epsg", "parent"
-OTHERS = (*SEA_LEVEL, "easting", "northing", *ECEF_COLUMNS, ZONE, "heading", AXES,
+OTHERS = ("easting", "northing", *ECEF_COLUMNS, ZONE, "heading", AXES,
           STATUS, DATUM, EPSG, PARENT)  # fmt: skip
-FIELDS = SAME | GEOID | {"utm_zone": ZONE} | {name: name for names in (OTHERS, *FLAT.values()) for name in names}
+FIELDS = PLACE_FIELDS | {name: name for names in (OTHERS, *FLAT.values()) for name in names}
 PATTERN = re.compile(
     rf"[#% ]*((?:.*[._/])??)({'|'.join(sorted(FIELDS, key=len, reverse=True))})"
     r"(?:[_ ]?(deg|rad|e7|m|mm|cm|ft))?\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*",
@@ -138,24 +138,15 @@ def _position(kind: str, spots: dict[str, NamedColumn], groups: Groups, earth: E
     if kind == UTM and missing <= {ZONE}:
         zone = fields.get(ZONE) or groups.get("utm_", {}).get(ZONE) or groups.get("", {}).get(ZONE)
         if zone is None and earth.zone is None:
-            _refuse_not_read(spots)
+            refuse_not_read(spots)
             raise ValueInvalid("easting and northing do not say their zone; add a column utm_zone, or give --zone 32N")
         fields, missing = ({} if zone is None else {ZONE: zone}) | fields, set()
     if missing:
         return None
     if kind == LLA:
         fields = {f"{name}_rad" if _in_radians(spot) else name: spot for name, spot in fields.items()}
-    return _columns(kind, fields | (_height(spots) if "alt" in row.names else {}), spots, earth)
-
-
-def _height(spots: dict[str, NamedColumn]) -> dict[str, NamedColumn]:
-    """Return the height above the ellipsoid, or that above the sea and the geoid's; raise ValueInvalid without it."""
-    if "alt" in spots:
-        return {"alt": spots["alt"]}
-    name = next((name for name in SEA_LEVEL if name in spots), "")
-    if name and "undulation" not in spots:
-        raise ValueInvalid(not_on_ellipsoid(spots[name].name))
-    return {"msl": spots[name], "undulation": spots["undulation"]} if name else {}
+    above = heights({field: spot.name for field, spot in spots.items()}) if "alt" in row.names else ()
+    return _columns(kind, fields | {field: spots[field] for field in above}, spots, earth)
 
 
 def _columns(kind: str, fields: dict[str, NamedColumn], spots: dict[str, NamedColumn], earth: Earth) -> Columns:
@@ -164,18 +155,13 @@ def _columns(kind: str, fields: dict[str, NamedColumn], spots: dict[str, NamedCo
         if field[:3] not in ("lat", "lon") and spot.unit not in ("", "m"):
             what = f"column {shown(spot.name)}: unknown unit {shown(spot.unit)} of a length here; known is m"
             raise ValueInvalid(what)
-    _refuse_not_read(spots)
+    refuse_not_read(spots)
     staying = {name: spots[name] for name in (STATUS, PARENT) if name in spots}
     fields = fields | {name: spots[name] for name in (AXES,) if name in spots} | staying
     axes, origin = (earth.axes or kind, earth.origin) if kind in LOCAL else (earth.axes, None)
     place = Place(kind, (*fields,), axes, earth.zone if kind == UTM and ZONE not in fields else None, origin)
     places, names, _ = zip(*fields.values(), strict=True)
     return Columns(places, names, unit=place, staying=len(staying))
-
-
-def _refuse_not_read(spots: dict[str, NamedColumn]) -> None:
-    if name := next((name for name in (DATUM, EPSG) if name in spots), None):
-        raise ValueInvalid(NOT_READ[name])
 
 
 def _in_radians(spot: NamedColumn) -> bool:
