@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
-    from frametool.geometry.types import Components, Condition, Five, Four, Functions, N, Nine, Three, Two
+    from frametool.geometry.types import Components, Condition, Four, Functions, N, Nine, Three, Two
 
 EPS = 2.0**-52
 UNIT = 4 * EPS  # one normalisation leaves |n^2 - 1| below 3 eps: within 4, bits are preserved
@@ -131,7 +131,7 @@ def distance(
 
 def toward(
     ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N, xp: Functions[N],
-) -> Five[N]:  # fmt: skip
+) -> tuple[N, N, N, N, N]:  # fmt: skip
     """Return the unit quaternion c orthogonal to a, in the plane of a and b, and half the arc to b in radians.
 
     The arc is the shorter one; at exactly 180 degrees of rotation both are, and the sign of b decides.

@@ -20,7 +20,7 @@ from frametool.geometry.quaternion import cross, either, length
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
-    from frametool.geometry.types import Components, Eight, Functions, N, Number, Rigid, Seven, Six, Three, Twelve, Two
+    from frametool.geometry.types import Components, Functions, N, Number, Rigid, Seven, Six, Three, Two
 
 EXACT, SCALED, UNCERTAIN = 7, 8, 43  # components of a pose: alone, with a scale, with a covariance
 IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
@@ -138,7 +138,7 @@ def extent(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N, xp: Functions[N]) -> Two
     return quaternion.magnitude(tx, ty, tz, xp), quaternion.angle(x, y, z, w, xp)
 
 
-def to_matrix(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N) -> Twelve[N]:
+def to_matrix(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N) -> tuple[N, N, N, N, N, N, N, N, N, N, N, N]:
     """Return the upper twelve entries m11 .. m34 of the homogeneous matrix, row-major; the last row is 0 0 0 1."""
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = quaternion.to_matrix(x, y, z, w)
     return r11, r12, r13, tx, r21, r22, r23, ty, r31, r32, r33, tz
@@ -199,7 +199,7 @@ def log(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N, xp: Functions[N]) -> Six[N]
 def prepare(
     atx: N, aty: N, atz: N, ax: N, ay: N, az: N, aw: N,
     btx: N, bty: N, btz: N, bx: N, by: N, bz: N, bw: N, xp: Functions[N],
-) -> Eight[N]:  # fmt: skip
+) -> tuple[N, N, N, N, N, N, N, N]:  # fmt: skip
     """Return the step dx, dy, dz in metres, then the result of `quaternion.toward`: c as x, y, z, w, half the arc."""
     cx, cy, cz, cw, half_arc = quaternion.toward(ax, ay, az, aw, bx, by, bz, bw, xp)
     return btx - atx, bty - aty, btz - atz, cx, cy, cz, cw, half_arc

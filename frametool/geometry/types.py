@@ -26,12 +26,9 @@ if TYPE_CHECKING:
     Two: TypeAlias = tuple[N, N]
     Three: TypeAlias = tuple[N, N, N]
     Four: TypeAlias = tuple[N, N, N, N]
-    Five: TypeAlias = tuple[N, N, N, N, N]
     Six: TypeAlias = tuple[N, N, N, N, N, N]
     Seven: TypeAlias = tuple[N, N, N, N, N, N, N]
-    Eight: TypeAlias = tuple[N, N, N, N, N, N, N, N]
     Nine: TypeAlias = tuple[N, N, N, N, N, N, N, N, N]
-    Twelve: TypeAlias = tuple[N, N, N, N, N, N, N, N, N, N, N, N]
 
     class Functions(Protocol[N]):
         """The functions that a kernel needs beyond arithmetic; all are exact or correctly rounded on every machine."""

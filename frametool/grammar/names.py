@@ -16,9 +16,8 @@ from frametool.grammar.readers import PARENT_NAMES
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-HEADER_FRAME = "header.frame_id"
 PARENT_KEYS = (*PARENT_NAMES, "frame")  # the frame in which something is expressed
-PARENT_COLUMNS = (HEADER_FRAME, *PARENT_KEYS)  # the header of a message has priority
+PARENT_COLUMNS = ("header.frame_id", *PARENT_KEYS)  # the header of a message has priority
 # names of other tools for columns, and for keys with a single number
 COLUMN_WORDS = {
     **{f"rvec_{axis}": f"rotvec_{axis}" for axis in "xyz"},

@@ -228,13 +228,12 @@ def _edge(pose: Pose, style: Style, above: str | None = None) -> dict[str, Any]:
 
     above: the parent of a sample that does not name it
     """
-    by_xyz = style.changed(place=None)
-    if style.place is None or style.place.name == EARTH_FRAMES[0] or (above or pose.parent) not in EARTH_FRAMES:
-        return Result(pose, uncertain(pose.covariance)).mapping(by_xyz)
-    from frametool.grammar.place import frame_entry
+    at: dict[str, Any] = {}
+    if style.place is not None and style.place.name != EARTH_FRAMES[0] and (above or pose.parent) in EARTH_FRAMES:
+        from frametool.grammar.place import frame_entry
 
-    at, pose = frame_entry(pose, style.place)
-    entry = Result(pose, uncertain(pose.covariance)).mapping(by_xyz)
+        at, pose = frame_entry(pose, style.place)
+    entry = Result(pose, uncertain(pose.covariance)).mapping(style.changed(place=None))
     return {key: entry.pop(key) for key in ("name", "parent") if key in entry} | at | entry
 
 
