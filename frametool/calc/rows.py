@@ -179,7 +179,7 @@ def poses_of_table(path: str, fmt: str, *, normalize: bool, degrees: bool) -> Te
     """Return the poses or points of a table as a list; raises FormatError at the first bad row."""
     request = Request(Operation(moves=True), normalize=normalize, degrees=degrees)
     with opened(path) as stream:
-        rows = gathered(FormatConverter(fmt, request, path), stream, BadRows(path)).numbers.tolist()
+        rows = gathered(FormatConverter(fmt, request, path).steps(stream), BadRows(path)).numbers.tolist()
     is_turned = len(rows[0]) > len(AXES)
     nowhere = [0.0] * (7 - len(rows[0])) if is_turned else []
     type_ = Type(POSE if is_turned else POINT)

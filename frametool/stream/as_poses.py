@@ -256,7 +256,7 @@ class FormatConverter:
             pairs = [rename(*(row.names or (None, None))) for row in (written if own else written[:1])]
             parents, names = zip(*pairs, strict=True) if pairs else ((None,), (None,))
             times = None if own else self._held(stamps[0][done.rows], fmt)
-            places = np.array(lines, np.int64)[done.rows] + 1
+            places = np.array(lines, np.int64)[done.rows]
             poses = RowPoses(done.results[done.rows], times, places, parents, names, extras)
             found, count = sorted(faults + done.faults()), len(lines) + len(faults)
             yield poses, Outcome(b"", found, count, notes=sorted(done.notes))

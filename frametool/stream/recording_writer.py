@@ -51,7 +51,10 @@ class RecordingWriter:
             raise ValueInvalid(f"{style.format} holds places by lat lon alt only; leave --to {style.place.name} out")
         if any(each.spec != "quaternion" for each in style.notations):
             raise ValueInvalid(f"{style.format} writes rotations in its own way; leave --to out")
-        self.kinds = asked.kinds or self._usual()
+        usual: tuple[str, ...] = () if kind == POINT else ("pose",)  # of points the frame decides
+        if style.place is not None or (kind == POSE and asked.frames and not asked.topic):
+            usual = ("pose", "tf") if style.place is None else ("fix",)
+        self.kinds = asked.kinds or usual
         if "fix" in self.kinds and len(self.kinds) > 1:
             raise ValueInvalid("--messages fix stands alone: its numbers are lat, lon, alt")
         if asked.topic and len(self.kinds) > 1:
@@ -61,13 +64,6 @@ class RecordingWriter:
         self.path: list[tuple[str, Ints, Floats]] = []
         self.lost: dict[str, None] = {}  # names of frames that poses are of
         self.is_named = True  # whether all rows say what they are seen from
-
-    def _usual(self) -> tuple[str, ...]:
-        """Return the messages where nobody says which; those of points depend on the frame they are expressed in."""
-        if self.style.place is not None:
-            return ("fix",)
-        asked = self.style.recording
-        return () if self.kind == POINT else ("pose", "tf") if asked.frames and not asked.topic else ("pose",)
 
     def of_block(self, block: RowPoses) -> bytes:
         """Write the messages of a block; their bytes come at the end."""
@@ -111,7 +107,8 @@ class RecordingWriter:
         """Return (parent, child) of each row, or one for all."""
         said = self.style.recording.frames
         if self.kinds == ("fix",):
-            return [(name or ANTENNA, "") for name in self._antennas(block)]
+            names = plain_cells(block.extras[NAME]) if NAME in block.extras else block.names
+            return [(name or ANTENNA, "") for name in (names if len({*names}) > 1 else names[:1])]
         parent, child = said or FRAMES
         there = {each for each in (*block.parents, *block.names) if each and each not in said}
         if said and there:
@@ -138,12 +135,6 @@ class RecordingWriter:
             x, y, z, w = quaternion.unit(x, y, z, w, arrays)
             numbers = np.column_stack([numbers[:, :3], *quaternion.from_quaternion(x, y, z, w, arrays)])
         return numbers + 0.0  # none is -0.0
-
-    @staticmethod
-    def _antennas(block: RowPoses) -> Sequence[str | None]:
-        """Return the names of what was at each place, or one for all; those of points are no more than an extra."""
-        found = plain_cells(block.extras[NAME]) if NAME in block.extras else block.names
-        return found if len({*found}) > 1 else found[:1]
 
     def _places(self, block: RowPoses) -> Floats:
         """Return lat, lon, alt of each row, as they were read where nothing changed them."""

@@ -123,7 +123,7 @@ def _of_table(file: InputFile, fmt: str, columns: Sequence[str], *, normalize: b
     sides, placed, places = list[Transform](), False, list[str]()
     for each in columns:
         request = Request(Operation(moves=True), columns=(each,), normalize=normalize)
-        poses = gathered(FormatConverter(fmt, request, file.name), BytesIO(text), BadRows(file.name))
+        poses = gathered(FormatConverter(fmt, request, file.name).steps(BytesIO(text)), BadRows(file.name))
         numbers = poses.numbers
         if numbers.shape[1] not in (4, 7):
             raise FormatError(f"no rotation among the columns {each}", source=file.name, line=1)
@@ -233,7 +233,7 @@ def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows) -> tuple
     if {"rows", "arrays"}.isdisjoint(FORMATS[fmt].reads):
         raise FormatError(f"no points in it: {FORMATS[fmt].summary}", source=file.name)
     converter = FormatConverter(fmt, Request(Operation(moves=True)), file.name, answers=answers)
-    rows = gathered(converter, cast("ByteStream", file.stream), bad, (*IDS, WEIGHT))
+    rows = gathered(converter.steps(cast("ByteStream", file.stream)), bad, (*IDS, WEIGHT))
     if rows.numbers.shape[1] < 3 or not converter.placed:
         raise FormatError("no positions in it: rotations alone are no points", source=file.name)
     if "arrays" in FORMATS[fmt].reads:

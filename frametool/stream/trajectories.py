@@ -37,11 +37,12 @@ from frametool.stream.table import open_table
 from frametool.text.cells import without_quotes
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
     from os import PathLike
 
     from frametool.frames.buffer import TransformBuffer
     from frametool.grammar.edges import Report
+    from frametool.stream.record_results import BlockResults
     from frametool.text.lines import ByteStream
 
 POSITION = 3  # numbers
@@ -129,7 +130,8 @@ def read_stamps(path: str, report: Report) -> list[int]:
     path: a file or a folder, or FILE:TOPIC; report: takes the errors of lines that are no time
     """
     if path != "-" and not os.path.isfile(path) and (os.path.isdir(path) or ":" in path):
-        return _stamps_of_tree(*split_name(path))
+        name, topics = split_name(path)
+        return _stamps_of(name, topics=topics)
     file = InputFile(path)
     try:
         head = file.head()
@@ -138,7 +140,8 @@ def read_stamps(path: str, report: Report) -> list[int]:
         fmt = "tum" if is_list else detect(head, "rows", "arrays", "tree", "records", name=file.path)
         known = FORMATS[fmt]
         if not known.is_table or fmt == "kitti":
-            return _stamps_of_poses(path, fmt, is_tree=not known.is_table and bool(re.search(TREE, head)))
+            is_tree = not known.is_table and re.search(TREE, head) is not None
+            return _stamps_of(path, fmt, is_tree=is_tree or {"tree", "records"}.intersection(known.reads) == {"tree"})
         text = file.stream.read()
     finally:
         file.close()
@@ -147,7 +150,7 @@ def read_stamps(path: str, report: Report) -> list[int]:
     text = _with_title(text, (known.delimiter or "").encode() or None)
     titled = not is_list or stamp_column([words[0].decode("utf-8", "replace")]) is not None
     table, rest = open_table(text, fmt, header=titled, source=file.name)
-    named = table.names or (("t",) if is_list else (known.columns or ("t",))[: table.width])
+    named = table.names or (known.columns or ("t",))[: table.width]
     at, below = (0, None) if fmt == "euroc" else stamp_places(named)
     if at is None:
         columns = f"; columns: {listed(named)}" if table.names else ""
@@ -185,51 +188,42 @@ def _with_title(text: bytes, delimiter: bytes | None) -> bytes:
 NO_TIMES = "no times in it; write one a line"
 
 
-def _stamps_of_poses(path: str, fmt: str, *, is_tree: bool) -> list[int]:
-    """Return the stamps of a format that lists poses or records, or of all that moves in a recording."""
-    if is_tree or ("tree" in FORMATS[fmt].reads and "records" not in FORMATS[fmt].reads):
-        return _stamps_of_tree(path, fmt=fmt)
-    trajectory = read_trajectory(path, fmt=fmt)
-    if trajectory.stamps_ns is None:
-        raise FormatError(f"no stamps in it ({FORMATS[fmt].summary})", source=path)
-    return [int(stamp) for stamp in trajectory.stamps_ns]
-
-
-def _stamps_of_tree(path: str, topics: Sequence[str] = (), *, fmt: str | None = None) -> list[int]:
-    """Return the stamps of all that moves in a tree or recording, or of what came by a topic."""
-    recording = FrameFile(path, fmt=fmt, topics=topics)
-    found = {edge.stamp_ns for edge in recording.edges() if edge.stamp_ns is not None}
+def _stamps_of(path: str, fmt: str = "", topics: Sequence[str] = (), *, is_tree: bool = True) -> list[int]:
+    """Return the stamps of all that moves in a tree or recording, or of poses or records in their order."""
+    if is_tree:
+        recording = FrameFile(path, fmt=fmt or None, topics=topics)
+        found = sorted({edge.stamp_ns for edge in recording.edges() if edge.stamp_ns is not None})
+        fmt = recording.format
+    else:
+        stamps_ns = read_trajectory(path, fmt=fmt).stamps_ns
+        found = [] if stamps_ns is None else stamps_ns.tolist()
     if not found:
-        raise FormatError(f"no stamps in it ({FORMATS[recording.format].summary})", source=path)
-    return sorted(found)
+        raise FormatError(f"no stamps in it ({FORMATS[fmt].summary})", source=path)
+    return found
 
 
-def gathered(converter: FormatConverter, stream: ByteStream, bad: BadRows, columns: Sequence[str] = ()) -> RowPoses:
+def gathered(steps: Iterable[tuple[RowPoses | None, Outcome]], bad: BadRows, columns: Sequence[str] = ()) -> RowPoses:
     """Return all results of a stream as one block with their lines from 1, and some of its other columns as values.
 
+    steps: what became of each block, and what is reported about it
     Bad rows go to `bad`.  Raises FormatError if no row is left.
     """
-    found: list[RowPoses] = []
+    blocks: list[RowPoses] = []
 
     def outcomes() -> Iterator[Outcome]:
-        line = int(converter.is_table)  # what lists poses says itself where they are
-        for poses, outcome in converter.steps(stream):
-            if len(poses.numbers):
-                found.append(poses._replace(lines=poses.lines + line))
+        line = 1
+        for poses, outcome in steps:
+            if poses is not None and len(poses.numbers):
+                blocks.append(poses._replace(lines=poses.lines + line))
             line += outcome.lines
             yield outcome
 
     run(outcomes(), lambda _: None, bad)
-    return _joined(found, converter.source, columns)
-
-
-def _joined(blocks: Sequence[RowPoses], source: str, columns: Sequence[str] = ()) -> RowPoses:
-    """Return blocks of poses as one."""
     if not blocks:
-        raise FormatError("no poses or points in it", source=source)
+        raise FormatError("no poses or points in it", source=bad.source)
     stamps = [each.stamps_ns for each in blocks if each.stamps_ns is not None]
     if len(stamps) not in (0, len(blocks)):
-        raise FormatError("some poses have a stamp and some have none", source=source)
+        raise FormatError("some poses have a stamp and some have none", source=bad.source)
     parents = [*chain.from_iterable(each.for_each(each.parents) for each in blocks)]
     names = [*chain.from_iterable(each.for_each(each.names) for each in blocks)]
     extras = {
@@ -249,54 +243,49 @@ def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows, asked: R
     own = answers if counts or fmt == "csv" else answers._replace(stamps="")
     request = asked._replace(operation=Operation(moves=True), rename=lambda parent, name: (parent, name))
     converter = FormatConverter(fmt, request, file.name, Style("tum"), own)
-    poses = gathered(converter, cast("ByteStream", file.stream), bad)
+    poses = gathered(converter.steps(cast("ByteStream", file.stream)), bad)
     named = {*zip(poses.parents, poses.names, strict=True)}
     if len(named) > 1:
         some = ", ".join(f"{parent}:{name}" for parent, name in sorted(named, key=str)[:3])
         raise ValueInvalid(f"{file.name}: poses of several frames ({some} ..); name one: {file.name}:TARGET:SOURCE")
-    width = poses.numbers.shape[1]
-    if width not in (POSITION, 7):
+    if poses.numbers.shape[1] not in (POSITION, 7):
         raise FormatError("rotations without positions are no trajectory", source=file.name)
     if counts and not own.stamps:
         poses = poses._replace(stamps_ns=None)
-    found = _trajectory(poses, *own.names(WORLD, BODY), turned=width > POSITION)
+    found = _trajectory(poses, *own.names(WORLD, BODY))
     return found if "arrays" in FORMATS[fmt].reads else found._replace(lines=poses.lines)
 
 
 def _of_records(file: InputFile, fmt: str, bad: BadRows, asked: Request, body: str = BODY) -> Trajectory:
     """Gather records: poses, or points, with their stamps."""
-    blocks, turned = list[RowPoses](), True
-
-    def outcomes() -> Iterator[Outcome]:
-        nonlocal turned
-        stream = cast("ByteStream", file.stream)
-        for outcome in run_records(stream, fmt, asked, source=file.name, style=Style("tum")):
-            yield outcome
-            if outcome.results is None:
-                continue
-            found = outcome.results.posed()
-            if found is None:
-                values = [*outcome.results.in_order()]
-                results = [each for each in values if isinstance(each, Result) and each.pose.position is not None]
-                if len(results) != len(values):
-                    raise FormatError("a trajectory is made of poses, or of points with stamps", source=file.name)
-                turned &= all(each.pose.rotation is not None for each in results)
-                whole = (Result(each.pose._replace(rotation=each.pose.components[3:]), each.extras) for each in results)
-                found = block_of([*whole]) if results else None
-            if found is not None:
-                blocks.append(found)
-
-    run(outcomes(), lambda _: None, bad)
-    made = _trajectory(_joined(blocks, file.name), WORLD, body, turned=turned)
+    outcomes = run_records(cast("ByteStream", file.stream), fmt, asked, source=file.name, style=Style("tum"))
+    steps = ((each.results and _posed(each.results, file.name), each) for each in outcomes)
+    made = _trajectory(gathered(steps, bad), WORLD, body)
     return made._replace(world=Names().bare(made.world))
 
 
-def _trajectory(poses: RowPoses, world: str, body: str, *, turned: bool) -> Trajectory:
-    """Return poses as a trajectory; world, body: the names where they have none, or several."""
+def _posed(results: BlockResults, source: str) -> RowPoses | None:
+    """Return the results of some records as poses; rotations are nan where one has none."""
+    if (found := results.posed()) is not None:
+        return found
+    values = [*results.in_order()]
+    made = [each for each in values if isinstance(each, Result) and each.pose.position is not None]
+    if len(made) != len(values):
+        raise FormatError("a trajectory is made of poses, or of points with stamps", source=source)
+    if all(each.pose.rotation is not None for each in made):
+        return block_of(made) if made else None
+    found = block_of([Result(each.pose._replace(rotation=each.pose.components[3:]), each.extras) for each in made])
+    found.numbers[:, POSITION:] = np.nan
+    return found
+
+
+def _trajectory(poses: RowPoses, world: str, body: str) -> Trajectory:
+    """Return poses or points as a trajectory; world, body: the names where they have none, or several."""
     named = {*zip(poses.parents, poses.names, strict=True)}
     parent, name = named.pop() if len(named) == 1 else (None, None)
-    turns = poses.numbers[:, POSITION:] if turned else None
-    return Trajectory(poses.stamps_ns, poses.numbers[:, :POSITION], turns, parent or world, name or body)
+    positions, turns = poses.numbers[:, :POSITION], poses.numbers[:, POSITION:]
+    turned = turns.shape[1] > 0 and not np.isnan(turns).any()
+    return Trajectory(poses.stamps_ns, positions, turns if turned else None, parent or world, name or body)
 
 
 def _of_tree(
