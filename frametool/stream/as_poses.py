@@ -167,7 +167,7 @@ class FormatConverter:
         none = RowPoses(np.empty((0, 7)), None, np.empty(0, np.int64), [None], [None], {})
         yield none, Outcome(b"", lines=rows.lines, size=rows.taken)
         count = 0
-        for block, _, outcome in rows.blocks():
+        for block, outcome in rows.blocks():
             before, count = count, count + len(block.numbers)
             poses = self._with_place(block)
             if self.looks_up_places:
@@ -312,7 +312,7 @@ def _check(rows: PlannedRows, fmt: Poses, file: InputFile, options: Options) -> 
     if rows.shape.notation is None:
         message = f"no rotation among the columns {rows.columns}: points are no frames"
         raise FormatError(message, source=file.name, line=1)
-    if rows.stamp_at is None and not fmt.counted and not options.answers.stamps and len(rows.roles) < 2:
+    if rows.layout.time is None and not fmt.counted and not options.answers.stamps and len(rows.roles) < 2:
         lacking = ", ".join(name for role, name in enumerate(("parent", "name")) if role not in rows.roles)
         wanted = "frames that stand still have parent and name, one that moves stamp or stamp_ns, or --stamps FILE"
         raise FormatError(f"no column {lacking} nor stamp among {rows.columns}; {wanted}", source=file.name, line=1)

@@ -132,20 +132,10 @@ class Layout(NamedTuple):
     columns: tuple[Column, ...]
     places: tuple[int, ...]
     frames: tuple[int, ...]
-    pieces: tuple[Piece, ...]
     stretches: tuple[Stretch, ...]
-    delimiter: bytes
-    null: bytes
     time: int | None = None
     below: int | None = None
     name: int | None = None
-
-    def header(self, raw: Sequence[bytes]) -> list[bytes]:
-        """Return the cells of the output's header, the kept names as they were written."""
-        return [
-            quoted(column.name, self.delimiter) if isinstance(column, ADDED) else raw[column.place]
-            for column in self.columns
-        ]
 
 
 def quoted(name: str, delimiter: bytes) -> bytes:
@@ -156,9 +146,7 @@ def quoted(name: str, delimiter: bytes) -> bytes:
     return text
 
 
-def lay_out(
-    columns: Sequence[Column], places: Sequence[int], frames: Sequence[int], width: int, delimiter: bytes
-) -> Layout:
+def lay_out(columns: Sequence[Column], width: int, delimiter: bytes) -> tuple[tuple[Piece, ...], tuple[Stretch, ...]]:
     """Make the pieces of a row out of its columns, as few as can be: neighbours that pass are one stretch."""
     between = delimiter or b" "
     pieces: list[Piece] = []
@@ -192,8 +180,7 @@ def lay_out(
     if not stretches or stretches[-1][3] != "line":
         stretches.append((width - 1, width - 1, "end", "line"))
         pieces.append(In(len(stretches) - 1))
-    null = b"" if delimiter else b"nan"
-    return Layout(tuple(columns), tuple(places), tuple(frames), tuple(pieces), tuple(stretches), delimiter, null)
+    return tuple(pieces), tuple(stretches)
 
 
 def _goes_on(before: Column, column: Column) -> bool:

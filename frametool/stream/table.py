@@ -48,7 +48,7 @@ class Naming:
 
     def __init__(self, table: Table, layout: Layout, request: Request, shape: Shape) -> None:
         """Take from the request what it does to names; shape: what a row is."""
-        self.layout = layout
+        self.layout, self.delimiter = layout, table.delimiter
         self.earth = EARTH_FRAMES[0] if shape.place is not None else None
         self.places = (layout.frames[0] if layout.frames else None, layout.name) if request.poses else (None, None)
         self.column = next((table.name(place) for place in self.places if place is not None), "")
@@ -90,6 +90,15 @@ class Naming:
         frames = [self.earth] if self.earth else [known[code] for code in parents.codes.tolist()]
         return frames, BlockNames(pairs, results, of_row, dict(sorted(lost.items())[:1])), bad
 
+    def texts(self, names: BlockNames, rows: Ints) -> list[list[str | None]]:
+        """Return the parents of the results of rows, and what these are the poses of: one a row, or one for all.
+
+        Where rows name none, the frames of what is placed on the Earth are known, and those of an expression.
+        """
+        unnamed = (self.earth, None) if self.rename is None else self.rename(self.earth, None)
+        known = zip(self.places, unnamed, strict=True)
+        return [[name] if place is None else names.texts(role, rows) for role, (place, name) in enumerate(known)]
+
     def _is_counter(self, name: str) -> bool:
         return self.counts is not None and self.counts(name)
 
@@ -109,7 +118,7 @@ class Naming:
     def spans(self, cells: Cells, role: int, names: BlockNames) -> Spans:
         """Write names as cells; one that does not change stays as it is written."""
         place, of_row = self.places[role] or 0, names.of_row
-        new = spans_of([quoted(result[role], self.layout.delimiter) for result in names.results])
+        new = spans_of([quoted(result[role], self.delimiter) for result in names.results])
         starts, ends = new.starts[of_row], new.ends[of_row]
         pairs = zip(names.pairs, names.results, strict=True)
         same = np.array([old[role] == result[role] for old, result in pairs])[of_row]
@@ -129,13 +138,6 @@ def rename_of(request: Request) -> Rename | None:
     if request.operation.looks_back:
         return lambda _parent, name: (name, name)
     return (lambda _parent, _name: (None, None)) if request.operation.of == "pair" else None
-
-
-def unnamed(request: Request, shape: Shape) -> Names:
-    """Return the frames of results whose rows name none: what is placed on the Earth is expressed in its frame."""
-    own = EARTH_FRAMES[0] if shape.place is not None else None
-    rename = rename_of(request.for_kind(shape.kind))
-    return (own, None) if rename is None else rename(own, None)
 
 
 def as_trajectory(table: Table, fmt: str, request: Request, source: str) -> Table:
@@ -217,7 +219,10 @@ class Table(NamedTuple):
             names = [each.name if isinstance(each, ADDED) else self.name(each.place) for each in layout.columns]
             grown = self.names and len(names) > self.width  # what was known by its count is not any more
             return self.head + (b"# " + " ".join(names).encode() + self.line_end if grown else b"")
-        cells = layout.header(self.header)
+        cells = [
+            quoted(column.name, self.delimiter) if isinstance(column, ADDED) else self.header[column.place]
+            for column in layout.columns
+        ]
         title = self.title if cells == list(self.header) else (self.delimiter or b" ").join(cells)
         return self.head + title + self.line_end
 
@@ -353,11 +358,11 @@ def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming, requ
     return Block(numbers, parts, cells.rows, lines, unchanged, broken, names, stamps, bad, frames=[frames])
 
 
-def at_other_times(table: Table, layout: Layout, time: int, text: bytes, offset_ns: int) -> bytes:
+def at_other_times(table: Table, layout: Layout, text: bytes, offset_ns: int) -> bytes:
     """Return rows with so much added to their stamps; what is no stamp stays unchanged and is reported when read."""
-    cells, name = table.split(text), table.name(time)
-    columns = [without_quotes(cells.column(place)) for place in (time, layout.below) if place is not None]
-    in_ns = in_nanoseconds(name)
+    cells, places = table.split(text), [place for place in (layout.time, layout.below) if place is not None]
+    columns = [without_quotes(cells.column(place)) for place in places]
+    in_ns = in_nanoseconds(table.name(places[0]))
     stamps, reasons = read_stamps(tuple(columns), in_ns=in_ns)
     edits = []
     for row in sorted({*range(len(stamps))} - {*reasons}):

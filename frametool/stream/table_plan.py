@@ -14,6 +14,7 @@ from frametool.grammar.names import (
     may_be_on_earth,
     may_be_uncertain,
     nanoseconds_beside,
+    stamp_places,
     without_mark,
 )
 from frametool.grammar.rotation_spelling import AXES_KEY
@@ -29,7 +30,7 @@ from frametool.stream.header import (
     row_shape,
     wholes_of,
 )
-from frametool.stream.layout import NAME, PARENT, Fixed, Kept, Named, New, lay_out, refuse_repeated
+from frametool.stream.layout import NAME, PARENT, Fixed, Kept, Layout, Named, New, lay_out, refuse_repeated
 from frametool.stream.request import PLAIN
 from frametool.stream.row_layout import POINT, POSE, RATE, SIX, VECTOR, Shape, place_of, six_names
 from frametool.stream.table import rename_of
@@ -38,15 +39,17 @@ from frametool.text.numbers import number_or_none
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from frametool.geometry.representations import Notation
-    from frametool.stream.layout import Column, Layout
+    from frametool.stream.layout import Column
     from frametool.stream.request import Request, Shown
     from frametool.stream.row_layout import Target
     from frametool.stream.table import Table
 
 
-def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layout]:
-    """Choose the columns that are read and written; raises FormatError that names the columns there are."""
+def plan_table(table: Table, request: Request, source: str, *, stamped: bool) -> tuple[Plan, Layout]:
+    """Choose the columns that are read and written; raises FormatError that names the columns there are.
+
+    Where all numbers are wanted no text is put together; stamped: a column with the name of a stamp is one then.
+    """
     poses = _find_if_read(table, request, source)
     only_turned = not request.operation.moves and request.keeps_position and request.gathered is None
     only_turned = only_turned and not (request.operation.turns and poses and poses[0].rotation is None)  # a point
@@ -56,7 +59,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     places: tuple[int, ...] = ()
     for columns in [columns for pose in poses for columns in pose if columns]:
         if columns.wrong:
-            raise FormatError(columns.wrong, source=source, line=1)
+            raise _refusal(columns.wrong, source)
         places += columns.places
     asked = tuple(_place(name, _names_or_numbers(table), source) for name in request.operation.columns)
     shapes = _shapes(poses, request, len(asked))
@@ -92,14 +95,15 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         shapes, targets, places, written = with_rates(table, request, shapes, targets, places, written, source)
     if table.header:
         refuse_repeated(written, table.names or ())
-    layout = lay_out(written, places, frames, table.width, table.delimiter)
     time = _time_column(table, request, source)
     below = None if time is None or not table.names else nanoseconds_beside(table.names, time)
-    layout = layout._replace(time=time, below=below, name=name)
+    if stamped and request.all_numbers and time is None:
+        time, below = _usual_stamps(table, request, places, frames)
+    pieces, stretches = ((), ()) if request.all_numbers else lay_out(written, table.width, table.delimiter)
+    layout = Layout(tuple(written), tuple(places), frames, stretches, time, below, name)
     return Plan(
-        shapes, targets, request, tuple(table.name(place) for place in places), layout.pieces, layout.null, edge_of,
-        frame_column=table.name(frames[0]) if len(frames) == 1 else "",
-        words=words, marked=marked,
+        shapes, targets, request, tuple(map(table.name, places)), pieces, b"" if table.delimiter else b"nan", edge_of,
+        frame_column=table.name(frames[0]) if len(frames) == 1 else "", words=words, marked=marked,
     ), layout  # fmt: skip
 
 
@@ -110,33 +114,55 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
     if request.columns:
         if len(request.columns) != request.poses:
             raise Misused(f"--columns is given {len(request.columns)} times, for {request.poses} poses in a row")
-        if request.given_place:
-            from frametool.stream.earth_columns import chosen_pose
-
-            return [chosen_pose(request.columns[0], table.names, table.width, request)]
         kinds = request.kinds or (request.kind,) * request.poses
-        return [
-            named_pose(spec, table.names, table.width, request.given, kind)
-            for spec, kind in zip(request.columns, kinds, strict=True)
-        ]
+        return [_chosen(spec, table, request, kind) for spec, kind in zip(request.columns, kinds, strict=True)]
     if table.pose is not None and request.given is None and request.poses == 1:
         return [table.pose]
     if table.names:
         known = request.extra_column
         names = ["" if name == known or may_be_uncertain(name) else name for name in table.names]
         return _find_named(names, request, source)
-    if request.poses == 1 and request.given_place:
-        from frametool.stream.earth_columns import chosen_pose, of_width
-
-        return [chosen_pose(of_width(table.width, request), None, table.width, request)]
-    if request.kind in SIX and table.width == len(six_names(request.kind)):
-        return [named_pose(f"1-{table.width}", None, table.width, None, request.kind)]
-    if request.poses == 1 and (spec := _by_width(table.width, request.given)):
-        return [named_pose(spec, None, table.width, request.given, request.kind)]
+    if spec := _by_width(table.width, request):
+        return [_chosen(spec, table, request, request.kind)]
     reason = f"{table.width} columns without names do not say what they are; give --from REP, or --columns"
     if request.poses == 1 and request.given:
         reason = f"{request.given.counted}; found {table.width} columns without names; or give --columns"
-    raise FormatError(reason, source=source, line=1)
+    raise _refusal(reason, source)
+
+
+def _refusal(reason: str, source: str) -> FormatError:
+    """Return the error that columns are not what is wanted; the first line names them."""
+    return FormatError(reason, source=source, line=1)
+
+
+def _chosen(spec: str, table: Table, request: Request, kind: str) -> PoseColumns:
+    """Return the columns of a point or pose that are chosen by name or number."""
+    if request.given_place:
+        from frametool.stream.earth_columns import chosen_pose
+
+        return chosen_pose(spec, table.names, table.width, request)
+    given = None if kind in SIX and not request.columns else request.given
+    return named_pose(spec, table.names, table.width, given, kind)
+
+
+def _by_width(width: int, request: Request) -> str:
+    """Choose all columns of a table without names: a point, a whole pose, or what --from says, behind a stamp or not.
+
+    "" where they may be something else.
+    """
+    given = request.given
+    if request.kind in SIX and width == len(six_names(request.kind)):
+        return f"1-{width}"
+    if request.poses > 1:
+        return ""
+    if request.given_place:
+        from frametool.stream.earth_columns import of_width
+
+        return of_width(width, request)
+    if given is None:
+        wholes = [notation.representation.whole for notation in wholes_of(None)]
+        return f"1-{width}" if width in (len(XYZ), *(len(whole.columns) for whole in wholes if whole)) else ""
+    return f"1-{width}" if width in given.counts else f"2-{width}" if width - 1 in given.counts[1:] else ""
 
 
 def _find_named(names: Sequence[str], request: Request, source: str) -> list[PoseColumns]:
@@ -144,11 +170,8 @@ def _find_named(names: Sequence[str], request: Request, source: str) -> list[Pos
     six = find_six(names, request.kind if request.kind in SIX else "")
     if request.kind in SIX and six is None:
         wanted = " ".join(six_names(request.kind))
-        raise FormatError(
-            f"no columns of a {request.kind} ({wanted}) among: {listed(names)}; name them with --columns",
-            source=source,
-            line=1,
-        )
+        found = f"no columns of a {request.kind} ({wanted}) among: {listed(names)}"
+        raise _refusal(f"{found}; name them with --columns", source)
     taken = () if six is None else six.places
     others = ["" if place in taken else name for place, name in enumerate(names)]
     if six is not None and (request.kind in SIX or not has_pose_column(others)):
@@ -209,27 +232,14 @@ def _shapes(poses: Sequence[PoseColumns], request: Request, asked: int) -> tuple
     return ((shapes[0] if shapes else Shape("", None))._replace(extra=asked),)
 
 
-def _by_width(width: int, expected: Notation | None) -> str:
-    """Take all columns of a table without names: a point, a whole pose, or what --from says, behind a stamp or not."""
-    if expected is None:
-        wholes = [notation.representation.whole for notation in wholes_of(None)]
-        return f"1-{width}" if width in (len(XYZ), *(len(whole.columns) for whole in wholes if whole)) else ""
-    if width in expected.counts:
-        return f"1-{width}"
-    return f"2-{width}" if width - 1 in expected.counts[1:] else ""
-
-
 def _without_position(pose: PoseColumns, request: Request, table: Table, source: str) -> PoseColumns:
     """Leave the position to pass as it is where only the rotation is rewritten."""
     if pose.rotation is None and request.by_default:
         return pose
     if pose.rotation is None:
         wanted = "; give --from REP or --columns" if request.given is None else ""
-        raise FormatError(
-            f"no columns of a rotation among: {listed(table.names or ('columns without names',))}{wanted}",
-            source=source,
-            line=1,
-        )
+        known = listed(table.names or ("columns without names",))
+        raise _refusal(f"no columns of a rotation among: {known}{wanted}", source)
     leaves_plane = pose.position and not pose.position.wrong and pose.position.absent and request.notations
     is_whole = len(request.notations) == 1 and request.notations[0].representation.whole is not None
     stays = not (is_whole or pose.rotation.whole or leaves_plane)
@@ -255,11 +265,8 @@ def _frame_columns(table: Table, request: Request, source: str, *, on_earth: boo
         return tuple(_place(name, names, source) for name in request.frames)
     found = _first_called(PARENT_COLUMNS, table)
     if found is None and request.frames:
-        raise FormatError(
-            f"rows do not say their frame; name SOURCE, or give --frame-column; columns: {', '.join(names)}",
-            source=source,
-            line=1,
-        )
+        remedy = "name SOURCE, or give --frame-column"
+        raise _refusal(f"rows do not say their frame; {remedy}; columns: {', '.join(names)}", source)
     return () if found is None else (found,)
 
 
@@ -295,6 +302,16 @@ def _time_column(table: Table, request: Request, source: str) -> int | None:
         except ValueInvalid as error:
             raise Misused(str(error), source=source, line=1) from None
     return place
+
+
+def _usual_stamps(
+    table: Table, request: Request, places: Sequence[int], frames: Sequence[int]
+) -> tuple[int | None, int | None]:
+    """Find the column of stamps that no option names, and that of the nanoseconds of such stamps."""
+    time, below = stamp_places(table.names)
+    if not (table.names or request.columns) and min(places, default=0) == 1:
+        time = 0  # what is before the numbers that --from speaks of
+    return (None, None) if time in frames else (time, below)
 
 
 def _names_or_numbers(table: Table) -> Sequence[str]:

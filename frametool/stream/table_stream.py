@@ -27,7 +27,6 @@ from frametool.stream.table import (
     at_other_times,
     open_table,
     table_block,
-    unnamed,
     without_comments,
 )
 from frametool.stream.table_plan import own_count, plan_table, with_vectors
@@ -37,7 +36,6 @@ from frametool.text.lines import read_blocks, whole_lines
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence
 
-    from frametool.stream.layout import Layout
     from frametool.stream.request import Request
     from frametool.stream.rows import Block
     from frametool.stream.stamp_source import Timed
@@ -102,7 +100,6 @@ class PlannedRows:
 
     A request for all numbers makes poses of them; its notations say which numbers come out.
     off: how far the worst rotation was from one; mended: how many were normalised
-    stamp_at: the column of stamps that are read of each row, whoever needs them
     inputs: the numbers of the last rows that became poses as read, a row a column
     """
 
@@ -117,25 +114,13 @@ class PlannedRows:
         self.table = table
         request = with_vectors(table.names, request, vectors)
         self.request, self.unasked = settle_stamps(table, request, source)
-        self.plan, self.layout = plan_table(table, self.request, source)
+        self.plan, self.layout = plan_table(table, self.request, source, stamped=stamped)
         self.shape = self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
         self.naming = Naming(table, self.layout, self.request.for_kind(self.shape.kind), self.shape)
         if request.gathered is not None:
             request.gathered.stamped |= stamp_places(table.names)[0] is not None
         self.state = State()
         self.mended, self.off = 0, 0.0
-        if request.all_numbers:  # no text is put together
-            self.layout = self.layout._replace(stretches=(), pieces=())
-            if self.layout.time is None and stamped:
-                self.layout = self._with_stamps(self.layout)
-        self.stamp_at = self.layout.time
-
-    def _with_stamps(self, layout: Layout) -> Layout:
-        """Find the column of stamps that no option names."""
-        time, below = stamp_places(self.table.names)
-        if not (self.table.names or self.request.columns) and min(layout.places, default=0) == 1:
-            time = 0  # what is before the numbers that --from speaks of
-        return layout if time in layout.frames else layout._replace(time=time, below=below)
 
     @property
     def columns(self) -> str:
@@ -169,18 +154,14 @@ class PlannedRows:
         layout, block = self.layout, run.block
         self.inputs = np.reshape(run.columns, (len(run.columns), run.count))[:, rows]
         used = {layout.time, layout.below, *layout.places, *self.naming.places}
-        names = [*map(self.table.name, range(self.table.width))]
-        extras = {name: taken(column(place), rows) for place, name in enumerate(names) if place not in used}
+        others = [place for place in range(self.table.width) if place not in used]
+        extras = {self.table.name(place): taken(column(place), rows) for place in others}
         own = own_count(self.plan, numbers.shape[1])
         extra = [each for each in layout.columns if isinstance(each, New) and each.number >= own]
         extras |= {each.name: numbers[:, each.number] for each in extra}
-        parents, called = (
-            block.names.texts(role, rows) if role in self.roles else [name]
-            for role, name in enumerate(unnamed(self.request, self.shape))
-        )
-        stamps: Any = None if self.stamp_at is None else block.stamps[0]
-        stamps = None if stamps is None else stamps[rows]
-        return RowPoses(numbers[:, :own], stamps, lines, parents, called, extras)
+        stamps = None if layout.time is None else block.stamps[0][rows]
+        parents, names = self.naming.texts(block.names, rows)
+        return RowPoses(numbers[:, :own], stamps, lines, parents, names, extras)
 
 
 class TableRows(PlannedRows):
@@ -210,7 +191,7 @@ class TableRows(PlannedRows):
         torn = torn_record(text, self.table.delimiter) if self.table.delimiter else None
         body = text[:torn]
         if self.request.offset_ns and self.layout.time is not None:
-            body = at_other_times(self.table, self.layout, self.layout.time, body, self.request.offset_ns)
+            body = at_other_times(self.table, self.layout, body, self.request.offset_ns)
         cells = self.table.split(body)
         block = table_block(self.table, self.layout, cells, self.naming, self.request)
         run = self.ran(block)
@@ -220,17 +201,15 @@ class TableRows(PlannedRows):
         rows = len(block.places) + len(block.broken)
         return run, Outcome(b"", faults, rows, text.count(b"\n"), len(run.mended), self.notes_of(run), len(text)), cells
 
-    def blocks(self) -> Iterator[tuple[RowPoses, int, Outcome]]:
-        """Yield the poses of all blocks, each with the line, from 1, at which it begins."""
-        line = 1 + self.lines
+    def blocks(self) -> Iterator[tuple[RowPoses, Outcome]]:
+        """Yield the poses of all blocks."""
         for text in self.texts:
             run, outcome, cells = self.of_text(text)
             rows, numbers = run.settled()
             lines = run.block.places[rows]
             if b'"' in text:  # a cell may hold line ends
                 lines = np.array([*map(run.block.line_of, rows.tolist())], np.int64)
-            yield self.poses_of(run, rows, numbers, cells.column, lines), line, outcome
-            line += outcome.lines
+            yield self.poses_of(run, rows, numbers, cells.column, lines), outcome
 
 
 def moves_in_time(timed: Timed, frames: set[str | None]) -> bool:
