@@ -87,8 +87,7 @@ class BadRow(FormatError):
         """Return `source:line:column: message`, or `source: row 17, column x: message`."""
         if self.counted == "line":
             return super().__str__()
-        column = f", column {self.fault.column}" if self.fault.column else ""
-        return f"{self.source}: {self.counted} {self.line}{column}: {self.message}"
+        return f"{_place(self.source, self.counted, self.line, self.fault.column)}: {self.message}"
 
     @property
     def kind(self) -> str:
@@ -102,6 +101,13 @@ class BadRow(FormatError):
         if self.counted != "line":
             place = {"source": self.source, self.counted: self.line}
         return place | ({"column": int(column) if column.isdecimal() else column} if column else {})
+
+
+def _place(source: str, counted: str, number: int, column: str) -> str:
+    """Name a line, or a row or message of a source, and a column in it."""
+    if counted == "line":
+        return f"{source}:{number}" + f":{column}" * bool(column)
+    return f"{source}: {counted} {number}" + f", column {column}" * bool(column)
 
 
 class RowsSkipped(FrametoolError):
@@ -146,9 +152,7 @@ class BadRows:
 
     def place(self, number: int, column: str = "") -> str:
         """Name a line or a row, and a column in it."""
-        if self.counted == "line":
-            return f"{self.source}:{number}" + f":{column}" * bool(column)
-        return f"{self.source}: {self.counted} {number}" + f", column {column}" * bool(column)
+        return _place(self.source, self.counted, number, column)
 
     def finish(self, rows: int) -> int:
         """Report the final count of a run of so many rows; return its exit status."""

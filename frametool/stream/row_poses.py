@@ -73,11 +73,6 @@ def _place() -> Any:
     return import_module("frametool.geometry.place")  # few rows are on the Earth
 
 
-def first_of(block: RowPoses) -> RowPoses:
-    """Return the first pose of a block."""
-    return kept(block, slice(0, 1))
-
-
 def kept(block: RowPoses, rows: slice | Ints) -> RowPoses:
     """Return some poses of a block."""
     at = np.arange(len(block.numbers))[rows]
@@ -181,15 +176,13 @@ def _block(
 
 def objects(values: Iterable[Any]) -> NDArray[Any]:
     """Return plain values as a column (n,): texts, None, mappings and lists; numbers and truth values as written."""
-    found = [Verbatim(_written(value)) if isinstance(value, (int, float)) else value for value in values]
+    found = list(values)
     column = np.empty(len(found), object)
     for at, value in enumerate(found):
-        column[at] = value
+        is_number = isinstance(value, (int, float))
+        text = str(value).lower() if isinstance(value, bool) else repr(value)
+        column[at] = Verbatim(text) if is_number else value
     return column
-
-
-def _written(value: float) -> str:
-    return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
 def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -> list[Result]:

@@ -341,20 +341,24 @@ def _columns(
         extras, entries = extras[:last], extras[last:]
     pose = poses[0]
     if _in_place(pose, shapes[0], target, request):
-        new = (*position, *rotation)
-        for column, place in zip(new, (place for each in ours for place in each.places), strict=False):
-            at[place].append(column)
-        at[max(at)] += [*new[len(at) :], *extras]
+        _put(at, [place for each in ours for place in each.places], [*position, *rotation])
+        at[max(at)] += extras
     elif pose.position and pose.rotation and target.unit is not None and len(poses) == 1:
-        for column, place in zip(position, pose.position.places, strict=False):
-            at[place].append(Kept(place) if only_turned else column)
-        at[max(pose.position.places)] += position[len(pose.position.places) :]
+        places = pose.position.places
+        _put(at, places, [*map(Kept, places), *position[len(places) :]] if only_turned else position)
         at[min(pose.rotation.places)] += [*rotation, *extras]
     else:
         at[min(at)] += [*position, *rotation, *extras]
     if covariance:
         at |= {place: entries if place == min(covariance) else [] for place in covariance}
     return [column for place, old in enumerate(columns) for column in at.get(place, [old])]
+
+
+def _put(at: dict[int, list[Column]], places: Sequence[int], new: Sequence[Column]) -> None:
+    """Put new columns where others were, one for one; those that are left come behind the last."""
+    for place, column in zip(places, new, strict=False):
+        at[place].append(column)
+    at[max(places)] += new[len(places) :]
 
 
 def _extra(table: Table, columns: Sequence[Column], extras: Sequence[Column], shown: Shown) -> list[Column]:

@@ -42,7 +42,6 @@ from frametool.stream.layout import Const, In, Out
 from frametool.stream.row_layout import POSE, SIX, Target
 from frametool.stream.row_poses import (
     block_of,
-    first_of,
     kept,
     plain_cell,
     plain_cells,
@@ -245,7 +244,7 @@ class TextWriter:
             return None
         key = (*alone, *block.extras, block.stamps_ns is None)
         if key not in self.known:
-            alike, first = self._learned(block), first_of(block)
+            alike, first = self._learned(block), kept(block, slice(0, 1))
             self.known[key] = alike if self._filled(alike, first) == self._one_by_one(first) else None
         return self.known[key]
 
