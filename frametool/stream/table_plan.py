@@ -141,8 +141,8 @@ def _chosen(spec: str, table: Table, request: Request, kind: str) -> PoseColumns
         from frametool.stream.earth_columns import chosen_pose
 
         return chosen_pose(spec, table.names, table.width, request)
-    given = None if kind in SIX and not request.columns else request.given
-    return named_pose(spec, table.names, table.width, given, kind)
+    notation = None if kind in SIX and not request.columns else request.given
+    return named_pose(spec, table.names, table.width, notation, kind)
 
 
 def _by_width(width: int, request: Request) -> str:
@@ -150,7 +150,6 @@ def _by_width(width: int, request: Request) -> str:
 
     "" where they may be something else.
     """
-    given = request.given
     if request.kind in SIX and width == len(six_names(request.kind)):
         return f"1-{width}"
     if request.poses > 1:
@@ -159,10 +158,10 @@ def _by_width(width: int, request: Request) -> str:
         from frametool.stream.earth_columns import of_width
 
         return of_width(width, request)
-    if given is None:
-        wholes = [notation.representation.whole for notation in wholes_of(None)]
+    if (notation := request.given) is None:
+        wholes = [each.representation.whole for each in wholes_of(None)]
         return f"1-{width}" if width in (len(XYZ), *(len(whole.columns) for whole in wholes if whole)) else ""
-    return f"1-{width}" if width in given.counts else f"2-{width}" if width - 1 in given.counts[1:] else ""
+    return f"1-{width}" if width in notation.counts else f"2-{width}" if width - 1 in notation.counts[1:] else ""
 
 
 def _find_named(names: Sequence[str], request: Request, source: str) -> list[PoseColumns]:
