@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 PLACED = (POINT, VECTOR)
 TO_RADIANS = 0.017453292519943295
 LENGTH, ANGLE = Type(NUMBER, unit=METRE), Type(NUMBER, unit=RADIAN)
-# the words in `Way.takes` that are no kinds
+# the words in `Overload.takes` that are no kinds
 FITS: dict[str, Callable[[Type], bool]] = {
     "placed": lambda type_: type_.kind in PLACED,
     "measure": lambda type_: type_.kind == NUMBER,
@@ -96,8 +96,8 @@ def _of_the_same_frames(name: str, a: Type, *others: Type) -> Type:
     return a
 
 
-class Way(NamedTuple):
-    """One meaning of an operator or function.
+class Overload(NamedTuple):
+    """One meaning of an operator or function: the kinds of its arguments, its type and its kernel.
 
     takes: a kind or a word of FITS for each argument; many: for each of any number
     gives: the type of the result, from what `joined` returns for the types of the arguments
@@ -302,48 +302,48 @@ def _kind(kind: str) -> Callable[[Type], Type]:
     return lambda type_: Type(kind, type_.target)
 
 
-def _sums(kernel: Kernel) -> list[Way]:
+def _sums(kernel: Kernel) -> list[Overload]:
     """Return the meanings that a sum and a difference share."""
     return [
-        Way("measure measure", _unchanged, kernel, _of_one_unit, as_written=True),
-        Way("vector vector", _unchanged, kernel, _in_one_frame),
-        Way("twist twist", _unchanged, kernel, _in_one_frame),
-        Way("point vector", _unchanged, kernel, _in_one_frame),
+        Overload("measure measure", _unchanged, kernel, _of_one_unit, as_written=True),
+        Overload("vector vector", _unchanged, kernel, _in_one_frame),
+        Overload("twist twist", _unchanged, kernel, _in_one_frame),
+        Overload("point vector", _unchanged, kernel, _in_one_frame),
     ]
 
 
-INVERSE = Way(POSE, lambda pose: Type(POSE, pose.source, pose.target), plain(rigid.inverse))
+INVERSE = Overload(POSE, lambda pose: Type(POSE, pose.source, pose.target), plain(rigid.inverse))
 # operator -> what cannot be done, its meanings
-OPERATORS: dict[str, tuple[str, Sequence[Way]]] = {
+OPERATORS: dict[str, tuple[str, Sequence[Overload]]] = {
     "*": ("multiply {} by {}", [
-        Way("pose pose", _unchanged, plain(rigid.compose), _touching),
-        Way("pose point", _unchanged, plain(rigid.apply), _moved),
-        Way("pose vector", _unchanged, lambda *numbers: quaternion.rotate(*numbers[3:-1]), _moved),
-        Way("measure plain", _unchanged, _TIMES, as_written=True),
-        Way("plain measure", _unchanged, _TIMES, _second, as_written=True),
-        Way("scale vector", _unchanged, plain(lambda n, x, y, z: (n * x, n * y, n * z)), _second),
-        Way("vector scale", _unchanged, plain(lambda x, y, z, n: (n * x, n * y, n * z))),
+        Overload("pose pose", _unchanged, plain(rigid.compose), _touching),
+        Overload("pose point", _unchanged, plain(rigid.apply), _moved),
+        Overload("pose vector", _unchanged, lambda *numbers: quaternion.rotate(*numbers[3:-1]), _moved),
+        Overload("measure plain", _unchanged, _TIMES, as_written=True),
+        Overload("plain measure", _unchanged, _TIMES, _second, as_written=True),
+        Overload("scale vector", _unchanged, plain(lambda n, x, y, z: (n * x, n * y, n * z)), _second),
+        Overload("vector scale", _unchanged, plain(lambda x, y, z, n: (n * x, n * y, n * z))),
     ]),
     "/": ("divide {} by {}", [
-        Way("measure plain", _unchanged, _OVER, check=_no_division, as_written=True),
-        Way("measure measure", _always(PLAIN_NUMBER), _OVER, _of_one_unit, _no_division, as_written=True),
-        Way("vector scale", _unchanged, plain(lambda x, y, z, n: (x / n, y / n, z / n)), check=_no_division),
+        Overload("measure plain", _unchanged, _OVER, check=_no_division, as_written=True),
+        Overload("measure measure", _always(PLAIN_NUMBER), _OVER, _of_one_unit, _no_division, as_written=True),
+        Overload("vector scale", _unchanged, plain(lambda x, y, z, n: (x / n, y / n, z / n)), check=_no_division),
     ]),
     "+": ("add {} and {}", [
         *_sums(_PLUS),
-        Way("vector point", _kind(POINT), _PLUS, _in_one_frame),
-        Way("point point", _unchanged, _PLUS, _free_of_frames),
+        Overload("vector point", _kind(POINT), _PLUS, _in_one_frame),
+        Overload("point point", _unchanged, _PLUS, _free_of_frames),
     ]),
-    "-": ("subtract {} and {}", [*_sums(_MINUS), Way("point point", _kind(VECTOR), _MINUS, _in_one_frame)]),
+    "-": ("subtract {} and {}", [*_sums(_MINUS), Overload("point point", _kind(VECTOR), _MINUS, _in_one_frame)]),
     "^": ("raise {} to {}: a power is that of a pose or a plain number, an exponent a plain number", [
-        Way("pose plain", _kind(POSE), _part_of_motion),
-        Way("plain plain", _unchanged, _powered, check=_no_power),
+        Overload("pose plain", _kind(POSE), _part_of_motion),
+        Overload("plain plain", _unchanged, _powered, check=_no_power),
     ]),
     "negate": ("negate {}", [
-        Way("measure", _unchanged, _NEGATED, as_written=True),
-        Way(VECTOR, _unchanged, _NEGATED),
-        Way(TWIST, _unchanged, _NEGATED),
-        Way(POINT, _unchanged, _NEGATED, _unplaced),
+        Overload("measure", _unchanged, _NEGATED, as_written=True),
+        Overload(VECTOR, _unchanged, _NEGATED),
+        Overload(TWIST, _unchanged, _NEGATED),
+        Overload(POINT, _unchanged, _NEGATED, _unplaced),
     ]),
 }  # fmt: skip
 REMEDIES = {
@@ -354,9 +354,9 @@ REMEDIES = {
 
 def operated(sign: str, *terms: Term) -> Term:
     """Return the result of an operator; raises CalcError."""
-    refusal, ways = OPERATORS[sign]
-    for way in ways:
-        if (found := way.result(sign, terms)) is not None:
+    refusal, overloads = OPERATORS[sign]
+    for each in overloads:
+        if (found := each.result(sign, terms)) is not None:
             return found
     remedy = next((text for kind, text in REMEDIES.items() if kind in [term.type.kind for term in terms]), "")
     raise CalcError(f"cannot {refusal.format(*(term.type.named for term in terms))}{remedy}")
@@ -370,67 +370,67 @@ def power(base: Term, exponent: Term) -> Term:
     return operated("^", base, exponent)
 
 
-def _angular(pick: Callable[[Number, Number], Number]) -> list[Way]:
+def _angular(pick: Callable[[Number, Number], Number]) -> list[Overload]:
     """Return the meanings of a function of an angle, from its sine and cosine; exact at quarter turns in degrees."""
     return [
-        Way("degrees", _always(PLAIN_NUMBER), lambda value, xp: (pick(*floats.half_sincos_deg(2.0 * value, xp)),),
+        Overload("degrees", _always(PLAIN_NUMBER), lambda value, xp: (pick(*floats.half_sincos_deg(2.0 * value, xp)),),
             as_written=True),
-        Way("angle", _always(PLAIN_NUMBER), lambda value, xp: (pick(*floats.half_sincos(2.0 * value, xp)),)),
+        Overload("angle", _always(PLAIN_NUMBER), lambda value, xp: (pick(*floats.half_sincos(2.0 * value, xp)),)),
     ]  # fmt: skip
 
 
 # function -> what it takes, its meanings
-FUNCTIONS: dict[str, tuple[str, Sequence[Way]]] = {
+FUNCTIONS: dict[str, tuple[str, Sequence[Overload]]] = {
     "inv": ("a pose", [INVERSE]),
-    "trans": ("a pose", [Way(POSE, _kind(POINT), lambda *pose: pose[:3])]),
-    "rot": ("a pose", [Way(POSE, _unchanged, lambda *pose: (*(0.0 * part for part in pose[:3]), *pose[3:7]))]),
-    "rpy": ("a pose", [Way(POSE, _kind(ANGLES), _roll_pitch_yaw)]),
-    "log": ("a pose", [Way(POSE, _kind(TWIST), _of_unit(rigid.log))]),
-    "exp": ("six numbers [vx, vy, vz, wx, wy, wz]", [Way(TWIST, _kind(POSE), rigid.exp, check=_no_twist)]),
+    "trans": ("a pose", [Overload(POSE, _kind(POINT), lambda *pose: pose[:3])]),
+    "rot": ("a pose", [Overload(POSE, _unchanged, lambda *pose: (*(0.0 * part for part in pose[:3]), *pose[3:7]))]),
+    "rpy": ("a pose", [Overload(POSE, _kind(ANGLES), _roll_pitch_yaw)]),
+    "log": ("a pose", [Overload(POSE, _kind(TWIST), _of_unit(rigid.log))]),
+    "exp": ("six numbers [vx, vy, vz, wx, wy, wz]", [Overload(TWIST, _kind(POSE), rigid.exp, check=_no_twist)]),
     "dist": ("two poses or two points", [
-        Way("pose pose", _always(LENGTH), lambda *both: rigid.distance(*both)[:1], _seen_from_one_frame),
-        Way("point point", _always(LENGTH), lambda ax, ay, az, bx, by, bz, xp: (
+        Overload("pose pose", _always(LENGTH), lambda *both: rigid.distance(*both)[:1], _seen_from_one_frame),
+        Overload("point point", _always(LENGTH), lambda ax, ay, az, bx, by, bz, xp: (
             quaternion.magnitude(bx - ax, by - ay, bz - az, xp),), _in_one_frame),
     ]),
     "angle": ("a pose, two poses or two vectors", [
-        Way(POSE, _always(ANGLE), _of_unit(lambda *pose: rigid.extent(*pose)[1:])),
-        Way("pose pose", _always(ANGLE), _angle_between_poses, _seen_from_one_frame),
-        Way("placed placed", _always(ANGLE), _angle_between_vectors, _in_one_frame, _no_direction),
+        Overload(POSE, _always(ANGLE), _of_unit(lambda *pose: rigid.extent(*pose)[1:])),
+        Overload("pose pose", _always(ANGLE), _angle_between_poses, _seen_from_one_frame),
+        Overload("placed placed", _always(ANGLE), _angle_between_vectors, _in_one_frame, _no_direction),
     ]),
     "interp": ("two poses, points or vectors and a fraction", [
-        Way("pose pose plain", _unchanged, rigid.interpolate, _of_the_same_frames),
-        Way("point point plain", _unchanged, _line, _in_one_frame),
-        Way("vector vector plain", _unchanged, _line, _in_one_frame),
+        Overload("pose pose plain", _unchanged, rigid.interpolate, _of_the_same_frames),
+        Overload("point point plain", _unchanged, _line, _in_one_frame),
+        Overload("vector vector plain", _unchanged, _line, _in_one_frame),
     ]),
     "mean": ("poses, points, vectors or numbers of one unit, or a list", [
-        Way(POSE, _unchanged, _mean_pose, _of_the_same_frames, many=True),
-        Way(POINT, _unchanged, _mean_parts(3), _in_one_frame, many=True),
-        Way(VECTOR, _unchanged, _mean_parts(3), _in_one_frame, many=True),
-        Way("measure", _unchanged, _mean_parts(1), _of_one_unit, many=True),
+        Overload(POSE, _unchanged, _mean_pose, _of_the_same_frames, many=True),
+        Overload(POINT, _unchanged, _mean_parts(3), _in_one_frame, many=True),
+        Overload(VECTOR, _unchanged, _mean_parts(3), _in_one_frame, many=True),
+        Overload("measure", _unchanged, _mean_parts(1), _of_one_unit, many=True),
     ]),
-    "vector": ("[x, y, z]", [Way("placed", _kind(VECTOR), lambda *vector: vector[:3])]),
-    "norm": ("a vector", [Way("placed", _always(LENGTH), lambda *vector: (quaternion.magnitude(*vector),))]),
-    "dot": ("two vectors", [Way("placed placed", _always(PLAIN_NUMBER), plain(
+    "vector": ("[x, y, z]", [Overload("placed", _kind(VECTOR), lambda *vector: vector[:3])]),
+    "norm": ("a vector", [Overload("placed", _always(LENGTH), lambda *vector: (quaternion.magnitude(*vector),))]),
+    "dot": ("two vectors", [Overload("placed placed", _always(PLAIN_NUMBER), plain(
         lambda ax, ay, az, bx, by, bz: (ax * bx + ay * by + az * bz,)), _in_one_frame)]),
-    "cross": ("two vectors", [Way("placed placed", _kind(VECTOR), plain(quaternion.cross), _in_one_frame)]),
+    "cross": ("two vectors", [Overload("placed placed", _kind(VECTOR), plain(quaternion.cross), _in_one_frame)]),
     "sin": ("an angle", _angular(lambda sine, _: sine)),
     "cos": ("an angle", _angular(lambda _, cosine: cosine)),
     "tan": ("an angle", _angular(lambda sine, cosine: sine / cosine)),
     "asin": ("a plain number", [
-        Way("plain", _always(ANGLE), _arcsine, check=_within("asin", -1.0, 1.0, "-1 .. 1"))]),
+        Overload("plain", _always(ANGLE), _arcsine, check=_within("asin", -1.0, 1.0, "-1 .. 1"))]),
     "acos": ("a plain number", [
-        Way("plain", _always(ANGLE), _arccosine, check=_within("acos", -1.0, 1.0, "-1 .. 1"))]),
-    "atan": ("a plain number", [Way("plain", _always(ANGLE), _arctangent)]),
-    "sqrt": ("a plain number", [Way("plain", _unchanged, lambda value, xp: (xp.sqrt(value),), check=_within(
+        Overload("plain", _always(ANGLE), _arccosine, check=_within("acos", -1.0, 1.0, "-1 .. 1"))]),
+    "atan": ("a plain number", [Overload("plain", _always(ANGLE), _arctangent)]),
+    "sqrt": ("a plain number", [Overload("plain", _unchanged, lambda value, xp: (xp.sqrt(value),), check=_within(
         "sqrt", 0.0, inf, "what is not negative"))]),
 }  # fmt: skip
 
 
 def called(name: str, terms: Sequence[Term]) -> Term:
     """Return the result of a function; raises CalcError."""
-    takes, ways = FUNCTIONS[name]
-    for way in ways:
-        if (found := way.result(name, terms)) is not None:
+    takes, overloads = FUNCTIONS[name]
+    for each in overloads:
+        if (found := each.result(name, terms)) is not None:
             return found
     what = first_of([term.type.named for term in terms], 3) or "nothing"
     raise CalcError(f"{name}() takes {takes}, found {what}")

@@ -21,7 +21,7 @@ from frametool.grammar.result import Result
 from frametool.ros.echo_format import message_text, transform_stamped
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator
 
     from frametool.grammar.result import Style
     from frametool.sim.simulate import IssuedCommand, SimulationStep
@@ -75,10 +75,9 @@ class StepWriter:
             yield self._record(emission)
 
     def _header(self, emission: Emission) -> str:
-        columns = list(emission.cells)
         if self._style.format == "text":
-            return _aligned([SHORT.get(name, name) for name in columns], map(_step_width, columns))
-        return row(columns, self._style) if self._style.format == "csv" else ""
+            return _aligned({name: SHORT.get(name, name) for name in emission.cells})
+        return row(emission.cells, self._style) if self._style.format == "csv" else ""
 
     def _record(self, emission: Emission) -> str:
         labels, style = emission.labels, self._style
@@ -90,27 +89,23 @@ class StepWriter:
                 return f"{dump(labels | emission.message, style.number)}\n"
             case "csv":
                 return row(emission.cells.values(), style)
-        t, *others = emission.cells.values()
-        cells = [f"{t:.3f}", *(_text_cell(cell, style) for cell in others)]
-        return _aligned(cells, map(_step_width, emission.cells))
+        digits = STEP_DECIMALS if style.precision is None else style.precision
+        texts = {name: _text_cell(cell, digits) for name, cell in emission.cells.items()}
+        return _aligned(texts | {"t": f"{emission.cells['t']:.3f}"})
 
 
-def _step_width(name: str) -> int:
-    """Return the width of a column of steps in text."""
-    return 7 if name in ("turtle", "parent", "child") else max(6, len(SHORT.get(name, name)))
-
-
-def _text_cell(cell: Any, style: Style) -> str:
+def _text_cell(cell: Any, digits: int) -> str:
     """Round for display; zero has no sign."""
-    if not isinstance(cell, float):
-        return "-" if cell is None else printable(str(cell))
-    digits = STEP_DECIMALS if style.precision is None else style.precision
-    return f"{round(cell, digits) + 0.0:.{digits}f}"
+    if isinstance(cell, float):
+        return f"{round(cell, digits) + 0.0:.{digits}f}"
+    return "-" if cell is None else printable(str(cell))
 
 
-def _aligned(cells: Sequence[str], widths: Iterable[int]) -> str:
+def _aligned(texts: Record) -> str:
     """Format a line, each cell right-aligned in its column."""
-    return " ".join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True)) + "\n"
+    wide = ("turtle", "parent", "child")
+    widths = {name: 7 if name in wide else max(6, len(SHORT.get(name, name))) for name in texts}
+    return " ".join(f"{text:>{widths[name]}}" for name, text in texts.items()) + "\n"
 
 
 def _commands(commands: Iterable[IssuedCommand]) -> Iterator[Emission]:
