@@ -166,17 +166,10 @@ class OtherAxes(NamedTuple):
 
 def with_other_axes(sheet: Sheet, pose: Rigid, change: OtherAxes) -> Rigid:
     """Add the steps from a pose to the same with other axes, on its left side, then on its right."""
-    values = named("t", pose[:3]) | named("q", pose[3:])
-    if change.world and change.axes:
-        sheet.play("both sides", values)
-    if change.mirrors:
-        sheet.play("mirrored", values)
-    if change.world:
-        values |= named("W", change.world[1])
-        sheet.play("world axes", values, name=change.world[0])
-    if change.axes:
-        values |= named("B", change.axes[1])
-        sheet.play("body axes", values, name=change.axes[0])
+    (world, turned), (axes, body) = change.world or ("", IDENTITY[3:]), change.axes or ("", IDENTITY[3:])
+    values = named("t", pose[:3]) | named("q", pose[3:]) | named("W", turned) | named("B", body)
+    values |= {"world": float(bool(world)), "axes": float(bool(axes)), "mirrors": float(change.mirrors)}
+    sheet.play("other axes", values, world_axes=world, body_axes=axes)
     return *vector_of(values, "t"), *quaternion_of(values, "q")
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid, alternatives, warn
 from frametool.fit.alignment import resampled, stamps_at_rate, stamps_every
-from frametool.fit.comparison import AUTO, EVO, Delta, Settings, parse_delta
+from frametool.fit.comparison import AUTO, EVO, Settings, parse_delta
 from frametool.fit.comparison import compare as compared
 from frametool.fit.measured_tree import TreeSolution, solve_tree
 from frametool.fit.numbers import whole_estimate
@@ -64,12 +64,10 @@ def compare(
         argument["deltas"] = tuple(map(parse_delta, deltas))
     if isinstance(first := argument.get("align_first"), str):
         argument["align_first"] = parse_delta(first, ("m", "s", "frames"))
-    elif isinstance(first, int):
-        argument["align_first"] = Delta(float(first), "frames")
     chosen = {name: value for name, value in argument.items() if value is not None}
     base = EVO if like else Settings()
-    names = _name(ref, "ref"), _name(est, "est")
-    return compared(_taken(ref, "ref"), _taken(est, "est"), base._replace(**chosen), names)
+    names = [name if isinstance(each, Trajectory) else fspath(each) for each, name in ((ref, "ref"), (est, "est"))]
+    return compared(_taken(ref, "ref"), _taken(est, "est"), base._replace(**chosen), (names[0], names[1]))
 
 
 def align(ref: Given, est: Given, **settings: Any) -> Alignment:
@@ -150,10 +148,6 @@ def _measurement(argument: Any, place: str) -> Measurement:
         return Measurement(parent, child, transform.components, taken(argument[3] if len(argument) > 3 else None))
     except ValueInvalid as error:
         raise ValueInvalid(f"{place}: {error}") from None
-
-
-def _name(argument: Given, otherwise: str) -> str:
-    return otherwise if isinstance(argument, Trajectory) else fspath(argument)
 
 
 def _taken(argument: Given, name: str) -> Trajectory:
