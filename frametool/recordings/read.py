@@ -59,11 +59,6 @@ class Channel:
     digest: str = ""
 
     @property
-    def key(self) -> tuple[Any, ...]:
-        """Return the values in which channels differ."""
-        return self.topic, self.type, self.encoding, self.schema, *self.said.items()
-
-    @property
     def is_static(self) -> bool:
         """Return True for a topic of static transforms."""
         return self.topic.rpartition("/")[2] == "tf_static"
@@ -335,7 +330,9 @@ class RecordingReader:
         self._is_packed = self.metadata.get("compression_mode", "").lower() == "message"
         known: dict[tuple[Any, ...], Channel] = {}
         for each in self.files:
-            each.channels |= {number: known.setdefault(one.key, one) for number, one in each.channels.items()}
+            for number, one in each.channels.items():
+                key = one.topic, one.type, one.encoding, one.schema, *one.said.items()
+                each.channels[number] = known.setdefault(key, one)
         topics = self.metadata.get("topics_with_message_count") or ()
         self._topics = [{**each["topic_metadata"], "count": each["message_count"]} for each in topics]
         hashes = {(each["name"], each["type"]): each.get("type_description_hash", "") for each in self._topics}

@@ -49,24 +49,18 @@ _POSE = [*_HEADER2, *_axes("pose.position"), *_axes("pose.orientation", "xyzw")]
 _MANY = re.compile(r"field\.(\w*?)0\.header\.seq")
 
 
-def message1(cells: Sequence[str], header: Sequence[str]) -> dict[str, Any]:
-    """Return the message of one row under a header of `rostopic echo -p`.
+def _message(cells: Sequence[str], header: Sequence[str]) -> dict[str, Any]:
+    """Return the message of one row, under a header of `rostopic echo -p`, or without one, of `ros2 topic echo --csv`.
 
-    Raises Misfit with the column.
+    Raises Misfit for a row that does not fit its header, or that is neither a pose nor transforms.
     """
-    if len(header) > 1 and (many := _MANY.fullmatch(header[1])):
+    if not header:
+        return _nested(_POSE, cells) if len(cells) == len(_POSE) else {"transforms": _entries(cells, TRANSFORM2)}
+    if many := _MANY.fullmatch("".join(header[1:2])):
         return {many[1]: _entries(cells[1:], TRANSFORM1)}
     if len(cells) != len(header):
         raise Misfit(f"expected {len(header)} cells, found {len(cells)}")
     return _nested([name.removeprefix("field.") for name in header[1:]], cells[1:])
-
-
-def message2(cells: Sequence[str]) -> dict[str, Any]:
-    """Return the message of one row of `ros2 topic echo --csv`.
-
-    Raises Misfit for a row that is neither a pose nor transforms.
-    """
-    return _nested(_POSE, cells) if len(cells) == len(_POSE) else {"transforms": _entries(cells, TRANSFORM2)}
 
 
 def _entries(cells: Sequence[str], names: Sequence[str]) -> list[dict[str, Any]]:
@@ -197,7 +191,7 @@ def _data_lines(piece: Piece, tally: Diagnostics) -> Iterator[tuple[int, str]]:
             yield number, line
 
 
-def _csv(stream: BinaryIO, name: str, fmt: str, tally: Diagnostics) -> Iterator[TextMessage | FormatError]:
+def _csv(stream: BinaryIO, name: str, tally: Diagnostics) -> Iterator[TextMessage | FormatError]:
     """Read rows; a line that begins with `%time` is the header of those below it."""
     header: list[str] = []
     for number, line in line_texts(stream, name, tally):
@@ -206,11 +200,11 @@ def _csv(stream: BinaryIO, name: str, fmt: str, tally: Diagnostics) -> Iterator[
             header = cells
             continue
         try:
-            value = message1(cells, header) if fmt == "csv1" else message2(cells)
+            value = _message(cells, header)
         except Misfit as misfit:
             yield FormatError(str(misfit), source=name, line=number)
             continue
-        received = int(cells[0]) if fmt == "csv1" and cells[0].isdecimal() else None
+        received = int(cells[0]) if header and cells[0].isdecimal() else None
         yield TextMessage(value, Source(name, line), number, cells=True, received_ns=received)
 
 
@@ -225,7 +219,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
             for stretch in _cut(piece, end, sizes.STRETCH):
                 yield from _plain(stretch, end, file, options)
     else:
-        for message in _csv(file.stream, file.name, file.format, options.tally):
+        for message in _csv(file.stream, file.name, options.tally):
             yield from _message_edges(message, options)
 
 

@@ -199,9 +199,9 @@ def frame_of(mapping: dict[str, Any], key: str, path: Path, reading: Reading) ->
     return reading.bare(name, *here)
 
 
-def header_stamp(header: dict[str, Any]) -> int | None:
+def header_stamp(header: Any) -> int | None:
     """Read the stamp of a header as nanoseconds; None if there is none."""
-    if "stamp" not in header:
+    if type(header) is not dict or "stamp" not in header:
         return None
     stamp_ns: int = within(("header", "stamp"), read_stamp, header["stamp"])
     return stamp_ns
@@ -263,12 +263,6 @@ STATE_LISTS = ("name", "position", "velocity", "effort")
 def is_joint_state(value: dict[str, Any]) -> bool:
     """Return True if a mapping is a JointState: it has a list of joint names."""
     return type(value.get("name")) is list or ("position" in value and "velocity" in value and "name" in value)
-
-
-def stamp_of_state(value: dict[str, Any]) -> int | None:
-    """Return the stamp of the header in nanoseconds; None without one."""
-    header = value.get("header")
-    return header_stamp(header) if type(header) is dict else None
 
 
 def positions(value: dict[str, Any]) -> Iterator[tuple[str, Any, Path]]:

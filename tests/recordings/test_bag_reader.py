@@ -61,6 +61,15 @@ def test_a_hash_that_is_not_that_of_its_definition_is_an_error(tmp_path: Path, r
     assert f"hash of {TF} is RIHS01_e369d0f05a23ae" in done.err
 
 
+def test_a_hash_is_compared_for_frames_that_move_too(tmp_path: Path, run: Run) -> None:
+    moved = [Sent("/tf", *Maker("sqlite").transforms(("map", "base", STILL, START + at)), START + at) for at in range(3)]
+    path = next(write(tmp_path / "run", "sqlite", moved).glob("*.db3"))
+    with closing(connect(path)) as database, database:
+        database.execute("UPDATE topics SET type_description_hash = 'RIHS01_other'")
+    done = run("lookup", str(path), "map", "base")
+    assert (done.status, f"hash of {TF} is RIHS01_e369d0f05a23ae" in done.err) == (1, True)
+
+
 def test_types_without_a_definition_are_those_of_ros2(tmp_path: Path, run: Run) -> None:
     path = recording(tmp_path, "sqlite", Sent("/odd", "my_msgs/msg/Odd", b"1234", START))
     as_of_humble(path)

@@ -381,7 +381,7 @@ def _of_value(value: Any, path: Path, message: TextMessage, joints: Mapping[str,
             if not messages.is_joint_state(mapping):
                 yield from _of_map(mapping, path, message, joints)
                 return
-            stamp_ns = messages.stamp_of_state(mapping)
+            stamp_ns = messages.header_stamp(mapping.get("header"))
             for joint, position, place in messages.positions(mapping):
                 refuse = partial(_refused, message, (*path, *place))
                 yield JointSample(joint, position, stamp_ns, refuse)
