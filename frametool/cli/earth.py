@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import asking, inputs, misuse, refuse
-from frametool.cli.sink import say
 from frametool.documents.source import Source
 from frametool.errors import FormatError, warn
 from frametool.geometry.conventions import world_of
@@ -68,8 +67,7 @@ def _origin(text: str) -> Origin:
 
 def _tell(place: Vector) -> None:
     lat, lon, alt = place
-    if not inputs().quiet:
-        say(f"origin: lat {lat!r}, lon {lon!r}, alt {alt!r}, the first position")
+    inputs().note(f"origin: lat {lat!r}, lon {lon!r}, alt {alt!r}, the first position")
     if lat == lon == 0.0:
         warn("the first position is lat 0, lon 0, as receivers write that have no fix; --origin PLACE names another")
 

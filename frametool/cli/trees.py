@@ -96,15 +96,14 @@ def _loaded(
 
 def lookups_in(tree: Frames, *, carried: bool) -> Lookups:
     """Return the look-ups of a command; report covariances that are not wanted."""
-    if tree.covariances and not carried and not inputs().quiet:
-        say(f"sigmas of {bare(tree.name)} not used (--covariance)")
+    unused = tree.covariances and not carried
+    inputs().note(f"sigmas of {bare(tree.name)} not used (--covariance)" if unused else None)
     return Lookups(tree, carried=carried)
 
 
 def report_granted(lookups: Lookups) -> None:
     """Report what look-ups have taken for granted."""
-    if (granted := lookups.granted()) and not inputs().quiet:
-        say(granted)
+    inputs().note(lookups.granted())
 
 
 def refuse_idle(files: Sequence[FrameFile]) -> None:
@@ -148,8 +147,7 @@ def state(files: Sequence[FrameFile], *, whole: bool = True) -> None:
     for file in files:
         if inputs().verbose:
             say(f"{file.name}: {FORMATS[file.format].summary}")
-        if file.tally.assumed and not inputs().quiet:
-            say(f"{file.name}: {file.tally.assumed}")
+        inputs().note(file.tally.assumed and f"{file.name}: {file.tally.assumed}")
 
 
 def opened(
@@ -199,23 +197,17 @@ def opened(
 
 
 def answers() -> Answers:
-    """Return what the options say about all files whose format leaves it open."""
-    chosen = inputs()
+    """Return what the options say about all files whose format leaves it open; no joint has two values."""
+    chosen, joints = inputs(), dict[str, str]()
+    for text in chosen.peek("joints"):
+        name, _, value = text.partition("=")
+        refuse(not (name and value), f"--joint takes NAME=VALUE, found {shown(text)}")
+        refuse(name in joints, f"--joint {shown(name)} has two values, {joints.get(name)} and {value}; leave one out")
+        joints[name] = value
     named = {name: chosen.peek(name) for name in Answers._fields if name not in ("joints", "frames")}
     notations = chosen.peek("from_rep")
     named["order"] = named["order"] or next((each.spec for each in notations or () if each.spec in ORDERS), "")
-    return SaidAnswers(joints=_joints(chosen.peek("joints")), **{name: value for name, value in named.items() if value})
-
-
-def _joints(texts: Sequence[str]) -> dict[str, str]:
-    """Take each NAME=VALUE apart; raise a usage error for a joint that has two values."""
-    values: dict[str, str] = {}
-    for text in texts:
-        name, _, value = text.partition("=")
-        refuse(not (name and value), f"--joint takes NAME=VALUE, found {shown(text)}")
-        refuse(name in values, f"--joint {shown(name)} has two values, {values.get(name)} and {value}; leave one out")
-        values[name] = value
-    return values
+    return SaidAnswers(joints=joints, **{name: value for name, value in named.items() if value})
 
 
 def tree_file(argument: str) -> str:

@@ -55,8 +55,7 @@ def command(inputs: Inputs) -> int:
     (one, of_one), (other, of_other) = load_sides(*sides, normalize=inputs.normalize)
     start = inputs.seen_from and frame_name(inputs.seen_from, one)
     comparison = diff(one, other, at_ns=at_ns(inputs.at), seen_from=start, tolerance=inputs.tolerance)
-    for note in () if inputs.quiet else comparison.notes:
-        say(note)
+    inputs.note(*comparison.notes)
     differences = [*comparison.differences, *(comparison.unmoved if inputs.everything else ())]
     if output.style.format == "github":
         output.text(_annotations(comparison, (of_one, of_other)))

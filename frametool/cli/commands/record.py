@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.options import pose_options, reading_options, verbose_option
 from frametool.cli.output import copied_as, folder_of, opened_place
-from frametool.cli.sink import say, say_error
+from frametool.cli.sink import say_error
 from frametool.cli.trees import FRAME, load_tree, tree_file, without_slash
 from frametool.errors import BadAnswer, FileProblem, FormatError, ValueInvalid, listing, printable, shown, warn
 from frametool.formats.load import FrameFile, Rules
@@ -101,8 +101,7 @@ def command(inputs: Inputs) -> int:
     moved = run.mover.tally.findings() if run.mover else ()
     for remark in (*tally.findings(), *moved):
         warn(f"{path}: {remark.message}", rule=remark.rule)
-    for sentence in () if quiet else run.summary():
-        say(f"{path}: {sentence}")
+    inputs.note(*(f"{path}: {sentence}" for sentence in run.summary()))
     return bad.finish(sum(run.moved.values()))
 
 
