@@ -103,7 +103,7 @@ class FormatName(Text):
         """Refuse an unknown one with the nearest name; of one that is not supported, say what to do."""
         if text in self.choices:
             return text
-        from frametool.formats.unsupported import UNSUPPORTED
+        from frametool.formats.detect import UNSUPPORTED
 
         if row := UNSUPPORTED.get(text):
             raise ValueInvalid(f"{text} ({row.summary}) is not supported: {row.remedy}")

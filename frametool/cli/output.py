@@ -107,7 +107,7 @@ class Output:
         self.force: bool = self.path is not None and inputs.force
         named: str | None = inputs.format_name
         if self.path is not None and named is None:
-            from frametool.formats.unsupported import refuse_suffix
+            from frametool.formats.detect import refuse_suffix
 
             refuse_suffix(self.path)
         self.chosen = named or (table.by_name(self.path, table.writers(*what)) if self.path is not None else None)

@@ -12,11 +12,10 @@ import pytest
 import yaml
 
 from frametool.errors import FormatError
-from frametool.formats.detect import by_sign, detect, of_folder
+from frametool.formats.detect import UNSUPPORTED, by_sign, detect, of_folder
 from frametool.formats.load import load
 from frametool.formats.rows.pose_rows import RowForm, rows_of
 from frametool.formats.table import FORMATS, Format, by_suffix, readers, writers
-from frametool.formats.unsupported import UNSUPPORTED
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING
 from frametool.documents.source import InputFile, paused_collector
 from frametool.documents.xml import Element, read_xml
 from frametool.errors import BadTopology, FormatError, ValueInvalid, alternatives, bare, first_of, listing, shown
+from frametool.formats.detect import UNSUPPORTED
 from frametool.formats.load import FrameFile, refuse_unknown_joints
 from frametool.formats.robots.joints import JointState
 from frametool.formats.robots.model import Joint, Link, Mimic, Robot, read_quaternion
 from frametool.formats.table import FORMATS
-from frametool.formats.unsupported import UNSUPPORTED
 from frametool.frames.topology import two_parents
 from frametool.geometry import euler, floats
 from frametool.geometry.quaternion import unit_vector
