@@ -30,6 +30,7 @@ NUMBER: Schema = {"type": ["number", "string"]}
 NAME: Schema = {"type": ["string", "number", "boolean"], "description": "the name of a frame"}
 UNIT = {True: ", degrees", False: ", radians", None: ", radians unless angles: deg"}
 KEYS = WORDS | EARTH_KEYS | STAMP_KEYS | {"samples", "camera"}
+MODEL: Schema = {"anyOf": [{"enum": [*CAMERA_MODELS]}, {"type": "string"}]}  # of a camera; in any case they are read
 MEANINGS: dict[str, Schema] = {
     "inverse": {"enum": [True, False], "description": "true: the numbers are those of the parent in the frame"},
     "angles": {"enum": ["deg", "rad"], "description": "the unit of bare angles"},
@@ -69,7 +70,7 @@ def schema() -> Schema:
             "camera": {
                 "type": "object",
                 "required": ["K"],
-                "properties": {key: {} for key in CAMERA_KEYS} | {"model": _model()},
+                "properties": {key: {} for key in CAMERA_KEYS} | {"model": MODEL},
                 "additionalProperties": False,
             },
         },
@@ -123,8 +124,3 @@ def _numbers(names: Collection[str], about: str) -> Schema:
     """Return a list, or a mapping with these keys, if there are any."""
     kinds = ["array", "object"] if names else ["array"]
     return {"type": kinds, "properties": dict.fromkeys(names, NUMBER), "description": about}
-
-
-def _model() -> Schema:
-    """Return the models of cameras, offered by their names; in any case they are read."""
-    return {"anyOf": [{"enum": [*CAMERA_MODELS]}, {"type": "string"}]}
