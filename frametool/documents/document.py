@@ -172,9 +172,6 @@ def refuse_alias(node: Node) -> None:
         raise Aliased("a YAML alias is in place of what is rewritten; replace it by its value")
 
 
-NOTHING = Node(0, 0, {})  # a mapping without keys
-
-
 def parse_nodes(text: str) -> list[Node]:
     """Return the trees of all documents of a text that `parse_documents` has read, without checks."""
     roots: list[Node] = []

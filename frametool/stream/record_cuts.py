@@ -93,7 +93,6 @@ class RecordCutter:
         self.source = source
         self.templates: list[Template] = []
         self.closed = False
-        self._long: tuple[bytes, RecordText] | None = None  # the last record that was too long to be looked for again
 
     def cut(self, text: bytes) -> tuple[FoundRecords, list[tuple[int, int]]]:
         """Return the records of a block that templates find, and what is left between them."""
@@ -168,13 +167,7 @@ class RecordCutter:
 
     def read(self, text: bytes, part: Part, line: int = 0) -> RecordText | Fault:
         """Read a record, or say what is wrong with it; line: where it begins, counted from 0."""
-        record = text[part.start : part.end]
-        if self._long is not None and self._long[0] == record:
-            return self._long[1]
-        known = attempt(text, part, self.fmt, self.request, self.source, line)
-        if isinstance(known, RecordText) and known.is_long:
-            self._long = record, known
-        return known
+        return attempt(text, part, self.fmt, self.request, self.source, line)
 
     def learn(self, known: RecordText) -> Template:
         """Make a template of a record; keep it in mind unless it is long, not too many."""

@@ -241,7 +241,7 @@ class RecordText:
         """Return True if it has so many scalars that no other one is looked for that is written alike."""
         return next(islice(self.root.leaves(), MOST_LEAVES, None), None) is not None
 
-    @property
+    @cached_property
     def line(self) -> int:
         """Return the line, from 0, of the first of our numbers."""
         paths = (path for entry in self.entries for path in entry.record.numbers if path is not None)
@@ -276,30 +276,23 @@ class RecordText:
             first += request.result_size(entry.record.shape, entry.target)
         return list(dict.fromkeys(edits))
 
-    def with_numbers(
-        self, edits: Sequence[Edit], texts: Sequence[str], numbers: Sequence[float], *, locked: bool = False
-    ) -> str:
-        """Return the text with the texts of numbers of results in their places, some of them as words."""
-        stretches, pieces = cut(len(self.text), (), edits)
+    def rendered(self, answers: Sequence[Answer]) -> bytes:
+        """Return the text with results in the place of numbers, some of them as words; b"" where nothing is in it."""
+        numbers = [number for each in answers for number in written(each)]
+        write = number_writer(self.request.precision, yaml=not self.json)
+        locked = any(each.entry.target.locked(each.parts) for each in answers)
+        stretches, pieces = cut(len(self.text), (), self.edits)
         shown = []
         for piece in pieces:
             if isinstance(piece, In):
                 shown.append(self.text[slice(*stretches[piece.part])])
             elif isinstance(piece, Out):
-                shown.append(texts[piece.first])
+                shown.append(write(numbers[piece.first]))
             elif isinstance(piece, Word):
                 shown.append(piece.text(numbers[piece.number]).decode())
             elif isinstance(piece, (Const, Renamed)) or (locked and isinstance(piece, IfLocked)):
                 shown.append(piece.text.decode())
-        return "".join(shown)
-
-    def rendered(self, answers: Sequence[Answer]) -> bytes:
-        """Return the text with results in the place of numbers; b"" where nothing is in it."""
-        numbers = [number for each in answers for number in written(each)]
-        write = number_writer(self.request.precision, yaml=not self.json)
-        locked = any(each.entry.target.locked(each.parts) for each in answers)
-        text = self.with_numbers(self.edits, [write(number) for number in numbers], numbers, locked=locked)
-        return text.encode() if self.entries else b""
+        return "".join(shown).encode() if self.entries else b""
 
     def row_notes(self) -> Iterator[RowNote]:
         """Yield warnings that hold for all records that are written alike."""

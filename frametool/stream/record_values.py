@@ -11,7 +11,7 @@ from functools import partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.document import NOTHING, Aliased, Node, refuse_alias
+from frametool.documents.document import Aliased, Node, refuse_alias
 from frametool.documents.json import JSON_NUMBER
 from frametool.documents.source import Source, Verbatim
 from frametool.errors import FormatError, Misused, ValueInvalid, shown, warn
@@ -62,8 +62,7 @@ def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
     for record in known.records:
         poses.append(pose_of(record, request)._replace(stamp_ns=stamp_of(known.values, record, source)))
         unit = unit_of(record, value_at(known.values, record.path[:1]))
-        if not _says_no_more(record, known.values, unit):
-            extra.update(_header_stamp(record), _rest(known.root.at(unit), unit, record))
+        extra.update(_header_stamp(record), _rest(known.root.at(unit), unit, record))
     if not poses:
         raise FormatError("nothing in it; a pose is {xyz: [x, y, z], rpy_deg: [roll, pitch, yaw]}", source=source.name)
     return poses, extra
@@ -147,10 +146,8 @@ def values_of_text(known: RecordText, answers: Sequence[Answer], style: Style) -
         record = each.entry.record
         units.setdefault(unit_of(record, value_at(known.values, record.path[:1])), []).append(each)
     for unit, ours in units.items():
-        alone = all(_says_no_more(each.entry.record, known.values, unit) for each in ours)
-        node = NOTHING if alone else known.root.at(unit)
         try:
-            yield from values_of_unit(node, unit, ours, known.request, style)
+            yield from values_of_unit(known.root.at(unit), unit, ours, known.request, style)
         except Aliased as error:
             raise error.in_text(known.text) from None
     if not known.values:
@@ -265,15 +262,6 @@ def used_keys(record: Record) -> set[str]:
     halves = PARTS.get(record.shape.kind, ())
     own = record.key, record.rotation, *record.others, *record.flat, *record.members, *record.placed
     return {*own, *halves, *NOT_PLAIN}
-
-
-def _says_no_more(record: Record, documents: dict[int, Any], unit: Path) -> bool:
-    """Return True if a unit is one pose with its frames and nothing else, so that its text need not be walked again."""
-    value = value_at(documents, unit)
-    if record.path != unit or record.shape.kind != POSE or type(value) is not dict:
-        return False
-    names = {path[-1] for each in (record.name, record.parent) for path in each.paths if path[:-1] == unit}
-    return used_keys(record).union(names).issuperset(value)
 
 
 def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
