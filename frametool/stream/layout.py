@@ -197,6 +197,9 @@ def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:
     kept = [names[column.place] for column in columns if not isinstance(column, ADDED)]
     if len({*new}) < len(new):
         twice = sorted({name for name in new if new.count(name) > 1})
+        if {"x", "y", "z"} <= {*twice}:
+            hint = "a point with a weight: --columns x,y,z; a rotation: name it qx, qy, qz, qw"
+            raise Misused(f"columns x, y, z, w are a quaternion, its position would have their names; {hint}")
         raise Misused(f"--to: columns {', '.join(twice)} would appear twice")
     clash = sorted(set(new).intersection(kept))
     if clash:
