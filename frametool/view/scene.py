@@ -21,7 +21,7 @@ from frametool.geometry import earth as wgs84
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.place import ECEF as EARTH
 from frametool.geometry.place import ENU
-from frametool.text.numbers import parse_number
+from frametool.text.numbers import parse_angle
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -225,10 +225,10 @@ def parse_eye(text: str) -> tuple[float, float]:
     """
     if text in EYES:
         return EYES[text]
-    cells = text.split(",")
+    angles = map(parse_angle, cells := [*map(str.strip, text.split(","))])
     if len(cells) != 2:
         raise ValueInvalid(f"expected {', '.join(EYES)} or AZ,EL in degrees, found {shown(text)}")
-    azimuth, elevation = (math.radians(math.fmod(parse_number(cell.strip()), 360.0)) for cell in cells)
+    azimuth, elevation = (each if unit == "rad" else math.radians(math.fmod(each, 360.0)) for each, unit in angles)
     if abs(elevation) > math.pi / 2.0:
         raise ValueInvalid(f"the elevation must be -90 .. 90 degrees, found {shown(cells[1])}")
     return azimuth, elevation
