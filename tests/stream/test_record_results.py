@@ -150,6 +150,11 @@ def test_poses_of_one_message_follow_each_other_as_those_of_many(run: Run, comma
     assert [each["distance"] for each in found] == [each["pose"]["distance"] for each in wanted]
 
 
+def test_the_scale_of_many_records_is_their_own(run: Run) -> None:
+    done = run("invert", "-f", "text", stdin='{"xyz": [1, 2, 3], "rpy": [0.1, 0.2, 0.3], "scale": 4.0}\n' * 100)
+    assert [line.split() for line in done.out.splitlines() if "scale" in line] == [["scale", "0.250000"]] * 100
+
+
 def test_a_frame_that_is_left_out_is_told_once(run: Run) -> None:
     line = '{"parent": "map", "xyz": [1, 2, 3], "xyzw": [0, 0, 0, 1]}\n'
     done = run("apply", "--transform", "{xyz: [1, 0, 0]}", "-f", "csv", stdin=line * 100)
