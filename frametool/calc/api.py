@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Self
 
 from frametool.calc.evaluate import Scope, evaluate_line, read_line
-from frametool.calc.operations import in_radians
+from frametool.calc.functions import in_radians
 from frametool.calc.parser import RADIAN, frame_text
 from frametool.calc.values import ANGLES, LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TREE, TWIST, VECTOR, Term, Type
 from frametool.errors import ValueInvalid, printable, shown

@@ -16,8 +16,8 @@ from contextlib import contextmanager
 from copy import copy
 from typing import TYPE_CHECKING, Any
 
-from frametool.calc import operations
-from frametool.calc.operations import FUNCTIONS
+from frametool.calc import functions
+from frametool.calc.functions import FUNCTIONS
 from frametool.calc.parser import PLAIN, RESERVED, UNITS, CalcError, NoTree, column_name, frame_text, parse_line
 from frametool.calc.values import LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TWIST, VECTOR, Term, Type, wanted
 from frametool.documents.document import parse_documents
@@ -241,7 +241,7 @@ class _Walk:
     def _list(self, branch: Branch) -> Term:
         items = tuple(map(self._value, branch.parts))
         if all(item.type.kind == NUMBER for item in items):
-            return operations.list_of_numbers(items)
+            return functions.list_of_numbers(items)
         other = next((item for item in items if item.type.kind != items[0].type.kind), None)
         if other is not None:
             raise CalcError(f"a list holds values of one kind, found {items[0].type.named} and {other.type.named}")
@@ -256,29 +256,29 @@ class _Walk:
             raise CalcError(f"unknown function {shown(name)}{hint}")
         read = self.term if name == "mean" and len(branch.parts) == 1 else self._value
         terms = [read(part) for part in branch.parts]
-        return operations.called(name, terms[0].items if terms and terms[0].type.kind == LIST else terms)
+        return functions.called(name, terms[0].items if terms and terms[0].type.kind == LIST else terms)
 
     def _chain(self, branch: Branch) -> Term:
         left = self._value(branch.parts[0])
         for (operator, at), part in zip(branch.value, branch.parts[1:], strict=True):
             right = self._value(part)
             with located(at):
-                left = operations.operated(operator, left, right)
+                left = functions.operated(operator, left, right)
         return left
 
     def _sign(self, branch: Branch) -> Term:
         below = self._value(branch.parts[0])
-        return operations.operated("negate", below) if branch.value == "-" else below
+        return functions.operated("negate", below) if branch.value == "-" else below
 
     def _power(self, branch: Branch) -> Term:
-        return operations.power(*map(self._value, branch.parts))
+        return functions.power(*map(self._value, branch.parts))
 
     def _as(self, branch: Branch) -> Term:
         target, source = map(self._bare, branch.value)
-        return operations.as_frames(self._value(branch.parts[0]), target, source)
+        return functions.as_frames(self._value(branch.parts[0]), target, source)
 
     def _in(self, branch: Branch) -> Term:
-        return operations.in_frame(self._value(branch.parts[0]), self._bare(branch.value.strip('"')))
+        return functions.in_frame(self._value(branch.parts[0]), self._bare(branch.value.strip('"')))
 
     def _bare(self, name: str, tree: Frames | None = None) -> str:
         """Remove one leading `/` from a frame's name, as tf2 does, unless a frame has this name.

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.calc.evaluate import AXES, PLACED, evaluate_line, literal, once_a_block, term_of_pose
-from frametool.calc.operations import in_radians
+from frametool.calc.functions import in_radians
 from frametool.calc.parser import RADIAN, CalcError, columns_of, needs_time, reads_row
 from frametool.calc.values import ANGLES, LIST, NUMBER, POINT, POSE, TREE, VECTOR, RowValues, Term, Type
 from frametool.documents.source import opened

@@ -390,8 +390,6 @@ class WithHelp(click.Command):
         return HELP_OPTION
 
 
-
-
 class Command(WithHelp):
     """A command whose arguments may be negative numbers.
 

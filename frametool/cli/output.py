@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from frametool.stream.row_poses import RowPoses
 
 
-
 def recorded(chosen: Inputs, fmt: str, output: str | None) -> RecordingStyle:
     """Return what of results a recording of a format holds, as options say; raises UsageError."""
     place = _place(fmt, output)
@@ -245,12 +244,12 @@ class Output:
 
     def writer(self) -> ResultWriter:
         """Return what writes the results of a stream of records."""
-        from frametool.stream.record_results import Collected, CsvTable, Documents
+        from frametool.stream.record_results import CollectedResults, CsvTable, Documents
 
         if self.style.format in ("csv", "json", "yaml"):
             return CsvTable(self.style) if self.style.format == "csv" else Documents(self.style)
         self._refuse_place()
-        return Blocks(self) if self._in_blocks else Collected()
+        return Blocks(self) if self._in_blocks else CollectedResults()
 
     def tree(self, tree: Frames, color: str = "auto") -> None:
         """Write a tree; on a terminal in colour, or as `color` says; in a format made of poses with every sample."""

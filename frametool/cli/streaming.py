@@ -347,7 +347,7 @@ class Stream:
 
     def _run_as_values(self, stream: Any, fmt: str, request: Request) -> int:
         """Write the results of records in another format than theirs."""
-        from frametool.stream.record_results import Collected, written_by
+        from frametool.stream.record_results import CollectedResults, written_by
         from frametool.stream.record_stream import run_records
 
         chosen, output = self.output.chosen or "", self.output
@@ -359,7 +359,7 @@ class Stream:
         bad, writer = self.policy(self.name), output.writer()
         outcomes = run_records(stream, fmt, request, source=self.name, style=output.style)
         outcomes = written_by(writer, outcomes, bad.on_error)
-        if not isinstance(writer, Collected):
+        if not isinstance(writer, CollectedResults):
             status = self._write(outcomes, bad)
             output.report_suffix()
             return status
@@ -414,8 +414,6 @@ def open_columns(file: InputFile, fmt: str) -> Any:
     """Return the columns of numbers that a file of a format holds."""
     file.format = fmt
     return import_module(FORMATS[fmt].reader).open_columns(file)
-
-
 
 
 def _signed(begin: bytes, name: str) -> str:

@@ -260,12 +260,3 @@ def lookup(
         return operations.compose(sheet, first, second, (printable(target), printable(fixed), printable(source)))
 
     return derived_pose(plan, f"{printable(target)}_from_{printable(source)}", own, way)
-
-
-class ByTree(NamedTuple):
-    """Transform by a lookup: from `source`, or the frame of the record, at a time or the latest."""
-
-    frames: Frames
-    target: str
-    source: str | None = None
-    at_ns: int | None = None

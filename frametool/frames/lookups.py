@@ -486,7 +486,6 @@ class FrameTree(Frames):
         return f"FrameTree({len(self._frames)} frames, roots: {', '.join(self.roots) or 'none'})"
 
 
-
 class Replayed(NamedTuple):
     """One lookup of a replay.
 

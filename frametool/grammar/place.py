@@ -240,7 +240,6 @@ def _zone(value: Any) -> float:
     return zone_number(value)
 
 
-
 def _position(spot: Spot) -> tuple[float, float, float]:
     x, y, z = spot.place.ecef(spot.numbers)
     return x, y, z

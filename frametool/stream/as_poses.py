@@ -308,10 +308,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
 
 
 def _check(rows: PlannedRows, fmt: Poses, file: InputFile, options: Options) -> None:
-    """Refuse a table that is no poses, or poses without time and names."""
-    if rows.shape.notation is None:
-        message = f"no rotation among the columns {rows.columns}: points are no frames"
-        raise FormatError(message, source=file.name, line=1)
+    """Refuse poses without time and names."""
     if rows.layout.time is None and not fmt.counted and not options.answers.stamps and len(rows.roles) < 2:
         lacking = ", ".join(name for role, name in enumerate(("parent", "name")) if role not in rows.roles)
         wanted = "frames that stand still have parent and name, one that moves stamp or stamp_ns, or --stamps FILE"

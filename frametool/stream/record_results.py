@@ -185,7 +185,7 @@ class CsvTable:
         return b""
 
 
-class Collected:
+class CollectedResults:
     """Keep results, for formats that are written of all of them at once."""
 
     def __init__(self) -> None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.fit.comparison import Comparison
-    from frametool.view.pictures import Shape
+    from frametool.view.pictures import SvgElement
 
 WIDE, HIGH = 412.0, 112.0  # pixels of a chart
 LEFT, TOP, RIGHT, BOTTOM = 54.0, 40.0, 14.0, 42.0  # around it
@@ -101,7 +101,7 @@ def _extremes(values: Any, stretches: int) -> Any:
     return np.array([0, count - 1, *np.ravel([*found])])
 
 
-def _figure(high: float, shapes: Sequence[Shape]) -> Picture:
+def _figure(high: float, shapes: Sequence[SvgElement]) -> Picture:
     return Picture(LEFT + WIDE + RIGHT, TOP + high + BOTTOM, shapes)
 
 

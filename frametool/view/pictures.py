@@ -65,7 +65,7 @@ def shade_of(part: float, stops: Sequence[tuple[int, int, int]] = STOPS) -> str:
     return f"#{''.join(f'{part:02x}' for part in mixed)}"
 
 
-class Shape(NamedTuple):
+class SvgElement(NamedTuple):
     """An element of SVG.
 
     kind: path, circle, rect, text or image.  look: its attributes but the colour.  points: of a path.
@@ -82,27 +82,27 @@ class Shape(NamedTuple):
 def line(
     points: Sequence[Point], colour: str, width: float = 1.0, alpha: float = 1.0,
     dashes: tuple[float, ...] = (), title: str = "",
-) -> Shape:  # fmt: skip
+) -> SvgElement:  # fmt: skip
     """Return a polyline; dashes: pixels drawn and skipped in turn; title: its tooltip."""
     look = {"stroke-width": width, "opacity": alpha, "stroke-dasharray": dashes}
-    return Shape("path", colour, look, points, title)
+    return SvgElement("path", colour, look, points, title)
 
 
-def dot(x: float, y: float, radius: float, colour: str, title: str = "") -> Shape:
+def dot(x: float, y: float, radius: float, colour: str, title: str = "") -> SvgElement:
     """Return a disc."""
-    return Shape("circle", colour, {"cx": x, "cy": y, "r": radius}, text=title)
+    return SvgElement("circle", colour, {"cx": x, "cy": y, "r": radius}, text=title)
 
 
-def box(x: float, y: float, width: float, height: float, colour: str) -> Shape:
+def box(x: float, y: float, width: float, height: float, colour: str) -> SvgElement:
     """Return a filled rectangle; x, y: its upper left corner."""
-    return Shape("rect", colour, {"x": x, "y": y, "width": width, "height": height})
+    return SvgElement("rect", colour, {"x": x, "y": y, "width": width, "height": height})
 
 
 def words(x: float, y: float, text: str, colour: str = "ink", anchor: str = "start", size: float = 12.0,
-          weight: str = "normal", halo: str = "") -> Shape:  # fmt: skip
+          weight: str = "normal", halo: str = "") -> SvgElement:  # fmt: skip
     """Return one line of text, vertically centred at y; anchor: the part of it at x; halo: colour of its outline."""
     look = {"x": x, "y": y, "text-anchor": anchor, "font-size": size, "font-weight": weight, "stroke": halo}
-    return Shape("text", colour, look, text=text)
+    return SvgElement("text", colour, look, text=text)
 
 
 class Picture(NamedTuple):
@@ -110,7 +110,7 @@ class Picture(NamedTuple):
 
     width: float
     height: float
-    shapes: Sequence[Shape]
+    shapes: Sequence[SvgElement]
     title: str = ""
     corner: Point = (0.0, 0.0)
     decimals: int = 1
@@ -146,7 +146,7 @@ def svg_element(picture: Picture, before: str = "", place: str = "") -> str:
     return f"{head}{before}{''.join(_element(each, picture.decimals) for each in picture.shapes)}</svg>\n"
 
 
-def _element(shape: Shape, decimals: int) -> str:
+def _element(shape: SvgElement, decimals: int) -> str:
     """Return an element without the attributes that are as usual; the name of a colour is a class."""
     kind, colour, look, points, text = shape
     if colour in NAMED:
@@ -274,7 +274,7 @@ class Chart:
         across = left + width * (x - self.x[0]) / (self.x[1] - self.x[0])
         return across, top + height * (self.y[1] - inside) / (self.y[1] - self.y[0])
 
-    def drawn(self) -> Iterator[Shape]:
+    def drawn(self) -> Iterator[SvgElement]:
         """Draw axes, lines and the legend."""
         left, top, width, height = self.area
         right, bottom = left + width, top + height
@@ -297,7 +297,7 @@ class Chart:
         yield from _legend(self.lines, left + text_width(self.names[1]), right, top - 14.0)
 
 
-def _legend(lines: Sequence[ChartLine], left: float, right: float, y: float) -> Iterator[Shape]:
+def _legend(lines: Sequence[ChartLine], left: float, right: float, y: float) -> Iterator[SvgElement]:
     """Draw a right-aligned legend on one line, each name after its line; of a long one only dashed lines."""
     named = [each for each in lines if each.name]
     if sum(text_width(each.name) + 33.0 for each in named) > right - left:
@@ -361,14 +361,14 @@ def write_png(picture: Picture) -> bytes:
     return stream.getvalue()
 
 
-def _paint_dots(axes: Any, dots: Sequence[Shape], order: int) -> None:
+def _paint_dots(axes: Any, dots: Sequence[SvgElement], order: int) -> None:
     """Paint a run of dots at once, for there may be many."""
     xs, ys, radii = zip(*(each.look.values() for each in dots), strict=True)
     sizes = [(2.0 * radius * POINTS) ** 2 for radius in radii]
     axes.scatter(xs, ys, s=sizes, c=[*map(_plain, dots)], linewidths=0.0, zorder=order)
 
 
-def _paint(axes: Any, shape: Shape, order: int) -> None:
+def _paint(axes: Any, shape: SvgElement, order: int) -> None:
     """Paint any other shape; gray images stay gray."""
     look, style = shape.look, {"color": _plain(shape), "zorder": order}
     match shape.kind:
@@ -399,7 +399,7 @@ def _edges(look: Mapping[str, float]) -> tuple[float, float, float, float]:
     return look["x"], look["x"] + look["width"], look["y"] + look["height"], look["y"]
 
 
-def _plain(shape: Shape) -> str:
+def _plain(shape: SvgElement) -> str:
     return NAMED.get(shape.colour, (shape.colour,))[0]
 
 
@@ -413,7 +413,7 @@ PNG, JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
 FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}  # the markers of JPEG that are followed by a size
 
 
-def read_shot(path: str) -> Shape:
+def read_shot(path: str) -> SvgElement:
     """Read a PNG or a JPEG; raises FormatError for anything else, FileProblem."""
     with opened(path) as file:
         data = file.read()
@@ -430,10 +430,10 @@ def read_shot(path: str) -> Shape:
     raise FormatError("neither a PNG nor a JPEG; an overlay is drawn over one of these", source=path)
 
 
-def _image(width: int, height: int, kind: str, data: bytes) -> Shape:
+def _image(width: int, height: int, kind: str, data: bytes) -> SvgElement:
     """Return an image whose file is embedded unchanged."""
     href = f"data:image/{kind};base64,{b64encode(data).decode()}"
-    return Shape("image", "", {"x": CORNER[0], "y": CORNER[1], "width": width, "height": height, "href": href})
+    return SvgElement("image", "", {"x": CORNER[0], "y": CORNER[1], "width": width, "height": height, "href": href})
 
 
 class Overlay:

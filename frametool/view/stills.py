@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from frametool.geometry.types import Rigid
-    from frametool.view.pictures import Point, Shape
+    from frametool.view.pictures import Point, SvgElement
     from frametool.view.scene import Flat, Label
 
     Run = tuple[str, str]  # text and its style
@@ -64,14 +64,14 @@ def still_picture(
     return Picture(WIDTH, HEIGHT, shapes, title, notes=notes)
 
 
-def _frame(flat: Projection, name: str) -> Iterator[Shape]:
+def _frame(flat: Projection, name: str) -> Iterator[SvgElement]:
     """Draw the axes of a frame, the nearest last."""
     x, y, _ = flat.origins[name]
     yield from (line([(x, y), tip[:2]], AXES[axis], 2.0, title=name) for axis, tip in flat.axes(name))
     yield dot(x, y, 2.2, "ink", name)
 
 
-def _trail(frame: str, stretches: Sequence[Sequence[Point]]) -> Iterator[Shape]:
+def _trail(frame: str, stretches: Sequence[Sequence[Point]]) -> Iterator[SvgElement]:
     """Draw the trail of a frame in pieces, coloured by time."""
     size = -(-sum(map(len, stretches)) // PIECES)
     pieces = [each[at : at + size + 1] for each in stretches for at in range(0, max(len(each) - 1, 1), size)]
@@ -79,7 +79,7 @@ def _trail(frame: str, stretches: Sequence[Sequence[Point]]) -> Iterator[Shape]:
         yield line(piece, shade_of(LAST_SHADE * number / len(pieces)), 1.5, 0.8, title=frame)
 
 
-def _other(flat: Projection, name: str, pose: Rigid) -> Iterator[Shape]:
+def _other(flat: Projection, name: str, pose: Rigid) -> Iterator[SvgElement]:
     """Draw a frame's pose in the other tree, and a line to it."""
     x, y, _ = flat.at(pose[:3])
     for axis, tip in zip(AXES, flat.tips(pose), strict=True):
@@ -87,7 +87,7 @@ def _other(flat: Projection, name: str, pose: Rigid) -> Iterator[Shape]:
     yield line([flat.origins[name][:2], (x, y)], "trail", 1.5)
 
 
-def _label(label: Label) -> Iterator[Shape]:
+def _label(label: Label) -> Iterator[SvgElement]:
     """Draw a name, with a leader line if it is away from its frame."""
     left, top, right, bottom = label.box
     if label.away > 1.1:
@@ -96,7 +96,7 @@ def _label(label: Label) -> Iterator[Shape]:
     yield words(left + 2.0, (top + bottom) / 2.0, label.words)
 
 
-def _corner(flat: Projection) -> Iterator[Shape]:
+def _corner(flat: Projection) -> Iterator[SvgElement]:
     """Draw the directions of the axes of the fixed frame."""
     x, y = CORNER, HEIGHT - CORNER
     right, up, toward = flat.view
@@ -106,7 +106,7 @@ def _corner(flat: Projection) -> Iterator[Shape]:
         yield words(x + 38.0 * dx, y + 38.0 * dy, AXES[axis], AXES[axis], "middle", weight="bold")
 
 
-def _scale(flat: Projection, step: float) -> Iterator[Shape]:
+def _scale(flat: Projection, step: float) -> Iterator[SvgElement]:
     """Draw the scale bar, and name the fixed frame."""
     metres = nice(110.0 / flat.scale)
     left, right, base = WIDTH - 20.0 - metres * flat.scale, WIDTH - 20.0, HEIGHT - 20.0

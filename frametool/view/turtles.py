@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import IssuedCommand, SimulationStep
     from frametool.sim.turtle import Pen, TurtleState
-    from frametool.view.pictures import Point, Shape
+    from frametool.view.pictures import Point, SvgElement
 
 # where pens have all one colour, curves and turtles still differ: one colour a turtle, in the order of their names;
 # the second is how it shows on white
@@ -115,7 +115,7 @@ def run_picture(drawing: Drawing) -> Picture:
     return Picture(LEFT + PANEL_WIDTH + MARGIN if followed else HEIGHT, HEIGHT, shapes, "turtles")
 
 
-def _window(drawing: Drawing, colours: dict[str, str]) -> Iterator[Shape]:
+def _window(drawing: Drawing, colours: dict[str, str]) -> Iterator[SvgElement]:
     """Draw the world: background, trails, and the turtles at the end from above."""
 
     def place(x: float, y: float) -> Point:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import frametool
 from frametool.calc.evaluate import Scope, evaluate
-from frametool.calc.operations import FUNCTIONS
+from frametool.calc.functions import FUNCTIONS
 from frametool.calc.values import TREE, Term, Type
 from frametool.errors import FrametoolError
 

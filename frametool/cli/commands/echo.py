@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Result
 
 
-
 @command_named("echo")
 @argument("tree", FILE)
 @argument("target", FRAME)

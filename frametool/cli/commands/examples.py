@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 PACKAGE = os.path.dirname(os.path.dirname(os.path.dirname(__file__)))
 
 
-
 def folder() -> str:
     """Return where the files are: in the installed package, or next to it in its sources."""
     installed = os.path.join(PACKAGE, "examples")
