@@ -241,7 +241,7 @@ class _Walk:
     def _list(self, branch: Branch) -> Term:
         items = tuple(map(self._value, branch.parts))
         if all(item.type.kind == NUMBER for item in items):
-            return functions.list_of_numbers(items)
+            return functions.operated("list", *items)
         other = next((item for item in items if item.type.kind != items[0].type.kind), None)
         if other is not None:
             raise CalcError(f"a list holds values of one kind, found {items[0].type.named} and {other.type.named}")

@@ -20,112 +20,77 @@ if TYPE_CHECKING:
     from frametool.calc.values import Check, Kernel
     from frametool.geometry.types import Components, Namespace, Number, Rigid
 
-PLACED = (POINT, VECTOR)
 TO_RADIANS = 0.017453292519943295
-LENGTH, ANGLE = Type(NUMBER, unit=METRE), Type(NUMBER, unit=RADIAN)
-# the words in `Overload.takes` that are no kinds
+# the words of a rule that are no kinds
 FITS: dict[str, Callable[[Type], bool]] = {
-    "placed": lambda type_: type_.kind in PLACED,
-    "measure": lambda type_: type_.kind == NUMBER,
+    "placed": lambda type_: type_.kind in (POINT, VECTOR),
+    "free": lambda type_: type_.kind == POINT and type_.target is None,
     "plain": lambda type_: type_.kind == NUMBER and type_.unit == PLAIN,
     "scale": lambda type_: type_.kind == NUMBER and type_.unit in (PLAIN, METRE),
     "angle": lambda type_: type_.kind == NUMBER and type_.unit in (PLAIN, RADIAN),
     "degrees": lambda type_: type_.degrees,
 }
-
-
-# --- how frames and units meet: the type that the result is derived from; None: not this meaning ---
-
-
-def _first(_: str, first: Type, *_others: Type) -> Type:
-    return first
-
-
-def _second(_: str, _first: Type, second: Type) -> Type:
-    return second
-
-
-def _touching(_: str, a: Type, b: Type) -> Type:
-    if not meet(a.source, b.target):
-        raise CalcError(f"{a} * {b}: {shown(a.source)} and {shown(b.target)} do not touch")
-    return Type(POSE, a.target, b.source)
-
-
-def _moved(_: str, pose: Type, placed: Type) -> Type:
-    if not meet(pose.source, placed.target):
-        where = f"in {shown(pose.source)}, found one in {shown(placed.target)}"
-        raise CalcError(f"{pose} takes {placed.kind}s {where}")
-    return placed._replace(target=pose.target)
-
-
-def _in_one_frame(_: str, a: Type, *others: Type) -> Type:
-    for b in others:
-        if b.kind != NUMBER and not meet(a.target, b.target):
-            raise CalcError(f"{a.named} and {b.named}: both must be in one frame")
-        a = a._replace(target=b.target if a.target is None else a.target)
-    return a
-
-
-def _free_of_frames(_: str, *points: Type) -> Type | None:
-    if any(each.target is not None for each in points):
-        raise CalcError("the sum of two points depends on the origin; subtract them, or use mean(..)")
-    return points[0]
-
-
-def _unplaced(_: str, point: Type) -> Type | None:
-    return point if point.target is None else None
-
-
-def _of_one_unit(_: str, first: Type, *others: Type) -> Type | None:
-    return first if all(each.unit == first.unit for each in others) else None
-
-
-def _seen_from_one_frame(name: str, a: Type, b: Type) -> Type:
-    if not meet(a.target, b.target):
-        raise CalcError(f"{name}() compares two poses in one frame, found {a} and {b}")
-    return a
-
-
-def _of_the_same_frames(name: str, a: Type, *others: Type) -> Type:
-    for b in others:
-        if b.kind == NUMBER:  # a fraction
-            continue
-        if not (meet(a.target, b.target) and meet(a.source, b.source)):
-            raise CalcError(f"{name}() needs two poses of the same frames, found {a} and {b}")
-        a = Type(POSE, b.target if a.target is None else a.target, b.source if a.source is None else a.source)
-    return a
+UNIT_OF = {"plain": PLAIN, "length": METRE, "angle": RADIAN}  # of results
 
 
 class Overload(NamedTuple):
-    """One meaning of an operator or function: the kinds of its arguments, its type and its kernel.
+    """One meaning of an operator or function: a rule for kinds, frames and units, and the kernel.
 
-    takes: a kind or a word of FITS for each argument; many: for each of any number
-    gives: the type of the result, from what `joined` returns for the types of the arguments
-    as_written: angles are not converted to radians if all are in degrees
+    rule: `pose.ab pose.bc -> pose.ac`, a kind or a word of FITS for each argument with letters for its frames, target
+        first, or for the unit of a number; equal letters must be the same frame or unit; `..` repeats the only argument
     check: returns the reason why floats have no result, "" if they have one
     """
 
-    takes: str
-    gives: Callable[[Type], Type]
+    rule: str
     kernel: Kernel
-    joined: Callable[..., Type | None] = _first
     check: Check | None = None
-    as_written: bool = False
-    many: bool = False
 
-    def result(self, name: str, terms: Sequence[Term]) -> Term | None:
+    def result(self, sign: str, terms: Sequence[Term]) -> Term | None:
         """Return the result; None if the arguments are of other kinds; raises CalcError if frames do not match."""
-        words = self.takes.split() * (len(terms) if self.many else 1)
-        if not terms or len(words) != len(terms) or not all(map(_fits, words, terms)):
+        takes, gives = self.rule.split(" -> ")
+        words = takes.split()
+        words = words[:1] * len(terms) if words[-1] == ".." else words
+        types = [term.type for term in terms]
+        if not types or len(words) != len(types) or not all(map(_fits, words, types)):
             return None
-        if not self.as_written or len({term.type.degrees for term in terms if term.type.unit == RADIAN}) > 1:
+        if (known := _unified(sign, words, types)) is None:
+            return None
+        if "angle" in words or len({type_.degrees for type_ in types if type_.unit == RADIAN}) > 1:
             terms = [*map(in_radians, terms)]
-        type_ = self.joined(name, *(term.type for term in terms))
-        return None if type_ is None else made(self.gives(type_), self.kernel, *terms, check=self.check)
+        kind, _, letters = gives.partition(".")
+        if kind == NUMBER:
+            type_ = Type(NUMBER, unit=known[letters] or PLAIN, degrees=any(term.type.degrees for term in terms))
+        elif kind in UNIT_OF:
+            type_ = Type(NUMBER, unit=UNIT_OF[kind])
+        else:
+            type_ = Type(kind, known.get(letters[:1]), known.get(letters[1:]))
+        return made(type_, self.kernel, *terms, check=self.check)
 
 
-def _fits(word: str, term: Term) -> bool:
-    return FITS[word](term.type) if word in FITS else term.type.kind == word
+def _fits(word: str, type_: Type) -> bool:
+    kind = word.partition(".")[0]
+    return FITS[kind](type_) if kind in FITS else type_.kind == kind
+
+
+def _unified(sign: str, words: Sequence[str], types: Sequence[Type]) -> dict[str, str | None] | None:
+    """Return the frame or the unit of each letter of a rule; None if units differ.
+
+    Raises CalcError if frames differ.
+    """
+    found: dict[str, str | None] = {}
+    for word, type_ in zip(words, types, strict=True):
+        values = (type_.unit,) if type_.kind == NUMBER else (type_.target, type_.source)
+        for letter, value in zip(word.partition(".")[2], values, strict=False):
+            known = found.setdefault(letter, value)
+            if not meet(known, value):
+                if type_.kind == NUMBER:
+                    return None
+                texts = [str(each) if each.kind == POSE else each.named for each in types]
+                text = f"{sign}({first_of(texts, 3)})" if sign in FUNCTIONS else f" {sign} ".join(texts)
+                remark = "do not touch" if sign == "*" else "must be one frame"
+                raise CalcError(f"{text}: {shown(known)} and {shown(value)} {remark}")
+            found[letter] = value if known is None else known
+    return found
 
 
 def in_radians(term: Term) -> Term:
@@ -155,6 +120,7 @@ def _by_part(operation: Callable[[Number, Number], Number]) -> Kernel:
 
 _PLUS, _MINUS, _TIMES, _OVER = map(_by_part, (operator.add, operator.sub, operator.mul, operator.truediv))
 _NEGATED = plain(lambda *numbers: tuple(0.0 - number for number in numbers))
+_SAME = plain(lambda *numbers: numbers)
 
 
 def _line(*numbers: Number) -> Components:
@@ -222,25 +188,22 @@ def _part_of_motion(*numbers: Number) -> Components:
     return rigid.exp(vx, vy, vz, wx, wy, wz, xp)
 
 
-def _powered(base: Number, exponent: Number, xp: Namespace) -> Components:
+def _power(base: Number, exponent: Number, xp: Namespace) -> Components:
     if xp is floats:
-        return (_power(base, exponent),)
+        return (_scalar_power(base, exponent),)
     import numpy as np
 
-    powers: Any = np.frompyfunc(_row_power, 2, 1)  # numpy's own differs between processors
+    powers: Any = np.frompyfunc(_scalar_power, 2, 1)  # numpy's own differs from that of floats
     return (powers(base, exponent).astype(float),)
 
 
-def _power(base: float, exponent: float) -> float:
-    result = base**exponent
-    return nan if isinstance(result, complex) else float(result)
-
-
-def _row_power(base: float, exponent: float) -> float:
+def _scalar_power(base: float, exponent: float) -> float:
+    """Return a power; nan or infinite if there is none."""
     try:
-        return _power(base, exponent)
+        result = base**exponent
     except (OverflowError, ZeroDivisionError):
         return inf
+    return nan if isinstance(result, complex) else float(result)
 
 
 def _arcsine(value: Number, xp: Namespace) -> Components:
@@ -289,66 +252,52 @@ def _within(name: str, least: float, most: float, words: str) -> Check:
 # --- the tables ---
 
 
-def _unchanged(type_: Type) -> Type:
-    return type_
-
-
-def _always(type_: Type) -> Callable[[Type], Type]:
-    return lambda _: type_
-
-
-def _kind(kind: str) -> Callable[[Type], Type]:
-    """Return the type of another kind in the same frame."""
-    return lambda type_: Type(kind, type_.target)
-
-
 def _sums(kernel: Kernel) -> list[Overload]:
     """Return the meanings that a sum and a difference share."""
-    return [
-        Overload("measure measure", _unchanged, kernel, _of_one_unit, as_written=True),
-        Overload("vector vector", _unchanged, kernel, _in_one_frame),
-        Overload("twist twist", _unchanged, kernel, _in_one_frame),
-        Overload("point vector", _unchanged, kernel, _in_one_frame),
-    ]
+    rules = "number.u number.u -> number.u", "vector.a vector.a -> vector.a", "twist.a twist.a -> twist.a"
+    return [Overload(rule, kernel) for rule in (*rules, "point.a vector.a -> point.a")]
 
 
-INVERSE = Overload(POSE, lambda pose: Type(POSE, pose.source, pose.target), plain(rigid.inverse))
 # operator -> what cannot be done, its meanings
 OPERATORS: dict[str, tuple[str, Sequence[Overload]]] = {
     "*": ("multiply {} by {}", [
-        Overload("pose pose", _unchanged, plain(rigid.compose), _touching),
-        Overload("pose point", _unchanged, plain(rigid.apply), _moved),
-        Overload("pose vector", _unchanged, lambda *numbers: quaternion.rotate(*numbers[3:-1]), _moved),
-        Overload("measure plain", _unchanged, _TIMES, as_written=True),
-        Overload("plain measure", _unchanged, _TIMES, _second, as_written=True),
-        Overload("scale vector", _unchanged, plain(lambda n, x, y, z: (n * x, n * y, n * z)), _second),
-        Overload("vector scale", _unchanged, plain(lambda x, y, z, n: (n * x, n * y, n * z))),
+        Overload("pose.ab pose.bc -> pose.ac", plain(rigid.compose)),
+        Overload("pose.ab point.b -> point.a", plain(rigid.apply)),
+        Overload("pose.ab vector.b -> vector.a", lambda *numbers: quaternion.rotate(*numbers[3:-1])),
+        Overload("number.u plain -> number.u", _TIMES),
+        Overload("plain number.u -> number.u", _TIMES),
+        Overload("scale vector.a -> vector.a", plain(lambda n, x, y, z: (n * x, n * y, n * z))),
+        Overload("vector.a scale -> vector.a", plain(lambda x, y, z, n: (n * x, n * y, n * z))),
     ]),
     "/": ("divide {} by {}", [
-        Overload("measure plain", _unchanged, _OVER, check=_no_division, as_written=True),
-        Overload("measure measure", _always(PLAIN_NUMBER), _OVER, _of_one_unit, _no_division, as_written=True),
-        Overload("vector scale", _unchanged, plain(lambda x, y, z, n: (x / n, y / n, z / n)), check=_no_division),
+        Overload("number.u plain -> number.u", _OVER, _no_division),
+        Overload("number.u number.u -> plain", _OVER, _no_division),
+        Overload("vector.a scale -> vector.a", plain(lambda x, y, z, n: (x / n, y / n, z / n)), _no_division),
     ]),
     "+": ("add {} and {}", [
         *_sums(_PLUS),
-        Overload("vector point", _kind(POINT), _PLUS, _in_one_frame),
-        Overload("point point", _unchanged, _PLUS, _free_of_frames),
+        Overload("vector.a point.a -> point.a", _PLUS),
+        Overload("free free -> point", _PLUS),
     ]),
-    "-": ("subtract {} and {}", [*_sums(_MINUS), Overload("point point", _kind(VECTOR), _MINUS, _in_one_frame)]),
+    "-": ("subtract {} and {}", [*_sums(_MINUS), Overload("point.a point.a -> vector.a", _MINUS)]),
     "^": ("raise {} to {}: a power is that of a pose or a plain number, an exponent a plain number", [
-        Overload("pose plain", _kind(POSE), _part_of_motion),
-        Overload("plain plain", _unchanged, _powered, check=_no_power),
+        Overload("pose.ab plain -> pose.a", _part_of_motion),
+        Overload("plain plain -> plain", _power, _no_power),
     ]),
     "negate": ("negate {}", [
-        Overload("measure", _unchanged, _NEGATED, as_written=True),
-        Overload(VECTOR, _unchanged, _NEGATED),
-        Overload(TWIST, _unchanged, _NEGATED),
-        Overload(POINT, _unchanged, _NEGATED, _unplaced),
+        Overload("number.u -> number.u", _NEGATED),
+        Overload("vector.a -> vector.a", _NEGATED),
+        Overload("twist.a -> twist.a", _NEGATED),
+        Overload("free -> point", _NEGATED),
+    ]),
+    "list": ("make a point (3 lengths) or a twist (3 lengths, 3 angles) of these; rotations say {{rpy_deg: [..]}}", [
+        Overload("scale scale scale -> point", _SAME),
+        Overload("scale scale scale angle angle angle -> twist", _SAME),
     ]),
 }  # fmt: skip
 REMEDIES = {
     POSE: "; poses have a * b, inv(a), inv(a) * b, a ^ 0.5 and a * point",
-    POINT: "; a direction is vector([x, y, z])",
+    POINT: "; points have p - q and mean(p, q), a direction is vector([x, y, z])",
 }
 
 
@@ -373,56 +322,56 @@ def power(base: Term, exponent: Term) -> Term:
 def _angular(pick: Callable[[Number, Number], Number]) -> list[Overload]:
     """Return the meanings of a function of an angle, from its sine and cosine; exact at quarter turns in degrees."""
     return [
-        Overload("degrees", _always(PLAIN_NUMBER), lambda value, xp: (pick(*floats.half_sincos_deg(2.0 * value, xp)),),
-            as_written=True),
-        Overload("angle", _always(PLAIN_NUMBER), lambda value, xp: (pick(*floats.half_sincos(2.0 * value, xp)),)),
-    ]  # fmt: skip
+        Overload("degrees -> plain", lambda value, xp: (pick(*floats.half_sincos_deg(2.0 * value, xp)),)),
+        Overload("angle -> plain", lambda value, xp: (pick(*floats.half_sincos(2.0 * value, xp)),)),
+    ]
 
 
 # function -> what it takes, its meanings
 FUNCTIONS: dict[str, tuple[str, Sequence[Overload]]] = {
-    "inv": ("a pose", [INVERSE]),
-    "trans": ("a pose", [Overload(POSE, _kind(POINT), lambda *pose: pose[:3])]),
-    "rot": ("a pose", [Overload(POSE, _unchanged, lambda *pose: (*(0.0 * part for part in pose[:3]), *pose[3:7]))]),
-    "rpy": ("a pose", [Overload(POSE, _kind(ANGLES), _roll_pitch_yaw)]),
-    "log": ("a pose", [Overload(POSE, _kind(TWIST), _of_unit(rigid.log))]),
-    "exp": ("six numbers [vx, vy, vz, wx, wy, wz]", [Overload(TWIST, _kind(POSE), rigid.exp, check=_no_twist)]),
+    "inv": ("a pose", [Overload("pose.ab -> pose.ba", plain(rigid.inverse))]),
+    "trans": ("a pose", [Overload("pose.ab -> point.a", lambda *pose: pose[:3])]),
+    "rot": ("a pose", [
+        Overload("pose.ab -> pose.ab", lambda *pose: (*(0.0 * part for part in pose[:3]), *pose[3:7]))]),
+    "rpy": ("a pose", [Overload("pose.ab -> angles.a", _roll_pitch_yaw)]),
+    "log": ("a pose", [Overload("pose.ab -> twist.a", _of_unit(rigid.log))]),
+    "exp": ("six numbers [vx, vy, vz, wx, wy, wz]", [Overload("twist.a -> pose.a", rigid.exp, _no_twist)]),
     "dist": ("two poses or two points", [
-        Overload("pose pose", _always(LENGTH), lambda *both: rigid.distance(*both)[:1], _seen_from_one_frame),
-        Overload("point point", _always(LENGTH), lambda ax, ay, az, bx, by, bz, xp: (
-            quaternion.magnitude(bx - ax, by - ay, bz - az, xp),), _in_one_frame),
+        Overload("pose.ab pose.ac -> length", lambda *both: rigid.distance(*both)[:1]),
+        Overload("point.a point.a -> length", lambda ax, ay, az, bx, by, bz, xp: (
+            quaternion.magnitude(bx - ax, by - ay, bz - az, xp),)),
     ]),
     "angle": ("a pose, two poses or two vectors", [
-        Overload(POSE, _always(ANGLE), _of_unit(lambda *pose: rigid.extent(*pose)[1:])),
-        Overload("pose pose", _always(ANGLE), _angle_between_poses, _seen_from_one_frame),
-        Overload("placed placed", _always(ANGLE), _angle_between_vectors, _in_one_frame, _no_direction),
+        Overload("pose.ab -> angle", _of_unit(lambda *pose: rigid.extent(*pose)[1:])),
+        Overload("pose.ab pose.ac -> angle", _angle_between_poses),
+        Overload("placed.a placed.a -> angle", _angle_between_vectors, _no_direction),
     ]),
     "interp": ("two poses, points or vectors and a fraction", [
-        Overload("pose pose plain", _unchanged, rigid.interpolate, _of_the_same_frames),
-        Overload("point point plain", _unchanged, _line, _in_one_frame),
-        Overload("vector vector plain", _unchanged, _line, _in_one_frame),
+        Overload("pose.ab pose.ab plain -> pose.ab", rigid.interpolate),
+        Overload("point.a point.a plain -> point.a", _line),
+        Overload("vector.a vector.a plain -> vector.a", _line),
     ]),
     "mean": ("poses, points, vectors or numbers of one unit, or a list", [
-        Overload(POSE, _unchanged, _mean_pose, _of_the_same_frames, many=True),
-        Overload(POINT, _unchanged, _mean_parts(3), _in_one_frame, many=True),
-        Overload(VECTOR, _unchanged, _mean_parts(3), _in_one_frame, many=True),
-        Overload("measure", _unchanged, _mean_parts(1), _of_one_unit, many=True),
+        Overload("pose.ab .. -> pose.ab", _mean_pose),
+        Overload("point.a .. -> point.a", _mean_parts(3)),
+        Overload("vector.a .. -> vector.a", _mean_parts(3)),
+        Overload("number.u .. -> number.u", _mean_parts(1)),
     ]),
-    "vector": ("[x, y, z]", [Overload("placed", _kind(VECTOR), lambda *vector: vector[:3])]),
-    "norm": ("a vector", [Overload("placed", _always(LENGTH), lambda *vector: (quaternion.magnitude(*vector),))]),
-    "dot": ("two vectors", [Overload("placed placed", _always(PLAIN_NUMBER), plain(
-        lambda ax, ay, az, bx, by, bz: (ax * bx + ay * by + az * bz,)), _in_one_frame)]),
-    "cross": ("two vectors", [Overload("placed placed", _kind(VECTOR), plain(quaternion.cross), _in_one_frame)]),
+    "vector": ("[x, y, z]", [Overload("placed.a -> vector.a", _SAME)]),
+    "norm": ("a vector", [Overload("placed.a -> length", lambda *vector: (quaternion.magnitude(*vector),))]),
+    "dot": ("two vectors", [
+        Overload("placed.a placed.a -> plain", plain(
+            lambda ax, ay, az, bx, by, bz: (ax * bx + ay * by + az * bz,)))]),
+    "cross": ("two vectors", [Overload("placed.a placed.a -> vector.a", plain(quaternion.cross))]),
     "sin": ("an angle", _angular(lambda sine, _: sine)),
     "cos": ("an angle", _angular(lambda _, cosine: cosine)),
     "tan": ("an angle", _angular(lambda sine, cosine: sine / cosine)),
-    "asin": ("a plain number", [
-        Overload("plain", _always(ANGLE), _arcsine, check=_within("asin", -1.0, 1.0, "-1 .. 1"))]),
-    "acos": ("a plain number", [
-        Overload("plain", _always(ANGLE), _arccosine, check=_within("acos", -1.0, 1.0, "-1 .. 1"))]),
-    "atan": ("a plain number", [Overload("plain", _always(ANGLE), _arctangent)]),
-    "sqrt": ("a plain number", [Overload("plain", _unchanged, lambda value, xp: (xp.sqrt(value),), check=_within(
-        "sqrt", 0.0, inf, "what is not negative"))]),
+    "asin": ("a plain number", [Overload("plain -> angle", _arcsine, _within("asin", -1.0, 1.0, "-1 .. 1"))]),
+    "acos": ("a plain number", [Overload("plain -> angle", _arccosine, _within("acos", -1.0, 1.0, "-1 .. 1"))]),
+    "atan": ("a plain number", [Overload("plain -> angle", _arctangent)]),
+    "sqrt": ("a plain number", [
+        Overload("plain -> plain", lambda value, xp: (xp.sqrt(value),), _within(
+            "sqrt", 0.0, inf, "what is not negative"))]),
 }  # fmt: skip
 
 
@@ -459,15 +408,3 @@ def in_frame(term: Term, frame: str) -> Term:
         moved = f"({frame_text(frame)}<-{frame_text(type_.target)}) * .."
         raise CalcError(f"this is in {shown(type_.target)} already; to move it: {moved}")
     return term._replace(type=type_._replace(target=frame))
-
-
-def list_of_numbers(items: Sequence[Term]) -> Term:
-    """Return the point of three numbers, or the twist of six."""
-    if len(items) not in (3, 6):
-        numbers = "1 number" if len(items) == 1 else f"{len(items)} numbers"
-        raise CalcError(f"a list of {numbers}; a point has 3, a twist 6; rotations need a name: {{rpy_deg: [..]}}")
-    for term, unit in zip(items, [METRE] * 3 + [RADIAN] * 3, strict=False):
-        if term.type.unit not in (PLAIN, unit):
-            what = "a point is in metres" if len(items) == 3 else "a twist is three lengths, then three angles"
-            raise CalcError(f"{what}, found {term.type.named}")
-    return made(Type(POINT if len(items) == 3 else TWIST), plain(lambda *parts: parts), *map(in_radians, items))

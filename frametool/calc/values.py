@@ -5,7 +5,7 @@ An unknown frame is None, shown as `?`, and matches any.  Numbers are components
 
 from __future__ import annotations
 
-from math import isfinite
+from math import inf, isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.calc.parser import PLAIN, CalcError, frame_text
@@ -123,9 +123,9 @@ def _of_floats(kernel: Kernel, numbers: Components, check: Check | None) -> Comp
     except ValueInvalid as error:
         raise CalcError(str(error)) from None
     except (ZeroDivisionError, OverflowError, ValueError):
-        raise CalcError("the result is not finite") from None
+        result = (inf,)
     if not all(map(isfinite, result)):
-        raise CalcError("the result is not finite: the numbers are too large")
+        raise CalcError("the result is not finite")
     return result
 
 

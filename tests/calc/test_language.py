@@ -139,19 +139,19 @@ frametool: base_link<-tool * map<-tool: 'tool' and 'map' do not touch
 frametool: lidar<-imu_link * tool<-base_link: 'imu_link' and 'tool' do not touch
   (lidar<-imu_link) * (tool<-base_link)
                     ^
-frametool: mean() needs two poses of the same frames, found map<-base_link and map<-tool
+frametool: mean(map<-base_link, map<-tool): 'base_link' and 'tool' must be one frame
   mean(map<-base_link, map<-tool)
   ^
-frametool: dist() compares two poses in one frame, found map<-tool and tool<-base_link
+frametool: dist(map<-tool, tool<-base_link): 'map' and 'tool' must be one frame
   dist(map<-tool, tool<-base_link)
   ^
-frametool: dist() compares two poses in one frame, found map<-tool and base_link<-lidar
+frametool: dist(map<-tool, base_link<-lidar): 'map' and 'base_link' must be one frame
   dist(map<-tool, base_link<-lidar)
   ^
-frametool: map<-lidar takes points in 'lidar', found one in 'camera_optical'
+frametool: map<-lidar * a point in 'camera_optical': 'lidar' and 'camera_optical' do not touch
   (map<-lidar) * ([1, 2, 3] in camera_optical)
                ^
-frametool: map<-lidar takes points in 'lidar', found one in 'map'
+frametool: map<-lidar * a point in 'map': 'lidar' and 'map' do not touch
   (map<-lidar) * trans(map<-tool)
                ^
 frametool: cannot multiply a point by the pose map<-lidar; poses have a * b, inv(a), inv(a) * b, a ^ 0.5 and a * point
@@ -169,7 +169,7 @@ frametool: cannot negate the pose map<-tool; poses have a * b, inv(a), inv(a) * 
 frametool: unknown name 'map'; a frame is asked for as TARGET<-SOURCE
   map
   ^
-frametool: a list of 4 numbers; a point has 3, a twist 6; rotations need a name: {rpy_deg: [..]}
+frametool: cannot make a point (3 lengths) or a twist (3 lengths, 3 angles) of these; rotations say {rpy_deg: [..]}
   [0, 0, 0, 1]
   ^
 frametool: cannot add a number in m and a number in rad
@@ -196,7 +196,7 @@ frametool: unexpected '('
 frametool: d is a tree; ask it: d[TARGET<-SOURCE]
   d * 2
   ^
-frametool: interp() needs two poses of the same frames, found map<-tool and map<-lidar
+frametool: interp(map<-tool, map<-lidar, a number): 'tool' and 'lidar' must be one frame
   interp(map<-tool, map<-lidar, 0.5)
   ^
 frametool: this is map<-tool already
@@ -232,7 +232,7 @@ frametool: something is missing here
 frametool: sin() takes an angle, found a number in m
   sin(1m)
   ^
-frametool: the sum of two points depends on the origin; subtract them, or use mean(..)
+frametool: cannot add a point in 'map' and a point in 'map'; points have p - q and mean(p, q), a direction is vector([x, y, z])
   trans(map<-tool) + trans(map<-lidar)
                    ^
 frametool: cannot multiply a number in m by a number in m

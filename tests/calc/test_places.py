@@ -37,7 +37,7 @@ def test_with_a_rotation_and_axes_it_is_a_pose() -> None:
 @pytest.mark.parametrize(
     ("expression", "message"),
     [
-        (f"(mast<-map) * {ABOVE}", "mast<-map takes points in 'map', found one in 'ecef'"),
+        (f"(mast<-map) * {ABOVE}", "mast<-map * a point in 'ecef': 'map' and 'ecef' do not touch"),
         ("{lat: 48.1, lon: 11.5, alt: 0, rpy: [0, 0, 1]}", "a pose at lat, lon does not state the axes of its rotation"),
         ("{frame: map, lat: 48.1, lon: 11.5, alt: 0}", "lat places a frame in ecef; frame is 'map'"),
         ("{lat: 95, lon: 11.5, alt: 0}", "lat 95.0 is beyond 90 degrees; are lat and lon swapped?"),
@@ -58,7 +58,7 @@ def test_rows_of_places_are_points_of_ecef(run: Callable[..., Any]) -> None:
     assert rows == [pytest.approx([1, 0, 0, 1], abs=5e-9), pytest.approx([2, 0, 0, 3], abs=5e-9)]
     wrong = run("calc", "--tree", "t.yaml", "(mast<-map) * row", "-i", "gps.csv", files=FILES)
     assert (wrong.status, wrong.out) == (1, "")
-    assert "mast<-map takes points in 'map', found one in 'ecef'" in wrong.err
+    assert "mast<-map * a point in 'ecef': 'map' and 'ecef' do not touch" in wrong.err
     beside = run("calc", "-e", f"d=dist(row, {ABOVE})", "-i", "gps.csv", files=FILES)
     assert [float(line.rpartition(",")[2]) for line in beside.out.splitlines()[1:]] == pytest.approx([0, 2], abs=5e-9)
 

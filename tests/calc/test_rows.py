@@ -125,7 +125,7 @@ def test_a_row_in_another_frame_is_a_bad_row(run: Callable[..., Any]) -> None:
     done = run("calc", "--tree", ROBOT, "(map<-lidar) * row", "--on-error", "skip", stdin=rows)
     assert done.status == 3
     assert [line.split(",")[0] for line in done.out.splitlines()] == ["frame", "map", "map"]
-    assert "stdin:3:frame: map<-lidar takes points in 'lidar', found one in 'imu_link'" in done.err
+    assert "stdin:3:frame: map<-lidar * a point in 'imu_link': 'lidar' and 'imu_link' do not touch" in done.err
     empty = run("calc", "--tree", ROBOT, "(map<-lidar) * row", "--on-error", "null", stdin=rows)
     assert empty.out.splitlines()[2] == "imu_link,,,"
 
