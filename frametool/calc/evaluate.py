@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.calc import functions
 from frametool.calc.functions import FUNCTIONS
-from frametool.calc.parser import PLAIN, RESERVED, UNITS, CalcError, NoTree, column_name, frame_text, parse_line
+from frametool.calc.parser import PLAIN, RESERVED, UNITS, CalcError, NoTree, frame_text, parse_line
 from frametool.calc.values import LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TWIST, VECTOR, Term, Type, wanted
 from frametool.documents.document import parse_documents
 from frametool.documents.source import Source, error_at
@@ -221,8 +221,7 @@ class _Walk:
 
     def _column(self, branch: Branch) -> Term:
         self._row("row")
-        name = column_name(branch.value)
-        return Term(PLAIN_NUMBER, None, lambda row: (row.cells[name],))
+        return Term(PLAIN_NUMBER, None, lambda row: (row.cells[branch.value],))
 
     def _pose(self, branch: Branch) -> Term:
         reading = self.scope.reading(Source(NAME, branch.value))

@@ -181,29 +181,19 @@ def walk(tree: Branch) -> Iterator[Branch]:
         waiting += branch.parts
 
 
-def columns_of(tree: Branch) -> list[str]:
-    """Return the columns that an expression uses, each once."""
-    return list(dict.fromkeys(column_name(branch.value) for branch in walk(tree) if branch.kind == "column"))
+def needs_time(branch: Branch) -> bool:
+    """Return True for a look-up at the time of the row."""
+    return branch.kind == "lookup" and branch.value[2] == "row"
 
 
-def column_name(text: str) -> str:
-    """Return the column of `row.COLUMN`."""
-    return text.partition(".")[2].strip().strip('"')
-
-
-def needs_time(tree: Branch) -> bool:
-    """Return True if an expression looks up at the time of the row."""
-    return any(branch.kind == "lookup" and branch.value[2] == "row" for branch in walk(tree))
-
-
-def reads_row(tree: Branch) -> bool:
-    """Return True if an expression uses the row's own pose, point or vector."""
-    return any(branch.kind == "name" and branch.value == "row" for branch in walk(tree))
+def reads_row(branch: Branch) -> bool:
+    """Return True for the row's own pose, point or vector."""
+    return branch.kind == "name" and branch.value == "row"
 
 
 def mentions_row(tree: Branch) -> bool:
     """Return True if an expression needs rows: `row`, `row.COLUMN`, `@ row`."""
-    return reads_row(tree) or bool(columns_of(tree)) or needs_time(tree)
+    return any(each.kind == "column" or reads_row(each) or needs_time(each) for each in walk(tree))
 
 
 class _Parser:
@@ -327,7 +317,9 @@ class _Parser:
             return Branch("call", start, start, end, text, parts)
         if kind == "name" and self.has("["):
             return self._asked(token)
-        if kind in ("column", "pose") or (kind == "name" and text not in ("as", "in")):
+        if kind == "column":
+            return Branch(kind, start, start, end, text.partition(".")[2].strip().strip('"'))
+        if kind == "pose" or (kind == "name" and text not in ("as", "in")):
             return Branch(kind, start, start, end, text)
         if kind == "end":
             raise CalcError("something is missing here", start)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.calc.evaluate import AXES, PLACED, evaluate_line, literal, once_a_block, term_of_pose
 from frametool.calc.functions import in_radians
-from frametool.calc.parser import RADIAN, CalcError, columns_of, needs_time, reads_row
+from frametool.calc.parser import RADIAN, CalcError, needs_time, reads_row, walk
 from frametool.calc.values import ANGLES, LIST, NUMBER, POINT, POSE, TREE, VECTOR, RowValues, Term, Type
 from frametool.documents.source import opened
 from frametool.errors import FormatError, FrametoolError
@@ -69,10 +69,9 @@ class RowExpressions(Formula):
         written = tuple((fmt, style.in_degrees(fmt)) for fmt in forms)
         self.target = Target(None if whole else 1.0, written, style.keep_sign, whole)
         self.adds = all(line.name for line in lines)
-        trees = [line.tree for line in (*bindings, *lines)]
-        self.columns = tuple(dict.fromkeys(name for tree in trees for name in columns_of(tree)))
-        self.needs_time = any(map(needs_time, trees))
-        self.reads_row = any(map(reads_row, trees))
+        parts = [branch for line in (*bindings, *lines) for branch in walk(line.tree)]
+        self.columns = tuple(dict.fromkeys(each.value for each in parts if each.kind == "column"))
+        self.needs_time, self.reads_row = any(map(needs_time, parts)), any(map(reads_row, parts))
         self._bound: dict[Type, Bound] = {}
 
     def check(self, kinds: Sequence[str]) -> None:
