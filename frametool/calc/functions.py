@@ -198,7 +198,7 @@ def _power(base: Number, exponent: Number, xp: Namespace) -> Components:
 
 
 def _scalar_power(base: float, exponent: float) -> float:
-    """Return a power; nan or infinite if there is none."""
+    """Return a power; nan if it is not real, infinite if it is too large."""
     try:
         result = base**exponent
     except (OverflowError, ZeroDivisionError):
