@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from importlib import import_module
 from pathlib import Path
 
 import click
 
 from frametool import __version__
 from frametool.cli.command import EXIT_CODES, option_groups, option_row
-from frametool.cli.commands import COMMANDS
+from frametool.cli.commands import COMMANDS, group
 from frametool.cli.commands.help import topic, topics
 
 FOLDER = Path(__file__).resolve().parent.parent / "frametool" / "data" / "share" / "man" / "man1"
@@ -19,8 +18,8 @@ FOLDER = Path(__file__).resolve().parent.parent / "frametool" / "data" / "share"
 def pages() -> dict[str, str]:
     """Return the text of each page by the name of its file."""
     made = {"frametool.1": _overview()}
-    for name, (module, about) in COMMANDS.items():
-        command: click.Command = import_module(module).command
+    for name, (_, about) in COMMANDS.items():
+        command = group.get_command(click.Context(group), name)
         made[f"frametool-{name}.1"] = _of_command(name, about, command)
     return made
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import sys
 from contextlib import contextmanager, suppress
-from functools import reduce
+from functools import cache, partial, reduce
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -341,7 +341,13 @@ def option(spec: str, about: str, kind: Any = None, name: str = "", **more: Any)
         more["is_flag"] = True
     shows = "[default" not in about and more.get("default") not in (None, (), "")
     names += [name] * bool(name)
-    return click.option(*names, cls=Option, help=about, metavar=taken or None, show_default=shows, **more)
+    made = cache(partial(Option, names, help=about, metavar=taken or None, show_default=shows, **more))
+
+    def add(function: Any) -> Any:
+        vars(function).setdefault("__click_params__", []).append(made())  # one object for all that share it
+        return function
+
+    return add
 
 
 def argument(name: str, kind: Any = TEXT, metavar: str | None = None, **more: Any) -> Adds:
@@ -369,7 +375,7 @@ class WithHelp(click.Command):
         """Add --help-all, which click does not know; of options with one name the first counts, as a command's own."""
         super().__init__(*args, **kwargs)
         names = {name: each for each in reversed(self.params) for name in each.opts}
-        self.params = [*(each for each in self.params if names[each.opts[-1]] is each), HELP_ALL]
+        self.params = [*dict.fromkeys(names[each.opts[-1]] for each in self.params), HELP_ALL]
         self.own = own
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

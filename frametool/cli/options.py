@@ -13,21 +13,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import Inputs, Text, inputs, misuse, option, refuse, say_if_typed, together
-from frametool.cli.sink import say_error
-from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
+from frametool.errors import FormatError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
 from frametool.geometry.euler import AXES
 from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, WORLDS, notations
-from frametool.stream.faults import RowsSkipped
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
     from frametool.cli.command import Adds
     from frametool.formats.load import Rules
     from frametool.geometry.representations import Notation
-    from frametool.grammar.result import Result
 
 STREAMED = ("records", "rows", "arrays")
 READ = readers("tree", "records", "rows", "arrays", "joints", "drawing")
@@ -311,39 +308,6 @@ def pose_result_options(*what: str) -> Adds:
 # --- times ---------------------------------------------------------------------------------------------------------
 
 LATEST = "latest"
-MOST_REPORTED = 10  # times without a result
-
-
-class Skipped:
-    """Times that are left out: the first are reported, all are counted."""
-
-    def __init__(self, *, in_json: bool) -> None:
-        """Create an empty count; `in_json` says how errors are written."""
-        self.in_json, self.count, self.found = in_json, 0, 0
-        self.errors: list[FrametoolError] = []
-
-    def add(self, error: FrametoolError | None, count: int = 1) -> None:
-        """Count one time, or several in a row; keep why they are left out if that will be reported."""
-        self.count += count
-        if error is not None and len(self.errors) < MOST_REPORTED:
-            self.errors.append(error)
-
-    def counted(self, results: Iterator[Result]) -> Iterator[Result]:
-        """Yield results and count them."""
-        for result in results:
-            self.found += 1
-            yield result
-
-    def finish(self) -> int:
-        """Report what was left out; return the exit status."""
-        if not self.count:
-            return 0
-        for error in self.errors:
-            say_error(error, in_json=self.in_json, fate="skipped")
-        asked = self.found + self.count
-        total = RowsSkipped(f"{self.count} of {asked} times skipped", bad=self.count, rows=asked)
-        say_error(total, in_json=self.in_json)
-        return total.exit_code
 
 
 def read_limit(text: str) -> int:

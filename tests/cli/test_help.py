@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +14,7 @@ import pytest
 from in_process import run_line
 
 from frametool.cli.command import EXIT_CODES, HEADINGS
-from frametool.cli.commands import COMMANDS, examples
+from frametool.cli.commands import COMMANDS, examples, group
 from frametool.cli.commands.help import questions, topic, topics
 from frametool.cli.commands.sim import SUBCOMMANDS
 from frametool.errors import FileProblem
@@ -223,8 +222,8 @@ def test_the_help_of_a_command_has_at_most_45_lines_of_80_and_no_group_that_is_e
 
 
 def options_of(words: tuple[str, ...]) -> list[click.Option]:
-    command = import_module(COMMANDS[words[0]][0]).command
-    command = command.commands[words[1]] if words[1:] else command
+    command = group.get_command(click.Context(group), words[0])
+    command = command.commands[words[1]] if isinstance(command, click.Group) and words[1:] else command
     return [each for each in command.get_params(click.Context(command)) if isinstance(each, click.Option) and not each.hidden]
 
 

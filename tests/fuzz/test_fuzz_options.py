@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +9,7 @@ import click
 import pytest
 from oracles_of_use import HOSTILE, TooMuch, cases, some
 
-from frametool.cli.commands import COMMANDS
+from frametool.cli.commands import COMMANDS, group
 from frametool.cli.commands.sim import SUBCOMMANDS
 
 if TYPE_CHECKING:
@@ -33,7 +32,7 @@ ROWS = b"stamp,frame,x,y,z,qx,qy,qz,qw\n1,lidar,1,2,3,0,0,0,1\n2,map,1,2,3,0,0,0
 def command_of(name: str) -> click.Command:
     """Import a command by its name; `sim follow` is one of two words."""
     first, _, second = name.partition(" ")
-    found: click.Command = import_module(COMMANDS[first][0]).command
+    found: click.Command = group.get_command(click.Context(group), first)
     return found.commands[second] if isinstance(found, click.Group) else found
 
 

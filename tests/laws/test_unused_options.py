@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 import click
 import pytest
 from console import ROOT
 
-from frametool.cli.commands import COMMANDS
+from frametool.cli.commands import COMMANDS, group
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -105,7 +104,7 @@ def test_each_option_has_an_effect_or_is_refused(run: Run, command: tuple[str, .
     plain = run(*command, files=files, stdin=stdin)
     assert plain.status == 0, plain.err
     ignored = set()
-    for option in import_module(COMMANDS[command[0]][0]).command.params:
+    for option in command_named(command[0]).params:
         if not isinstance(option, click.Option) or option.name in FREE or {*option.opts} & {*command}:
             continue
         first = [each for each in getattr(option.type, "choices", ()) if each != option.default][:1]
@@ -125,15 +124,17 @@ def test_what_is_asked_of_inputs_is_a_parameter_of_a_command() -> None:
     assert {name for name in asked if not name.startswith("_")} - known - methods == set()
 
 
+def command_named(name: str) -> click.Command:
+    return group.get_command(click.Context(group), name)
+
+
 def every_command() -> Iterator[click.Command]:
-    for module, _ in COMMANDS.values():
-        command: click.Command = import_module(module).command
+    for command in map(command_named, COMMANDS):
         yield from getattr(command, "commands", {"": command}).values()
 
 
 def commands() -> Iterator[tuple[str, click.Option]]:
-    for name, (module, _) in COMMANDS.items():
-        command: click.Command = import_module(module).command
+    for name, command in zip(COMMANDS, map(command_named, COMMANDS), strict=True):
         for option in command.params:
             if isinstance(option, click.Option) and not (option.multiple or option.is_flag):
                 yield name, option

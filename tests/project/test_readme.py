@@ -5,15 +5,15 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from importlib import import_module
 from typing import TYPE_CHECKING
 
+import click
 import console
 import make_picture
 import pytest
 from in_process import printed, run_line, understands
 
-from frametool.cli.commands import COMMANDS
+from frametool.cli.commands import COMMANDS, group
 from frametool.geometry.representations import REPRESENTATIONS
 
 if TYPE_CHECKING:
@@ -26,8 +26,8 @@ QUESTIONS, ANSWERS = ([pair for block in console.BLOCK.findall(text) for pair in
 EXAMPLES = QUESTIONS + ANSWERS
 HELPS = [
     (name, each.help)
-    for name, (module, _) in COMMANDS.items()
-    for command in [import_module(module).command]
+    for name in COMMANDS
+    for command in [group.get_command(click.Context(group), name)]
     for each in (command, *getattr(command, "commands", {}).values())
 ]
 HELP_EXAMPLES = [

@@ -19,7 +19,7 @@ import console
 import pytest
 import yaml
 
-from frametool.cli.commands.sim import SUBCOMMANDS, command
+from frametool.cli.commands.sim import SUBCOMMANDS, sim_command
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,7 +34,7 @@ TOOL = [sys.executable, "-c", "from frametool.cli import main; main()"]
 SCENE = "turtles:\n  turtle1: {leader: square}\n  turtle2: {spawn: [4, 2], follow: turtle1}\nduration: 1\n"
 HELP_EXAMPLES = [
     line.strip()
-    for each in command.commands.values()
+    for each in sim_command.commands.values()
     for line in (each.help or "").splitlines()
     if line.strip().startswith("frametool ") and "teleop" not in line
 ]

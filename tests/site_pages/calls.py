@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from importlib import import_module
 from typing import NamedTuple
 
 import click
 
-from frametool.cli.commands import COMMANDS, Group
+from frametool.cli.commands import COMMANDS, Group, group
 
 
 @cache
 def commands() -> dict[str, tuple[click.Command, str]]:
     """Return all commands and subcommands by name, each with what it is about in a line."""
     found: dict[str, tuple[click.Command, str]] = {}
-    for name, (module, about) in COMMANDS.items():
-        command: click.Command = import_module(module).command
+    for name, (_, about) in COMMANDS.items():
+        command = group.get_command(click.Context(group), name)
         found[name] = (command, about)
         if isinstance(command, Group):
             context = click.Context(command)

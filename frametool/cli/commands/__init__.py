@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 # name -> (module, what it does); help, completion and the README's check are derived from this table
 COMMANDS = {
     "convert": ("frametool.cli.commands.convert", "one rotation or pose in other representations"),
-    "compose": ("frametool.cli.commands.compose", "product of poses, left to right: a_from_b, b_from_c -> a_from_c"),
-    "invert": ("frametool.cli.commands.invert", "the inverse of a pose: a_from_b -> b_from_a"),
-    "relative": ("frametool.cli.commands.relative", "the pose of B seen from A, with distance and angle"),
+    "compose": ("frametool.cli.commands.algebra", "product of poses, left to right: a_from_b, b_from_c -> a_from_c"),
+    "invert": ("frametool.cli.commands.algebra", "the inverse of a pose: a_from_b -> b_from_a"),
+    "relative": ("frametool.cli.commands.algebra", "the pose of B seen from A, with distance and angle"),
     "mean": ("frametool.cli.commands.mean", "the mean of poses or rows, and how far they lie from it"),
     "between": ("frametool.cli.commands.between", "the shortest rotation from one direction to another"),
-    "interpolate": ("frametool.cli.commands.interpolate", "poses between A and B at fractions of the way"),
+    "interpolate": ("frametool.cli.commands.algebra", "poses between A and B at fractions of the way"),
     "calc": ("frametool.cli.commands.calc", "expressions over poses whose frames are checked like units"),
     "lookup": ("frametool.cli.commands.lookup", "where SOURCE is seen from TARGET in a tree of frames"),
     "tree": ("frametool.cli.commands.tree", "the frames of a tree, drawn or written in another format"),
@@ -43,12 +43,12 @@ COMMANDS = {
     "solve": ("frametool.cli.commands.solve", "transforms estimated from measurements: trees, cameras, matched points"),
     "apply": ("frametool.cli.commands.apply", "points, vectors and poses moved into another frame"),
     "project": ("frametool.cli.commands.project", "points into the picture of a camera: pixels, depths, overlays"),
-    "unproject": ("frametool.cli.commands.unproject", "pixels of a camera as rays, or as points in TARGET"),
+    "unproject": ("frametool.cli.commands.project", "pixels of a camera as rays, or as points in TARGET"),
     "batch": ("frametool.cli.commands.batch", "many commands, one a line, in one process"),
     "compare": ("frametool.cli.commands.compare", "how far trajectories are from a reference"),
-    "align": ("frametool.cli.commands.align", "the transform that brings a trajectory onto its reference"),
-    "resample": ("frametool.cli.commands.resample", "a trajectory at other times"),
-    "echo": ("frametool.cli.commands.echo", "where SOURCE is seen from TARGET as a recording plays"),
+    "align": ("frametool.cli.commands.compare", "the transform that brings a trajectory onto its reference"),
+    "resample": ("frametool.cli.commands.compare", "a trajectory at other times"),
+    "echo": ("frametool.cli.commands.lookup", "where SOURCE is seen from TARGET as a recording plays"),
     "record": ("frametool.cli.commands.record", "a recording with other edges, frames of poses or time span"),
     "monitor": ("frametool.cli.commands.monitor", "rate, interval, gaps and jumps of each edge of a recording"),
     "formats": ("frametool.cli.commands.formats", "the file formats that are read and written, and what they mean"),
@@ -102,7 +102,7 @@ class Group(WithHelp, click.Group):
             rest = f"`{ctx.command_path} --help` lists all, `frametool help WORD` searches"
             hint = f"; a file follows a command: frametool tree {cmd_name}" * os.path.isfile(cmd_name)
             raise click.UsageError(f"no command {shown(cmd_name)}{hint or any_near(cmd_name, self.table, rest)}", ctx)
-        found: click.Command = import_module(self.table[cmd_name][0]).command
+        found: click.Command = getattr(import_module(self.table[cmd_name][0]), f"{cmd_name}_command")
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002

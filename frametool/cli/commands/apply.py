@@ -206,7 +206,7 @@ moving_row_options = together(
 @frame_column_option
 @moving_row_options
 @options.reading_options
-def command(inputs: Inputs) -> int:
+def apply_command(inputs: Inputs) -> int:
     """Move points, vectors and poses from SOURCE into TARGET.
 
     \b

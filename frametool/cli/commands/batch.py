@@ -199,7 +199,7 @@ class _NoInput(TextIOBase):
 @command_named("batch", epilog=EXIT_CODES)
 @argument("file", FILE, default="-", metavar="[FILE]")
 @option("--on-error", "stop at a line that fails, or report and skip it", (STOP, SKIP), name="on_failure", default=STOP)
-def command(inputs: Inputs) -> int:
+def batch_command(inputs: Inputs) -> int:
     """Run the commands of FILE, or of standard input, in one process: one per line, as typed after frametool.
 
     \b

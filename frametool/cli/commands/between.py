@@ -23,7 +23,7 @@ OPPOSITE = 1e-8  # radians from half a turn at which no digit of the axis is lef
 @argument("vectors", nargs=-1, required=True, metavar="V1 V2")
 @rotation_options
 @result_options("poses")
-def command(inputs: Inputs) -> None:
+def between_command(inputs: Inputs) -> None:
     """Print the shortest rotation that turns the direction V1 into the direction V2, and its angle.
 
     \b

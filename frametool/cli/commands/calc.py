@@ -261,7 +261,7 @@ def _begins_with_minus(argument: str) -> bool:
 @stream_options
 @pose_result_options("points")
 @reading_options
-def command(inputs: Inputs) -> int:
+def calc_command(inputs: Inputs) -> int:
     """Calculate with poses whose frames are checked like units.
 
     \b

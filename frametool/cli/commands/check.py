@@ -51,7 +51,7 @@ class CheckCommand(Command):
         kind=partial(parse_tolerance, otherwise=Tolerance(0.01, radians(1.0))))  # fmt: skip
 @option("--each", "check each file separately; one without frames is a warning")
 @file_options
-def command(inputs: Inputs) -> int:
+def check_command(inputs: Inputs) -> int:
     """Look for mistakes in FILES, trees and recordings, read as one tree.
 
     \b

@@ -1,4 +1,4 @@
-"""`frametool compare`: how far trajectories are from a reference; and what `align` and `resample` share with it."""
+"""Trajectories: `compare` with a reference, `align` with it, `resample` at other times."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ from frametool.cli.command import Inputs, argument, command_named, option, refus
 from frametool.cli.output import Output
 from frametool.cli.sink import refuse_existing, say, say_error, writing
 from frametool.cli.trees import answers, load_tree
-from frametool.errors import FrametoolError, ValueInvalid, shown, warn
+from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, shown, warn
+from frametool.formats.table import by_name, writers
+from frametool.frames.path import seconds
 from frametool.frames.stamps import parse_stamp, parse_time
+from frametool.grammar.edges import stop
 from frametool.stream.faults import ROWS_SKIPPED, STOP, BadRows
 from frametool.text.numbers import parse_lengths, parse_share
 
@@ -107,7 +110,7 @@ EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 5 file; -
 @option("--report FILE.html|svg", "also write a report in one file; with -o instead", options.file_with(*REPORTS))
 @trajectory_options
 @options.list_options("markdown", "latex")
-def command(inputs: Inputs) -> int:
+def compare_command(inputs: Inputs) -> int:
     """Compare trajectories with a reference: absolute and relative errors.
 
     \b
@@ -180,6 +183,113 @@ def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], ro
         output.text(write_comparison(every[0]))
     else:
         output.report(every)
+
+
+@command_named("align")
+@argument("ref")
+@argument("est")
+@pairing_options
+@option("--names REF,EST", "names of the two worlds  [default: their own]", options.names_as("REF,EST"))
+@trajectory_options
+@options.rotation_options
+@options.result_options("poses")
+def align_command(inputs: Inputs) -> int:
+    """Print the pose of EST's world in REF's, as `compare` fits it, as a tree entry.
+
+    \b
+      frametool align truth.tum odometry.tum --offset auto --names map,odom
+      frametool align truth.tum odometry.tum --offset auto -o aligned.tum
+      frametool align truth.tum mono.tum --align sim3 --to matrix
+
+    -o FILE writes all of EST as it was compared: on REF's clock, with the mount and the fit applied, in the format of
+    its suffix or of -f. `frametool help trajectories` describes the fits. The scale of sim3 is separate from the pose:
+    p' = scale R p + t; such an entry cannot be part of a tree.
+    """
+    into = Output(inputs, "poses") if inputs.output else None
+    entry = Output(inputs.but(output=None, format_name=None) if into else inputs, "poses")
+    (found,), skipped = comparisons(inputs.ref, [inputs.est], inputs)
+    from frametool.fit.numbers import whole_estimate, worlds
+    from frametool.grammar.pose import Pose
+    from frametool.grammar.result import Result
+
+    named = inputs.names or worlds(found)
+    whole = whole_estimate(found)._replace(world=found.pairs.ref.world)
+    if into is not None or entry.is_trajectory:
+        write_trajectory(into or entry, whole)
+    if not entry.is_trajectory:
+        pose = Pose.of(found.fit.transform.components, named[1], named[0])
+        entry.values([Result(pose._replace(scale=found.fit.scale))])
+    return ROWS_SKIPPED if skipped else 0
+
+
+@command_named("resample")
+@argument("path", metavar="TRAJ")
+@option("--rate HZ", "poses per second, from the first on", options.read_rate)
+@option("--at FILE|TIMES", "at the timestamps of a file; T,T,.., START:STOP:STEP", name="times")
+@option("--every 1m|5deg", "at even steps of distance or rotation", lambda text: read_delta(text, "m", "deg"))
+@gap_option
+@trajectory_options
+@options.limit_options
+@options.rotation_options
+@options.result_options("poses")
+def resample_command(inputs: Inputs) -> int:
+    """Interpolate a trajectory at other times: positions along the line, rotations by slerp.
+
+    \b
+      frametool resample walk.tum --rate 10
+      frametool resample truth.tum --at mono.tum -o same_stamps.tum
+      frametool resample walk.tum --every 0.5m -f csv
+
+    TRAJ is a trajectory as for `compare`. There are no poses beyond its ends, nor in gaps longer than --max-gap; the
+    number of times without a pose is reported.
+    """
+    path, rate, times, every = inputs.path, inputs.rate, inputs.times, inputs.every
+    refuse(sum(each is not None for each in (rate, times, every)) != 1, "give one of --rate, --at and --every")
+    output = Output(inputs, "poses", otherwise=by_name(path, writers("poses")) or "csv")
+    (fmt,) = options.for_each(inputs.input_formats, 1)
+    found, name, skipped = trajectory(inputs, path, fmt, inputs.on_error)
+    from frametool.fit.alignment import resampled, stamps_at_rate, stamps_every
+
+    found = _in_order(found, name)
+    counted = found.stamps_ns is None
+    if counted:
+        refuse(every is None, f"{name} has no stamps; give them with --stamps FILE")
+        found = found.numbered()
+    if every:
+        stamps = stamps_every(found, every)
+    else:
+        stamps = stamps_at_rate(found, rate) if rate else _stamps(inputs, times or "")
+    if not counted and (window := options.window_of(inputs)):
+        inputs.ask("start", "stop")
+        stamps = stamps[(window[0] <= stamps) & (stamps <= window[1])]
+    made = resampled(found, stamps, inputs.max_gap_ns)
+    if lost := len(stamps) - made.size:
+        first, last = map(int, found.stamps_ns[[0, -1]])
+        in_gap = " or in a gap" * int(lost > ((stamps < first) | (stamps > last)).sum())
+        lies, are = ("lies", "is") if lost == 1 else ("lie", "are")
+        span = f"{seconds(first)} .. {seconds(last)} s of {name}{in_gap}"
+        say(f"note: {lost} of {len(stamps)} times {lies} outside {span} and {are} left out")
+    write_trajectory(output, made._replace(stamps_ns=None) if counted else made)
+    return ROWS_SKIPPED if skipped else 0
+
+
+def _stamps(inputs: Inputs, text: str) -> Any:
+    """Read the stamps of a trajectory, or a list of times."""
+    import numpy as np
+
+    try:
+        found, name, _ = trajectory(inputs, text)
+    except (FormatError, FileProblem):
+        return np.array(options.read_times(text, stop), np.int64)
+    refuse(found.stamps_ns is None, f"--at {text}: the poses there have no stamps")
+    return _in_order(found, name).stamps_ns
+
+
+def _in_order(found: Trajectory, name: str) -> Trajectory:
+    """Sort a trajectory; warn of what that changes."""
+    for hint in found.disorder(name):
+        warn(hint)
+    return found.in_order()
 
 
 def trajectory(inputs: Inputs, argument: str, fmt: str = "", on_error: str = STOP) -> tuple[Trajectory, str, bool]:

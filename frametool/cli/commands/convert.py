@@ -56,7 +56,7 @@ class ConvertCommand(Command):
 @option("--time-column NAME", "column or key of the timestamps, for the next three", options.COLUMN,
     requires=("time_offset", "start", "stop"), under="Time")  # fmt: skip
 @options.limit_options
-def command(inputs: Inputs) -> int:
+def convert_command(inputs: Inputs) -> int:
     """Write one rotation or pose in other representations.
 
     \b

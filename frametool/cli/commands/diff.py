@@ -33,7 +33,7 @@ EXIT_CODES = "Exit codes: 0 the same, 1 different, 2 trouble of any kind, with f
 @option("--all", "also list the frames that did not move", name="everything")
 @file_options
 @list_options("github")
-def command(inputs: Inputs) -> int:
+def diff_command(inputs: Inputs) -> int:
     """Compare two trees, calibrations or recordings, A and B, in any formats.
 
     \b

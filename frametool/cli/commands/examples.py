@@ -54,7 +54,7 @@ class Example(Text):
 @argument("name", Example(), required=False)
 @option("-o --output FOLDER|FILE", "copy all files into this folder, or NAME into this file", FILE, under="Result")
 @option("--force", "let --output overwrite files", requires=("output",), under="Result")
-def command(inputs: Inputs) -> None:
+def examples_command(inputs: Inputs) -> None:
     """List the example files, print one, or copy them.
 
     \b

@@ -22,7 +22,7 @@ from frametool.stream.request import Operation, Request
 @stream_options
 @reading_options
 @pose_result_options("poses")
-def command(inputs: Inputs) -> int:
+def fk_command(inputs: Inputs) -> int:
     """Add the pose of TIP in BASE to rows of joint values.
 
     \b

@@ -13,7 +13,7 @@ from frametool.view.reports import format_entry, write_format, write_formats
 @command_named("formats")
 @argument("name", FormatName(FORMATS, "known"), required=False)
 @list_options()
-def command(inputs: Inputs) -> None:
+def formats_command(inputs: Inputs) -> None:
     """List the file formats that are read and written: suffixes, meaning of the numbers, required options.
 
     \b

@@ -197,7 +197,7 @@ class Topic(Text):
 @option("-f --format", "json: options, values and exit codes of all commands or one", ("text", "json"), name="fmt",
     default="text")  # fmt: skip
 @click.pass_context
-def command(ctx: click.Context, inputs: Inputs) -> None:
+def help_command(ctx: click.Context, inputs: Inputs) -> None:
     """Explain a topic on one screen, or a command; search for any word in them and in the cookbook.
 
     \b

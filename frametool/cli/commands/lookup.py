@@ -1,30 +1,73 @@
-"""`frametool lookup`: where one frame is seen from another, and when; also for every row of a table."""
+"""Where one frame is seen from another: `lookup`, at a time, many or those of rows; `echo`, as a recording goes by."""
 
 from __future__ import annotations
 
+import sys
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool.cli import options
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, together
-from frametool.cli.output import QUATERNION
+from frametool.cli.output import QUATERNION, Output
+from frametool.cli.sink import say_error
 from frametool.cli.streaming import EXPLAIN, PoseTask, stream_options
 from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, report_granted
-from frametool.errors import NoDataAt, UnknownFrame
+from frametool.errors import FrametoolError, NoDataAt, UnknownFrame, warn
 from frametool.formats.table import holds_arrays
 from frametool.geometry.rigid import EXACT, UNCERTAIN
+from frametool.grammar import pose_algebra
 from frametool.grammar.edges import stop
+from frametool.grammar.pose import LEFT_OUT
 from frametool.grammar.pose_algebra import Lookups, looked_up_across, looked_up_many, sample_stamps, why_missing
-from frametool.stream.faults import NULL, SKIP
+from frametool.stream.faults import NULL, SKIP, RowsSkipped
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from frametool.cli.command import Adds
-    from frametool.cli.output import Output
+    from frametool.frames.lookups import Replayed
     from frametool.geometry.types import Components
+    from frametool.grammar.result import Result
 
 WITH_COVARIANCE = ("json", "yaml", "csv")
 MANY = ("times", "start", "stop")
+
+
+MOST_REPORTED = 10  # times without a result
+
+
+class Skipped:
+    """Times that are left out: the first are reported, all are counted."""
+
+    def __init__(self, *, in_json: bool) -> None:
+        """Create an empty count; `in_json` says how errors are written."""
+        self.in_json, self.count, self.found = in_json, 0, 0
+        self.errors: list[FrametoolError] = []
+
+    def add(self, error: FrametoolError | None, count: int = 1) -> None:
+        """Count one time, or several in a row; keep why they are left out if that will be reported."""
+        self.count += count
+        if error is not None and len(self.errors) < MOST_REPORTED:
+            self.errors.append(error)
+
+    def counted(self, results: Iterator[Result]) -> Iterator[Result]:
+        """Yield results and count them."""
+        for result in results:
+            self.found += 1
+            yield result
+
+    def finish(self) -> int:
+        """Report what was left out; return the exit status."""
+        if not self.count:
+            return 0
+        for error in self.errors:
+            say_error(error, in_json=self.in_json, fate="skipped")
+        asked = self.found + self.count
+        total = RowsSkipped(f"{self.count} of {asked} times skipped", bad=self.count, rows=asked)
+        say_error(total, in_json=self.in_json)
+        return total.exit_code
 
 
 def _column_option(end: str, *excludes: str) -> Adds:
@@ -50,7 +93,7 @@ def _column_option(end: str, *excludes: str) -> Adds:
 @options.pose_result_options("poses")
 @EXPLAIN
 @together(_column_option("TARGET"), _column_option("SOURCE"), _column_option("time", "at"))
-def command(inputs: Inputs) -> int:
+def lookup_command(inputs: Inputs) -> int:
     """Print the pose of SOURCE in TARGET, which maps points in SOURCE to TARGET.
 
     \b
@@ -108,7 +151,7 @@ def _check_covariance(output: Output, *, by_row: bool) -> None:
 def _many(task: PoseTask, lookups: Lookups, target: str, source: str) -> int:
     """Print the results at --times, or at those of all samples; with --on-error skip report the others."""
     inputs, tree, window = task.inputs, lookups.tree, task.window
-    times, skipped = inputs.times, options.Skipped(in_json=task.output.chosen == "json")
+    times, skipped = inputs.times, Skipped(in_json=task.output.chosen == "json")
     skip = times is not None and inputs.on_error == SKIP
     if times is not None and inputs.on_error == NULL:
         raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")
@@ -121,7 +164,7 @@ def _many(task: PoseTask, lookups: Lookups, target: str, source: str) -> int:
             raise NoDataAt(f"no sample of {target} -> {source} from --start to --stop")
 
     def miss(at_ns: int) -> None:
-        is_full = len(skipped.errors) == options.MOST_REPORTED  # to say why takes longest
+        is_full = len(skipped.errors) == MOST_REPORTED  # to say why takes longest
         skipped.add(None if is_full else why_missing(tree, target, source, at_ns))
 
     found = looked_up_many(tree, target, source, asked, miss=miss if skip else None, covariance=lookups.carried)
@@ -168,3 +211,60 @@ def _by_row(task: PoseTask, lookups: Lookups, target: str | None, source: str | 
         operation=Operation(uncertain=lookups.carried), timed=timed,
     )  # fmt: skip
     return task.run(request, tables_only=True)
+
+
+@command_named("echo")
+@argument("tree", FILE)
+@argument("target", FRAME)
+@argument("source", FRAME)
+@option("--rate HZ", "blocks per second, in the time of the recording", options.read_rate, default=1.0)
+@option("--start T", "begin there  [default: when all edges have data]", options.read_limit, under="Time")
+@option("--stop T", "end there  [default: when the first edge has no more]", options.read_limit, under="Time")
+@option("-l --limit N", "print at most N blocks", click.IntRange(1))
+@options.tree_result_options("poses")
+def echo_command(inputs: Inputs) -> int:
+    """Print the pose of SOURCE in TARGET over time, like tf2_echo on a running robot.
+
+    \b
+      frametool echo drive.yaml map base_link
+      frametool echo drive.yaml map lidar --rate 10 --format csv
+      frametool echo drive.yaml lidar box --start 2.5 --limit 1 --precision 6
+
+    The order is TARGET SOURCE, as the first line says in words: tf2_echo names its arguments the other way round but
+    prints the same. Blocks are text unless --format or the suffix of --output says otherwise; they have 3 decimals
+    unless --precision sets another number. Timestamps are seconds with nine decimals. TREE is also what `ros2 topic
+    echo /tf` printed (help recordings).
+    """
+    target, source, start, stop, limit = inputs.target, inputs.source, inputs.start, inputs.stop, inputs.limit
+    refuse(start is not None and stop is not None and start > stop, "--start is after --stop")
+    out = Output(inputs, "poses", otherwise=None if inputs.output else "text")
+    out.check_target(target)
+    if out.style.place is not None and out.style.format == "text":
+        raise click.UsageError(f"--to {out.style.place.name}: tf2_echo's blocks have x, y, z; -f yaml, json or csv")
+    frames = load_tree(inputs.tree, inputs.more, options.rules(inputs))
+    target, source = frame_name(target, frames), frame_name(source, frames)
+    out.take_axes_in(frames, source)
+    if frames.covariances:
+        warn(LEFT_OUT.format("echo"))
+    replayed = frames.replay(target, source, rate_hz=inputs.rate, start_ns=start, stop_ns=stop)
+    skipped = Skipped(in_json=out.chosen == "json")
+    results = skipped.counted(_results(replayed, target, source, skipped))
+    shown = islice(results, None if limit is None else min(limit, sys.maxsize))
+    if out.style.format == "text":
+        from frametool.view.pose_text import write_blocks
+
+        out.pieces(write_blocks(shown, target, source, out.style))
+    else:
+        out.poses_as_they_come(shown)
+    return skipped.finish()
+
+
+def _results(replayed: Iterator[Replayed], target: str, source: str, skipped: Skipped) -> Iterator[Result]:
+    """Yield the answers and count the errors; raise the first error where no time has data."""
+    for at_ns, found, steps in replayed:
+        if isinstance(found, NoDataAt):
+            skipped.add(found, steps)
+        else:
+            yield pose_algebra.result_at(found.components, target, source, at_ns)
+    if skipped.errors and not skipped.found:
+        raise skipped.errors[0]

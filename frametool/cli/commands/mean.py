@@ -21,7 +21,7 @@ from frametool.text.numbers import parse_number
 @option("--robust", "reject outliers, and list them")
 @pose_stream_options
 @pose_result_options("poses")
-def command(inputs: Inputs) -> int:
+def mean_command(inputs: Inputs) -> int:
     """Average poses: the mean position, the mean rotation, and how far the poses lie from them.
 
     \b

@@ -27,7 +27,7 @@ MOST_TOLD = 3  # frames that come by the topics of two robots
 @offset_option
 @file_options
 @result_options("report")
-def command(inputs: Inputs) -> int:
+def monitor_command(inputs: Inputs) -> int:
     """Print the rate, count, first and last stamp, largest gap, delay and jumps of each edge of RECORDING.
 
     \b

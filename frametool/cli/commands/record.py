@@ -52,7 +52,7 @@ def _between(text: str) -> tuple[int, int]:
 @reading_options
 @verbose_option
 @pose_options
-def command(inputs: Inputs) -> int:
+def record_command(inputs: Inputs) -> int:
     """Copy RECORDING with changes; all other messages are unchanged.
 
     \b

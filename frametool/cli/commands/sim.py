@@ -236,7 +236,7 @@ of transforms, as `lookup` does. A summary goes to stderr.
 
 
 @click.group("sim", cls=Group, table=SUBCOMMANDS, help=HELP, epilog=EXIT_CODES)
-def command() -> None:
+def sim_command() -> None:
     """Hold the subcommands."""
 
 
@@ -244,7 +244,7 @@ LAW_OPTIONS = ("rate", "gain_linear", "gain_angular", "max_linear", "max_angular
 SCENE_OPTIONS = ("followers", "spawn", "target", "delay", "duration", "turtlesim")
 
 
-@command.command("follow", cls=Command)
+@sim_command.command("follow", cls=Command)
 @option("--leader NAME|FILE|-", "still, circle, square, figure8, random, a file of commands, or - for standard input",
         default="still")
 @follow_options("20")
@@ -293,7 +293,7 @@ def scene_of(inputs: Inputs, leader: MakeLeader) -> Scene:
         return tutorial(leader=leader, law=law, holonomic=holonomic, **chosen)
 
 
-@command.command("run", cls=Command)
+@sim_command.command("run", cls=Command)
 @argument("scene")
 @option("--duration S", "simulated seconds, or inf  [default: the scene's]", parse_duration)
 @option("--seed", "seed of random leaders  [default: the scene's]", click.IntRange(0), under="Turtles")
@@ -329,7 +329,7 @@ def run(inputs: Inputs) -> None:
     output.run(chosen)
 
 
-@command.command("teleop", cls=Command)
+@sim_command.command("teleop", cls=Command)
 @follow_options("inf")
 @output_options
 def teleop(inputs: Inputs) -> None:

@@ -208,7 +208,7 @@ FORMATS_OF_SCALE = ("text", "yaml", "json", "csv")
 @option("--report FILE.json|csv", "statistics of the fit and of each row", options.file_with(".json", ".csv"))
 @options.reading_options
 @options.pose_result_options("tree", "trajectory")
-def command(inputs: Inputs) -> None:
+def solve_command(inputs: Inputs) -> None:
     """Estimate transforms from measurements, with sigmas; outliers are rejected and listed.
 
     \b

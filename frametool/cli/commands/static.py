@@ -24,7 +24,7 @@ ABOUT = "as static_transform_publisher has it"
 @together(*(option(f"--{name} {'FRAME' if name.endswith('id') else 'N'}", ABOUT) for name in FLAGS))
 @reading_options
 @pose_result_options("tree")
-def command(inputs: Inputs) -> None:
+def static_command(inputs: Inputs) -> None:
     """Write the static_transform_publisher arguments of a TREE, or read such arguments into a tree.
 
     \b

@@ -15,7 +15,7 @@ from frametool.cli.trees import load_tree
 @option("--at TIME", "seconds, nanoseconds with ns  [default: latest of each edge]", read_time)
 @color_option
 @tree_result_options("tree", "trajectory")
-def command(inputs: Inputs) -> None:
+def tree_command(inputs: Inputs) -> None:
     """Draw the frames of TREE with their poses in their parents; moving frames with rate and interval.
 
     \b

@@ -53,7 +53,7 @@ def _eye(text: str) -> Eye:
 @option("--no-sliders", "leave out the sliders for the joints of a robot", name="no_sliders")
 @option("--open", "show the page in the browser", name="opens")
 @color_option
-def command(inputs: Inputs) -> None:
+def view_command(inputs: Inputs) -> None:
     """Plot the frames of TREE: in the terminal, as an interactive HTML page, as SVG, PNG, or GLB for 3-D programs.
 
     \b
