@@ -17,7 +17,7 @@ from click import UsageError
 
 from frametool.cli.command import refuse
 from frametool.cli.options import FULL
-from frametool.cli.sink import filling, in_colour, is_special, say, writing
+from frametool.cli.sink import in_colour, is_special, say, writing
 from frametool.errors import ValueInvalid, first_of, listing, printable, shown, warn
 from frametool.formats import table
 from frametool.formats.table import FORMATS, by_name, is_folder, writers
@@ -328,7 +328,7 @@ class Output:
 
     def opened(self) -> AbstractContextManager[Write]:
         """Open the place where results go."""
-        return opened_place(self.style.format, self.path, force=self.force)
+        return writing(self.path, force=self.force, folder=is_folder(self.style.format))
 
     def report_suffix(self, fmt: str = "") -> None:
         """Report the format of a file whose suffix names none, where none was chosen.
@@ -406,8 +406,3 @@ def _only_mover(tree: Frames, fmt: str) -> str:
         instead = f"name two: lookup TREE TARGET SOURCE -f {fmt}"
         raise ValueInvalid(f"{fmt} holds one frame, the tree has {frames}; {instead}")
     return children[0]
-
-
-def opened_place(fmt: str, path: str | None, *, force: bool) -> AbstractContextManager[Write]:
-    """Open the place where results of a format go."""
-    return filling(path, force=force) if table.is_folder(fmt) and path is not None else writing(path, force=force)

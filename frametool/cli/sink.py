@@ -11,6 +11,7 @@ import re
 import stat
 import sys
 from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
 from itertools import groupby, pairwise
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TextIO
@@ -39,26 +40,44 @@ LONGEST_BEGIN = 40  # characters of a name that its part begins with: names have
 
 
 @contextmanager
-def writing(path: str | None, *, force: bool = False) -> Iterator[Write]:
+def writing(path: str | None, *, force: bool = False, folder: bool = False) -> Iterator[Write]:
     """Open a place for results and yield what writes to it; each piece of text is out when the call returns.
 
     path: None or `-` is standard output.  A pipe, a device or one of the process's own streams is written to as it
-    is.  Anything else is written to `NAME.PID.part` in the same folder, which takes the file's place, mode and owner
-    when the block ends without an error (the file itself, if the path is a link), and else is gone; only `kill -9`
-    leaves it behind.
+    is.  Anything else is written to `NAME.PID.part` next to it, which takes its place when the block ends without an
+    error (with mode and owner of the file before; the file itself, if the path is a link), and else is gone; only
+    `kill -9` leaves it behind.
+    folder: the place is a new folder, and a piece that has a name begins the file of this name
     Raises FileProblem if the file exists and `force` is not set, or cannot be written; BrokenPipeError if the reader
     of a pipe is gone; what a check finds wrong.
     """
     if path in (None, "-", "/dev/stdout"):
         yield writer_into(sys.stdout.buffer, "standard output")
-    elif (number := _own_stream(path)) is not None or is_special(path):
+        return
+    if is_special(path) and not folder:
+        number = _own_stream(path)
         with problems_of(path):
             special = open(path if number is None else os.dup(number), "wb", buffering=0)  # noqa: SIM115 - closed below
         with special:
             yield writer_into(special, path)
-    else:
-        with _filling_file(path, force=force) as write:
-            yield write
+        return
+    refuse = partial(_refuse_folder if folder else refuse_existing, path, force=force)
+    refuse()
+    clean_up()
+    place = os.path.realpath(path)
+    parent, name = os.path.split(place)
+    part = os.path.join(parent, f"{name[:LONGEST_BEGIN]}.{os.getpid()}.part")
+    try:
+        with ExitStack() as opened:
+            mode = 0o600 if os.path.exists(path) else 0o666  # private until it has the mode of the file before
+            yield _folder_writer(part, path, opened) if folder else _file_writer(part, path, opened, mode)
+            check()
+        refuse()  # again, now that the part is complete
+        with problems_of(path):
+            _take_over(part, place)
+    except BaseException:
+        _remove(part)
+        raise
 
 
 def in_colour(text: str, marks: Iterable[str]) -> str:
@@ -171,62 +190,27 @@ def problems_of(name: str) -> Iterator[None]:
         raise FileProblem(f"{printable(name)}: {(error.strerror or str(error)).lower()}") from None
 
 
-@contextmanager
-def _replacing(path: str, refuse: Callable[[], None]) -> Iterator[str]:
-    """Yield the name of a part that takes the place of `path` if all goes well, and else is gone.
-
-    refuse: raises FileProblem where nothing may be replaced; the place is looked at again when the part is complete
-    """
-    refuse()
-    clean_up()
-    place = os.path.realpath(path)
-    folder, name = os.path.split(place)
-    part = os.path.join(folder, f"{name[:LONGEST_BEGIN]}.{os.getpid()}.part")
-    try:
-        yield part
-        refuse()
-        with problems_of(path):
-            _take_over(part, place)
-    except BaseException:
-        _remove(part)
-        raise
+def _file_writer(part: str, path: str, opened: ExitStack, mode: int = 0o666) -> Write:
+    """Open a part that is not there yet."""
+    with problems_of(path):
+        file = open(part, "xb", buffering=0, opener=lambda name, flags: os.open(name, flags, mode))  # noqa: SIM115
+    return writer_into(opened.enter_context(file), path)
 
 
-@contextmanager
-def _filling_file(path: str, *, force: bool) -> Iterator[Write]:
-    """Yield what writes into a part file that takes the place of `path` if all goes well."""
-    with _replacing(path, lambda: refuse_existing(path, force=force)) as part:
-        with problems_of(path):
-            stream = _new_file(part, 0o600 if os.path.exists(path) else 0o666)
-        with stream:
-            yield writer_into(stream, path)
-            check()
-
-
-@contextmanager
-def filling(path: str, *, force: bool) -> Iterator[Write]:
-    """Yield what fills a new folder, each file begun by a piece that has its name; it is there whole or not at all."""
+def _folder_writer(part: str, path: str, opened: ExitStack) -> Write:
+    """Make a folder; each of its files is begun by a piece that has its name."""
     write: Write | None = None
 
     def fill(piece: str | bytes | memoryview) -> None:
         nonlocal write
         if name := getattr(piece, "name", ""):
-            with problems_of(path):
-                file = opened.enter_context(_new_file(os.path.join(part, name)))
-            write = writer_into(file, path)
+            write = _file_writer(os.path.join(part, name), path, opened)
         if write is not None and piece:  # nothing comes before the first name
             write(piece)
 
-    with _replacing(path, lambda: _refuse_folder(path, force=force)) as part, ExitStack() as opened:
-        with problems_of(path):
-            os.mkdir(part)
-        yield fill
-        check()
-
-
-def _new_file(path: str, mode: int = 0o666) -> BinaryIO:
-    """Open a file that is not there yet."""
-    return open(path, "xb", buffering=0, opener=lambda name, flags: os.open(name, flags, mode))
+    with problems_of(path):
+        os.mkdir(part)
+    return fill
 
 
 def _take_over(part: str, place: str) -> None:

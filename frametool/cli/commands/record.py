@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.options import pose_options, reading_options, verbose_option
-from frametool.cli.output import copied_as, folder_of, opened_place
-from frametool.cli.sink import say_error
+from frametool.cli.output import copied_as, folder_of
+from frametool.cli.sink import say_error, writing
 from frametool.cli.trees import FRAME, load_tree, tree_file, without_slash
 from frametool.errors import BadAnswer, FileProblem, FormatError, ValueInvalid, listing, printable, shown, warn
 from frametool.formats.load import FrameFile, Rules
-from frametool.formats.table import FORMATS, is_recording, writers
+from frametool.formats.table import FORMATS, is_folder, is_recording, writers
 from frametool.frames.stamps import parse_time
 from frametool.grammar.edges import Diagnostics
 from frametool.stream.faults import ON_ERROR, STOP, BadRows
@@ -92,7 +92,7 @@ def record_command(inputs: Inputs) -> int:
     request = RecordRequest(bad, edges, inputs.replace, without_slash(into or ""), topics, inputs.between, normalize)
     quiet, force = inputs.quiet, inputs.force
     inputs.refuse_idle()
-    with opened_place(copy, place, force=force) as write, opened_recording(path, tally) as opened:
+    with writing(place, force=force, folder=is_folder(copy)) as write, opened_recording(path, tally) as opened:
         run = RecordRun(opened, request)
         with ProgressBar(None, quiet=quiet, counted="messages") as progress:
             run.look(progress.advance)
