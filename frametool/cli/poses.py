@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from frametool.cli.output import Output
+    from frametool.cli.streaming import PoseTask
     from frametool.geometry.representations import Notation
     from frametool.grammar.result import Result
     from frametool.stream.request import Request
@@ -291,11 +292,12 @@ class Rows(NamedTuple):
     timed: dict[str, Any] | None
 
 
-def rows_among(arguments: Sequence[str], request: Request, has_table: Callable[[str], bool]) -> Rows:
+def rows_among(arguments: Sequence[str], request: Request, task: PoseTask) -> Rows:
     """Choose them: standard input, a table, what holds several poses, or the last that says more than a pose."""
     bare = [without_inverse(each)[0] for each in arguments]
     refuse_two_readers(bare)
-    streams = [at for at, each in enumerate(bare) if each == "-" or has_table(each)]
+    refuse(task.path and "-" not in bare, "-i FILE is read where - stands among the poses")
+    streams = [at for at, each in enumerate(bare) if each == "-" or task.has_table(each)]
     if len(streams) > 1:
         files = " and ".join(bare[at] for at in streams)
         raise click.UsageError(f"only one argument may hold rows, {files} do; frametool compare takes two trajectories")

@@ -14,7 +14,8 @@ import pytest
 from in_process import run_line
 
 from frametool.cli.command import EXIT_CODES, HEADINGS
-from frametool.cli.commands import COMMANDS, examples, group
+from frametool.cli.commands import COMMANDS, group
+from frametool.cli.commands import help as examples
 from frametool.cli.commands.help import questions, topic, topics
 from frametool.cli.commands.sim import SUBCOMMANDS
 from frametool.errors import FileProblem

@@ -19,9 +19,8 @@ from site_pages import calls, markup, texts, try_it
 from site_pages.cookbook import questions
 
 import frametool
-from frametool.cli.commands.examples import names
+from frametool.cli.commands.help import names, topics
 from frametool.cli.commands.help import questions as answers
-from frametool.cli.commands.help import topics
 from frametool.formats.table import FORMATS
 
 if TYPE_CHECKING:

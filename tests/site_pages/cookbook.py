@@ -10,8 +10,7 @@ from functools import cache, cached_property
 import console
 
 from frametool.cli.command import HEADINGS
-from frametool.cli.commands.examples import names
-from frametool.cli.commands.help import topic, topics
+from frametool.cli.commands.help import names, topic, topics
 from frametool.errors import FormatError
 from frametool.formats.detect import detect
 from frametool.formats.table import FORMATS

@@ -1,27 +1,35 @@
-"""Arithmetic of poses: `compose`, `invert`, `relative`, `interpolate`."""
+"""Arithmetic of poses: `compose`, `invert`, `relative`, `interpolate`, `mean`, `between`."""
 
 from __future__ import annotations
 
 from functools import reduce
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import Inputs, argument, command_named, option, refuse
-from frametool.cli.options import COLUMN, limit_options, offset_option, pose_result_options, scale_option
-from frametool.cli.poses import combinations, rows_among, without_inverse
+from frametool.cli import options, poses
+from frametool.cli.command import Inputs, argument, command_named, misuse, option, refuse
+from frametool.cli.output import Output
+from frametool.cli.sink import say, say_first
 from frametool.cli.streaming import EXPLAIN, PoseTask, one_argument, pose_stream_options
 from frametool.errors import warn
 from frametool.grammar.pose import LEFT_OUT, Pose
-from frametool.text.numbers import parse_fractions
+from frametool.stream.faults import MOST
+from frametool.text.numbers import parse_fractions, parse_number
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.grammar.readers import Vector
 
 
 @command_named("compose")
 @argument("poses", nargs=-1, required=True, metavar="POSE POSE ..")
 @pose_stream_options
-@pose_result_options("poses")
-@scale_option
+@options.pose_result_options("poses")
+@options.scale_option
 @EXPLAIN
-@offset_option
+@options.offset_option
 def compose_command(inputs: Inputs) -> int:
     """Multiply poses, left to right: a_from_b, b_from_c -> a_from_c.
 
@@ -34,16 +42,14 @@ def compose_command(inputs: Inputs) -> int:
     POSE is a mapping, a file, or - for standard input. If poses name their frames, adjacent frames must match. The
     inverse of a pose is inv(POSE) or ~POSE, in quotes, or the word inv before it.
     """
-    task, poses = PoseTask(inputs), inputs.poses
+    task = PoseTask(inputs)
     if task.derives:
-        return task.derive("compose", *map(task.written, poses))
-    if task.path and not any(without_inverse(each)[0] == "-" for each in poses):
-        raise click.UsageError("-i FILE is read where - stands among the poses")
+        return task.derive("compose", *map(task.written, inputs.poses))
     from frametool.grammar.pose_algebra import product
     from frametool.stream.request import Operation
 
     request = task.request(operation=Operation(similar=True, multiples=inputs.scale))
-    rows = rows_among(poses, request, task.has_table)
+    rows = poses.rows_among(inputs.poses, request, task)
     before = reduce(product, rows.before) if rows.before else None
 
     def rename(parent: str | None, name: str | None) -> tuple[str | None, str | None]:
@@ -58,10 +64,10 @@ def compose_command(inputs: Inputs) -> int:
 @command_named("invert")
 @argument("pose", default="-")
 @pose_stream_options
-@pose_result_options("poses")
-@scale_option
+@options.pose_result_options("poses")
+@options.scale_option
 @EXPLAIN
-@offset_option
+@options.offset_option
 def invert_command(inputs: Inputs) -> int:
     """Invert poses: a_from_b -> b_from_a; frame names are swapped.
 
@@ -84,14 +90,14 @@ def invert_command(inputs: Inputs) -> int:
 @argument("a", required=False)
 @argument("b", required=False)
 @pose_stream_options
-@pose_result_options("poses")
+@options.pose_result_options("poses")
 @option("--consecutive", "of a stream, each row relative to the row before it", excludes=("first", "explain"))
 @option("--first", "of a stream, each row relative to the first", excludes=("explain",))
 @option("--velocity", "with --consecutive, also the twist between rows, m/s and rad/s", requires=("consecutive",))
-@option("--time-column NAME", "with --velocity, the column or key of the stamps  [default: stamp, t ..]", COLUMN,
-    requires=("velocity", "time_offset", "start", "stop"))
+@option("--time-column NAME", "with --velocity, the column or key of the stamps  [default: stamp, t ..]",
+    options.COLUMN, requires=("velocity", "time_offset", "start", "stop"))  # fmt: skip
 @EXPLAIN
-@limit_options
+@options.limit_options
 def relative_command(inputs: Inputs) -> int:
     """Print B seen from A, inverse(A) B, with the distance and the angle between them.
 
@@ -113,10 +119,9 @@ def relative_command(inputs: Inputs) -> int:
         return task.derive("relative", *map(task.written, [one_argument(each) for each in (a, b)]))
     from frametool.stream.request import PREVIOUS, START, Operation
 
-    poses = [each for each in (a, b) if each is not None]
     if inputs.consecutive or inputs.first:
         velocity = inputs.consecutive and inputs.velocity
-        refuse(len(poses) > 1, "rows are compared with one of themselves; leave A and B out")
+        refuse(b is not None, "rows are compared with one of themselves; leave A and B out")
         # a row is seen from another one of the same stream, which is the same thing at another moment
         operation = Operation(of=PREVIOUS if inputs.consecutive else START, velocity=velocity)
         column = (inputs.time_column or "") if velocity or task.window else None
@@ -128,13 +133,10 @@ def relative_command(inputs: Inputs) -> int:
     if b is None:
         refuse(a not in (None, "-"), "name A and B; one of them may be - for standard input")
         return task.answer("-", task.request(operation=Operation(of="pair"), poses=2))
-    bare = [without_inverse(each)[0] for each in poses]
-    refuse(bare == ["-", "-"], "standard input can be read once; leave A and B out to compare two poses of each row")
-    refuse(task.path and "-" not in bare, "-i FILE is read where - stands for A or B")
     from frametool.grammar.pose_algebra import relative_names
 
     request = task.request()
-    rows = rows_among(poses, request, task.has_table)
+    rows = poses.rows_among((a, b), request, task)
     fixed = [*rows.before, *rows.behind][0]
 
     def rename(parent: str | None, name: str | None) -> tuple[str | None, str | None]:
@@ -149,7 +151,7 @@ def relative_command(inputs: Inputs) -> int:
 @argument("a")
 @argument("b")
 @argument("fractions", parse_fractions, nargs=-1, required=True, metavar="FRACTION..")
-@pose_result_options("poses")
+@options.pose_result_options("poses")
 @EXPLAIN
 def interpolate_command(inputs: Inputs) -> int:
     """Print poses between A (fraction 0) and B (fraction 1), as tf2 does: straight line and slerp.
@@ -168,9 +170,122 @@ def interpolate_command(inputs: Inputs) -> int:
     from frametool.grammar.pose_algebra import interpolated, shared_stamp
     from frametool.grammar.result import Result
 
-    pairs = combinations((inputs.a, inputs.b), task.request())
+    pairs = poses.combinations((inputs.a, inputs.b), task.request())
     if any(pose.covariance for pair in pairs for pose in pair):
         warn(LEFT_OUT.format("interpolate"))
     between = [interpolated(first, last, each) for first, last in pairs for each in asked]
     task.output.values([Result(pose, shared_stamp((pose,))) for pose in between])
     return 0
+
+
+@command_named("mean")
+@argument("poses", nargs=-1, metavar="[POSE.. | FILE]")
+@option("--weights NAME | W,W,..", "column or key with weights, or the weights of the POSEs", options.COLUMN)
+@option("--by NAME", "one mean per value of this column or key", options.COLUMN, excludes=("weights",))
+@option("--robust", "reject outliers, and list them")
+@pose_stream_options
+@options.pose_result_options("poses")
+def mean_command(inputs: Inputs) -> int:
+    """Average poses: the mean position, the mean rotation, and how far the poses lie from them.
+
+    \b
+      frametool mean '{rpy_deg: [0, 0, 80]}' '{rpy_deg: [0, 0, 100]}'
+      frametool mean '{xyz: [0, 0, 0]}' '{xyz: [1, 0, 0]}' --weights 1,3
+      printf 'x,y,z,weight\\n0,0,0,1\\n4,0,0,3\\n' | frametool mean --weights weight
+      frametool mean tag_seen.csv --robust
+      printf 'tag,x,y,z\\n7,0,0,0\\n7,4,0,0\\n9,1,1,1\\n' | frametool mean --by tag
+
+    Poses are arguments, the rows of a FILE, or of standard input. The mean rotation is the chordal one: the least sum
+    of squared differences of matrices. distance_rms and distance_max are metres, angle_rms and angle_max radians (and
+    _deg degrees) between the poses and the mean. covariance is that of one pose: x y z and rotations about X Y Z in the
+    parent's axes as in ROS, with n - 1; std_x, std_y, std_z and std_angle are roots of its diagonal.
+
+    With --robust outliers, more than 3 sigmas off by medians, are rejected: all of that is of the poses kept, `used` of
+    `count`. A warning lists each with its place, how far off it is, and u, that in sigmas. Without outliers the
+    numbers are those of the plain mean. Weights are in proportion to 1 / variance.
+    """
+    task, weights, by, robust = PoseTask(inputs), inputs.weights, inputs.by, inputs.robust
+    from frametool.grammar.result import Result
+    from frametool.stream.gathering import Gathered
+    from frametool.stream.record_values import read_poses
+
+    arguments, status, numbers = inputs.poses, 0, None
+    gathered = Gathered(named=robust, labelled=by is not None)
+    request = task.request(extra_column=by or weights, gathered=gathered)
+    bare, is_inverse = poses.without_inverse(arguments[0]) if len(arguments) == 1 else ("", False)
+    if bare == "-" or (bare and not task.path and not poses.is_pasted(bare, task.notation)):
+        task.path, arguments = task.path if bare == "-" else bare, ()
+        request = request.of_inverses() if is_inverse else request
+    if not arguments:
+        status = task.run(request)
+    else:
+        refuse(by is not None, "--by is of rows; POSEs have no column")
+        task.only_arguments(arguments)
+        for number, each in enumerate(arguments, 1):
+            name = f"argument {number}" if poses.is_inline(each) else each
+            gathered.add(list(poses.read_with(each, request, read_poses)), name)
+        with misuse("--weights of POSEs are numbers: "):
+            numbers = None if weights is None else [parse_number(text.strip()) for text in weights.split(",")]
+        if numbers is not None and len(numbers) != len(gathered.transforms):
+            raise click.UsageError(f"--weights are {len(numbers)}, the poses {len(gathered.transforms)}")
+    if gathered.uncertain:
+        warn("covariances left out: mean's is that of the rows")
+    if gathered.stamped:
+        warn("stamps left out: a mean is of no one time")
+    from frametool.fit.closed_forms import mean_of_rows
+
+    groups = [("", gathered)] if by is None else gathered.groups()
+    found = [(label, *mean_of_rows(each, numbers, robust=robust)) for label, each in groups]
+    labels: list[dict[str, Any]] = [{} if by is None else {by: label} for label, *_ in found]
+    task.output.values([Result(mean.pose, own | mean.extras) for own, (_, mean, _) in zip(labels, found, strict=True)])
+    say_first([line for *_, lines in found for line in lines], MOST, "poses left out", warn, warn)
+    return status
+
+
+OPPOSITE = 1e-8  # radians from half a turn at which no digit of the axis is left
+
+
+@command_named("between", own=("notations",))
+@argument("vectors", nargs=-1, required=True, metavar="V1 V2")
+@options.rotation_options
+@options.result_options("poses")
+def between_command(inputs: Inputs) -> None:
+    """Print the shortest rotation that turns the direction V1 into the direction V2, and its angle.
+
+    \b
+      frametool between 1,0,0 0,1,0 --to rpy_deg
+      frametool between 0 0 1 0.1 -0.2 9.7
+      frametool between '{x: 0, y: 0, z: 1}' '[1, 1, 0]'
+
+    A vector is three numbers or a mapping, of any length but 0. For opposite directions any perpendicular axis is
+    valid; one is chosen and reported.
+    """
+    from frametool.grammar.pose_algebra import turn_between
+
+    output = Output(inputs, "poses")
+    start, end = _directions(inputs.vectors)
+    result = turn_between(start, end)
+    if result.extras["angle_deg"] > 180.0 - OPPOSITE:
+        say("note: the directions are opposite: half a turn about any axis at right angles to them; one was chosen")
+    output.values([result])
+
+
+def _directions(texts: Sequence[str]) -> tuple[Vector, Vector]:
+    """Read two vectors: six bare numbers, or each by itself."""
+    if len(texts) == 6:
+        texts = ",".join(texts[:3]), ",".join(texts[3:])
+    found = [vector for text in texts for vector in _vectors(text)]
+    refuse(len(found) != 2, f"two vectors are wanted, V1 and V2, of three numbers each; found {len(found)}")
+    return found[0], found[1]
+
+
+def _vectors(text: str) -> list[Vector]:
+    """Read the vectors of an argument."""
+    from frametool.stream.record_values import read_text
+    from frametool.stream.request import Operation, Request
+    from frametool.stream.row_layout import VECTOR
+
+    request = Request(Operation(moves=True), kind=VECTOR)
+    with poses.inline_misuse():
+        records = read_text(poses.pose_source(text, request), request).records
+        return [record.shape.position(record.values) for record in records]

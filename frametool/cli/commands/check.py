@@ -1,4 +1,4 @@
-"""`frametool check`: mistakes in trees and recordings."""
+"""What is to be said of files: `check` finds mistakes, `diff` differences, `monitor` rates, gaps and jumps."""
 
 from __future__ import annotations
 
@@ -7,25 +7,35 @@ from functools import partial
 from math import radians
 from typing import TYPE_CHECKING
 
-from frametool.cli.command import EVERYTHING, FILE, Command, Inputs, argument, command_named, option, refuse_two_readers
-from frametool.cli.options import file_options
-from frametool.cli.sink import folded, in_colour, say, writing
-from frametool.cli.trees import opened, state
+from frametool.cli.command import (
+    EVERYTHING,
+    FILE,
+    Command,
+    Inputs,
+    argument,
+    command_named,
+    option,
+    refuse,
+    refuse_two_readers,
+)  # fmt: skip
+from frametool.cli.options import at_ns, file_options, list_options, offset_option, read_time, result_options
+from frametool.cli.output import Output
+from frametool.cli.sink import folded, in_colour, say, say_error, say_first, writing
+from frametool.cli.trees import FRAME, frame_name, load_sides, opened, state
 from frametool.errors import Finding, FormatError, listing, warn
-from frametool.lint.findings import RULES, WRITERS, level
-from frametool.lint.rules import check
-from frametool.lint.tree_diff import Tolerance, parse_tolerance
+from frametool.lint.findings import RULES, WRITERS, github_command, level
+from frametool.lint.tree_diff import Tolerance, TreeComparison, diff, entry, parse_tolerance
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     import click
 
-    from frametool.formats.load import FrameFile
+    from frametool.formats.load import EdgePlace, FrameFile
     from frametool.stream.measurements import Measurement
 
 FAILED = 1
-TROUBLE = (r"(?m)^\S.*?: (?P<red>error): ", r"(?m)^\S.*?: (?P<magenta>warning): ")
+MARKS = (r"(?m)^\S.*?: (?P<red>error): ", r"(?m)^\S.*?: (?P<magenta>warning): ")
 
 
 class CheckCommand(Command):
@@ -78,7 +88,7 @@ def check_command(inputs: Inputs) -> int:
     text = WRITERS[fmt](findings)
     with writing(None) as write:
         is_seen = fmt == "text" and sys.stdout.isatty()
-        write(in_colour("\n".join(map(folded, text.split("\n"))), TROUBLE) if is_seen else text)
+        write(in_colour("\n".join(map(folded, text.split("\n"))), MARKS) if is_seen else text)
     counts = {kind: sum(level(each) == kind for each in findings) for kind in ("error", "warning", "note")}
     summary = ", ".join(f"{count} {kind}{'s' * (count != 1)}" for kind, count in counts.items() if count)
     if summary or (fmt == "text" and sys.stdout.isatty()):
@@ -88,6 +98,8 @@ def check_command(inputs: Inputs) -> int:
 
 def _one_by_one(files: Sequence[str], *, normalize: bool) -> list[Finding]:
     """Return what is wrong with each file alone; that one holds no frames, or is of an unknown format, is a warning."""
+    from frametool.lint.rules import check
+
     findings = []
     for number, file in enumerate(files):
         try:
@@ -112,6 +124,8 @@ def _with_loops(
     files: Sequence[FrameFile], rows: Sequence[Measurement], tolerance: Tolerance | None, *, normalize: bool
 ) -> list[Finding]:
     """Return what is wrong with files, then the measurements that do not agree; report what was not compared."""
+    from frametool.lint.rules import check
+
     if not rows:
         return check(files, normalize=normalize)
     from frametool.fit.measured_tree import loops
@@ -125,3 +139,116 @@ def _with_loops(
     if apart:
         warn(f"{apart} of {len(rows)} measurements not compared: their frames are not connected by static frames")
     return [*findings, *found]
+
+
+DIFFERENT, TROUBLE = 1, 2
+EXIT_CODES = "Exit codes: 0 the same, 1 different, 2 trouble of any kind, with files too."
+
+
+@command_named("diff", epilog=EXIT_CODES)
+@argument("a", FILE)
+@argument("b", FILE)
+@option("--with-a FILE", "merge this file into A; may be repeated", multiple=True)
+@option("--with-b FILE", "merge this file into B; may be repeated", multiple=True)
+@option("--at TIME", "compare at this time: seconds, nanoseconds with ns  [default: the latest of each]", read_time)
+@option("--seen-from FRAME", "also show motion as seen from this frame  [default: the root of A]", FRAME)
+@option("--tolerance LENGTH,ANGLE", "largest difference that is ignored, e.g. 1mm,0.1deg  [default: 1e-9 m, 1e-9 rad]",
+    parse_tolerance, default=Tolerance())  # fmt: skip
+@option("--all", "also list the frames that did not move", name="everything")
+@file_options
+@list_options("github")
+def diff_command(inputs: Inputs) -> int:
+    """Compare two trees, calibrations or recordings, A and B, in any formats.
+
+    \b
+      frametool diff robot.yaml robot.yaml
+      sed 's/0.285/0.3/' robot.yaml | frametool diff - robot.yaml --tolerance 9mm
+      frametool diff drive.yaml drive.yaml --at 2.5 --seen-from base_link
+
+    Lists frames that only one has, frames with another parent, and for all others how far they moved from A to B: in
+    their own parent, and as seen from the root, so that two structures of one robot can be compared. The largest motion
+    comes first, frames that only moved with their parent last. Signs of quaternions and the order of names are ignored.
+    Cameras of both files whose intrinsics differ are listed with the numbers of A -> B.
+    Moving frames are compared at their latest time and sample by sample, or with --at at one time.
+
+    A and B are files, - for standard input, or . for the file that FRAMETOOL_TREE names. --in and --frames are taken in
+    the order of the files: A, those of --with-a, B, those of --with-b; one alone applies to both.
+    """
+    output = Output(inputs, "report", otherwise="text")
+    sides = (inputs.a, *inputs.with_a), (inputs.b, *inputs.with_b)
+    (one, of_one), (other, of_other) = load_sides(*sides, normalize=inputs.normalize)
+    start = inputs.seen_from and frame_name(inputs.seen_from, one)
+    comparison = diff(one, other, at_ns=at_ns(inputs.at), seen_from=start, tolerance=inputs.tolerance)
+    inputs.note(*comparison.notes)
+    differences = [*comparison.differences, *(comparison.unmoved if inputs.everything else ())]
+    if output.style.format == "github":
+        output.text(_annotations(comparison, (of_one, of_other)))
+    elif output.style.format == "text":
+        from frametool.view.reports import write_diff
+
+        output.text(write_diff(differences))
+    else:
+        output.report(list(map(entry, differences)))
+    if comparison.uncompared:
+        count = len(comparison.uncompared)
+        say(f"{count} frame{'s' * (count != 1)} not compared: no data in A and B; --at chooses another time")
+        return TROUBLE
+    return DIFFERENT if comparison.differences else 0
+
+
+def _annotations(found: TreeComparison, places: Sequence[Mapping[str, EdgePlace]]) -> str:
+    """Return workflow commands, each at the line where B says where the frame is, or else A."""
+    from frametool.formats.load import lines_of
+
+    in_a, in_b = places
+    known = {each.frame: in_b.get(each.frame) or in_a.get(each.frame) for each in found.differences}
+    placed = {frame: place for frame, place in known.items() if place is not None}
+    where = dict(zip(placed, lines_of([*placed.values()]), strict=True))
+    lines = []
+    for each in found.differences:
+        file, line = where.get(each.frame, ("", 0))
+        lines.append(github_command("error", each.sentence, file=file, line=line, title=each.kind))
+    return "".join(lines)
+
+
+MOST_TOLD = 3  # frames that come by the topics of two robots
+
+
+@command_named("monitor")
+@argument("recording")
+@argument("frames", nargs=-1, metavar="[TARGET SOURCE]")
+@option("--with FILE", "read this file too; may be repeated", name="more", multiple=True, under="Files")
+@offset_option
+@file_options
+@result_options("report")
+def monitor_command(inputs: Inputs) -> int:
+    """Print the rate, count, first and last stamp, largest gap, delay and jumps of each edge of RECORDING.
+
+    \b
+      frametool monitor drive.yaml
+      frametool monitor drive.yaml map box --format json
+      frametool sim follow --duration 2 --emit tf | frametool monitor -
+
+    RECORDING is a bag, a tree that moves, or what `ros2 topic echo /tf` prints. With TARGET and SOURCE only the edges
+    between them are reported, and the interval in which all of them have data. Rates are in stamp time; the delay is
+    the recorder's clock minus the stamp, known only from bags and `rostopic echo -p`. A gap is the longest pause
+    between two stamps, in the order of time; back counts samples that come after a later stamp, reparented the changes
+    of parent; gaps are pauses 5 times the median one. length_m is that of the path, speed_mean and speed_max metres a
+    second from stamp to stamp. A jump is a step 10 times the median one and longer than 0.1 m or 0.2 rad.
+    """
+    from frametool.lint.monitor_report import clocks_differ, monitor
+
+    frames = inputs.frames
+    refuse(len(frames) not in (0, 2), f"name TARGET and SOURCE, or neither; found {len(frames)} frames")
+    output = Output(inputs, "report")
+    files = opened((inputs.recording, *inputs.more))
+    clashes: list[FormatError] = []
+    report = monitor(files, *frames, normalize=inputs.normalize, clashing=clashes.append)
+    inputs.ask("time_offset")
+    state(files)
+    tell = partial(say_error, in_json=output.chosen == "json")
+    say_first(clashes, MOST_TOLD, "frames come by two topics", tell)
+    if clocks_differ(report):
+        say("note: stamps and the recorder's clock are years apart (simulated time?): the delays say nothing")
+    output.report(report)
+    return FAILED if clashes else 0

@@ -1,4 +1,4 @@
-"""`frametool help`: a subject on one screen, the help of a command, questions of the cookbook, any word in them."""
+"""What comes with the program: `help` on subjects, commands and words, the cookbook, and the files of `examples`."""
 
 from __future__ import annotations
 
@@ -12,15 +12,47 @@ import click
 
 from frametool import __version__
 from frametool.cli import command as shared
-from frametool.cli.command import EXIT_CODES, Inputs, Text, argument, command_named, option, option_groups, refuse
+from frametool.cli.command import (
+    EXIT_CODES,
+    FILE,
+    Inputs,
+    Text,
+    argument,
+    command_named,
+    option,
+    option_groups,
+    refuse,
+)  # fmt: skip
 from frametool.cli.commands import COMMANDS, group
-from frametool.cli.commands.examples import example
-from frametool.cli.sink import show
-from frametool.errors import any_near, shown
+from frametool.cli.sink import refuse_existing, show, writing
+from frametool.errors import FileProblem, ValueInvalid, any_near, printable, shown
 from frametool.formats.table import FORMATS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
+
+
+PACKAGE = os.path.dirname(os.path.dirname(os.path.dirname(__file__)))
+
+
+def folder() -> str:
+    """Return where the files are: in the installed package, or next to it in its sources."""
+    installed = os.path.join(PACKAGE, "examples")
+    return installed if os.path.isdir(installed) else os.path.join(os.path.dirname(PACKAGE), "examples")
+
+
+def names() -> list[str]:
+    """Return the names of the example files."""
+    try:
+        return sorted(each for each in os.listdir(folder()) if os.path.isfile(os.path.join(folder(), each)))
+    except OSError:
+        raise FileProblem(f"{folder()}: the example files are missing; install frametool anew") from None
+
+
+def example(name: str) -> bytes:
+    """Return what is in an example file."""
+    with open(os.path.join(folder(), name), "rb") as file:
+        return file.read()
 
 
 FOLDER = os.path.join(os.path.dirname(os.path.dirname(__file__)), "topics")
@@ -246,3 +278,54 @@ def _json(ctx: click.Context, name: str, named: click.Command | None) -> str:
         "exit_codes": _exit_codes(EXIT_CODES),
     }  # fmt: skip
     return f"{dump(every[0] if named else whole)}\n"
+
+
+class Example(Text):
+    """The name of an example file."""
+
+    def read(self, text: str) -> str:
+        """Refuse an unknown one with the nearest."""
+        name = text.removeprefix("examples/")
+        if name not in names():
+            raise ValueInvalid(f"no example {shown(name)}{any_near(name, names(), '`frametool examples` lists all')}")
+        return name
+
+    def offers(self, ctx: click.Context, incomplete: str) -> dict[str, str]:  # noqa: ARG002
+        """Offer the files."""
+        return dict.fromkeys(names(), "")
+
+
+@command_named("examples")
+@argument("name", Example(), required=False)
+@option("-o --output FOLDER|FILE", "copy all files into this folder, or NAME into this file", FILE, under="Result")
+@option("--force", "let --output overwrite files", requires=("output",), under="Result")
+def examples_command(inputs: Inputs) -> None:
+    """List the example files, print one, or copy them.
+
+    \b
+      frametool examples
+      frametool examples robot.yaml
+      frametool examples -o frames
+
+    The examples of every `COMMAND --help` run inside the folder, those of the cookbook beside one called `examples`.
+    `frametool help cookbook` searches the cookbook, COOKBOOK.md; SKILL.md is the tool in brief for an assistant.
+    """
+    name, output, force = inputs.name, inputs.output, inputs.force
+    if output is None:
+        with writing(None) as write:
+            write(example(name) if name else "".join(f"{each}\n" for each in names()))
+        return
+    refuse(name is None and output == "-", "--output - prints one example; name it, or a folder for all")
+    if name is None or os.path.isdir(output):
+        targets = {each: os.path.join(output, each) for each in ([name] if name else names())}
+        try:
+            os.makedirs(output, exist_ok=True)
+        except OSError as error:
+            raise FileProblem(f"{printable(output)}: {(error.strerror or str(error)).lower()}") from None
+    else:
+        targets = {name: output}
+    for path in targets.values():  # all of them first: nothing is copied by half
+        refuse_existing(path, force=force)
+    for each, path in targets.items():
+        with writing(path, force=force) as write:
+            write(example(each))

@@ -7,7 +7,7 @@ import re
 from typing import Any
 
 from frametool import run
-from frametool.cli.commands.examples import example, names
+from frametool.cli.commands.help import example, names
 
 EXAMPLES = {name: example(name) for name in names() if not name.endswith((".md", ".svg", ".png"))}
 os.environ["TERM"] = "xterm-256color"
