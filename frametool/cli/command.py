@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     Record = TypeVar("Record")
     Adds = Callable[[Any], Any]
+    Offers = Callable[[click.Context, str], Mapping[str, str] | None]
 
 # an argument that begins like this is a number, whatever short options there are
 NEGATIVE = r"(?i)-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translation:|Rotation:|Pose \[)|--\s)"
@@ -263,9 +264,17 @@ def _is_negative(argument: str) -> bool:
 
 
 class Text(click.types.StringParamType):
-    """A text argument, without the blank that shields negative numbers; as a file's name it may hold any bytes."""
+    """A text argument, without the blank that shields negative numbers; as a file's name it may hold any bytes.
+
+    read: returns what a text says; a ValueInvalid that it raises is a wrong value of the option
+    offers: returns what the shell may complete, and what it means; None for names of files, which the shell knows
+    """
 
     name = "text"
+
+    def __init__(self, read: Callable[[str], Any] = str, offers: Offers = lambda _ctx, _incomplete: {}) -> None:
+        """Keep both."""
+        self.read, self.offers = read, offers
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Remove the blank, and read the text."""
@@ -275,14 +284,6 @@ class Text(click.types.StringParamType):
             return self.read(value[1:] if value[:1] == " " and _is_negative(value[1:]) else value)
         except ValueInvalid as error:
             self.fail(str(error), param, ctx)
-
-    def read(self, text: str) -> Any:
-        """Return what a text says; a ValueInvalid that it raises is a wrong value of the option."""
-        return text
-
-    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:  # noqa: ARG002
-        """Return what the shell may complete, and what it means; None for names of files, which the shell knows."""
-        return {}
 
     def offered(self, ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:
         """Return what it offers, without a word; nothing where a file cannot be read."""
@@ -300,16 +301,8 @@ class Text(click.types.StringParamType):
         return [CompletionItem(word, help=about) for word, about in offered.items() if word.startswith(incomplete)]
 
 
-class File(Text):
-    """A file's name."""
-
-    def offers(self, ctx: click.Context, incomplete: str) -> None:  # noqa: ARG002
-        """Leave it to the shell."""
-        return
-
-
 TEXT = Text()
-FILE = File()
+FILE = Text(offers=lambda _ctx, _incomplete: None)
 # options that may be without =VALUE, and their values: the first is what they mean then
 OPTIONAL = {"--explain": ("text", "markdown"), "--rows": ("ate", "rpe", "kitti")}
 
@@ -320,9 +313,7 @@ def _kind(kind: Any) -> click.ParamType[Any]:
         return kind
     if isinstance(kind, tuple):
         return click.Choice(kind)
-    text = Text()
-    text.read = kind  # type: ignore[method-assign]
-    return text
+    return Text(kind)
 
 
 def option(spec: str, about: str, kind: Any = None, name: str = "", **more: Any) -> Adds:

@@ -67,25 +67,26 @@ def _digits(text: str) -> Any:
     return FULL if text == "full" else click.IntRange(0, 30)(text)
 
 
-class Notations(Text):
-    """Names of representations, separated by commas."""
+def _read_notations(text: str) -> tuple[Notation, ...]:
+    """Look each name up."""
+    chosen = tuple(each for spec in text.split(",") for each in notations(spec.strip()))
+    for each in chosen:
+        each.bound_axes()  # euler without its axes is refused before any work
+    return chosen
 
-    def read(self, text: str) -> tuple[Notation, ...]:
-        """Look each name up."""
-        chosen = tuple(each for spec in text.split(",") for each in notations(spec.strip()))
-        for each in chosen:
-            each.bound_axes()  # euler without its axes is refused before any work
-        return chosen
 
-    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
-        """Offer names behind the last comma, and the axes of one that has its colon."""
-        done, comma, begun = incomplete.rpartition(",")
-        names = [*REPRESENTATIONS, *(f"{name}_deg" for name, row in REPRESENTATIONS.items() if row.angles)]
-        spec = begun.partition(":")[0]
-        if spec in names and REPRESENTATIONS[spec.removesuffix("_deg")].axes == NAMED_AXES:
-            names += [f"{spec}:{axes}" for axes in ("all", *AXES)]
-        names += [f"heading_deg:{axes}" for axes in WORLDS]
-        return dict.fromkeys((done + comma + name for name in names), "")
+def _offer_notations(_ctx: click.Context, incomplete: str) -> Mapping[str, str]:
+    """Offer names behind the last comma, and the axes of one that has its colon."""
+    done, comma, begun = incomplete.rpartition(",")
+    names = [*REPRESENTATIONS, *(f"{name}_deg" for name, row in REPRESENTATIONS.items() if row.angles)]
+    spec = begun.partition(":")[0]
+    if spec in names and REPRESENTATIONS[spec.removesuffix("_deg")].axes == NAMED_AXES:
+        names += [f"{spec}:{axes}" for axes in ("all", *AXES)]
+    names += [f"heading_deg:{axes}" for axes in WORLDS]
+    return dict.fromkeys((done + comma + name for name in names), "")
+
+
+NOTATIONS = Text(_read_notations, _offer_notations)
 
 
 class FormatName(Text):
@@ -128,40 +129,37 @@ def file_with(*suffixes: str) -> Callable[[str], str]:
     return parse
 
 
-class AxesName(Text):
-    """A convention of axes, or the change from one to another: A_from_B."""
+def _offer_axes(_ctx: click.Context, incomplete: str) -> Mapping[str, str]:
+    """Offer the conventions; behind `_from_` those it may come from."""
+    from frametool.geometry.conventions import AXES, MIRRORED, SYSTEMS
 
-    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
-        """Offer the conventions; behind `_from_` those it may come from."""
-        from frametool.geometry.conventions import AXES, MIRRORED, SYSTEMS
-
-        begun, joint, _ = incomplete.partition("_from_")
-        known = {name: about for name, (_, about) in (AXES | MIRRORED).items()} | dict.fromkeys(SYSTEMS, "")
-        return {f"{begun}{joint}{name}" if joint else name: about for name, about in known.items() if name != begun}
+    begun, joint, _ = incomplete.partition("_from_")
+    known = {name: about for name, (_, about) in (AXES | MIRRORED).items()} | dict.fromkeys(SYSTEMS, "")
+    return {f"{begun}{joint}{name}" if joint else name: about for name, about in known.items() if name != begun}
 
 
-class ColumnNames(Text):
-    """Columns of the input, or keys of its records, with commas between them."""
-
-    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:
-        """Offer those of the file that -i names."""
-        from frametool.documents.source import HEAD
-        from frametool.formats.detect import Beginning, detect
-        from frametool.stream.table import open_table
-
-        path = ctx.params.get("input_path") or ""
-        path = path if isinstance(path, str) else path[0]
-        with open(path, "rb") as file:
-            head = file.read(HEAD)
-        fmt = detect(head, "rows", "records", name=path)
-        names = sorted(path.replace("/", ".") for path in Beginning(head).json_paths)
-        if FORMATS[fmt].is_table:
-            names = list(open_table(head, fmt, header=True, source=path)[0].names or ())
-        done, comma, _ = incomplete.rpartition(",")
-        return dict.fromkeys((done + comma + name for name in names), "")
+AXIS = Text(offers=_offer_axes)
 
 
-COLUMN = ColumnNames()
+def _offer_columns(ctx: click.Context, incomplete: str) -> Mapping[str, str]:
+    """Offer those of the file that -i names."""
+    from frametool.documents.source import HEAD
+    from frametool.formats.detect import Beginning, detect
+    from frametool.stream.table import open_table
+
+    path = ctx.params.get("input_path") or ""
+    path = path if isinstance(path, str) else path[0]
+    with open(path, "rb") as file:
+        head = file.read(HEAD)
+    fmt = detect(head, "rows", "records", name=path)
+    names = sorted(path.replace("/", ".") for path in Beginning(head).json_paths)
+    if FORMATS[fmt].is_table:
+        names = list(open_table(head, fmt, header=True, source=path)[0].names or ())
+    done, comma, _ = incomplete.rpartition(",")
+    return dict.fromkeys((done + comma + name for name in names), "")
+
+
+COLUMN = Text(offers=_offer_columns)
 
 
 def tree_on_the_line(ctx: click.Context) -> str | None:
@@ -170,20 +168,20 @@ def tree_on_the_line(ctx: click.Context) -> str | None:
     return ctx.params.get("tree") or next(iter(named), None)
 
 
-class JointSetting(Text):
-    """A joint of a robot and its value."""
+def _offer_joints(ctx: click.Context, incomplete: str) -> Mapping[str, str]:
+    """Offer the joints of the robot on the line with their limits; behind the = the limits."""
+    from frametool.formats.load import load
 
-    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:
-        """Offer the joints of the robot on the line with their limits; behind the = the limits."""
-        from frametool.formats.load import load
+    robots = load(tree_on_the_line(ctx) or "").robots
+    joints = [joint for _, links, _ in robots for link in links for joint in link.joints]
+    ends = {each.name: [str(end) for end in (each.lower, each.upper) if end is not None] for each in joints}
+    name, equals, _ = incomplete.partition("=")
+    if equals:
+        return {f"{name}={end}": "a limit" for end in ends.get(name, ())}
+    return {f"{each}=": " .. ".join(both) for each, both in ends.items()}
 
-        robots = load(tree_on_the_line(ctx) or "").robots
-        joints = [joint for _, links, _ in robots for link in links for joint in link.joints]
-        ends = {each.name: [str(end) for end in (each.lower, each.upper) if end is not None] for each in joints}
-        name, equals, _ = incomplete.partition("=")
-        if equals:
-            return {f"{name}={end}": "a limit" for end in ends.get(name, ())}
-        return {f"{each}=": " .. ".join(both) for each, both in ends.items()}
+
+JOINT = Text(offers=_offer_joints)
 
 
 # --- inputs --------------------------------------------------------------------------------------------------------
@@ -209,7 +207,7 @@ reading_options = together(
     _TOPIC,
     _of_files("--quiet", "suppress notes on files"),
     _of_formats("-j --joint NAME=VALUE", "value of a robot's joint: radians or metres, 30deg, 2cm, a POSE; "
-              "may be repeated", JointSetting(), name="joints", multiple=True),
+              "may be repeated", JOINT, name="joints", multiple=True),
     _of_formats("--joints FILE", "joint values: a map, JointState messages, CSV, MJCF:KEY", name="joint_files",
               multiple=True),
     _of_formats("--frames WORLD,BODY", "frame names that a format does not store; may be repeated, "
@@ -287,7 +285,7 @@ def list_options(*more: str) -> Adds:
 
 
 rotation_options = together(
-    _of_rotations("--to REP[,REP..]", "representations of the result  [default: quaternion]", Notations(),
+    _of_rotations("--to REP[,REP..]", "representations of the result  [default: quaternion]", NOTATIONS,
                   name="notations"),
     _of_rotations("--deg", "angles in degrees"),
     _of_rotations("--keep-sign", "do not normalize the quaternion's sign to w >= 0"),

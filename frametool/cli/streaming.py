@@ -47,7 +47,7 @@ ONE_RECORD = "--explain derives one record; write it as an argument"
 _of_rows = partial(option, under="Rows")
 _ROWS = together(
     options.in_option,
-    option("--from REP", "representation of bare numbers", options.Notations(), name="from_rep", under="Rotations"),
+    option("--from REP", "representation of bare numbers", options.NOTATIONS, name="from_rep", under="Rotations"),
     _of_rows("--columns NAME,..", "pose columns by name or number, once per pose; or one key of records, a.b",
              options.COLUMN, multiple=True),
     _of_rows("--keep", "append result columns, keep the input's"),

@@ -219,18 +219,15 @@ def tree_file(argument: str) -> str:
     raise click.UsageError("TREE is . but FRAMETOOL_TREE is not set; name a file")
 
 
-class Frame(Text):
-    """A frame's name, completed from the tree named before it."""
-
-    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:  # noqa: ARG002
-        """Offer the frames of the tree, or files where none is named yet."""
-        named = tree_on_the_line(ctx)
-        if named is None and "arguments" in ctx.params:
-            return None
-        return dict.fromkeys(load_tree(named or ".", ctx.params.get("more") or ()).frames, "")
+def _offer_frames(ctx: click.Context, _incomplete: str) -> Mapping[str, str] | None:
+    """Offer the frames of the tree, or files where none is named yet."""
+    named = tree_on_the_line(ctx)
+    if named is None and "arguments" in ctx.params:
+        return None
+    return dict.fromkeys(load_tree(named or ".", ctx.params.get("more") or ()).frames, "")
 
 
-FRAME = Frame()
+FRAME = Text(offers=_offer_frames)
 
 
 def frame_name(name: str, tree: Frames | Robot) -> str:

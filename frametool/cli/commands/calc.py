@@ -76,18 +76,18 @@ def named_file(path: str, scope: Scope) -> Term:
     return Term(Type(TREE), (), tree=tree)
 
 
-class Expression(Text):
-    """An expression, completed from --tree and from the files that were named before it."""
+def _offer_words(ctx: click.Context, incomplete: str) -> Mapping[str, str]:
+    """Offer what its last word may become."""
+    scope, trees = Scope(), ctx.params.get("trees")
+    scope.tree = load_tree(trees[0], trees[1:]) if trees else None
+    for each in ctx.params.get("arguments") or ():
+        file_named_in(each, scope)
+    cut = max(incomplete.rfind(mark) for mark in BETWEEN_WORDS) + 1
+    before, word = incomplete[:cut], incomplete[cut:]
+    return dict.fromkeys((before + each for each in Completer(scope, None).completions(word, before)), "")
 
-    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:
-        """Offer what its last word may become."""
-        scope, trees = Scope(), ctx.params.get("trees")
-        scope.tree = load_tree(trees[0], trees[1:]) if trees else None
-        for each in ctx.params.get("arguments") or ():
-            file_named_in(each, scope)
-        cut = max(incomplete.rfind(mark) for mark in BETWEEN_WORDS) + 1
-        before, word = incomplete[:cut], incomplete[cut:]
-        return dict.fromkeys((before + each for each in Completer(scope, None).completions(word, before)), "")
+
+EXPRESSION = Text(offers=_offer_words)
 
 
 def value_texts(terms: Iterable[Term], style: Style) -> Iterator[str]:
@@ -252,10 +252,10 @@ def _begins_with_minus(argument: str) -> bool:
 
 
 @command_named("calc", own=("input_path",), cls=CalcCommand)
-@argument("arguments", Expression(), nargs=-1, metavar="[NAME=FILE ..] [EXPR ..]")
+@argument("arguments", EXPRESSION, nargs=-1, metavar="[NAME=FILE ..] [EXPR ..]")
 @option("--tree FILE", "the tree of look-ups; may be repeated  [default: FRAMETOOL_TREE]", name="trees", multiple=True)
 @option("-e NAME=EXPR", "a result in its own columns: NAME, NAME_x ..; may be repeated; also EXPR, @FILE",
-    Expression(), name="expressions", multiple=True)
+    EXPRESSION, name="expressions", multiple=True)
 @option("--as", "what the rows are  [default: as they look]", KINDS, name="kind")
 @option("--time-column NAME", "of the time of @ row  [default: the one that looks so]", COLUMN, under="Time")
 @stream_options

@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     from frametool.stream.request import Operation
 
 
-AXES = options.AxesName()
-
-
 class ConvertCommand(Command):
     """A command whose help lists the representations."""
 
@@ -43,9 +40,9 @@ class ConvertCommand(Command):
 
 @command_named("convert", own=("from_rep", "notations"), cls=ConvertCommand)
 @argument("values", nargs=-1, metavar="[VALUES.. | POSE]")
-@option("--axes NAME", "the pose at the same place in these axes (help axes)", AXES)
-@option("--world-axes A_from_B", "axes of the reference frame (help axes)", AXES, name="world")
-@option("--all-axes A_from_B", "axes of both: unity_from_ros, or x,-y,-z", AXES, excludes=("axes", "world"))
+@option("--axes NAME", "the pose at the same place in these axes (help axes)", options.AXIS)
+@option("--world-axes A_from_B", "axes of the reference frame (help axes)", options.AXIS, name="world")
+@option("--all-axes A_from_B", "axes of both: unity_from_ros, or x,-y,-z", options.AXIS, excludes=("axes", "world"))
 @option("--find A,B,C", "Euler conventions with these angles (help euler)")
 @option("--tolerance RAD", "tolerance of --find  [default: 1e-06]", parse_number, requires=("find",), default=1e-6)
 @pose_stream_options

@@ -216,16 +216,13 @@ def _option(option: click.Option, group: str, ctx: click.Context) -> dict[str, A
     }  # fmt: skip
 
 
-class Topic(Text):
-    """A subject or a command."""
-
-    def offers(self, ctx: click.Context, incomplete: str) -> dict[str, str]:  # noqa: ARG002
-        """Offer the subjects and the commands."""
-        return topics() | MADE | {name: row[1] for name, row in COMMANDS.items()}
+def _offer_topics(_ctx: click.Context, _incomplete: str) -> dict[str, str]:
+    """Offer the subjects and the commands."""
+    return topics() | MADE | {name: row[1] for name, row in COMMANDS.items()}
 
 
 @command_named("help")
-@argument("words", Topic(), nargs=-1, metavar="[TOPIC | COMMAND | WORD ..]")
+@argument("words", Text(offers=_offer_topics), nargs=-1, metavar="[TOPIC | COMMAND | WORD ..]")
 @option("-f --format", "json: options, values and exit codes of all commands or one", ("text", "json"), name="fmt",
     default="text")  # fmt: skip
 @click.pass_context
@@ -280,23 +277,21 @@ def _json(ctx: click.Context, name: str, named: click.Command | None) -> str:
     return f"{dump(every[0] if named else whole)}\n"
 
 
-class Example(Text):
-    """The name of an example file."""
+def _read_example(text: str) -> str:
+    """Refuse an unknown one with the nearest."""
+    name = text.removeprefix("examples/")
+    if name not in names():
+        raise ValueInvalid(f"no example {shown(name)}{any_near(name, names(), '`frametool examples` lists all')}")
+    return name
 
-    def read(self, text: str) -> str:
-        """Refuse an unknown one with the nearest."""
-        name = text.removeprefix("examples/")
-        if name not in names():
-            raise ValueInvalid(f"no example {shown(name)}{any_near(name, names(), '`frametool examples` lists all')}")
-        return name
 
-    def offers(self, ctx: click.Context, incomplete: str) -> dict[str, str]:  # noqa: ARG002
-        """Offer the files."""
-        return dict.fromkeys(names(), "")
+def _offer_examples(_ctx: click.Context, _incomplete: str) -> dict[str, str]:
+    """Offer the files."""
+    return dict.fromkeys(names(), "")
 
 
 @command_named("examples")
-@argument("name", Example(), required=False)
+@argument("name", Text(_read_example, _offer_examples), required=False)
 @option("-o --output FOLDER|FILE", "copy all files into this folder, or NAME into this file", FILE, under="Result")
 @option("--force", "let --output overwrite files", requires=("output",), under="Result")
 def examples_command(inputs: Inputs) -> None:

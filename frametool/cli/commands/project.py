@@ -34,18 +34,15 @@ if TYPE_CHECKING:
 AXES = ("optical", "opengl", "flu")
 
 
-class CameraFile(Text):
-    """A file, and behind a colon which of its cameras is meant; or a camera written inline."""
+def _offer_cameras(_ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:
+    """Offer the names of the cameras in a file that is there."""
+    path, colon, _ = incomplete.rpartition(":")
+    if not colon:
+        return None
+    from frametool.documents.source import InputFile
+    from frametool.formats.cameras import cameras_of
 
-    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:  # noqa: ARG002
-        """Offer the names of the cameras in a file that is there."""
-        path, colon, _ = incomplete.rpartition(":")
-        if not colon:
-            return None
-        from frametool.documents.source import InputFile
-        from frametool.formats.cameras import cameras_of
-
-        return {f"{path}:{name}": "" for name in cameras_of(InputFile(path)) if name}
+    return {f"{path}:{name}": "" for name in cameras_of(InputFile(path)) if name}
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -57,7 +54,7 @@ def parse_size(text: str) -> tuple[int, int]:
 
 
 camera_options = together(
-    option("--camera FILE[:NAME]", "intrinsics from this file, or inline, not from TREE", CameraFile()),
+    option("--camera FILE[:NAME]", "intrinsics from this file, or inline, not from TREE", Text(offers=_offer_cameras)),
     option("--model NAME", "distortion model of --camera", requires=("camera",)),
     option("--size W,H", "image size, to which K is scaled", parse_size),
     option("--rectified", "use the rectified image: R, then P, no distortion"),
