@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections import deque
-from itertools import count, cycle
+from itertools import chain, count, cycle
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, shown
@@ -156,11 +156,7 @@ class Mailbox:
         """Add a command; it acts now, or at a later time."""
         self._posted.append((t_ns, command))
 
-    def close(self) -> None:
-        """End the simulation."""
-        self._failure = EndOfRun()
-
-    def fill_from(self, commands: Iterable[TimedTwist]) -> None:
+    def fill_from(self, commands: Iterable[tuple[int, Twist | Heading]]) -> None:
         """Post commands from a separate thread, as they arrive."""
         from threading import Thread
 
@@ -176,7 +172,7 @@ class Mailbox:
     def __call__(self, look: Look) -> Leader:  # noqa: ARG002 - whoever posts does the looking
         """Yield the newest command whose time has come, at each tick.
 
-        Raises EndOfRun when it was closed.
+        Raises what ended the commands, EndOfRun if somebody did.
         """
         for now_ns in count(0, TICK_NS):
             yield now_ns
@@ -305,13 +301,12 @@ def _ahead(pose: TurtlePose) -> TurtlePose:
 ARROWS = {b"A": "up", b"B": "down", b"C": "right", b"D": "left"}
 
 
-def keys_in(data: bytes) -> list[bytes]:
-    """Split the input of a terminal into keys: escape sequences of arrows, and single letters."""
-    return re.findall(rb"(?s)\x1b[\[O].|.", data)
-
-
-def meaning_of(key: bytes, *, headings: bool) -> Twist | Heading | None:
-    """Return the command of a key; None for any other key."""
-    if len(key) == 3:
-        return KEYS.get(ARROWS.get(key[2:], ""))
-    return HEADINGS.get(key.decode("latin-1").lower()) if headings else None
+def typed_commands(reads: Iterable[bytes], *, headings: bool) -> Iterator[tuple[int, Twist | Heading]]:
+    """Yield the commands of what is typed, other keys without any; raise EndOfRun at the key that ends it."""
+    for key in chain.from_iterable(re.findall(rb"(?s)\x1b[\[O].|.", data) for data in reads):
+        if key in b"qQ\x04":
+            raise EndOfRun
+        heading = HEADINGS.get(key.decode("latin-1").lower()) if headings else None
+        command = heading if len(key) == 1 else KEYS.get(ARROWS.get(key[2:], ""))  # an arrow has three bytes
+        if command is not None:
+            yield 0, command

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from frametool.errors import ValueInvalid
-from frametool.sim.drivers import LAWS, LEADERS, FollowController, Heading, Mailbox, scripted
+from frametool.sim.drivers import LAWS, LEADERS, FollowController, Heading, Mailbox, scripted, typed_commands
 from frametool.sim.scene import Follow, Scene, SceneTurtle, ServiceCall, tutorial
 from frametool.sim.simulate import RunSummary, Simulation, SimulationStep, simulate
 from frametool.sim.turtle import (
@@ -338,12 +338,12 @@ def test_a_mailbox_gives_the_newest_command_that_is_due_and_turns_to_headings() 
     assert last_of(scene)[1].poses["turtle1"].angular_velocity == 1.0
 
 
-def test_closing_a_mailbox_ends_the_run() -> None:
+def test_an_arrow_is_a_command_and_the_key_q_ends_the_run() -> None:
+    typed = typed_commands([b"\x1b[A?", b"fq\x1b[B"], headings=False)
+    assert next(typed) == (0, Twist(2.0, 0.0))
     mailbox = Mailbox()
-    steps = simulate(tutorial(leader=mailbox, duration=None))
-    next(steps)
-    mailbox.close()
-    assert len(list(steps)) < 10
+    mailbox.fill_from(typed)
+    assert max(step.t_ns for step in simulate(tutorial(leader=mailbox, duration=600.0))) < 600 * SECOND
 
 
 def test_a_mailbox_tells_what_went_wrong_while_it_was_filled() -> None:

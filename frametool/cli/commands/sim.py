@@ -358,25 +358,12 @@ def keyboard(mailbox: drivers.Mailbox, *, headings: bool) -> Iterator[None]:
         import tty
     except ImportError:
         raise click.UsageError(f"single keys are read on Linux and macOS alone; {INSTEAD}") from None
-    from threading import Thread
-
     clean_up()
     before = termios.tcgetattr(sys.stdin)
     tty.setcbreak(sys.stdin)
     try:
-        Thread(target=_listen, args=(mailbox, headings), daemon=True).start()
+        typed = iter(partial(os.read, sys.stdin.fileno(), 64), b"")
+        mailbox.fill_from(drivers.typed_commands(typed, headings=headings))
         yield
     finally:
         termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
-
-
-def _listen(mailbox: drivers.Mailbox, headings: bool) -> None:
-    """Post what keys mean until the key that ends it."""
-    while data := os.read(sys.stdin.fileno(), 64):
-        for key in drivers.keys_in(data):
-            if key in b"qQ\x04":
-                mailbox.close()
-                return
-            command = drivers.meaning_of(key, headings=headings)
-            if command is not None:
-                mailbox.post(command)
