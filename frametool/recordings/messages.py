@@ -20,7 +20,7 @@ from frametool.grammar.edges import Edge, EdgeColumns
 from frametool.recordings.read import opened_recording
 from frametool.recordings.types import POSE_ARRAY, Layouts, posed_messages, text_of
 from frametool.ros.messages import PATH, POSES, STAMPS, body_of, on_topic, stamp_problem
-from frametool.ros.plain_messages import unit_components, unit_rows
+from frametool.ros.plain_messages import edge_columns, unit_components
 from frametool.text.lines import Pieces
 
 if TYPE_CHECKING:
@@ -327,23 +327,21 @@ def _transforms(reader: RecordingReader, message: Recorded, number: int, options
 
 
 def _columns(rows: Sequence[tuple[RawTransform, int, Recorded]], options: Options) -> EdgeColumns | None:
-    """Return the edges of many messages at once; None, and no warnings, if one of them is refused."""
+    """Return the edges of many messages at once; None, and no warnings about numbers, if one of them is refused."""
     transforms, lines, sent = zip(*rows, strict=True)
     *names, numbers, stamps = zip(*transforms, strict=True)
     bare = {name: options.tally.names.bare(name) for name in dict.fromkeys(chain(*names))}
     parents, children = ([*map(bare.__getitem__, each)] for each in names)
     topics = [each.channel.topic for each in sent]
-    published = dict.fromkeys(zip(topics, children, strict=True))
-    seconds, parts = zip(*stamps, strict=True)
-    if (
-        not all(bare) or not all(options.topics.agrees(*each) for each in published)
-        or any(stamp_problem(pick(seconds), pick(parts), STAMPS[0]) for pick in (min, max))
-        or (components := unit_rows(numbers, lines, options.tally, options.normalize)) is None
-    ):  # fmt: skip
+    if not all(options.topics.agrees(*each) for each in dict.fromkeys(zip(topics, children, strict=True))):
         return None
-    options.topics.counts.update(Counter(topics) + Counter(options.topics.counts))
-    stamps_ns = [second * BILLION + part for second, part in stamps]
-    return EdgeColumns(parents, children, stamps_ns, components, lines, topics, [each.log_ns for each in sent])
+    found = edge_columns(
+        (parents, children), zip(*stamps, strict=True), numbers, lines, options.tally, normalize=options.normalize,
+        topics=topics, received_ns=[each.log_ns for each in sent],
+    )  # fmt: skip
+    if found:
+        options.topics.counts.update(Counter(topics) + Counter(options.topics.counts))
+    return found
 
 
 def _edge(said: RawTransform, number: int, message: Recorded, path: str, options: Options) -> Edge:

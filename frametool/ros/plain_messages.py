@@ -25,15 +25,15 @@ from frametool.errors import ValueInvalid
 from frametool.frames.stamps import BILLION
 from frametool.geometry import floats, quaternion
 from frametool.grammar.edges import EdgeColumns
+from frametool.ros.messages import STAMPS, stamp_problem
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Diagnostics
 
 INFINITE = float("inf")
-LATEST = 1 << 32  # seconds that no message can hold
 STAMPED = {"stamp": {"sec": "WHOLE", "nanosec": "WHOLE"}, "frame_id": "NAME"}
 STAMPED1 = {"seq": "COUNT", "stamp": {"secs": "WHOLE", "nsecs": "WHOLE"}, "frame_id": "NAME"}
 PLACED = {
@@ -91,15 +91,10 @@ class MessageLayout(NamedTuple):
     first: int = 0
 
 
-def _pattern(layout: str, groups: Mapping[str, str]) -> str:
-    """Replace the words of a layout by patterns."""
-    for mark, group in groups.items():
-        layout = layout.replace(mark, group)
-    return layout
-
-
-def _layout(opening: str, entry: str, between: str, closing: str, *lines: int) -> MessageLayout:
-    """Return a layout made from the patterns of its parts."""
+def _layout(groups: dict[str, str], opening: str, entry: str, between: str, closing: str, *lines: int) -> MessageLayout:
+    """Return a layout made from the texts of its parts, in which `groups` replaces words by patterns."""
+    for word, pattern in groups.items():
+        opening, entry = opening.replace(word, pattern), entry.replace(word, pattern)
     gap, end = f"{between}|{closing}{opening}", f"{closing}|\\Z" if lines else closing
     first, each, inner, last = (re.compile(part, re.ASCII) for part in (opening, entry, gap, end))
     return MessageLayout(first, each, inner, last, *lines)
@@ -107,14 +102,13 @@ def _layout(opening: str, entry: str, between: str, closing: str, *lines: int) -
 
 def _echoed(entry: str) -> MessageLayout:
     """Return the layout of documents printed by a tool."""
-    opening, pattern = (_pattern(part, ECHO_GROUPS) for part in ("transforms:\n", entry))
-    return _layout(opening, pattern, "", "---\n", entry.count("\n"), entry[: entry.index("header")].count("\n"))
+    lines = entry.count("\n"), entry[: entry.index("header")].count("\n")
+    return _layout(ECHO_GROUPS, "transforms:\n", entry, "", "---\n", *lines)
 
 
 def _on_lines(opening: str, between: str, closing: str) -> list[MessageLayout]:
     """Return the layouts of a kind of lines, in ROS 2 and in ROS 1."""
-    begin, *entries = (_pattern(part, JSON_GROUPS) for part in (opening, json.dumps(FIELDS), json.dumps(FIELDS1)))
-    return [_layout(begin, each, between, closing) for each in entries]
+    return [_layout(JSON_GROUPS, opening, json.dumps(each), between, closing) for each in (FIELDS, FIELDS1)]
 
 
 LAYOUTS = (
@@ -140,38 +134,39 @@ def plain_columns(text: str, line: int, tally: Diagnostics, *, normalize: bool =
     found = {gap: layout.gap.fullmatch(gap) for gap in {*gaps}}
     if begin != opened[0] or not all(found.values()) or not layout.closing.fullmatch(end):
         return None
-    seconds, nanoseconds = ([*map(int, parts[at::EACH])] for at in (1, 2))
-    if max(seconds) >= LATEST or max(nanoseconds) >= BILLION:
-        return None
-    parents, children = parts[3::EACH], parts[4::EACH]
-    names = tally.names
-    if not all(names[name] for pair in dict.fromkeys(zip(parents, children, strict=True)) for name in pair):
-        return None
+    parents, children = ([tally.names[name] for name in parts[at::EACH]] for at in (3, 4))
+    stamps = [*map(int, parts[1::EACH])], [*map(int, parts[2::EACH])]
+    rows = zip(*(map(float, parts[at::EACH]) for at in range(5, EACH)), strict=True)
     steps = {gap: gap.count("\n") + layout.lines for gap in found}
     lines = [*accumulate(map(steps.__getitem__, gaps), initial=line + begin.count("\n") + layout.first)]
-    rows = zip(*(map(float, parts[at::EACH]) for at in range(5, EACH)), strict=True)
-    components = unit_rows(rows, lines, tally, normalize)
-    if components is None:
-        return None
-    stamps_ns = [second * BILLION + part for second, part in zip(seconds, nanoseconds, strict=True)]
     topics: Iterator[str] | tuple[()] = ()
     if opened.re.groups:
         named = (str(found[gap][1] or "")[1:-1] for gap in gaps)  # type: ignore[index]
         topics = accumulate(named, lambda before, topic: topic or before, initial=opened[1][1:-1])
-    parents, children = ([names[each] for each in column] for column in (parents, children))
-    return EdgeColumns(parents, children, stamps_ns, components, lines, topics)
+    return edge_columns((parents, children), stamps, rows, lines, tally, normalize=normalize, topics=topics)
 
 
-def unit_rows(
-    rows: Iterable[Rigid], lines: Sequence[int], tally: Diagnostics, normalize: bool  # noqa: FBT001 - as below
-) -> list[Rigid] | None:  # fmt: skip
-    """Return the components of each row with a unit quaternion; None, and no warnings, if one of them is refused."""
+def edge_columns(
+    names: tuple[Sequence[str], Sequence[str]], stamps: Iterable[Sequence[int]], rows: Iterable[Rigid],
+    lines: Sequence[int], tally: Diagnostics, *, normalize: bool, topics: Iterable[str] = (),
+    received_ns: Iterable[int] = (),
+) -> EdgeColumns | None:  # fmt: skip
+    """Return edges with unit quaternions; None, and no warnings about numbers, if one of them is refused.
+
+    names: of parents and of children; stamps: seconds and nanoseconds; rows: components as they were read
+    """
+    seconds, nanoseconds = stamps
+    is_refused = any(stamp_problem(pick(seconds), pick(nanoseconds), STAMPS[0]) for pick in (min, max))
+    if is_refused or not all(map(all, names)):
+        return None
     rough = len(tally.rough)
     try:
-        return [unit_components(row, line, tally, normalize) for row, line in zip(rows, lines, strict=True)]
+        components = [unit_components(row, line, tally, normalize) for row, line in zip(rows, lines, strict=True)]
     except ValueError:  # of numbers that are refused, or no numbers
         del tally.rough[rough:]
-    return None
+        return None
+    stamps_ns = [second * BILLION + part for second, part in zip(seconds, nanoseconds, strict=True)]
+    return EdgeColumns(*names, stamps_ns, components, lines, topics, received_ns)
 
 
 def unit_components(numbers: Rigid, line: int, tally: Diagnostics, normalize: bool) -> Rigid:  # noqa: FBT001 - fast
