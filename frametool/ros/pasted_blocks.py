@@ -16,7 +16,6 @@ its angles and its matrix are the same with as few digits.
 from __future__ import annotations
 
 import re
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.json import dump, looks_like_json, parse_json
@@ -32,14 +31,12 @@ if TYPE_CHECKING:
 
 MOST_PASTED = 1 << 16  # characters
 _LIST = rf"\[\s*({NUMBER}(?:\s*,\s*{NUMBER})*)\s*\]"
-_TRANSLATION = re.compile(r"(?m)^(?=[ \t]*+(?:-\s+)?Translation:)")  # a selection may begin after the dash
-_TIME = re.compile(r"(?m)^[ \t]*+At time (\d{1,10}(?:\.\d{1,9})?)(?![\d.])")
-_HEADING = re.compile(r"(?m)^(\S+) seen from (\S+)\s+\(maps points")  # frametool's own block
-_ROTATIONS = (
-    ("xyzw", re.compile(r"in Quaternion(?: \(xyzw\))?")),
-    ("rpy", re.compile(r"in RPY \(radian\)")),
-    ("rpy_deg", re.compile(r"in RPY \(degree\)")),
+_TRANSLATION = r"(?m:^)[ \t]*+(?:-\s+)?Translation:"  # a selection may begin after the dash
+_PART = re.compile(  # of a block, by the key of the grammar
+    rf"(?m:^)[ \t]*+At time (?P<stamp_ns>\d{{1,10}}(?:\.\d{{1,9}})?)(?![\d.])|(?P<xyz>{_TRANSLATION})"
+    r"|(?P<xyzw>in Quaternion(?: \(xyzw\))?)|(?P<rpy>in RPY \(radian\))|(?P<rpy_deg>in RPY \(degree\))"
 )
+_HEADING = re.compile(r"(?m)^(\S+) seen from (\S+)\s+\(maps points")  # frametool's own block
 _TRIPLE = rf"\[({NUMBER}(?:[ |]+{NUMBER}){{2}})\]"
 _GAZEBO = re.compile(rf"Pose \[ XYZ \(m\) \] \[ RPY \(rad\) \]:\s*{_TRIPLE}\s*{_TRIPLE}")
 _ARGS = re.compile(r"\bargs\s*[=:]\s*([\"'])(.*?)\1", re.DOTALL)
@@ -70,7 +67,7 @@ _BEGIN = re.compile(
 
 def may_be_pasted(text: str) -> bool:
     """Return True if the beginning of a text may be a pasted print."""
-    return bool(_BEGIN.match(text) or _TRANSLATION.search(text, 0, 4096)) or _mended(text) != text
+    return bool(_BEGIN.match(text) or re.search(_TRANSLATION, text[:4096])) or _mended(text) != text
 
 
 def in_grammar(
@@ -117,32 +114,24 @@ def _size(value: Any) -> tuple[int, int]:
 
 
 def _blocks(text: str) -> list[Any]:
-    """Read all blocks printed by tf2_echo; a block may lack its position or its time."""
-    parts = _TRANSLATION.split(text)
-    if len(parts) == 1:
-        return [value] if (value := _block(text)) else []
-    names = _HEADING.search(text)
+    """Read all blocks printed by tf2_echo; a block may lack its position or its time, and its first rotation counts."""
+    names, values, stamp = _HEADING.search(text), list[dict[str, Any]](), 0
     known = {"name": names[1], "parent": names[2]} if names else {}
-    values = []
-    for before, part in pairwise(parts):
-        times = _TIME.findall(before)
-        stamp = parse_stamp(times[-1]) if times else 0  # 0 is that of a static one
-        values.append({**known, **({"stamp_ns": Verbatim(stamp)} if stamp else {}), **_block(part)})
-    return values
-
-
-def _block(text: str) -> dict[str, Any]:
-    """Read position and rotation of one block; of several notations the first."""
-    turned = next(((key, found) for key, heading in _ROTATIONS if (found := heading.search(text))), None)
-    value: dict[str, Any] = {}
-    for key, heading in filter(None, (("xyz", re.search(r"(?:-\s+)?Translation:", text)), turned)):
-        if heading:
-            numbers = re.compile(rf"\s*{_LIST}").match(text, heading.end())
+    for part in _PART.finditer(text):
+        key = str(part.lastgroup)
+        if key == "stamp_ns":
+            stamp = parse_stamp(part[key])
+            continue
+        if key == "xyz" or not values:
+            values.append({**known, **({"stamp_ns": Verbatim(stamp)} if stamp else {})})  # 0 is that of a static one
+            stamp = 0
+        if values[-1].keys().isdisjoint(("xyzw", "rpy", "rpy_deg")):
+            numbers = re.compile(rf"\s*{_LIST}").match(text, part.end())
             if not numbers:
-                line = text[heading.start() :].strip().partition("\n")[0]
+                line = text[part.start() :].strip().partition("\n")[0]
                 raise ValueInvalid(f"expected a list of numbers, found {shown(line)}")
-            value[key] = numbers[1].replace(",", " ").split()
-    return value
+            values[-1][key] = numbers[1].replace(",", " ").split()
+    return values
 
 
 def _gazebo(text: str) -> list[Any]:
