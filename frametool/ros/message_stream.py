@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool import sizes
 from frametool.documents.document import Piece, counted_from, documents, lines, parse_documents
-from frametool.documents.json import strict_json
-from frametool.documents.source import Source, check_text
+from frametool.documents.source import Source
 from frametool.errors import FormatError, first_of, shown
 from frametool.frames.stamps import BILLION
 from frametool.grammar.edges import Edge
@@ -29,7 +28,7 @@ from frametool.ros.messages import body_of, is_pose, on_topic
 from frametool.ros.plain_messages import plain_columns
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
     from typing import BinaryIO
 
     from frametool.documents.source import InputFile
@@ -104,23 +103,21 @@ NOISE = re.compile(
 ).fullmatch
 
 
-_SEPARATOR = re.compile(r"^.*---[ \t]*$\n?", re.MULTILINE)
 _ODD_START = re.compile(r"^(?=[A-Z\t\[\d$^\ufeff])", re.MULTILINE)  # no key that ROS prints begins like this
 
 
 class TextMessage(NamedTuple):
-    """The plain values of one message, with its text and the number of its first line."""
+    """The plain values of one message, with its text and the number of its first line; document: None for a row."""
 
     value: Any
     source: Source
     line: int
-    document: int = 0
-    cells: bool = False
+    document: int | None = 0
     received_ns: int | None = None
 
     def error(self, misfit: Misfit) -> FormatError:
         """Return the error for this message, with its place in the whole file."""
-        if self.cells:
+        if self.document is None:
             error = FormatError(str(misfit), source=self.source.name, line=1, rule=misfit.rule)
         else:
             error = misfit.placed(self.source, self.document)
@@ -136,18 +133,17 @@ def read_messages(stream: BinaryIO, name: str, tally: Diagnostics) -> Iterator[T
 
 def piece_messages(piece: Piece, name: str, fmt: str, tally: Diagnostics) -> Iterator[TextMessage | FormatError]:
     """Yield the messages of documents that end in `---`, or of lines."""
-    if fmt == "jsonl":
-        for number, text in _data_lines(piece, tally):
-            yield from _parsed(text.removeprefix("\ufeff"), number, name, fmt)
-        return
-    at, line = 0, piece.line
-    while at < len(piece.text):
-        separator = _SEPARATOR.search(piece.text, at)
-        end = separator.end() if separator else len(piece.text)
-        text = piece.text[at:end]
-        yield from _parsed(without_noise(text, line, tally), line, name, fmt)
-        line += text.count("\n")
-        at = end
+    texts: Iterable[tuple[int, str]] = _data_lines(piece, tally)
+    if fmt != "jsonl":
+        texts = ((line, without_noise(text, line, tally)) for text, line in _cut(piece, "---\n", 1))
+    for line, text in texts:
+        try:
+            with counted_from(line):
+                found = parse_documents(text, name)
+        except FormatError as error:
+            yield error
+            continue
+        yield from (TextMessage(each.value, each.source, line, each.index) for each in found)
 
 
 def without_noise(text: str, line: int, tally: Diagnostics) -> str:
@@ -160,23 +156,6 @@ def without_noise(text: str, line: int, tally: Diagnostics) -> str:
             tally.noise.append((line + index, each.strip()))
             kept[index] = "---" if each.endswith("---") else ""
     return "\n".join(kept)
-
-
-def _parsed(text: str, line: int, name: str, fmt: str) -> Iterator[TextMessage | FormatError]:
-    """Read the documents of a text, or one line of JSON, that begins on this line."""
-    source = Source(name, text)
-    try:
-        with counted_from(line):
-            if fmt == "jsonl":
-                check_text(source)
-                found = [*enumerate(strict_json(source))]
-            else:
-                found = [(document.index, document.value) for document in parse_documents(text, name)]
-    except FormatError as error:
-        yield error
-        return
-    for index, value in found:
-        yield TextMessage(value, source, line, index)
 
 
 def line_texts(stream: BinaryIO, name: str, tally: Diagnostics) -> Iterator[tuple[int, str]]:
@@ -205,7 +184,7 @@ def _csv(stream: BinaryIO, name: str, tally: Diagnostics) -> Iterator[TextMessag
             yield FormatError(str(misfit), source=name, line=number)
             continue
         received = int(cells[0]) if header and cells[0].isdecimal() else None
-        yield TextMessage(value, Source(name, line), number, cells=True, received_ns=received)
+        yield TextMessage(value, Source(name, line), number, None, received)
 
 
 _HEADER = re.compile(r"\bheader\b")
