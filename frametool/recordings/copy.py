@@ -17,10 +17,9 @@ from frametool.frames.stamps import BILLION
 from frametool.frames.topology import resolve_name, static_and_moving, to_root, two_parents
 from frametool.geometry import floats, quaternion, rigid, uncertainty
 from frametool.grammar.edges import Diagnostics, Names, Topics
-from frametool.recordings.messages import numbers_of
-from frametool.recordings.types import POSE_ARRAY, posed_messages
+from frametool.recordings.messages import POSE_ARRAY, numbers_of, posed_messages
+from frametool.ros.message_stream import unit_components
 from frametool.ros.messages import PATH, STAMPS, stamp_problem
-from frametool.ros.plain_messages import unit_components
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -28,8 +27,7 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
     from frametool.recordings.messages import RawTransform
-    from frametool.recordings.read import Channel
-    from frametool.recordings.types import MessageTypes
+    from frametool.recordings.read import Channel, MessageTypes
 
 SAME = 1e-12  # metres, for positions of about a metre, and radians: the rounding of composing and writing numbers
 STATIC = "tf_static"
@@ -59,9 +57,13 @@ class AddedEdge(NamedTuple):
 
 
 class EdgePlan(NamedTuple):
-    """The edges of a tree, grouped by whether a recording lacks them or has the same or other values."""
+    """The edges of a tree: those that a recording lacks, by topic, and those with the same or other values there.
 
-    added: list[AddedEdge]
+    apart: the roots of added edges that are not connected to the recording
+    """
+
+    added: dict[str, list[AddedEdge]]
+    apart: list[str]
     same: list[AddedEdge]
     replaced: list[AddedEdge]
 
@@ -90,20 +92,6 @@ class RecordedEdges:
                 found.setdefault(frame, next(iter(edge.topics)))
         return found
 
-    def topic_for(self, edge: AddedEdge, added: Iterable[AddedEdge]) -> str:
-        """Return the topic for an added edge: `tf_static` in the namespace of the frames above it."""
-        parents = {each.child: each.parent for each in added}
-        line = [*to_root(edge.parent, parents.get), edge.child]
-        topic = next((self.frames[frame] for frame in line if frame in self.frames), "/tf")
-        return f"{topic.rpartition('/')[0]}/{STATIC}"
-
-    def apart(self, added: Sequence[AddedEdge]) -> list[str]:
-        """Return the roots of added edges that are not connected to the recording."""
-        parents, known = {each.child: each.parent for each in added}, self.frames.keys()
-        root_of = {edge: to_root(edge.parent, parents.get)[-1] for edge in added}
-        held = {root for edge, root in root_of.items() if not known.isdisjoint((edge.parent, edge.child))}
-        return sorted({*root_of.values()} - held) if known else []
-
     def plan(self, tree: Frames, *, replace: bool) -> EdgePlan:
         """Group the edges of a tree: missing in the recording, present with the same values, or with others.
 
@@ -111,25 +99,34 @@ class RecordedEdges:
         Raises BadTopology for a frame that moves here or there, has another parent or would be below itself, and for
         other values without `replace`.
         """
-        found = EdgePlan([], [], [])
+        added, same, others = list[AddedEdge](), list[AddedEdge](), list[AddedEdge]()
         for track in tree.tracks():
             child, parent = (resolve_name(frame, self.frames) for frame in (track.child, track.parent))
             if not track.is_static:
                 raise static_and_moving(child, f" moves in {bare(tree.name)}; --with adds static frames")
             edge, known = AddedEdge(parent, child, track.components), self.known.get(child)
             if known is None:
-                found.added.append(edge)
+                added.append(edge)
                 continue
             self._refuse_other(edge, known, tree.name)
-            same = not known.varies and is_same(known.numbers, edge.numbers)
-            (found.same if same else found.replaced).append(edge)
-        if found.replaced and not replace:
-            raise BadTopology(self._others(found.replaced, tree.name), rule="two-poses")
-        parents = {child: [*edge.parents][-1] for child, edge in self.known.items()}
-        parents |= {edge.child: edge.parent for edge in found.added}
-        for edge in found.added:
-            to_root(edge.child, parents.get)  # raises for a frame below itself
-        return found
+            is_there = not known.varies and is_same(known.numbers, edge.numbers)
+            (same if is_there else others).append(edge)
+        if others and not replace:
+            raise BadTopology(self._others(others, tree.name), rule="two-poses")
+        return EdgePlan(*self._by_topic(added), same, others)
+
+    def _by_topic(self, added: Iterable[AddedEdge]) -> tuple[dict[str, list[AddedEdge]], list[str]]:
+        """Return added edges by topic, `tf_static` in the namespace of the frames above them, and the roots apart."""
+        above = {each.child: each.parent for each in added}
+        topics, is_held = dict[str, list[AddedEdge]](), dict[str, bool]()
+        everywhere = {child: [*edge.parents][-1] for child, edge in self.known.items()} | above
+        for edge in added:
+            to_root(edge.child, everywhere.get)  # raises for a frame below itself
+            line = [*to_root(edge.parent, above.get), edge.child]
+            near = next((self.frames[frame] for frame in line if frame in self.frames), "/tf")
+            topics.setdefault(f"{near.rpartition('/')[0]}/{STATIC}", []).append(edge)
+            is_held[line[-2]] = is_held.get(line[-2], False) or not self.frames.keys().isdisjoint(line[:1] + line[-1:])
+        return topics, sorted(root for root, held in is_held.items() if not held) if self.frames else []
 
     def _refuse_other(self, edge: AddedEdge, known: RecordedEdge, tree: str) -> None:
         """Raise BadTopology for a frame with another parent, a moving one, and one that comes from two robots."""
@@ -158,12 +155,9 @@ def is_same(a: Rigid, b: Rigid) -> bool:
     """Return True if two transforms are equal, whatever the sign of their quaternions; a zero quaternion never is."""
     if not (any(a[3:]) and any(b[3:])):
         return a == b
-    metres, radians = rigid.distance(*_unit(*a), *_unit(*b), xp=floats)
+    one, other = ((*each[:3], *quaternion.normalized(*each[3:], floats)) for each in (a, b))
+    metres, radians = rigid.distance(*one, *other, xp=floats)
     return bool(metres <= SAME * (1.0 + max(map(abs, a[:3]))) and radians <= SAME)
-
-
-def _unit(tx: float, ty: float, tz: float, x: float, y: float, z: float, w: float) -> Rigid:
-    return tx, ty, tz, *quaternion.normalized(x, y, z, w, floats)
 
 
 def replaced(message: Any, edges: dict[str, AddedEdge], bare_name: Callable[[str], str]) -> bool:

@@ -6,10 +6,15 @@ from every topic that has any; those on a topic `tf_static` are static.  Points 
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from contextlib import ExitStack
+from dataclasses import replace
 from io import BufferedReader
 from itertools import chain, groupby
+from json import dumps
+from math import isfinite
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -18,25 +23,27 @@ from frametool.errors import FormatError, Unanswered, ValueInvalid, first_of, li
 from frametool.frames.stamps import BILLION
 from frametool.grammar.edges import Edge, EdgeColumns
 from frametool.recordings.read import opened_recording
-from frametool.recordings.types import POSE_ARRAY, Layouts, posed_messages, text_of
+from frametool.ros.message_stream import edge_columns, unit_components
 from frametool.ros.messages import PATH, POSES, STAMPS, body_of, on_topic, stamp_problem
-from frametool.ros.plain_messages import edge_columns, unit_components
 from frametool.text.lines import Pieces
+from frametool.text.spans import MARGIN, Spans, framed, join
+from frametool.text.write import shortest_spans
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
+    from rosbags.interfaces import Nodetype
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Diagnostics, Options
-    from frametool.recordings.read import Channel, Recorded, RecordingReader
+    from frametool.recordings.read import Channel, MessageTypes, Recorded, RecordingReader
 
 
-CLOUD = "sensor_msgs/msg/PointCloud2"
+CLOUD, POSE_ARRAY = "sensor_msgs/msg/PointCloud2", "geometry_msgs/msg/PoseArray"
 DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
-_MOST_VALUES = 1 << 16  # per point
+MOST_VALUES = 1 << 16  # per field
 
 
 class PointCloud(NamedTuple):
@@ -113,10 +120,8 @@ def _record_of(message: Any) -> tuple[tuple[str, ...], np.dtype[Any]]:
             raise ValueInvalid(f"field {shown(field.name)} has the datatype {field.datatype}, known are 1 to 8")
         count, offset, size = max(int(field.count), 1), int(field.offset), int(code[1])
         end = offset + count * size
-        if end > step:
+        if end > step or count > MOST_VALUES:
             raise ValueInvalid(f"field {shown(field.name)} ends at byte {end}, a point has {step} (point_step)")
-        if len(columns) + count > _MOST_VALUES:
-            raise ValueInvalid(f"a point has more than {_MOST_VALUES} values")
         names = [field.name] if count == 1 else [f"{field.name}_{place}" for place in range(count)]
         if twice := columns.keys() & {*names}:
             raise ValueInvalid(f"field {shown(min(twice))} appears twice")
@@ -130,16 +135,15 @@ def _record_of(message: Any) -> tuple[tuple[str, ...], np.dtype[Any]]:
 
 def _rows(message: Any, kind: np.dtype[Any], width: int, height: int) -> NDArray[Any]:
     """Return the points; the rows of a grid may be padded."""
-    data = np.asarray(message.data, np.uint8)
-    step, row = kind.itemsize, int(message.row_step) or width * kind.itemsize
-    if height > 1 and row < width * step:
-        raise ValueInvalid(f"a row of {width} points of {step} bytes has {row} bytes (row_step)")
-    needed = (height - 1) * row + width * step if width and height else 0
-    if len(data) < needed:
-        raise ValueInvalid(f"{width} x {height} points need {needed} bytes, the message has {len(data)}")
+    data, least = np.asarray(message.data, np.uint8), width * kind.itemsize
+    row = int(message.row_step) or least
+    needed = (height - 1) * row + least if width and height else 0
+    if needed > len(data) or (height > 1 and row < least):
+        points = f"{width} x {height} points of {kind.itemsize} bytes"
+        raise ValueInvalid(f"{points} in rows of {row} (row_step) do not fit: the message has {len(data)} bytes")
     if not needed:
         return np.empty(0, kind)
-    grid: NDArray[Any] = np.ndarray((height, width), kind, data, 0, (max(row, width * step), step))
+    grid: NDArray[Any] = np.ndarray((height, width), kind, data, 0, (max(row, least), kind.itemsize))
     return grid.reshape(-1)
 
 
@@ -161,7 +165,6 @@ def open_records(path: str, chosen: Collection[str], tally: Diagnostics) -> Buff
     """
     with ExitStack() as opened:
         reader = opened.enter_context(opened_recording(path, tally))
-        reader.refuse_foreign(chosen)
         if channels := reader.on_topics(RECORDS, chosen):
             _refuse_several(channels, chosen, "records", path)
             return _opened_lines(reader, channels, opened)
@@ -202,7 +205,7 @@ def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[by
         for stretch in reader.blocks(channels):
             known: dict[int, bytes] = {}
             for at, layout, values in layouts.groups(stretch):
-                known |= zip(at, layout.lines(values).splitlines(keepends=True) if layout else (), strict=False)
+                known |= zip(at, layout.lines(values).splitlines(keepends=True), strict=True)
             lines: list[bytes] = []
             try:
                 for place, each in enumerate(stretch):
@@ -215,6 +218,187 @@ def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[by
     except Exception as error:  # noqa: BLE001 - of broken bytes the libraries raise anything
         what = f"message {number}: cannot be read ({type(error).__name__})"
         raise FormatError(what, source=reader.path) from None
+
+
+def posed_messages(message: Any, kind: str) -> list[Any]:
+    """Return the poses of a message that is a list of them, each with its header; else the message itself.
+
+    A pose of a Path has its own header; a missing frame or stamp is that of the path.  A stamp of 0 with a frame is
+    a valid time if other poses have stamps.
+    """
+    if kind == POSE_ARRAY:
+        return [SimpleNamespace(header=message.header, pose=pose) for pose in message.poses]
+    if kind != PATH:
+        return [message]
+    outer, found = message.header, []
+    has_stamps = any(each.header.stamp.sec or each.header.stamp.nanosec for each in message.poses)
+    for each in message.poses:
+        own = each.header
+        says_when = own.stamp.sec or own.stamp.nanosec or (has_stamps and own.frame_id)
+        header = replace(own, stamp=own.stamp if says_when else outer.stamp, frame_id=own.frame_id or outer.frame_id)
+        found.append(SimpleNamespace(header=header, pose=each.pose))
+    return found
+
+
+def text_of(types: MessageTypes, channel: Channel, data: bytes) -> bytes:
+    """Return a message as a line of JSON, a list of poses as a line for each."""
+    found = posed_messages(types.read(channel, data), channel.type)
+    return "".join(f"{dumps(_plain(each), ensure_ascii=False)}\n" for each in found).encode()
+
+
+def _plain(value: Any) -> Any:
+    """Return a message, or a part of one, as plain values; numbers that JSON does not have are written by name."""
+    if isinstance(value, float):
+        return value if isfinite(value) else str(value)
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list):
+        return [*map(_plain, value)]
+    if isinstance(value, str | int):
+        return value
+    return {name: _plain(each) for name, each in vars(value).items() if name[0].islower()}  # others are constants
+
+
+CODES = {"float64": "<f8", "float32": "<f4", "uint32": "<u4", "int32": "<i4", "uint16": "<u2", "int16": "<i2",
+         "uint8": "<u1", "int8": "<i1"}  # fmt: skip
+MOST_NUMBERS = 200  # per message
+MOST_LAYOUTS = 16  # of messages of one length
+CDR_LE = b"\0\1"
+HOLE = b"\0"  # a placeholder for a number; no JSON text contains it
+STRING_OR_NUMBER = re.compile(rb'("(?:[^"\\]|\\.)*")|-?\d[-+.\de]*')
+POINT_ZERO = 2  # the characters `.0` that an integer written as a float has too many
+
+
+class BinaryLayout(NamedTuple):
+    """The positions of numbers in messages, the bytes that all of them share, and the JSON text in between.
+
+    sample: the message that it was learned from
+    """
+
+    numbers: np.dtype[Any]
+    shared: Sequence[slice]
+    texts: Sequence[bytes]
+    sample: bytes
+
+    def values(self, messages: Sequence[bytes]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Return the numbers of messages of equal length, (n, k), and which differ from the sample in nothing else.
+
+        Those with numbers that are not finite do not count as alike.
+        """
+        text = b"".join(messages)
+        rows = np.frombuffer(text, np.uint8).reshape(len(messages), -1)
+        columns = np.frombuffer(text, self.numbers)
+        numbers = np.stack([columns[name].astype(np.float64) for name in self.numbers.names or ()], axis=-1)
+        same = [rows[:, part] == np.frombuffer(self.sample[part], np.uint8) for part in self.shared]
+        alike: Any = np.hstack([np.isfinite(numbers), *same]).all(axis=1)
+        return numbers, alike
+
+    def lines(self, numbers: NDArray[np.float64]) -> bytes:
+        """Return messages with these numbers, (n, k), as lines."""
+        names = self.numbers.names or ()
+        written = shortest_spans(numbers, b" " * len(names))
+        ends = written.ends - np.array([1 + POINT_ZERO * (self.numbers[name].kind != "f") for name in names])
+        parts = [_repeated(self.texts[0], len(numbers))]
+        for at, each in enumerate(self.texts[1:]):
+            parts += [Spans(written.data, written.starts[:, at], ends[:, at]), _repeated(each, len(numbers))]
+        return join(parts)
+
+
+def _repeated(text: bytes, count: int) -> Spans:
+    """Return a text for each row, in pieces that are copied at once."""
+    starts = np.arange(0, len(text), MARGIN)
+    ends = np.minimum(starts + MARGIN, len(text))
+    return Spans(framed(text), np.tile(starts + MARGIN, (count, 1)), np.tile(ends + MARGIN, (count, 1)))
+
+
+class MessageNumbers:
+    """The numbers in one message: their places and types, and the parts that other messages must share with it."""
+
+    def __init__(self, types: MessageTypes, kind: str, data: bytes) -> None:
+        """Read a message; raises ValueError if one of its parts has no fixed place."""
+        from rosbags.interfaces import Nodetype
+
+        self.fields, self.data = types.store.fielddefs, data
+        self.begin = self.at = 0 if types.ros1 else 4
+        self.aligned = not types.ros1
+        self.numbers: list[tuple[int, str]] = []
+        self.shared = [slice(self.begin)]
+        self._value(Nodetype.NAME, kind)
+        if self.at != len(data) or not self.numbers or (self.aligned and data[:2] != CDR_LE):
+            raise ValueError
+
+    def _value(self, node: Nodetype, what: Any) -> None:
+        from rosbags.interfaces import Nodetype  # the extra is named where it is missing
+
+        if node == Nodetype.NAME:
+            for _, inner in self.fields[what][1]:
+                self._value(*inner)
+        elif node == Nodetype.ARRAY:
+            for _ in range(min(what[1], MOST_NUMBERS)):
+                self._value(*what[0])
+        elif node == Nodetype.SEQUENCE or what[0] == "string":
+            begin = self._place(4)
+            count = int.from_bytes(self.data[begin : self.at], "little")
+            self.at += count if node == Nodetype.BASE else 0
+            self.shared.append(slice(begin, self.at))
+            for _ in range(min(count, MOST_NUMBERS) if node == Nodetype.SEQUENCE else 0):
+                self._value(*what[0])
+        else:
+            code = CODES.get(what[0])
+            if code is None or len(self.numbers) > MOST_NUMBERS:
+                raise ValueError
+            self.numbers.append((self._place(int(code[-1])), code))
+
+    def _place(self, size: int) -> int:
+        """Skip the next part of this many bytes; return its position."""
+        self.at += size + (-(self.at - self.begin) % size if self.aligned else 0)
+        return self.at - size
+
+
+def layout_of(types: MessageTypes, channel: Channel, data: bytes) -> BinaryLayout | None:
+    """Return the layout of messages like this one; None unless it gives the same line as the full reader."""
+    try:
+        line = text_of(types, channel, data)
+        fields = MessageNumbers(types, channel.type, data)
+    except ValueError:
+        return None
+    places, codes = zip(*fields.numbers, strict=True)
+    names = [f"f{at}" for at in range(len(codes))]
+    numbers = np.dtype({"names": names, "formats": codes, "offsets": places, "itemsize": len(data)})
+    texts = STRING_OR_NUMBER.sub(lambda found: found[1] or HOLE, line).split(HOLE)
+    if len(texts) != len(codes) + 1:
+        return None
+    made = BinaryLayout(numbers, fields.shared, texts, data)
+    values, alike = made.values([data])
+    return made if alike.all() and made.lines(values) == line else None
+
+
+class Layouts:
+    """The layouts that were learned of the messages of a recording, by channel and length."""
+
+    def __init__(self, types: MessageTypes) -> None:
+        """Create an empty set."""
+        self.types = types
+        self._known: dict[Any, list[BinaryLayout | None]] = {}
+
+    def groups(self, messages: Sequence[Recorded]) -> Iterator[tuple[list[int], BinaryLayout, NDArray[np.float64]]]:
+        """Yield the places of messages of one layout, and their numbers, (n, k); those whose layout varies are left."""
+        groups: dict[Any, list[int]] = {}
+        for at, each in enumerate(messages):
+            groups.setdefault((each.channel, len(each.data)), []).append(at)
+        for key, group in groups.items():
+            left, known = np.array(group), self._known.setdefault(key, [])
+            for tried in range(MOST_LAYOUTS):
+                if tried == len(known):
+                    known.append(layout_of(self.types, key[0], messages[left[0]].data))
+                if (layout := known[tried]) is None:
+                    break
+                values, alike = layout.values([messages[at].data for at in left.tolist()])
+                if alike.any():
+                    yield left[alike].tolist(), layout, values[alike]
+                left = left[~alike]
+                if not left.size:
+                    break
 
 
 TYPES = frozenset(("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"))
@@ -263,7 +447,6 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
 def _channels(reader: RecordingReader, options: Options) -> list[Channel]:
     """Return the chosen channels with transforms or poses, or all with transforms; FormatError if the bag has none."""
     chosen = options.topics.chosen
-    reader.refuse_foreign(chosen)
     options.topics.seen |= {each.topic for each in reader.channels}
     with_frames, posed = reader.on_topics(TYPES), reader.on_topics(POSES, chosen)
     for other in reader.channels:
@@ -296,11 +479,10 @@ def _contents(
     reader: RecordingReader, layouts: Layouts, messages: Sequence[Recorded], number: int, options: Options
 ) -> list[list[RawTransform]]:
     """Return the transforms or the pose in each message, of equal layout at once; `number` of them before."""
-    found: list[list[RawTransform]] = [[] for _ in messages]
+    found: dict[int, list[RawTransform]] = {}
     for at, layout, values in layouts.groups(messages):
-        first = messages[at[0]]
-        known = _transforms(reader, first._replace(data=layout.sample), 0, options) if layout else []
-        if layout and known and values.shape[1] in (9 * len(known), 10 * len(known)):  # ROS 1 counts its headers
+        known = _transforms(reader, messages[at[0]]._replace(data=layout.sample), 0, options)
+        if known and values.shape[1] in (9 * len(known), 10 * len(known)):  # ROS 1 counts its headers
             numbers = np.vstack([layout.values([layout.sample])[0], values])
             own, *rows = numbers.reshape(len(numbers), len(known), -1)[:, :, -9:].tolist()
             if own == [[*each.stamp, *each.numbers] for each in known]:
@@ -309,10 +491,7 @@ def _contents(
                         RawTransform(each.parent, each.child, tuple(numbers), (int(second), int(part)))
                         for each, (second, part, *numbers) in zip(known, row, strict=True)
                     ]
-                continue
-        for place in at:
-            found[place] = _transforms(reader, messages[place], number + place + 1, options)
-    return found
+    return [found.get(at) or _transforms(reader, each, number + at + 1, options) for at, each in enumerate(messages)]
 
 
 def _transforms(reader: RecordingReader, message: Recorded, number: int, options: Options) -> list[RawTransform]:

@@ -1,6 +1,6 @@
 """Read recordings: ROS 1 bags with rosbags, MCAP files with mcap, databases with sqlite3; the extra `frametool[bag]`.
 
-Messages are bytes here, in the order of their log times; `types` parses them.
+Messages are bytes, in the order of their log times; `MessageTypes` makes objects of rosbags of them.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from bisect import bisect_left
 from collections import Counter
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from functools import lru_cache
 from io import BytesIO
 from itertools import chain
 from operator import attrgetter, itemgetter
@@ -19,7 +20,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import parse_documents
-from frametool.errors import FileProblem, FormatError, FrametoolError, shown
+from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -37,6 +38,7 @@ NO_SUMMARY = "{} has no summary: whether it lost messages cannot be known"
 RECORD_HEAD = 9  # bytes
 RECORD, MESSAGE = Struct("<BQ"), Struct("<HIQQ")  # the header of a record, and of a message in it (mcap.dev/spec)
 BLOCK = 1 << 10  # messages
+TF = "tf2_msgs/msg/TFMessage"
 MANY = 4000  # messages
 
 
@@ -259,11 +261,11 @@ class DatabaseFile:
 class Bag1File:
     """A ROS 1 bag; chunks are read whole, so that the index of their messages is not."""
 
-    head = None
+    head, compression = None, ""
 
     def __init__(self, path: Path, opened: ExitStack, _tally: Diagnostics) -> None:
         """Read what the end of the file says of its connections and chunks."""
-        from rosbags.rosbag1.reader import Reader, decompressors
+        from rosbags.rosbag1.reader import Reader
 
         class Unindexed(Reader):
             def read_index_data(self, pos: int, indexes: Any) -> None:
@@ -278,9 +280,6 @@ class Bag1File:
             self.channels[each.id] = Channel(each.topic, each.msgtype, "ros1", schema, about, each.digest)
         self.stated = sum((Counter(each.connection_counts) for each in self.reader.chunk_infos), Counter[int]())
         self.total = self.stated.total()
-        used = {id(each.decompressor) for each in self.reader.chunks.values()}
-        names = [name for name, each in decompressors.items() if id(each) in used]
-        self.compression = names[0].removeprefix("none") if names else ""
 
     def found(self, numbers: set[int]) -> Iterator[list[Recorded]]:
         """Yield the messages of each chunk on some channels."""
@@ -309,6 +308,74 @@ class Bag1File:
                 found.append(Recorded(self.channels[number], log_ns, data, log_ns))
 
 
+@lru_cache
+def typestore(*, ros1: bool) -> Any:
+    """Return the usual types of messages."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+    if TF not in store.types:  # the library's Noetic has only tf/tfMessage
+        store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms\n", TF))
+    return store
+
+
+TIMES = {"builtin_interfaces/msg/Time": "uint32", "builtin_interfaces/msg/Duration": "int32"}  # wiki.ros.org/msg
+
+
+class MessageTypes:
+    """The types of some channels: those defined in the recording, or the usual ones if it defines none."""
+
+    def __init__(self, channels: Sequence[Channel], *, ros1: bool) -> None:
+        """Create an empty set; a type that cannot be read affects only its own messages."""
+        from rosbags.interfaces import Nodetype
+        from rosbags.typesys import Stores, get_typestore
+
+        self.channels, self.ros1 = channels, ros1
+        self.store: Any = get_typestore(Stores.EMPTY)
+        for name, code in TIMES.items() if ros1 else ():  # the library has int32 for both
+            fields: Any = [("sec", (Nodetype.BASE, (code, 0))), ("nanosec", (Nodetype.BASE, ("uint32", 0)))]
+            self.store.fielddefs[name] = ([], fields)
+
+    def read(self, channel: Channel, data: bytes) -> Any:
+        """Return a message; raises ValueInvalid for invalid bytes."""
+        if channel.type not in self.store.types:
+            self._learn(channel.type)
+        try:
+            return (self.store.deserialize_ros1 if self.ros1 else self.store.deserialize_cdr)(data, channel.type)
+        except Exception:  # noqa: BLE001 - of broken bytes the library raises anything
+            raise ValueInvalid(f"its bytes are not a {channel.type}") from None
+
+    def write(self, channel: Channel, message: Any) -> bytes:
+        """Return the bytes of a message that was read."""
+        return bytes((self.store.serialize_ros1 if self.ros1 else self.store.serialize_cdr)(message, channel.type))
+
+    def _learn(self, kind: str) -> None:
+        """Learn the definition of a type; raises TypeError if it does not match its hash."""
+        from rosbags.typesys import get_types_from_msg
+
+        found: dict[str, Any] = {}
+        digests: set[str] = set()
+        for each in self.channels:
+            _, fmt, definition = each.schema or ("", "", b"")
+            if each.type == kind and fmt in ("ros1msg", "ros2msg"):
+                digests |= {each.digest} - {""}
+                found |= get_types_from_msg(definition.decode(), kind)
+        known = self.store
+        self._register(found)
+        try:
+            known.generate_msgdef(kind)
+        except Exception:  # noqa: BLE001 - of a type that is not there, or has parts that are not
+            self._register(typestore(ros1=self.ros1).fielddefs)
+        for digest in digests:
+            made = known.generate_msgdef(kind)[1] if self.ros1 else known.hash_rihs01(kind)
+            if made != digest:
+                raise TypeError(f"hash of {kind} is {made}, not {digest}")
+
+    def _register(self, types: dict[str, Any]) -> None:
+        """Register types that are not known yet."""
+        self.store.register({name: each for name, each in types.items() if name not in self.store.types})
+
+
 class RecordingReader:
     """An open recording.
 
@@ -318,8 +385,6 @@ class RecordingReader:
 
     def __init__(self, path: str, opened: ExitStack, tally: Diagnostics) -> None:
         """Open its files; the stack closes them."""
-        from frametool.recordings.types import MessageTypes
-
         self.path, self.metadata, files = path, dict[str, Any](), [Path(path)]
         if files[0].is_dir():
             self.metadata = read_metadata((files[0] / METADATA).read_text(encoding="utf-8"), f"{path}/{METADATA}")
@@ -382,14 +447,6 @@ class RecordingReader:
         """Return the channels of some types, on some topics, with or without a leading `/`, or on all."""
         named = {topic.strip("/") for topic in topics}
         return [each for each in self.channels if each.type in types and (not named or each.topic.strip("/") in named)]
-
-    def refuse_foreign(self, chosen: Iterable[str]) -> None:
-        """Raise FormatError for a chosen topic whose messages are not encoded as ROS does."""
-        named = {topic.strip("/") for topic in chosen}
-        for each in self.foreign:
-            if each.topic.strip("/") in named:
-                what = f"the messages of {each.topic} are encoded as {shown(each.encoding)}; cdr is read"
-                raise FormatError(what, source=self.path)
 
 
 def _unpacked(message: Recorded) -> Recorded:

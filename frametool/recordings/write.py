@@ -26,8 +26,7 @@ from frametool.errors import FileProblem, FrametoolError, ValueInvalid, printabl
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import floats, quaternion
 from frametool.recordings import read
-from frametool.recordings.read import BAG1, BAG2, QOS, Channel, Recorded
-from frametool.recordings.types import TF, typestore
+from frametool.recordings.read import BAG1, BAG2, QOS, TF, Channel, Recorded, typestore
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -152,7 +151,7 @@ class RecordingFile:
     def __init__(self, fmt: str, folder: str = "", compression: str = "", *, head: Any = None) -> None:
         """Open it in a folder for temporary files; raises FileProblem without the extra.
 
-        compression: of its chunks, as MCAP files and bags name them; head: profile and library of MCAP
+        Of MCAP, compression: of its chunks; head: profile and library
         """
         read.require_extra("recordings are written")
         from mcap.writer import CompressionType
@@ -170,8 +169,6 @@ class RecordingFile:
             self._writer: Any
             if fmt == BAG1:
                 self._writer = Writer1(place)
-                if compression:
-                    self._writer.set_compression(Writer1.CompressionFormat[compression.upper()])
                 self._writer.open()
                 self._stream = self._writer.bio
             else:
@@ -339,18 +336,16 @@ def room_in(folder: str) -> Iterator[None]:
 
 def new_channel(kind: Kind, topic: str, *, ros1: bool, like: Iterable[Channel] = ()) -> Channel:
     """Return a channel of messages that are made; like: others of the same recording, whose definition is taken."""
-    store = typestore(ros1=ros1)
-    definition, digest = store.generate_msgdef(kind.type, ros_version=1 if ros1 else 2)
-    known = [each for each in like if each.type == kind.type]
-    encoding = "ros1" if ros1 else read.CDR
-    schema = kind.type, f"ros{2 - ros1}msg", definition.encode()
+    store, same = typestore(ros1=ros1), next((each for each in like if each.type == kind.type), None)
+    definition, digest = store.generate_msgdef(kind.type, ros_version=2 - ros1)
+    schema: Any = kind.type, f"ros{2 - ros1}msg", definition.encode()
     said = {"latching": str(int(kind.stays))}
     if not ros1:
         by_numbers = any(BY_NUMBERS.search(each.said.get(QOS, "")) for each in like)
         said, digest = {QOS: latched(by_numbers=by_numbers) if kind.stays else ""}, store.hash_rihs01(kind.type)
-    if known:
-        return Channel(topic, kind.type, encoding, known[0].schema, said, known[0].digest)
-    return Channel(topic, kind.type, encoding, schema, said, digest)
+    if same:
+        schema, digest = same.schema, same.digest
+    return Channel(topic, kind.type, "ros1" if ros1 else read.CDR, schema, said, digest)
 
 
 def latched(*, by_numbers: bool) -> str:

@@ -34,22 +34,17 @@ if TYPE_CHECKING:
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
     """Return a message for each pose; frames without a name are "", an unknown stamp is 0."""
-    return write_messages((transform_stamped(result, style) for result in results), style)
+    return "".join(message_text(transform_stamped(result, style), style) for result in results)
 
 
 def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
     """Return PointStamped and Vector3Stamped messages; messages are unchanged."""
-    return write_messages((_stamped(record, style) for record in records), style)
+    return "".join(message_text(_stamped(record, style), style) for record in records)
 
 
 def write_tree(tree: FrameTree, style: Style) -> str:
     """Return one message with every edge, as in a latched /tf_static."""
-    return write_messages([{"transforms": [transform_stamped(edge, style) for edge in edge_results(tree)]}], style)
-
-
-def write_messages(messages: Iterable[dict[str, Any]], style: Style) -> str:
-    """Return any messages, one document each."""
-    return "".join(message_text(message, style) for message in messages)
+    return message_text({"transforms": [transform_stamped(edge, style) for edge in edge_results(tree)]}, style)
 
 
 def message_text(message: dict[str, Any], style: Style) -> str:

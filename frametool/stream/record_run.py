@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import (
@@ -30,8 +31,7 @@ from frametool.recordings.copy import (
     replaced,
 )
 from frametool.recordings.messages import TYPES, RawTransform, recorded_edges
-from frametool.recordings.read import ITSELF, SERIALIZED, Recorded, broken, read_metadata
-from frametool.recordings.types import typestore
+from frametool.recordings.read import ITSELF, SERIALIZED, Recorded, broken, read_metadata, typestore
 from frametool.recordings.write import KINDS, SECONDS_ROS2, RecordingFile, new_channel, serialised
 from frametool.stream.faults import STOP, Fault
 
@@ -76,7 +76,7 @@ class RecordRun:
     """One copy of a recording: `look` reads it, `pieces` are the bytes of the copy, `summary` says what was done.
 
     Messages are bytes, and everything that is not changed is preserved.  No messages are kept in memory.
-    change: returns the new messages of a channel; added: the edges that come first, by topic
+    change: returns the new messages of a channel
     counts: of messages by channel; span: the first and the last log time
     inside: how many are in the window; outside: how many outside of it are copied; first_ns: the first time of these
     undefined: types that the recording does not define, and whether ROS 2 Humble does
@@ -86,14 +86,13 @@ class RecordRun:
         """Begin with a recording that is not read yet."""
         self.reader, self.request, self.path = recording, request, recording.path
         self.change: dict[Channel, Change] = {}
-        self.added: dict[str, list[AddedEdge]] = {}
         self.counts: Counter[Channel] = Counter()
         self.span: tuple[int, int] | None = None
         self.inside = self.outside = 0
         self.first_ns: int | None = None
         self.undefined: dict[str, bool] = {}
         self.edges = RecordedEdges(recording.path)
-        self.plan = EdgePlan([], [], [])
+        self.plan = EdgePlan({}, [], [], [])
         self.transform_topics = {topic for topic in request.topics if topic.rpartition("/")[2] in ("tf", STATIC)}
         self.used = recording.on_topics(TYPES, self.transform_topics)  # channels whose transforms are used
         named = {topic.strip("/") for topic in {*request.topics} - self.transform_topics}
@@ -118,9 +117,7 @@ class RecordRun:
             self._refuse_others()
         if request.tree is not None:
             self.plan = self.edges.plan(request.tree, replace=request.replace)
-            for edge in self.plan.added:
-                self.added.setdefault(self.edges.topic_for(edge, self.plan.added), []).append(edge)
-            for root in self.edges.apart(self.plan.added):
+            for root in self.plan.apart:
                 near = did_you_mean(root, self.edges.frames)
                 warn(f"{self.path}: frame {shown(root)} is in none of its transforms{near}")
         if self.plan.replaced:
@@ -174,11 +171,10 @@ class RecordRun:
                 raise FormatError(f"{each.topic} holds {each.type}: no transforms of recordings", source=self.path)
             if each.encoding == "ros1":
                 raise FormatError("messages of ROS 1 in MCAP are only copied, not read", source=self.path)
-        self.reader.refuse_foreign(self.request.topics)
 
     def _frames(self) -> Frames:
         """Return all transforms as they are in the copy."""
-        more = [*self.plan.added, *self.plan.replaced]
+        more = [*chain.from_iterable(self.plan.added.values()), *self.plan.replaced]
         used = [each for each in self.used if self.counts[each]]
         if not more and not used:
             raise FormatError("no transforms in it; --with FILE brings some", source=self.path)
@@ -247,7 +243,7 @@ class RecordRun:
             if each.schema is None and each.type:
                 self._define(each)
         file = RecordingFile(fmt, folder, files[0].compression, head=files[0].head)
-        for topic, edges in self.added.items():
+        for topic, edges in self.plan.added.items():
             channel = self._latched(topic)
             file.begin([channel])
             data = serialised(TF_STATIC, fmt, [(stamp_ns, (edge.parent, edge.child), edge.numbers) for edge in edges])
@@ -297,7 +293,7 @@ class RecordRun:
 
     def summary(self) -> Iterator[str]:
         """Yield a sentence for each thing that was done or not needed."""
-        for topic, edges in self.added.items():
+        for topic, edges in self.plan.added.items():
             yield f"added on {topic}: {_listed(edges)}"
         if self.plan.replaced:
             yield f"replaced in {_count(self.rewritten)}: {_listed(self.plan.replaced)}"
@@ -312,7 +308,7 @@ class RecordRun:
         for is_usual, how in (True, "written as in ROS 2 Humble"), (False, "copied without a definition"):
             if kinds := sorted(kind for kind, usual in self.undefined.items() if usual is is_usual):
                 yield f"types that it does not define are {how}: {first_of(kinds, MOST_NAMED)}"
-        if not (self.added or self.rewritten or self.moved or self.request.window):
+        if not (self.plan.added or self.rewritten or self.moved or self.request.window):
             yield f"nothing is changed: {_count(self.counts.total())} copied"
 
 

@@ -123,11 +123,12 @@ def test_topics_in_other_encodings_are_in_nobodys_way(encoding: str, summary: bo
 
 
 @pytest.mark.parametrize("call", [("convert", "-i", "BAG", "--topic", "/log"), ("lookup", "BAG", "a", "b", "--topic", "log")])
-def test_a_topic_in_another_encoding_that_is_asked_for_says_which(call: tuple[str, ...], tmp_path: Path, run: Run) -> None:
+def test_a_topic_in_another_encoding_that_is_asked_for_has_nothing_to_read(call: tuple[str, ...], tmp_path: Path, run: Run) -> None:
     path = str(with_foreign(tmp_path, "jsonschema", summary=True))
     done = run(*(path if each == "BAG" else each for each in call))
     assert (done.status, done.out) == (1, "")
-    assert done.err == f"frametool: {path}: the messages of /log are encoded as 'json'; cdr is read\n"
+    assert done.err.startswith(f"frametool: {path}: no ")
+    assert "; topics: " in done.err
 
 
 @pytest.mark.parametrize("form", ["folder", "sqlite"])

@@ -14,7 +14,7 @@ from frametool.formats.load import FrameFile, load
 from frametool.grammar.edges import Diagnostics
 from frametool.grammar.result import Style
 from frametool.ros.echo_format import message_text
-from frametool.ros.plain_messages import plain_columns
+from frametool.ros.message_stream import plain_columns
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
