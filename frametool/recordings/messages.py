@@ -30,7 +30,7 @@ from frametool.text.spans import MARGIN, Spans, framed, join
 from frametool.text.write import shortest_spans
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Sequence
+    from collections.abc import Collection, Iterator, Sequence
 
     from numpy.typing import NDArray
     from rosbags.interfaces import Nodetype
@@ -70,11 +70,20 @@ def cloud_topics(reader: RecordingReader, chosen: Collection[str]) -> list[str]:
 
     Raises Unanswered if there are several, FormatError if there is none.
     """
-    found = reader.on_topics({CLOUD}, chosen)
-    _refuse_several(found, chosen, "clouds", reader.path)
+    return sorted({each.topic for each in _of_one_topic(reader, {CLOUD}, chosen, "clouds")})
+
+
+def _of_one_topic(
+    reader: RecordingReader, types: Collection[str], chosen: Collection[str], what: str
+) -> list[Channel]:  # fmt: skip
+    """Return the channels of some types on the chosen topics, or on the only one."""
+    found = reader.on_topics(types, chosen)
+    topics = sorted({each.topic for each in found})
+    if len(topics) > 1 and not chosen:
+        raise Unanswered(f"several topics hold {what}; give --topic {first_of(topics, 8, gap='|')}", source=reader.path)
     if not found:
-        raise _nothing(reader, "clouds", chosen)
-    return sorted({each.topic for each in found})
+        raise _nothing(reader, what, chosen)
+    return found
 
 
 def _nothing(reader: RecordingReader, what: str, chosen: Collection[str] = ()) -> FormatError:
@@ -165,19 +174,9 @@ def open_records(path: str, chosen: Collection[str], tally: Diagnostics) -> Buff
     """
     with ExitStack() as opened:
         reader = opened.enter_context(opened_recording(path, tally))
-        if channels := reader.on_topics(RECORDS, chosen):
-            _refuse_several(channels, chosen, "records", path)
-            return _opened_lines(reader, channels, opened)
-        if reader.on_topics({CLOUD}, chosen):
+        if reader.on_topics({CLOUD}, chosen) and not reader.on_topics(RECORDS, chosen):
             return None
-        raise _nothing(reader, "points, poses or fixes", chosen)
-
-
-def _refuse_several(channels: Iterable[Channel], chosen: Collection[str], what: str, path: str) -> None:
-    """Raise Unanswered if channels have several topics and none was chosen."""
-    topics = sorted({each.topic for each in channels})
-    if len(topics) > 1 and not chosen:
-        raise Unanswered(f"several topics hold {what}; give --topic {first_of(topics, 8, gap='|')}", source=path)
+        return _opened_lines(reader, _of_one_topic(reader, RECORDS, chosen, "points, poses or fixes"), opened)
 
 
 def open_trajectory(path: str, chosen: Collection[str], tally: Diagnostics) -> tuple[BufferedReader, str] | None:

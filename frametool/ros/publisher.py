@@ -39,6 +39,7 @@ QUATERNION = ("qx", "qy", "qz", "qw")
 RPY = ("roll", "pitch", "yaw")
 FRAMES = ("frame-id", "child-frame-id")
 FLAGS = (*XYZ, *QUATERNION, *RPY, *FRAMES)
+WITH_QUATERNION, WITH_ANGLES = (*XYZ, *QUATERNION, *FRAMES), (*XYZ, *RPY[::-1], *FRAMES)  # the old syntax
 _NUMBER = re.compile(r"[-+]?(\d|\.\d)")
 _FORMS = "x y z qx qy qz qw PARENT CHILD, or x y z yaw pitch roll PARENT CHILD"
 
@@ -77,10 +78,10 @@ def _line(pose: Pose, style: Style) -> str:
     angles = bool(style.notations) and style.notations[0].representation.name == "rpy"
     numbers = rotation_numbers(pose, notation("rpy_rad" if angles else "quaternion"), style)
     cells = [*map(style.number, (*pose.components[:3], *numbers)), quote(pose.parent), quote(pose.name)]
+    flags = dict(zip((*XYZ, *(RPY if angles else QUATERNION), *FRAMES), cells, strict=True))
     if style.format == "static1":
-        return " ".join([*cells[:3], *(cells[5:2:-1] if angles else cells[3:7]), *cells[-2:]])
-    names = (*XYZ, *(RPY if angles else QUATERNION), *FRAMES)
-    return " ".join(f"--{name} {cell}" for name, cell in zip(names, cells, strict=True))
+        return " ".join(flags[name] for name in (WITH_ANGLES if angles else WITH_QUATERNION))
+    return " ".join(f"--{name} {cell}" for name, cell in flags.items())
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
@@ -169,30 +170,19 @@ def read_flags(flags: dict[str, str], reading: Reading) -> Pose:
         if not flags.get(name):
             raise ValueInvalid(f"missing --{name}: a transform is that of a child frame in its parent")
     flags = {"qw": "1", **flags}  # the tool's default, also with other components: refused below unless they are 0
-    position, rotation = ([flags.get(name, "0") for name in names] for names in (XYZ, RPY if angles else QUATERNION))
-    frames = flags["frame-id"], flags["child-frame-id"]
-    return _pose(position, "rpy" if angles else "quaternion", rotation, *frames, reading)
-
-
-def read_positional(words: Sequence[str], reading: Reading) -> Pose:
-    """Read the old syntax: 8 or 9 words, with an optional period in ms; a numeric seventh means a quaternion."""
-    angles = len(words) >= 7 and not _NUMBER.match(words[6])
-    size = 6 if angles else 7
-    if len(words) not in (size + 2, size + 3):
-        raise ValueInvalid(f"{CALL} takes {_FORMS}; found {len(words)} words")
-    rotation = words[5:2:-1] if angles else words[3:7]
-    return _pose(words[:3], "rpy" if angles else "quaternion", rotation, words[size], words[size + 1], reading)
-
-
-def _pose(
-    position: Sequence[str], key: str, rotation: Sequence[str], parent: str, child: str, reading: Reading
-) -> Pose:
-    """Check the numbers of a call."""
-    x, y, z = map(read_number, position)
-    turned = rotation_of(ROTATION_KEYS[key], rotation, INDICES, reading)
-    if not parent or not child:
-        raise ValueInvalid(f"an empty frame name; {CALL} takes {_FORMS}")
+    x, y, z = (read_number(flags.get(name, "0")) for name in XYZ)
+    key, names = ("rpy", RPY) if angles else ("quaternion", QUATERNION)
+    turned = rotation_of(ROTATION_KEYS[key], [flags.get(name, "0") for name in names], INDICES, reading)
+    parent, child = (flags[name] for name in FRAMES)
     if parent == child:
         error = own_parent(child)
         raise ValueInvalid(error.message, rule=error.rule)
     return Pose((x, y, z), turned, child, parent)
+
+
+def read_positional(words: Sequence[str], reading: Reading) -> Pose:
+    """Read the old syntax: 8 or 9 words, with an optional period in ms; a numeric seventh means a quaternion."""
+    names = WITH_ANGLES if len(words) >= 7 and not _NUMBER.match(words[6]) else WITH_QUATERNION
+    if len(words) not in (len(names), len(names) + 1):
+        raise ValueInvalid(f"{CALL} takes {_FORMS}; found {len(words)} words")
+    return read_flags(dict(zip(names, words, strict=False)), reading)

@@ -99,7 +99,7 @@ def test_of_several_topics_one_is_named(bag: Path, run: Run) -> None:
     done = run("convert", "-i", str(bag))
     assert (done.status, done.out) == (2, "")
     assert done.err.count("\n") == 1
-    assert "several topics hold records; give --topic /fix|/pose" in done.err
+    assert "several topics hold points, poses or fixes; give --topic /fix|/pose" in done.err
 
 
 def test_a_topic_without_records_says_which_there_are(bag: Path, run: Run) -> None:
