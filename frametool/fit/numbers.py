@@ -340,9 +340,9 @@ class Limit(NamedTuple):
         kind, _, delta = self.name.partition(":")
         if kind == "rpe" and delta:
             row = next((row for row in found["rpe"] if row["delta"] == delta), None)
-            value = _at(row, "percent" if self.unit == "%" else "deg.rmse" if self.unit in ("deg", "rad") else "m.rmse")
+            value = number_at(row, {"%": "percent", "deg": "deg.rmse", "rad": "deg.rmse"}.get(self.unit, "m.rmse"))
         else:
-            value = _at(found, SHORT.get(self.name, self.name))
+            value = number_at(found, SHORT.get(self.name, self.name))
             if self.name == "paired" and self.unit == "%" and value is not None:
                 value = 100.0 * value / max(found["poses"]["possible"], 1)
         if not isinstance(value, int | float):
@@ -371,7 +371,7 @@ def parse_limits(text: str) -> list[Limit]:
     return found
 
 
-def _at(value: Any, path: str) -> Any:
+def number_at(value: Any, path: str) -> Any:
     """Follow a path of keys and indices into a mapping; None if it ends."""
     for step in path.split("."):
         if isinstance(value, dict):

@@ -1,7 +1,4 @@
-"""Reports as text within 80 columns: trees, edges of a recording, differences, file formats, solutions, comparisons.
-
-Also tables of comparisons for papers, and solutions for programs.
-"""
+"""Reports as text within 80 columns: trees, edges of a recording, differences, file formats, solutions."""
 
 from __future__ import annotations
 
@@ -9,11 +6,10 @@ import math
 import re
 from importlib import import_module
 from shutil import get_terminal_size
-from textwrap import fill, wrap
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, cells, printable
-from frametool.formats.rows.csv import quoted
 from frametool.formats.table import CHOICES, FORMATS
 from frametool.frames.edge_log import motion
 from frametool.frames.stamps import format_stamp
@@ -23,11 +19,11 @@ from frametool.lint.tree_diff import SAME
 from frametool.view.pose_text import WIDTH, in_width, largest_sigmas, sigmas_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.frames.track import Track
-    from frametool.geometry.types import Components, Rigid
+    from frametool.grammar.pose import Pose
     from frametool.grammar.result import Style
     from frametool.lint.tree_diff import Apart, Difference
 
@@ -285,114 +281,48 @@ def _signs(name: str) -> Iterator[str]:
 MOST = 50  # frames
 
 
-class SolvedFrame(NamedTuple):
-    """A frame of the result.
-
-    parent: None for a root; components: its pose there; covariance: 36 numbers, None where they are not known
-    rows: how many measurements of it are used; checked: whether its pose rests on loops only
-    fixed: whether its entry is one of --fix
-    """
-
-    name: str
-    parent: str | None
-    components: Rigid
-    covariance: Components | None
-    rows: int
-    checked: bool
-    fixed: bool = False
-
-
-class SolvedRow(NamedTuple):
-    """A measurement and its residual: metres, radians, and in sigmas (`u`).
-
-    counted: its weight is not 0; fits: the blunder that explains it
-    """
-
-    place: str
-    row: int
-    id: str | None
-    parent: str
-    child: str
-    distance: float
-    angle: float | None
-    u: float
-    used: bool
-    checked: bool
-    fits: str | None = None
-    counted: bool = True
-
-
 class Solution(NamedTuple):
-    """What was solved: `shape` tree, hand-eye or points; sigma: of one axis, estimated, metres and radians.
+    """What was solved.
 
-    turns: rms about the two main axes, radians; scale_sigma: of the scale, where it was solved for
+    numbers: the report for programs, of the fit, its frames and its measurements; `shape` tree, hand-eye or points
+    poses: of the frames in their parents; roots too.  left_out: the rejected measurements
+    fixed: the frames of --fix.  turns: rms about the two main axes, radians
     """
 
-    shape: str
-    root: str | None
-    dof: int
-    rms_distance: float
-    rms_angle: float | None
-    sigma: tuple[float, float | None] | None
-    frames: list[SolvedFrame]
-    rows: list[SolvedRow]
-    noise_at: str | None = None
-    scale: float = 1.0
-    scale_sigma: float | None = None
+    numbers: dict[str, Any]
+    poses: list[Pose]
+    left_out: list[dict[str, Any]]
+    fixed: Collection[str | None] = ()
     turns: tuple[float, float] | None = None
 
-    @property
-    def left_out(self) -> list[SolvedRow]:
-        """Return the rejected measurements."""
-        return [each for each in self.rows if each.counted and not each.used]
 
-
-def row_report(each: SolvedRow, *, in_cells: bool = False) -> dict[str, Any]:
-    """Return a measurement for programs; in_cells: as a row of a table."""
-    row = {key: value for key, value in each._asdict().items() if key != "counted"}
-    return {key: str(value).lower() if in_cells and isinstance(value, bool) else value for key, value in row.items()}
-
-
-def report(found: Solution) -> dict[str, Any]:
-    """Return a solution for programs."""
-    sigma = found.sigma and {"xyz": found.sigma[0], "rpy": found.sigma[1]}
-    frames = [
-        {"name": each.name, "parent": each.parent, "sigma": _sigmas(each), "rows": each.rows, "checked": each.checked}
-        for each in found.frames
-    ]
-    return {
-        "shape": found.shape, "root": found.root, "count": len(found.rows),
-        "used": sum(each.used for each in found.rows), "dof": found.dof, "rms_distance": found.rms_distance,
-        "rms_angle": found.rms_angle, "sigma": sigma, "noise_at": found.noise_at, "scale_sigma": found.scale_sigma,
-        "frames": frames, "measurements": [row_report(each) for each in found.rows],
-    }  # fmt: skip
-
-
-def _sigmas(each: SolvedFrame) -> dict[str, list[float]] | None:
-    if each.covariance is None:
+def sigma_entry(pose: Pose) -> dict[str, list[float]] | None:
+    """Return the sigmas of a pose for a report: metres and degrees, along and about each axis."""
+    if pose.covariance is None:
         return None
-    roots = sigmas_of(each.covariance)
+    roots = sigmas_of(pose.covariance)
     return {"xyz": roots[:3], "rpy_deg": [*map(math.degrees, roots[3:])]}
 
 
 def write_solution(found: Solution) -> str:
     """Write the summary, the frames and the rejected measurements."""
-    used, last = [each for each in found.rows if each.used], found.frames[-1]
-    count, rms = f"{len(used)} of {len(found.rows)}", f"rms {_off(found.rms_distance, found.rms_angle)}"
-    noise = f"noise at the {found.noise_at}; " if found.noise_at else ""
-    loops = sum(each.checked for each in used)
+    numbers, last = found.numbers, found.poses[-1]
+    count = f"{numbers['used']} of {numbers['count']}"
+    rms = f"rms {_off(numbers['rms_distance'], numbers['rms_angle'])}"
+    noise = f"noise at the {numbers['noise_at']}; " if numbers["noise_at"] else ""
+    loops = sum(each["used"] and each["checked"] for each in numbers["measurements"])
     lines = [{
-        "tree": f"{len(found.frames)} frames from {count} measurements, {loops} in loops; {rms}",
+        "tree": f"{len(found.poses)} frames from {count} measurements, {loops} in loops; {rms}",
         "points": f"{printable(f'{last.parent}<-{last.name}')} from {count} matched points; {rms}",
         "hand-eye": f"hand-eye from {count} samples; {noise}{rms}",
-    }[found.shape]]  # fmt: skip
-    if found.sigma is not None and found.dof > 0:
-        lines.append(f"noise of one axis {_off(*found.sigma)}, estimated")
+    }[numbers["shape"]]]  # fmt: skip
+    if numbers["sigma"] and numbers["dof"] > 0:
+        lines.append(f"noise of one axis {_off(*numbers['sigma'].values())}, estimated")
     if found.turns is not None:
         first, second = map(math.degrees, found.turns)
         lines.append(f"turns seen: {first:.1f} deg rms about the main axis, {second:.1f} deg about the second")
-    if found.scale_sigma is not None:
-        lines.append(f"scale {found.scale:.9g} sigma {found.scale_sigma:.2g}")
+    if numbers["scale_sigma"] is not None:
+        lines.append(f"scale {last.scale:.9g} sigma {numbers['scale_sigma']:.2g}")
     return "".join(f"{line}\n" for line in lines) + _solved_frames(found) + write_left_out(found)
 
 
@@ -403,20 +333,21 @@ def _off(metres: float, radians: float | None) -> str:
 
 def _solved_frames(found: Solution) -> str:
     """Return the table of the frames: each in its parent, which is named unless it is the root of a tree."""
-    root = found.root if found.shape == "tree" else None
-    shown = [each for each in found.frames if each.parent is not None or each.name == root][:MOST]
+    root = found.numbers["root"] if found.numbers["shape"] == "tree" else None
+    pairs = zip(found.poses, found.numbers["frames"], strict=True)
+    shown = [each for each in pairs if each[0].parent is not None or each[0].name == root][:MOST]
     rows = [["  frame", *"xyz", "sigma mm", "deg", "rows", ""]]
-    for each in shown:
-        name = f"  {printable(each.name if each.parent in (None, root) else f'{each.parent}<-{each.name}')}"
-        if each.parent is None:
-            rows.append([name, *[""] * 5, str(each.rows), "root"])
+    for pose, entry in shown:
+        name = f"  {printable(str(pose.name) if pose.parent in (None, root) else f'{pose.parent}<-{pose.name}')}"
+        if pose.parent is None:
+            rows.append([name, *[""] * 5, str(entry["rows"]), "root"])
             continue
-        sigmas = _sigmas(each)
-        length, angle = (1e3 * max(sigmas["xyz"]), max(sigmas["rpy_deg"])) if sigmas else (None, None)
-        remark = "fixed" if each.fixed else "" if each.checked else "unchecked"
-        place = (fixed(round(part, 4), 4) for part in each.components[:3])
-        rows.append([name, *place, fixed(length, 1), fixed(angle, 2), str(each.rows), remark])
-    more = len(found.frames) - len(shown) if root else 0
+        sigma = entry["sigma"]
+        largest = (1e3 * max(sigma["xyz"]), max(sigma["rpy_deg"])) if sigma else (None, None)
+        remark = "fixed" if pose.name in found.fixed else "" if entry["checked"] else "unchecked"
+        place = (fixed(round(part, 4), 4) for part in pose.components[:3])
+        rows.append([name, *place, fixed(largest[0], 1), fixed(largest[1], 2), str(entry["rows"]), remark])
+    more = len(found.poses) - len(shown) if root else 0
     rest = f"  .. and {more} more; --report FILE.json has all\n" if more else ""
     return columns(rows, [True, *[False] * 6, True]) + rest
 
@@ -425,157 +356,11 @@ def write_left_out(found: Solution) -> str:
     """Write a table of the rejected measurements: where each is, what it measures, how far it is off."""
     if not found.left_out:
         return ""
-    in_tree = found.shape == "tree"
+    in_tree = found.numbers["shape"] == "tree"
     rows = [["left out", "off mm", "deg", "" if in_tree else "u", ""]]
     for each in found.left_out:
-        what = f"{each.parent}<-{each.child}" if in_tree else each.id or f"row {each.row}"
-        angle = "-" if each.angle is None else f"{math.degrees(each.angle):.1f}"
-        numbers = fixed(1e3 * each.distance, 1), angle, "" if in_tree else fixed(each.u, 1)
-        rows.append([printable(f"  {each.place} {what}"), *numbers, f"fits when {each.fits}" if each.fits else ""])
+        what = f"{each['parent']}<-{each['child']}" if in_tree else each["id"] or f"row {each['row']}"
+        angle = "-" if each["angle"] is None else f"{math.degrees(each['angle']):.1f}"
+        off = fixed(1e3 * each["distance"], 1), angle, "" if in_tree else fixed(each["u"], 1)
+        rows.append([printable(f"  {each['place']} {what}"), *off, f"fits when {each['fits']}" if each["fits"] else ""])
     return columns(rows, [True, False, False, False, True])
-
-
-LABEL, CELL, NAME, LONGEST_NAME = 16, 10, 18, 24  # characters; a longer name does not push the rest aside
-COLUMNS = ("rmse", "mean", "median", "p95", "max")
-ABSOLUTE = {
-    "m": "ate m", "deg": "ate deg", "rot": "ate rot", "full": "ate full",
-    "along_m": "  along m", "across_m": "  across m", "up_m": "  up m",
-}  # fmt: skip
-TITLES = ("est", "ate", "max", "deg", "along", "across", "up", "rpe", "kitti", "scale", "paired")
-CSV_TITLES = (
-    "est", "ate_m", "max_m", "ate_deg", "along_m", "across_m", "up_m", "rpe_percent", "kitti_percent", "scale",
-    "paired",
-)  # fmt: skip
-RANKED = range(1, TITLES.index("scale"))
-WIDEST = 1e5  # from where on errors have an exponent
-
-
-def write_comparison(found: dict[str, Any]) -> str:
-    """Write one comparison: pairs, alignment, errors."""
-    poses, settings, kitti = found["poses"], found["settings"], found["kitti"]
-    duration = "" if found["ref_duration_s"] is None else f", {found['ref_duration_s']:.3f} s"
-    share = 100 * poses["paired"] / max(poses["possible"], 1)
-    how = {
-        "interpolate": f", {found.get(settings['interpolated'] or '')} interpolated",
-        "nearest": f", nearest within {1e3 * (settings['max_diff_s'] or 0):g} ms",
-        "number": ", by number",
-    }[settings["match"]]
-    heads = [
-        (found["ref"] + "  ", f"reference: {poses['ref']} poses{duration}, {found['path_m']['ref']:.3f} m"),
-        (found["est"] + "  ", f"{poses['paired']} of {poses['possible']} poses paired ({share:.0f} %){how}"),
-    ]
-    if found["offset_s"]:
-        side = "behind" if found["offset_s"] > 0 else "ahead"
-        heads.append(("clock", f"{abs(found['offset_s']):.6f} s {side}, corrected"))
-    if settings["mount"]:
-        x, y, z, w = settings["mount"]["quaternion"].values()
-        turn = math.degrees(2.0 * math.atan2(math.hypot(x, y, z), abs(w)))
-        place = ", ".join(f"{number:.6f}" for number in settings["mount"]["xyz"])
-        heads.append(("mount", f"{place} m" + (f", turned by {turn:.3f} deg" if turn else "")))
-    fits = "  ".join(f"{kind} {_error(value)}" for kind, value in found["ate_by_alignment"].items())
-    heads.append((f"fit {settings['align']}; ate m ", fits))
-    longest = max(len(name) for name, _ in heads[:2])
-    width, indent = max(NAME, longest if longest <= LONGEST_NAME else 0), " " * LABEL
-    lines = [
-        fill(f"{name:<{width}}{text}", WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
-        for name, text in heads
-    ]
-    lines.append(indent + "".join(f"{title:>{CELL}}" for title in COLUMNS))
-    lines += (_statistics(label, found["ate"][key]) for key, label in ABSOLUTE.items() if key in found["ate"])
-    for row in found["rpe"]:
-        percent = "" if row["percent"] is None else f"{row['percent']:>8.2f} %"
-        lines.append(_statistics(f"rpe {row['delta']} m", row["m"]) + percent)
-        other = ("  distance m", "distance_m") if row["deg"] is None else (f"rpe {row['delta']} deg", "deg")
-        lines.append(_statistics(other[0], row[other[1]]))
-    stretches = f"-  ({found['path_m']['ref']:.1f} m of path, {min(settings['segments_m']):g} m asked)"
-    if kitti:
-        stretches = f"{kitti['percent']:.4f} %  {kitti['deg_per_m']:.6f} deg/m  ({kitti['segments']} segments)"
-    return "\n".join([*lines, f"{'kitti':<{NAME}}{stretches}", ""])
-
-
-def _statistics(label: str, summed: dict[str, float] | None) -> str:
-    """Return a row of statistics, each in eight characters."""
-    texts = []
-    for key in COLUMNS:
-        if summed is None:
-            texts.append("-")
-        else:
-            whole = len(str(int(abs(summed[key])))) + (summed[key] < 0)
-            decimals = f".{min(6, CELL - 2 - whole)}f" if abs(summed[key]) < WIDEST else ".3e"
-            texts.append(f"{summed[key]:{decimals}}")
-    return f"{label:<{LABEL}}" + "".join(f"{text:>{CELL}}" for text in texts)
-
-
-def _error(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f}" if abs(value) < WIDEST else f"{value:.3e}"
-
-
-def write_explanation(found: dict[str, Any]) -> str:
-    """Write the formulas of a comparison with the numbers of this run."""
-    poses, fit, ate, settings = found["poses"], found["transform"], found["ate"], found["settings"]
-    c, q = fit.get("scale", 1.0), fit["quaternion"]
-    parts = [ate[key]["rmse"] for key in ("along_m", "across_m", "up_m")]
-    turn, shift = ", ".join(f"{q[axis]:.9g}" for axis in "xyzw"), ", ".join(f"{part:.9g}" for part in fit["xyz"])
-    lines = [
-        f"pairs      n = {poses['paired']} of {poses['possible']}, t_ref = t_est + {found['offset_s']:.9g} s",
-        f"fit        p' = c R p + t, R' = R R_i   ({settings['align']})",
-        f"           c = {c:.9g}",
-        f"           R = quaternion x y z w ({turn})",
-        f"           t = ({shift}) m",
-        "ate        d_i = p'_i - p_ref,i;  rmse = sqrt(sum |d_i|^2 / n)",
-        f"           = sqrt({ate['m']['sse']:.9g} / {poses['paired']}) = {ate['m']['rmse']:.9g} m",
-        "           along, across, up: d_i in the axes of REF's path",
-        f"           {' + '.join(f'{each:.6g}^2' for each in parts)} = {ate['m']['rmse']:.6g}^2",
-    ]
-    if ate["deg"]:
-        lines.append(f"           E_i = inv(ref_i) est'_i;  its angle: rmse {ate['deg']['rmse']:.9g} deg")
-    if found["rpe"]:
-        lines.append("rpe        E_ij = inv(inv(ref_i) ref_j) inv(est'_i) est'_j")
-    for row in found["rpe"]:
-        if row["m"]:
-            share = "" if row["percent"] is None else f" = {row['percent']:.6g} % of the delta"
-            root = f"sqrt({row['m']['sse']:.9g} / {row['pairs']}) = {row['m']['rmse']:.9g} m"
-            lines.append(f"           {row['delta']}: |t(E)|, rmse = {root}{share}")
-    if kitti := found["kitti"]:
-        lines.append(f"kitti      mean of |t(E)| / L over {kitti['segments']} stretches = {kitti['percent']:.9g} %")
-        lines.append(f"           mean of angle(E) / L = {kitti['deg_per_m']:.9g} deg/m")
-    return "\n".join([*lines, ""])
-
-
-def write_table(found: Sequence[dict[str, Any]], fmt: str = "text") -> str:
-    """Write one row per comparison: `csv`, or `text`, `markdown`, `latex` with the best value of each column marked."""
-    rows = [_table_row(each) for each in found]
-    if fmt == "csv":
-        lines = [CSV_TITLES, *(["" if cell is None else str(cell) for cell in row] for row in rows)]
-        return "".join(f"{','.join(map(quoted, line))}\n" for line in lines)
-    known = ([cell for cell in column if isinstance(cell, float)] for column in zip(*rows, strict=True))
-    best = [min(there) if at in RANKED and there and len(rows) > 1 else None for at, there in enumerate(known)]
-    mark = {"text": "{}*", "markdown": "**{}**", "latex": r"\textbf{{{}}}"}[fmt]
-    shown: list[Sequence[str]] = [TITLES]
-    for row in rows:
-        texts = [str(cell) if isinstance(cell, (str, int)) else _error(cell) for cell in row]
-        if fmt == "latex":
-            texts = ["".join(_LATEX.get(letter, letter) for letter in text) for text in texts]
-        marks = (mark if cell is not None and cell == least else "{}" for cell, least in zip(row, best, strict=True))
-        shown.append([each.format(text) for each, text in zip(marks, texts, strict=True)])
-    if fmt == "markdown":
-        shown.insert(1, ["---", *["---:"] * len(TITLES[1:])])
-        return "".join(f"| {' | '.join(cell.replace('|', '&#124;') for cell in line)} |\n" for line in shown)
-    if fmt == "latex":
-        body = "".join(f"{' & '.join(line)} \\\\\n" for line in shown)
-        return f"\\begin{{tabular}}{{l{'r' * len(TITLES[1:])}}}\n{body}\\end{{tabular}}\n"
-    return columns(shown, [True, *[False] * len(TITLES[1:])])
-
-
-def _table_row(found: dict[str, Any]) -> list[Any]:
-    """Return the table row of a comparison: the name of the estimate and its errors."""
-    ate, last = found["ate"], found["rpe"][-1] if found["rpe"] else None
-    rmse = [(ate[key] or {}).get("rmse") for key in ("m", "deg", "along_m", "across_m", "up_m")]
-    return [
-        found["est"], rmse[0], ate["m"]["max"], *rmse[1:], last and last["percent"],
-        found["kitti"] and found["kitti"]["percent"], found["transform"].get("scale"), found["poses"]["paired"],
-    ]  # fmt: skip
-
-
-_LATEX = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
-_LATEX |= {letter: "\\" + letter for letter in "_%&#${}"}

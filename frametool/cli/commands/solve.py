@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from functools import partial
+from itertools import compress
 from math import degrees, hypot, sqrt
 from typing import TYPE_CHECKING, Any
 
@@ -15,11 +16,12 @@ from frametool.cli.sink import refuse_existing, say_error, tell, writing
 from frametool.cli.trees import answers, load_tree, opened, state
 from frametool.errors import ValueInvalid, alternatives, first_of, shown, warn
 from frametool.geometry.rigid import IDENTITY
+from frametool.grammar.pose import Pose
 from frametool.stream.faults import BadRows
-from frametool.view.reports import Solution, SolvedFrame, SolvedRow
+from frametool.view.reports import Solution, sigma_entry
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.transform import Transform
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 
 
 NAMES = ("base", "gripper", "camera", "target")
+ROW_KEYS = ("place", "row", "id", "parent", "child", "distance", "angle", "u", "used", "checked", "fits")
 UNSURE = 1.2  # times: sigmas of the input that are smaller than that are reported
 
 
@@ -41,22 +44,18 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
     found = solve_tree(measurements, root=inputs.root, fixed=fixed, robust=robust)
     if found.sigma_factor > UNSURE:
         warn(f"the sigmas of the input are {found.sigma_factor:.2g} times too small for what the used rows are off")
-    frames = []
+    poses, exact = [], {name for name in found.frames if fixed and fixed.track(name)}
     for name in sorted(found.frames, key=lambda name: name != found.root):
         track = found.tree.track(name)  # in the root, or as --fix has it
-        pose = IDENTITY if track is None else track.components
-        is_fixed = fixed is not None and fixed.track(name) is not None
-        covariance = found.tree.covariances.get(name)
-        seen = found.rows[name], found.frame_checked[name], is_fixed
-        frames.append(SolvedFrame(name, None if track is None else track.parent, _numbers(pose), covariance, *seen))
-    unknown = [each.name for each in frames if each.parent and not each.fixed and not each.covariance]
+        parent, pose = (track.parent, track.components) if track else (None, IDENTITY)
+        poses.append(_pose(name, parent, pose, found.tree.covariances.get(name)))
+    unknown = [str(each.name) for each in poses if each.parent and each.name not in exact and not each.covariance]
     if unknown:
         warn(f"no covariance of {first_of(unknown, 5)}: neither loops nor sigmas say how sure that is")
     alone = [m.place for m, checked in zip(found.measurements, found.checked, strict=True) if not checked]
     inputs.note(f"in no loop, cannot be cross-checked: {first_of(alone, 5)}" if alone else None)
     labels = [(m.place, m.id, m.parent, m.child) for m in found.measurements]
-    own = [{"checked": bool(checked), "fits": fits} for checked, fits in zip(found.checked, found.fits, strict=True)]
-    return _solution("tree", found, frames, labels, own, root=found.root)
+    return _solution("tree", found, poses, labels, found.root, exact)
 
 
 def _fixed_tree(inputs: Inputs, measured: Collection[str]) -> Frames:
@@ -86,34 +85,49 @@ def _measurements(inputs: Inputs, files: Sequence[str]) -> list[Measurement]:
     return without(found, inputs.without)
 
 
-def _numbers(components: Iterable[Any]) -> Any:
-    """Return components as floats; none is -0.0."""
-    return tuple(float(part) + 0.0 for part in components)
+def _pose(name: str, parent: str | None, components: Iterable[Any], covariance: Iterable[float] | None) -> Pose:
+    """Return the pose of a frame; none of its numbers is -0.0."""
+    return Pose.of((*(float(part) + 0.0 for part in components), *(covariance or ())), name, parent)
 
 
-def _side(parent: str, name: str, pose: Transform, covariance: Array | None, rows: int) -> list[SolvedFrame]:
+def _side(parent: str, name: str, pose: Transform, covariance: Array | None) -> list[Pose]:
     """Return a root and the one frame in it."""
-    root = SolvedFrame(parent, None, IDENTITY, None, rows, checked=True)
-    listed = None if covariance is None else tuple(covariance.ravel().tolist())
-    return [root, SolvedFrame(name, parent, _numbers(pose.components), listed, rows, checked=True)]
+    listed = None if covariance is None else covariance.ravel().tolist()
+    return [_pose(parent, None, IDENTITY, None), _pose(name, parent, pose.components, listed)]
 
 
 def _solution(
-    shape: str, found: Any, frames: list[SolvedFrame], labels: Iterable[tuple[str, str | None, str, str]],
-    own: Iterable[Mapping[str, Any]], *, sigma: Any = None, **more: Any,
+    shape: str, found: Any, poses: list[Pose], labels: Iterable[tuple[Any, ...]], root: str | None,
+    fixed: Collection[str | None] = (),
 ) -> Solution:  # fmt: skip
     """Return what was found with its rows: how far each is off in metres, and in radians where it has turned.
 
-    labels: place, id, parent and child of each row; own: what else it says
+    labels: place, id, parent and child of each row
     """
+
+    def of(name: str, otherwise: Any = None) -> Any:
+        return getattr(found, name, otherwise)
+
+    count, used = len(found.used), found.used.tolist()
+    sigma = found.sigma if isinstance(found.sigma, tuple | None) else (found.sigma, None)
+    own = found.u.tolist(), used, map(bool, of("checked", [found.dof > 0] * count)), of("fits", [None] * count)
     rows = []
-    parts = zip(labels, own, found.residuals.tolist(), found.u.tolist(), found.used.tolist(), strict=True)
-    for at, (label, said, off, u, used) in enumerate(parts, 1):
-        place, name, parent, child = label
+    for at, ((place, *names), off, *said) in enumerate(zip(labels, found.residuals.tolist(), *own, strict=True), 1):
         angle = hypot(*off[3:]) if len(off) > 3 else None
-        rows.append(SolvedRow(place, at, name, parent, child, hypot(*off[:3]), angle, u, used, **said))
-    numbers = found.dof, found.rms_distance, getattr(found, "rms_angle", None), sigma or found.sigma
-    return Solution(shape, more.pop("root", None), *numbers, frames, rows, **more)
+        rows.append(dict(zip(ROW_KEYS, (place, at, *names, hypot(*off[:3]), angle, *said), strict=True)))
+    frames = [
+        {"name": each.name, "parent": each.parent, "sigma": sigma_entry(each),
+         "rows": of("rows", {}).get(each.name, sum(used)), "checked": of("frame_checked", {}).get(each.name, True)}
+        for each in poses
+    ]  # fmt: skip
+    numbers = {
+        "shape": shape, "root": root, "count": count, "used": sum(used), "dof": found.dof,
+        "rms_distance": found.rms_distance, "rms_angle": of("rms_angle"),
+        "sigma": sigma and dict(zip(("xyz", "rpy"), sigma, strict=True)), "noise_at": of("noise_at"),
+        "scale_sigma": of("scale_sigma"), "frames": frames, "measurements": rows,
+    }  # fmt: skip
+    gone = of("left_out", ~found.used).tolist()  # not what has no weight
+    return Solution(numbers, poses, [*compress(rows, gone)], fixed, of("turns"))
 
 
 def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
@@ -138,17 +152,14 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
     from frametool.fit.hand_eye import solve_hand_eye
 
     found = solve_hand_eye(samples.gripper, samples.target, eye_to_hand=eye_to_hand, robust=robust, names=called)
-    count = int(found.used.sum())
     sigmas: list[Any] = [found.covariance_x, found.covariance_z]
     if not samples.placed:
         sure = " and ".join(f"{degrees(sqrt(each[3:, 3:].trace() / 3)):.2g} deg" for each in sigmas)
         warn(f"no positions: only the rotations are solved (sigma {sure}); xyz 0, 0, 0 stands for what is not known")
         sigmas = [None, None]
-    frames = _side(holder, camera, found.x, sigmas[0], count)
-    frames += _side(other, target, found.z, sigmas[1], count)
+    poses = _side(holder, camera, found.x, sigmas[0]) + _side(other, target, found.z, sigmas[1])
     labels = [(place, None, camera, target) for place in samples.places]
-    own = [{"checked": found.dof > 0}] * number
-    return _solution("hand-eye", found, frames, labels, own, noise_at=found.noise_at, turns=found.turns)
+    return _solution("hand-eye", found, poses, labels, None)
 
 
 def _paired(inputs: Inputs, files: Sequence[str]) -> HandEyeSamples:
@@ -178,11 +189,10 @@ def solved_points(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solu
     inputs.note(f"{points}; {len(pairs.places)} matched {how}")
     weights, scale = pairs.weights, inputs.scale
     found = solve_points(pairs.target, pairs.source, weights=weights, scale=scale, robust=robust, names=names)
-    frames = _side(target, source, found.transform, found.covariance, int(found.used.sum()))
+    root, pose = _side(target, source, found.transform, found.covariance)
+    poses = [root, pose._replace(scale=found.scale)]
     labels = [(place, ids[at] if ids else None, target, source) for at, place in enumerate(pairs.places)]
-    own = [{"checked": found.dof > 0, "counted": counts} for counts in (found.used | found.left_out).tolist()]
-    more = {"root": target, "scale": found.scale, "scale_sigma": found.scale_sigma}
-    return _solution("points", found, frames, labels, own, sigma=(found.sigma, None), **more)
+    return _solution("points", found, poses, labels, target)
 
 
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, not solvable or undecided, 2 usage, 5 file."
@@ -253,44 +263,38 @@ def solve_command(inputs: Inputs) -> None:
 
 def _write(output: Output, found: Solution, *, on_hand: bool) -> None:
     """Write the result: a tree, or entries where there is a scale; as hand-eye calibration only the camera."""
-    entries = [each for each in found.frames if each.parent is not None]
-    if output.style.format == "csv" or found.scale_sigma is not None:
-        from frametool.grammar.pose import Pose
+    if output.style.format == "csv" or found.numbers["scale_sigma"] is not None:
         from frametool.grammar.result import Result, uncertain
 
-        poses = [Pose.of(each.components, each.name, each.parent)._replace(scale=found.scale) for each in entries]
-        output.values([Result(pose, uncertain(each.covariance)) for pose, each in zip(poses, entries, strict=True)])
-    elif output.style.format == "handeye" and found.shape == "hand-eye":
+        output.values([Result(each, uncertain(each.covariance)) for each in found.poses if each.parent])
+    elif output.style.format == "handeye" and found.numbers["shape"] == "hand-eye":
         from frametool.formats.trees.calibrations import write_mount
 
-        camera, target = entries
+        _, camera, _, target = found.poses
         warn(f"handeye: {shown(target.name)} in {shown(str(target.parent))} and covariances left out")
-        output.text(write_mount(str(camera.parent), camera.name, camera.components, output.style, on_hand=on_hand))
+        output.text(write_mount(str(camera.parent), str(camera.name), camera.components, output.style, on_hand=on_hand))
     else:
         from frametool.frames.lookups import FrameTree
-        from frametool.geometry.transform import Transform
 
         tree = FrameTree("the result")
-        for each in found.frames:
+        for each in found.poses:
             if each.parent is None:
-                tree.add_root(each.name)
+                tree.add_root(str(each.name))
             else:
-                tree.add(each.parent, each.name, Transform.of(*each.components), each.covariance)
+                tree.add(each.parent, str(each.name), each.transform, each.covariance)
         output.tree(tree)
 
 
 def _write_report(found: Solution, path: str, *, force: bool) -> None:
     """Write the numbers of the fit as one document, or those of its rows as a table."""
-    from frametool.view.reports import report, row_report
-
     if options.suffix_of(path) == ".csv":
         from frametool.formats.rows.csv import write_points
         from frametool.grammar.result import Style
 
-        text = write_points([row_report(each, in_cells=True) for each in found.rows], Style("csv"))
+        text = write_points(found.numbers["measurements"], Style("csv"))
     else:
         from frametool.documents.json import dump
 
-        text = f"{dump(report(found))}\n"
+        text = f"{dump(found.numbers)}\n"
     with writing(path, force=force) as write:
         write(text)

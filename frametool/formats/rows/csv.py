@@ -127,7 +127,7 @@ def cell(value: Any, style: Style) -> str:
     """Format one cell, quoted if necessary."""
     if isinstance(value, float):
         return style.number(value)
-    if isinstance(value, (dict, list)):
+    if isinstance(value, (dict, list, bool)):
         from frametool.documents.json import dump
 
         return quoted(dump(value, style.number))

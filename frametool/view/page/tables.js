@@ -36,14 +36,13 @@ function make(tag, properties = {}, ...children) {
   return element;
 }
 
-const short = (value) => (value == null ? "-" : Math.abs(value) < 1e5 ? value.toFixed(3) : value.toExponential(3));
 const digits = (value, count) => (value ? `${Number(value.toPrecision(count))}` : "0");
 
-// Write a number as the terminal does: in eight characters.
-function exact(value) {
+// Write a number as the terminal does: with an exponent where decimals say nothing or too much.
+function fixed(value, decimals) {
   if (value == null) return "-";
-  const whole = String(Math.trunc(Math.abs(value))).length + (value < 0);
-  return Math.abs(value) < 1e5 ? value.toFixed(Math.min(6, 8 - whole)) : value.toExponential(3);
+  const size = Math.abs(value), is_plain = size < 1e-9 || (size >= 0.5 * 10 ** -decimals && size < 1e6);
+  return is_plain ? (Math.round(value * 10 ** decimals) / 10 ** decimals + 0).toFixed(decimals) : value.toExponential(1);
 }
 
 function tiles({ate, rpe, poses, settings: {align}}) {
@@ -69,7 +68,7 @@ function measures({ate, rpe, kitti, path_m: {ref}, settings, ate_by_alignment}) 
   }
   const none = `- (${ref.toFixed(1)} m of path, ${Math.min(...settings.segments_m)} m asked)`;
   const stretches = kitti ? `${kitti.percent.toFixed(4)} %  ${kitti.deg_per_m.toFixed(6)} deg/m  (${kitti.segments} segments)` : none;
-  const fits = Object.entries(ate_by_alignment).map(([kind, value]) => `${kind} ${short(value)}`).join(", ");
+  const fits = Object.entries(ate_by_alignment).map(([kind, value]) => `${kind} ${fixed(value, 3)}`).join(", ");
   return [...rows, ["kitti", "", KITTI, stretches], ["ate by fit", "m", "The absolute error under each alignment", fits]];
 }
 
@@ -77,7 +76,7 @@ function table_of(found) {
   const head = ["", "", ...STATISTICS, "%"].map((title) => make("th", {}, title));
   const rows = measures(found).map(([name, of, meaning, value, percent]) => {
     const cells = typeof value === "string" ? [make("td", {colSpan: 6}, value)]
-      : [...STATISTICS.map((key) => make("td", {}, exact(value?.[key]))), make("td", {}, percent == null ? "" : percent.toFixed(2))];
+      : [...STATISTICS.map((key) => make("td", {}, fixed(value?.[key], 6))), make("td", {}, percent == null ? "" : percent.toFixed(2))];
     return make("tr", {}, make("th", {tabIndex: 0, data: {tip: meaning}}, name), make("td", {}, of), ...cells);
   });
   return make("table", {className: "measures"}, make("tr", {}, ...head), ...rows);
@@ -102,7 +101,7 @@ function estimates() {
     make("th", {}, make("i", {className: `swatch ${colour}-swatch`}), name),
     ...columns.map((column) => {
       const value = column.values[at];
-      return make("td", {className: value === best(column) ? "best" : "", data: {value: value ?? ""}}, column.name === "paired" ? value : short(value));
+      return make("td", {className: value === best(column) ? "best" : "", data: {value: value ?? ""}}, column.name === "paired" ? value : fixed(value, 3));
     })));
   return make("table", {id: "estimates"}, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...rows));
 }

@@ -1,11 +1,16 @@
-"""Reports of comparisons: an HTML page with numbers, paths and errors over time, or an SVG of one comparison."""
+"""Reports of comparisons: as text, as tables for papers, and as pictures of paths and errors over time.
+
+The pictures are an HTML page with all numbers, or an SVG of one comparison.
+"""
 
 from __future__ import annotations
 
 import json
+import math
 from datetime import UTC, datetime
 from html import escape
 from itertools import groupby, pairwise
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -13,15 +18,142 @@ import numpy as np
 from frametool import __version__
 from frametool.documents.json import dump
 from frametool.errors import printable
+from frametool.fit.numbers import SHORT, number_at
+from frametool.formats.rows.csv import quoted
 from frametool.view import pictures
 from frametool.view.pictures import Chart, ChartLine, Picture
-from frametool.view.reports import write_comparison, write_table
+from frametool.view.pose_text import WIDTH
+from frametool.view.reports import columns, fixed
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.fit.comparison import Comparison
     from frametool.view.pictures import SvgElement
+
+NAME, LONGEST_NAME = 18, 24  # characters; a longer one does not push the rest aside
+STATISTICS = ("rmse", "mean", "median", "p95", "max")
+ABSOLUTE = {
+    "m": "ate m", "deg": "ate deg", "rot": "ate rot", "full": "ate full",
+    "along_m": "  along m", "across_m": "  across m", "up_m": "  up m",
+}  # fmt: skip
+# the columns of a table: their names for people and in CSV
+TITLES = {
+    "est": "est", "ate": "ate_m", "max": "max_m", "deg": "ate_deg", "along": "along_m", "across": "across_m",
+    "up": "up_m", "rpe": "rpe_percent", "kitti": "kitti_percent", "scale": "scale", "paired": "paired",
+}  # fmt: skip
+RANKED = range(1, [*TITLES].index("scale"))
+
+
+def write_comparison(found: dict[str, Any]) -> str:
+    """Write one comparison: pairs, alignment, errors."""
+    poses, settings, kitti, path = found["poses"], found["settings"], found["kitti"], found["path_m"]["ref"]
+    duration = "" if found["ref_duration_s"] is None else f", {found['ref_duration_s']:.3f} s"
+    share = 100 * poses["paired"] / max(poses["possible"], 1)
+    how = {
+        "interpolate": f", {found.get(settings['interpolated'] or '')} interpolated",
+        "nearest": f", nearest within {1e3 * (settings['max_diff_s'] or 0):g} ms",
+        "number": ", by number",
+    }[settings["match"]]
+    heads = [
+        (f"{found['ref']}  ", f"reference: {poses['ref']} poses{duration}, {path:.3f} m"),
+        (f"{found['est']}  ", f"{poses['paired']} of {poses['possible']} poses paired ({share:.0f} %){how}"),
+    ]
+    if found["offset_s"]:
+        side = "behind" if found["offset_s"] > 0 else "ahead"
+        heads.append(("clock", f"{abs(found['offset_s']):.6f} s {side}, corrected"))
+    if settings["mount"]:
+        x, y, z, w = settings["mount"]["quaternion"].values()
+        turn = math.degrees(2.0 * math.atan2(math.hypot(x, y, z), abs(w)))
+        place = ", ".join(f"{number:.6f}" for number in settings["mount"]["xyz"])
+        heads.append(("mount", f"{place} m" + (f", turned by {turn:.3f} deg" if turn else "")))
+    fits = "  ".join(f"{kind} {fixed(value, 3)}" for kind, value in found["ate_by_alignment"].items())
+    heads.append((f"fit {settings['align']}; ate m ", fits))
+    size = max([NAME, *(len(name) for name, _ in heads[:2] if len(name) <= LONGEST_NAME)])
+    hanging: Any = {"subsequent_indent": " " * 16, "break_long_words": False, "break_on_hyphens": False}
+    lines = [fill(f"{name:{size}}{text}", WIDTH, **hanging) for name, text in heads]
+    lines.append("".join([f"{'':16}", *(f"{title:>10}" for title in STATISTICS)]))
+    lines += (_statistics(label, found["ate"][key]) for key, label in ABSOLUTE.items() if key in found["ate"])
+    for row in found["rpe"]:
+        percent = "" if row["percent"] is None else f"{row['percent']:8.2f} %"
+        lines.append(_statistics(f"rpe {row['delta']} m", row["m"]) + percent)
+        other = ("  distance m", "distance_m") if row["deg"] is None else (f"rpe {row['delta']} deg", "deg")
+        lines.append(_statistics(other[0], row[other[1]]))
+    stretches = f"-  ({path:.1f} m of path, {min(settings['segments_m']):g} m asked)"
+    if kitti:
+        stretches = f"{kitti['percent']:.4f} %  {kitti['deg_per_m']:.6f} deg/m  ({kitti['segments']} segments)"
+    return "\n".join([*lines, f"{'kitti':{NAME}}{stretches}", ""])
+
+
+def _statistics(label: str, summed: dict[str, float] | None) -> str:
+    return f"{label:16} " + " ".join(f"{fixed(summed[key] if summed else None, 6):>9}" for key in STATISTICS)
+
+
+def write_explanation(found: dict[str, Any]) -> str:
+    """Write the formulas of a comparison with the numbers of this run."""
+    poses, fit, ate, settings = found["poses"], found["transform"], found["ate"], found["settings"]
+    c, q = fit.get("scale", 1.0), fit["quaternion"]
+    parts = [ate[key]["rmse"] for key in ("along_m", "across_m", "up_m")]
+    turn, shift = ", ".join(f"{q[axis]:.9g}" for axis in "xyzw"), ", ".join(f"{part:.9g}" for part in fit["xyz"])
+    lines = [
+        f"pairs      n = {poses['paired']} of {poses['possible']}, t_ref = t_est + {found['offset_s']:.9g} s",
+        f"fit        p' = c R p + t, R' = R R_i   ({settings['align']})",
+        f"           c = {c:.9g}",
+        f"           R = quaternion x y z w ({turn})",
+        f"           t = ({shift}) m",
+        "ate        d_i = p'_i - p_ref,i;  rmse = sqrt(sum |d_i|^2 / n)",
+        f"           = sqrt({ate['m']['sse']:.9g} / {poses['paired']}) = {ate['m']['rmse']:.9g} m",
+        "           along, across, up: d_i in the axes of REF's path",
+        f"           {' + '.join(f'{each:.6g}^2' for each in parts)} = {ate['m']['rmse']:.6g}^2",
+    ]
+    if ate["deg"]:
+        lines.append(f"           E_i = inv(ref_i) est'_i;  its angle: rmse {ate['deg']['rmse']:.9g} deg")
+    if found["rpe"]:
+        lines.append("rpe        E_ij = inv(inv(ref_i) ref_j) inv(est'_i) est'_j")
+    for row in found["rpe"]:
+        if row["m"]:
+            share = "" if row["percent"] is None else f" = {row['percent']:.6g} % of the delta"
+            root = f"sqrt({row['m']['sse']:.9g} / {row['pairs']}) = {row['m']['rmse']:.9g} m"
+            lines.append(f"           {row['delta']}: |t(E)|, rmse = {root}{share}")
+    if kitti := found["kitti"]:
+        lines.append(f"kitti      mean of |t(E)| / L over {kitti['segments']} stretches = {kitti['percent']:.9g} %")
+        lines.append(f"           mean of angle(E) / L = {kitti['deg_per_m']:.9g} deg/m")
+    return "\n".join([*lines, ""])
+
+
+def write_table(found: Sequence[dict[str, Any]], fmt: str = "text") -> str:
+    """Write one row per comparison: `csv`, or `text`, `markdown`, `latex` with the best value of each column marked."""
+    rows = [_table_row(each) for each in found]
+    if fmt == "csv":
+        lines = [TITLES.values(), *(["" if cell is None else str(cell) for cell in row] for row in rows)]
+        return "".join(f"{','.join(map(quoted, line))}\n" for line in lines)
+    known = ([cell for cell in column if isinstance(cell, float)] for column in zip(*rows, strict=True))
+    best = [min(there) if at in RANKED and there and len(rows) > 1 else None for at, there in enumerate(known)]
+    mark = {"text": "{}*", "markdown": "**{}**", "latex": r"\textbf{{{}}}"}[fmt]
+    shown: list[Sequence[str]] = [[*TITLES]]
+    for row in rows:
+        texts = [str(cell) if isinstance(cell, (str, int)) else fixed(cell, 3) for cell in row]
+        if fmt == "latex":
+            texts = ["".join(_LATEX.get(letter, letter) for letter in text) for text in texts]
+        marks = (mark if cell is not None and cell == least else "{}" for cell, least in zip(row, best, strict=True))
+        shown.append([each.format(text) for each, text in zip(marks, texts, strict=True)])
+    if fmt == "markdown":
+        shown.insert(1, ["---", *["---:"] * (len(TITLES) - 1)])
+        return "".join(f"| {' | '.join(cell.replace('|', '&#124;') for cell in line)} |\n" for line in shown)
+    if fmt == "latex":
+        body = "".join(f"{' & '.join(line)} \\\\\n" for line in shown)
+        return f"\\begin{{tabular}}{{l{'r' * (len(TITLES) - 1)}}}\n{body}\\end{{tabular}}\n"
+    return columns(shown, [True, *[False] * (len(TITLES) - 1)])
+
+
+def _table_row(found: dict[str, Any]) -> list[Any]:
+    """Return the table row of a comparison: the name of the estimate and its errors."""
+    own = {"est": found["est"], "rpe": found["rpe"][-1]["percent"] if found["rpe"] else None}
+    return [own[title] if title in own else number_at(found, SHORT[title]) for title in TITLES]
+
+
+_LATEX = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+_LATEX |= {letter: "\\" + letter for letter in "_%&#${}"}
 
 WIDE, HIGH = 412.0, 112.0  # pixels of a chart
 LEFT, TOP, RIGHT, BOTTOM = 54.0, 40.0, 14.0, 42.0  # around it
