@@ -21,12 +21,12 @@ from frametool.errors import printable
 from frametool.fit.numbers import SHORT, number_at
 from frametool.formats.rows.csv import quoted
 from frametool.view import pictures
-from frametool.view.pictures import Chart, ChartLine, Picture
+from frametool.view.pictures import Chart, ChartLine, Picture, stacked
 from frametool.view.pose_text import WIDTH
 from frametool.view.reports import columns, fixed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from frametool.fit.comparison import Comparison
     from frametool.view.pictures import SvgElement
@@ -176,9 +176,9 @@ class Curve(NamedTuple):
     chosen: Any
     times: list[float]
 
-    def over_time(self, values: Any) -> list[tuple[float, float]]:
-        """Return (time, value) of the pairs drawn."""
-        return [*zip(self.times, values[self.chosen].tolist(), strict=True)]
+    def line(self, name: str, colour: str, values: Any) -> ChartLine:
+        """Return the line of a value of the pairs drawn over their times."""
+        return ChartLine(name, colour, [*zip(self.times, values[self.chosen].tolist(), strict=True)], 1.2)
 
 
 def write_report(found: Sequence[Comparison], fmt: str, command: str) -> str:
@@ -283,24 +283,17 @@ def _coloured(curve: Curve, seen: Any) -> Iterator[ChartLine]:
 
 def _over_time(curves: Sequence[Curve], along: str) -> list[Chart]:
     """Return the charts over time: errors in position, in rotation, and for one estimate along and across its path."""
-
-    def lines(values: Iterable[tuple[str, str, Any, Curve]]) -> list[ChartLine]:
-        return [ChartLine(name, colour, curve.over_time(each), 1.2) for name, colour, each, curve in values]
-
     ate, one = curves[0].found.ate, len(curves) == 1
-    position = lines((each.name * (not one), each.colour, each.found.ate.m, each) for each in curves)
-    turned = [(each, each.found.ate.rad) for each in curves if each.found.ate.rad is not None]
-    kinds = {"error in position (m)": position}
-    if turned:
-        kinds["error in rotation (deg)"] = lines(("", each.colour, np.degrees(rad), each) for each, rad in turned)
+    position = [each.line(each.name * (not one), each.colour, each.found.ate.m) for each in curves]
+    turned = [(each, each.found.ate.rad) for each in curves]
+    rotation = [each.line("", each.colour, np.degrees(rad)) for each, rad in turned if rad is not None]
+    kinds = {"error in position (m)": position, **({"error in rotation (deg)": rotation} if rotation else {})}
     if one:
         rmse, end = float(np.sqrt((ate.m**2).mean())), curves[0].times[-1]
         position.append(ChartLine(f"rmse {rmse:.3g} m", "soft", [(0.0, rmse), (end, rmse)], 1.0, (4.0, 3.0)))
         parts = (("along", "x", ate.along), ("across", "y", ate.across), ("up", "z", ate.up))
-        kinds["error in the path's axes (m)"] = lines((*part, curves[0]) for part in parts)
-    step, last = HIGH + TOP + BOTTOM - 14.0, [*kinds][-1]
-    return [Chart((LEFT, TOP + at * step, WIDE, HIGH), (along * (name == last), name), drawn)
-            for at, (name, drawn) in enumerate(kinds.items())]  # fmt: skip
+        kinds["error in the path's axes (m)"] = [curves[0].line(*part) for part in parts]
+    return stacked((LEFT, TOP, WIDE, HIGH), TOP + BOTTOM - 14.0, along, kinds)
 
 
 def _histogram(curve: Curve) -> Picture:
@@ -346,8 +339,8 @@ def _by_length(curves: Sequence[Curve], numbers: Sequence[dict[str, Any]]) -> Pi
 def _samples(curve: Curve, paths: Chart, seen: Any, errors: Chart) -> dict[str, Any]:
     """Return the pixels of the drawn pairs in both charts and the values shown on hover."""
     ate, chosen = curve.found.ate, curve.chosen
-    points = ("path", paths, seen(curve.found.moved.xyz[chosen])), ("errors", errors, curve.over_time(ate.m))
-    pixels = {key: [chart.place(*each) for each in points_of] for key, chart, points_of in points}
+    points = ("path", paths, seen(curve.found.moved.xyz[chosen])), ("errors", errors, curve.line("", "", ate.m).points)
+    pixels = {key: [chart.place(*each) for each in places] for key, chart, places in points}
     numbers = {"m": ate.m[chosen], **({} if ate.rad is None else {"deg": np.degrees(ate.rad[chosen])})}
     return {
         "name": curve.name, "colour": curve.colour, "t": [round(each, 3) for each in curve.times],

@@ -199,8 +199,8 @@ def write_html(
     digests = {kind: b64encode(sha256(text.encode()).digest()).decode() for kind, text in texts.items() if text}
     allowed = "".join(f"{kind}-src 'sha256-{digest}'; " for kind, digest in digests.items())
     policy = f"default-src 'none'; img-src data:; {allowed}base-uri 'none'; form-action 'none'"
-    held = {name: text.translate(HARMLESS) for name, text in (data or {}).items()}
-    scripts = "".join(f'<script type="application/json" id="{name}">{text}</script>' for name, text in held.items())
+    held = ((name, text.translate(HARMLESS)) for name, text in (data or {}).items())
+    scripts = "".join(f'<script type="application/json" id="{name}">{text}</script>' for name, text in held)
     if script:
         texts["script"] = f'<script type="module">{texts["script"]}</script>'
     return filled("shell.html", policy=policy, title=_text(title), body=body, data=scripts, **texts)
@@ -255,15 +255,12 @@ class Chart:
         ends: least and greatest x and y; by default 0 and those of the lines, in y rounded to ticks.
         """
         self.area, self.names, self.lines = area, names, lines
-        columns = [(0.0, *column) for column in zip(*(point for line in lines for point in line.points), strict=True)]
-        found = ends or [(min(column), max(column)) for column in columns] or [(0.0, 0.0)] * 2
-        limits = [(max(begin, -FURTHEST), min(end, FURTHEST)) for begin, end in found]
-        rounded = [ticks(*each) for each in limits]
-        self.x, self.y = ((each[0], each[-1]) for each in rounded)
-        if limits[0][1] - limits[0][0] > LEAST_SPAN:
-            self.x = limits[0]
-        if ends:
-            self.y = limits[1]
+        columns = zip(*(point for line in lines for point in line.points), strict=True)
+        found = ends or [(min(0.0, *column), max(0.0, *column)) for column in columns] or [(0.0, 0.0)] * 2
+        x, y = ((max(begin, -FURTHEST), min(end, FURTHEST)) for begin, end in found)
+        rounded = ticks(*x), ticks(*y)
+        self.x = x if x[1] - x[0] > LEAST_SPAN else (rounded[0][0], rounded[0][-1])
+        self.y = y if ends else (rounded[1][0], rounded[1][-1])
         self.ticks = [[at for at in each if begin <= at <= end]
                       for each, (begin, end) in zip(rounded, (self.x, self.y), strict=True)]  # fmt: skip
 
@@ -295,6 +292,18 @@ class Chart:
                 yield line(points, each.colour, each.width, dashes=each.dashes, title=each.name)
             yield from (dot(x, y, 3.0, each.colour) for x, y in points if each.dots)
         yield from _legend(self.lines, left + text_width(self.names[1]), right, top - 14.0)
+
+
+def stacked(area: Box, gap: float, along: str, kinds: Mapping[str, Sequence[ChartLine]]) -> list[Chart]:
+    """Return charts one below the other over the same x axis, which the last one names.
+
+    area: of the first.  along: title of the x axis.  kinds: the lines of each by the title of its y axis
+    """
+    left, top, width, height = area
+    return [
+        Chart((left, top + at * (height + gap), width, height), (along * (at == len(kinds) - 1), name), lines)
+        for at, (name, lines) in enumerate(kinds.items())
+    ]
 
 
 def _legend(lines: Sequence[ChartLine], left: float, right: float, y: float) -> Iterator[SvgElement]:
@@ -383,20 +392,17 @@ def _paint(axes: Any, shape: SvgElement, order: int) -> None:
             text = printable(shape.text).replace("$", r"\$")
             axes.text(look["x"], look["y"], text, fontsize=look["font-size"] * POINTS, **style)
         case "rect":
-            left, right, bottom, top = _edges(look)
-            axes.fill([left, right, right, left], [top, top, bottom, bottom], linewidth=0.0, **style)
+            from matplotlib.patches import Rectangle
+
+            axes.add_patch(Rectangle((look["x"], look["y"]), look["width"], look["height"], linewidth=0.0, **style))
         case "image":
             from matplotlib.image import imread
 
             kind, _, data = look["href"].removeprefix("data:image/").partition(";base64,")
             pixels = imread(io.BytesIO(b64decode(data)), format=kind)
             gray = {"cmap": "gray", "vmin": 0.0, "vmax": 1.0 if pixels.dtype.kind == "f" else 255.0}
-            axes.imshow(pixels, extent=_edges(look), interpolation="none", zorder=order, **gray)
-
-
-def _edges(look: Mapping[str, float]) -> tuple[float, float, float, float]:
-    """Return left, right, bottom and top of a box or an image."""
-    return look["x"], look["x"] + look["width"], look["y"] + look["height"], look["y"]
+            extent = look["x"], look["x"] + look["width"], look["y"] + look["height"], look["y"]
+            axes.imshow(pixels, extent=extent, interpolation="none", zorder=order, **gray)
 
 
 def _plain(shape: SvgElement) -> str:

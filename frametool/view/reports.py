@@ -235,13 +235,11 @@ def option_of(ask: str) -> str:
     return f"--{name}{' ' * bool(choices)}{choices}"
 
 
-def write_formats(entries: Iterable[dict[str, Any]]) -> str:
+def write_formats(entries: Sequence[dict[str, Any]]) -> str:
     """Return the list of formats, those that are only written last."""
-    parts: dict[str, str] = {}
-    for entry in entries:
-        kind = "read" if entry["reads"] else "only written"
-        parts[kind] = parts.get(kind, f"{kind}:\n") + _described(entry)
-    return "\n".join(parts[kind] for kind in sorted(parts, reverse=True))
+    read = "".join(_described(entry) for entry in entries if entry["reads"])
+    written = "".join(_described(entry) for entry in entries if not entry["reads"])
+    return f"read:\n{read}\nonly written:\n{written}"
 
 
 def write_format(entry: dict[str, Any]) -> str:

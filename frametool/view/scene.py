@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Rigid
 
     Point = tuple[float, float, float]
+    Ground = tuple[str, Rigid]  # the replacement of the Earth's frame: level axes, x east and y north, at a frame
     Box = tuple[float, float, float, float]  # left, top, right, bottom
 
 PARTS = 8  # of the way between two stamps, so that a trail is round where a frame turns
@@ -51,35 +52,27 @@ def _expression(text: str) -> re.Pattern[str]:
         raise ValueInvalid(f"{shown(text)} is not a regular expression: {error}") from None
 
 
-class Ground(NamedTuple):
-    """The replacement of the Earth's frame: level axes, x east and y north, at a frame on the ground."""
-
-    name: str
-    pose: Rigid
-
-
 def _ground(tree: Frames) -> Ground | None:
     """Return the ground at the first frame on the Earth, a static one if there is any."""
     earth = tree.resolve_name(EARTH)
     there = sorted((track for track in tree.tracks() if track.parent == earth), key=lambda track: not track.is_static)
     if not there or earth not in tree.roots:
         return None
-    x, y, z = there[0].components[:3]
-    lat, lon, alt = wgs84.lla(x, y, z, floats)
-    if not isfinite(alt):
-        return None
-    return Ground(f"enu at {there[0].child}", (x, y, z, *wgs84.ecef_from_axes(lat, lon, ENU, floats)))
+    place = there[0].components[:3]
+    lat, lon, alt = wgs84.lla(*place, floats)
+    axes = wgs84.ecef_from_axes(lat, lon, ENU, floats) if isfinite(alt) else None
+    return axes and (f"enu at {there[0].child}", (*place, *axes))
 
 
 def _on(tree: Frames, ground: Ground) -> Frames:
     """Return the tree with the ground instead of the Earth's frame."""
-    earth, found = tree.resolve_name(EARTH), TransformBuffer(name=tree.name)
+    earth, found, (name, pose) = tree.resolve_name(EARTH), TransformBuffer(name=tree.name), ground
     for frame in tree.frames:
-        found.add_root(ground.name if frame == earth else frame)
+        found.add_root(name if frame == earth else frame)
     for track in tree.tracks():
-        for stamp_ns, parent, pose in track.walk():
-            above, seen = (ground.name, rigid.relative(*ground.pose, *pose)) if parent == earth else (parent, pose)
-            found.insert_components(above, track.child, seen, stamp_ns)
+        for stamp_ns, parent, seen in track.walk():
+            above, moved = (name, rigid.relative(*pose, *seen)) if parent == earth else (parent, seen)
+            found.insert_components(above, track.child, moved, stamp_ns)
     return found
 
 
@@ -123,13 +116,12 @@ class FrameScene:
         first = [track.first_ns for track in self.tracks.values()]
         self.span_ns = min(first, default=0), max((track.last_ns for track in self.tracks.values()), default=0)
         self.at_ns = (max(first) if at_ns is None else at_ns) if first else None
-        roots = Counter(Snapshot(tree).roots.values())
-        self.fixed = fixed or target or below or max(roots, key=roots.__getitem__)
+        self.fixed = fixed or target or below or Counter(Snapshot(tree).roots.values()).most_common(1)[0][0]
         self.chosen = self._choice(below, only)
 
     def _choice(self, below: str | None, only: str | None) -> set[str]:
         """Return the names to draw."""
-        chosen = {name for name in self.names if self.ground is None or name != self.ground.name}
+        chosen = {name for name in self.names if self.ground is None or name != self.ground[0]}
         if below is not None:
             chosen &= {*Snapshot(self.tree, self.at_ns).below(below)}
         if self.path_only and self.target and self.source:
@@ -155,8 +147,8 @@ class FrameScene:
 
         It is cut into stretches where its parent changes or data are missing.
         """
-        chosen = {name: self._stretches(name) for name in self.tracks if name in self.chosen}
-        return {name: stretches for name, stretches in chosen.items() if stretches}
+        drawn = (name for name in self.tracks if name in self.chosen)
+        return {name: stretches for name in drawn if (stretches := self._stretches(name))}
 
     def _stretches(self, name: str) -> list[list[Point]]:
         """Look a frame up at, and between, the stamps of all moving frames on its path."""
@@ -237,7 +229,6 @@ def parse_eye(text: str) -> tuple[float, float]:
 AXIS_PART = 0.55  # of the usual distance between a frame and its parent
 USUAL_LINK = 0.5  # metres, where there is none
 LEAST = 1e-9  # metres; below, frames lie on one point
-SPOT = 0.12  # of the picture: a small part of it
 # frames lie together within REACH times the distance that NEAR_PART of them keep, if one is VERY_FAR times as far
 REACH, NEAR_PART, VERY_FAR, FEWEST = 2.5, 0.7, 4.0, 4
 
@@ -295,7 +286,9 @@ class Projection:
         lengths = sorted(math.dist(self.poses[parent][:3], self.poses[name][:3]) for parent, name in self.links)
         lengths = [length for length in lengths if length > LEAST]
         usual = lengths[len(lengths) // 2] if lengths else USUAL_LINK
-        fitted = self._together() if most else [*self._points()]
+        fitted: list[Sequence[float]] = [self.poses[name][:3] for name in (self.cluster() if most else self.poses)]
+        if len(fitted) == len(self.poses):
+            fitted += (point for stretches in self.trails.values() for stretch in stretches for point in stretch)
         self.low, self.high = _bounds(fitted)
         self.centre = [(low + high) / 2.0 for low, high in zip(self.low, self.high, strict=True)]
         flat = [self.turned(point) for point in fitted]
@@ -311,20 +304,14 @@ class Projection:
         shortest, longest = (pixels / self.scale for pixels in size.axes)
         self.axis = min(max(AXIS_PART * usual, shortest), longest)
 
-    def _points(self) -> Iterator[Point]:
-        for x, y, z, *_ in self.poses.values():
-            yield x, y, z
-        yield from (point for stretches in self.trails.values() for stretch in stretches for point in stretch)
-
-    def _together(self) -> list[Point]:
-        """Return the positions of the frames in the densest cluster; all points if no frame is far away."""
-        places = [pose[:3] for pose in self.poses.values()]
-        middle = [sorted(column)[len(places) // 2] for column in zip(*places, strict=True)]
-        away = sorted(math.dist(place, middle) for place in places)
-        reach = REACH * away[int(NEAR_PART * (len(away) - 1))] if len(away) >= FEWEST else 0.0
-        if reach > 0.0 and away[-1] > VERY_FAR * reach:
-            return [(x, y, z) for x, y, z in places if math.dist((x, y, z), middle) <= reach]
-        return [*self._points()]
+    def cluster(self) -> list[str]:
+        """Return the frames that lie together where most are; all if no frame is far from them."""
+        middle = [sorted(column)[len(self.poses) // 2] for column in zip(*self.poses.values(), strict=True)][:3]
+        away = {name: math.dist(pose[:3], middle) for name, pose in self.poses.items()}
+        far = sorted(away.values())
+        reach = REACH * far[int(NEAR_PART * (len(far) - 1))] if len(far) >= FEWEST else 0.0
+        is_apart = reach > 0.0 and far[-1] > VERY_FAR * reach
+        return [name for name, metres in away.items() if not is_apart or metres <= reach]
 
     def holds(self, place: Flat) -> bool:
         """Return True if a point is inside the picture."""
@@ -356,14 +343,6 @@ class Projection:
     def axes(self, name: str) -> list[tuple[int, Flat]]:
         """Return the axes 0, 1, 2 of a frame with their tips, from the farthest to the nearest."""
         return sorted(enumerate(self.tips(self.poses[name])), key=lambda each: each[1].depth)
-
-    def crowded(self) -> int:
-        """Return the number of frames in one small spot if that is most of them, else 0."""
-        places = self.origins.values()
-        middle = [sorted(column)[len(places) // 2] for column in zip(*(place[:2] for place in places), strict=True)]
-        reach = SPOT * min(self.size[:2])
-        near = sum(math.dist(place[:2], middle) < reach for place in places)
-        return near if len(places) >= 6 and near > 0.6 * len(places) else 0
 
     def ground(self) -> tuple[float, list[tuple[Point, Point, bool]]]:
         """Return the grid on z = 0: its spacing in metres, and its lines with whether they pass the origin."""

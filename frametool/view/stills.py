@@ -58,8 +58,9 @@ def still_picture(
     for label in labels.placed:
         shapes += _label(label)
     shapes += [*_corner(flat), *_scale(flat, step)]
-    crowded, hidden = flat.crowded(), labels.hidden
-    notes = [f"{crowded} of {len(scene.names)} frames lie in a small spot; --below FRAME shows a part"] * bool(crowded)
+    near, hidden = len(flat.cluster()), labels.hidden
+    crowded = f"{near} of {len(scene.names)} frames lie in a small spot; --below FRAME shows a part"
+    notes = [crowded] * (near < len(flat.poses))
     notes += [f"{hidden} names found no place"] * bool(hidden)
     return Picture(WIDTH, HEIGHT, shapes, title, notes=notes)
 

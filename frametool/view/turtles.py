@@ -11,7 +11,7 @@ from frametool.errors import printable
 from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import BILLION
 from frametool.sim.turtle import SIZE
-from frametool.view.pictures import Chart, ChartLine, Picture, box, dot, line, words
+from frametool.view.pictures import ChartLine, Picture, box, dot, line, stacked, words
 from frametool.view.progress import coloured_console
 from frametool.view.stills import ARROWS, Canvas
 
@@ -104,14 +104,13 @@ def run_picture(drawing: Drawing) -> Picture:
     colours = colours_of({*drawing.turtles, *drawing.curves})
     shapes = [*_window(drawing, colours)]
     followed = {name: rows for name, rows in drawing.curves.items() if rows}
-    height = (WINDOW - 2.0 * PANEL_GAP) / len(PANELS)
-    for number, title in enumerate(PANELS if followed else ()):
-        curves = [
-            ChartLine(name, COLOURS[colours[name]], [(row[0], row[number + 1]) for row in rows])
-            for name, rows in followed.items()
-        ]
-        area = LEFT, MARGIN + number * (height + PANEL_GAP), PANEL_WIDTH, height
-        shapes += Chart(area, ("time (s)" * (title == PANELS[-1]), title), curves).drawn()
+    panels = {
+        title: [ChartLine(name, COLOURS[colours[name]], [(row[0], row[at]) for row in rows])
+                for name, rows in followed.items()]
+        for at, title in enumerate(PANELS if followed else (), 1)
+    }  # fmt: skip
+    area = LEFT, MARGIN, PANEL_WIDTH, (WINDOW - 2.0 * PANEL_GAP) / len(PANELS)
+    shapes += (shape for chart in stacked(area, PANEL_GAP, "time (s)", panels) for shape in chart.drawn())
     return Picture(LEFT + PANEL_WIDTH + MARGIN if followed else HEIGHT, HEIGHT, shapes, "turtles")
 
 
