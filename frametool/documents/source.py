@@ -375,6 +375,10 @@ class InputFile:
         """Return the whole text with its name."""
         return Source(self.name, self.text)
 
+    def error(self, message: str, line: int = 0) -> FormatError:
+        """Return the error for a line, or for the whole file."""
+        return FormatError(message, source=self.name, line=line)
+
     def close(self) -> None:
         """Close a file; standard input remains open."""
         if self.path != "-":

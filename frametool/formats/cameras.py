@@ -80,14 +80,14 @@ def load_camera(
     with closing(InputFile("--camera" if inline else text, inline, folder=of_folder(text) is not None)) as file:
         known = cameras_of(file)
     if not known:
-        raise FormatError("no camera in it: neither K nor what else `frametool help cameras` lists", source=file.name)
+        raise file.error("no camera in it: neither K nor what else `frametool help cameras` lists")
     first, *others = known
     if name is None and any(known[each].args != known[first].args for each in others):
-        raise FormatError(f"several cameras; {text}:NAME chooses one; cameras: {listing(known)}", source=file.name)
+        raise file.error(f"several cameras; {text}:NAME chooses one; cameras: {listing(known)}")
     if name is not None and name not in known and (number := re.fullmatch(r"(?:P|cam)?0?(\d)", name)):
         name = next((each for each in (f"cam{number[1]}", f"cam{number[1]}_rect") if each in known), name)
     if name is not None and name not in known:
-        raise FormatError(f"no camera {shown(name)}{alternatives(name, known, 'cameras')}", source=file.name)
+        raise file.error(f"no camera {shown(name)}{alternatives(name, known, 'cameras')}")
     return known[first if name is None else name](model=model, size=size)
 
 

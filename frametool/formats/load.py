@@ -542,7 +542,7 @@ def _add(builder: TreeBuilder, file: FrameFile) -> None:
             for edge in (piece,) if isinstance(piece, Edge) else piece.edges():
                 builder.add_edge(edge, EdgePlace(file, edge))
     if piece is None:
-        raise FormatError("no frames in it", source=file.name)
+        raise file.error("no frames in it")
     builder.axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}
     builder.drawn |= file.tally.drawn
     builder.cameras |= file.cameras

@@ -112,7 +112,7 @@ def rows_of(file: InputFile, tally: Diagnostics) -> list[DhRow]:
             raise fail(f"two joints are called {shown(row.name)}: rows {[*rows].index(row.name) + 1} and {number}")
         rows[row.name] = row
     if not rows:
-        raise FormatError("a table without rows", source=file.name)
+        raise file.error("a table without rows")
     if others:
         first = next(iter(rows.values())).line - (not is_document)
         tally.note_each(f"left out, about something else: {listing(others)}", first)
@@ -212,8 +212,7 @@ def _of_lines(file: InputFile) -> Iterator[tuple[list[Item], Fail, int]]:
     lines = [(number, line) for number, line in enumerate(file.text.split("\n"), 1) if line.strip()]
     begin = next((at for at, (_, line) in enumerate(lines) if _is_row({word.text for word in _split(line)})), None)
     if begin is None:
-        message = "no header with d, a and alpha above the rows; write theta,d,a,alpha"
-        raise FormatError(message, source=file.name, line=1)
+        raise file.error("no header with d, a and alpha above the rows; write theta,d,a,alpha", 1)
     header = [word.text for word in _split(lines[begin][1])]
     for number, line in lines[begin + 1 :]:
         if line.lstrip().startswith("#"):

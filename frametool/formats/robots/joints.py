@@ -349,9 +349,9 @@ def read_joint_file(path: str, joints: Mapping[str, Joint]) -> Iterator[JointSam
             yield from import_module(FORMATS[fmt].reader).read_joints(file, state)
         elif state:
             having = " and ".join(readers("joints"))
-            raise FormatError(f"has no states with names; {having} files do", source=file.name)
+            raise file.error(f"has no states with names; {having} files do")
         elif head.lstrip().startswith(b"<"):
-            raise FormatError("this XML has no values of joints; maps, JointState messages, CSV have", source=file.name)
+            raise file.error("this XML has no values of joints; maps, JointState messages, CSV have")
         elif "rows" in FORMATS[fmt].reads:
             yield from _of_table(file, fmt, joints, tally)
         else:
@@ -423,7 +423,7 @@ def _of_table(
             if own not in joints and (near := did_you_mean(own, [*without], cutoff=0.8)):
                 raise ValueInvalid(f"column {shown(name)} is not a joint{near}")
     except ValueInvalid as error:
-        raise FormatError(str(error), source=file.name, line=first) from None
+        raise file.error(str(error), first) from None
     stamp = stamp_column(names, joints)
     used = {column.place for column in columns} | {stamp[0] if stamp else -1}
     if others := [name for place, name in enumerate(names) if place not in used]:

@@ -83,7 +83,7 @@ def describe(file: InputFile, options: Options) -> tuple[dict[str, int], list[Li
     links = list(_connected(joints, frames, options))
     posture = JointState.of(links, options, file.name)
     if not frames:
-        raise FormatError("no links in it", source=file.name)
+        raise file.error("no links in it")
     if len(roots := _roots(frames, links)) > 1:
         named = first_of(roots, 5, quote=bare)
         message = f"{len(roots)} roots, where a robot has one: {named}; they are not connected"
@@ -209,7 +209,7 @@ def robot_of(file: FrameFile) -> tuple[Robot, JointState]:
     """Return the robot of a file, and its joint values from the file's answers; otherwise as `load_robot`."""
     if file.format != "urdf":
         file.close()
-        raise FormatError(f"expected a URDF robot, found {FORMATS[file.format].summary}", source=file.name)
+        raise file.error(f"expected a URDF robot, found {FORMATS[file.format].summary}")
     options = Options(file.tally, file.topics, answers=file.answers)
     try:
         with paused_collector():

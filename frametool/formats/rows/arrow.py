@@ -20,7 +20,7 @@ import numpy as np
 from frametool import sizes
 from frametool.documents.json import dump
 from frametool.documents.source import Verbatim
-from frametool.errors import FileProblem, FormatError, ValueInvalid, shown, warn
+from frametool.errors import FileProblem, ValueInvalid, shown, warn
 from frametool.formats.rows import column_file
 from frametool.frames.stamps import SUFFIXES
 from frametool.text.parse import nanoseconds_of
@@ -432,7 +432,7 @@ def open_columns(file: InputFile) -> ArrowFile:
     fmt = next((fmt for begin, fmt in BEGINNINGS.items() if head.startswith(begin)), "")
     if not fmt:
         found = f"it begins with {shown(head[:8])}" if head else "it is empty"
-        raise FormatError(f"neither Parquet (PAR1) nor Arrow (ARROW1): {found}", source=file.name)
+        raise file.error(f"neither Parquet (PAR1) nor Arrow (ARROW1): {found}")
     return ArrowFile(file, fmt)
 
 

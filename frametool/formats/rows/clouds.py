@@ -67,7 +67,7 @@ class CloudFile(column_file.RecordFile):
         yield from super().batches()
         self.behind = self.file.stream.read(self.record.itemsize) if self.is_last else b""
         if self.behind and len(self.behind) == self.record.itemsize:
-            raise FormatError(f"the header says {self.count} {self.what}, more follow", source=self.file.name)
+            raise self.file.error(f"the header says {self.count} {self.what}, more follow")
 
     def rest(self) -> Iterator[bytes]:
         """Yield the rest of the file after the points."""
@@ -158,7 +158,7 @@ class TextRows:
 
     def problem(self, message: str, line: int = 0) -> FormatError:
         """Return the error for a line, or for the file."""
-        return FormatError(message, source=self.cloud.file.name, line=line)
+        return self.cloud.file.error(message, line)
 
     def batches(self) -> Iterator[TextBatch]:
         """Yield the rows; raises FormatError for a row of another width, or if the file ends too early."""
@@ -306,7 +306,7 @@ class BinCloud(column_file.RecordFile):
             fits = [name for name in others if size % (_SINGLE.itemsize * len(FORMATS[name].columns)) == 0]
             hint = f"; --in {fits[0]} fits" if fits else "; is it whole?"
             points = f"points of {record.itemsize} bytes (float32 {' '.join(names)})"
-            raise FormatError(f"{size} bytes are no whole number of {points}{hint}", source=file.name)
+            raise file.error(f"{size} bytes are no whole number of {points}{hint}")
         super().__init__(file, names, record, size // record.itemsize)
 
     def batches(self) -> Iterator[column_file.Batch]:
@@ -317,7 +317,7 @@ class BinCloud(column_file.RecordFile):
             bad = np.flatnonzero((rings != np.rint(rings)) | (rings < 0))
             if len(bad):
                 found = f"ring: {rings[bad[0]]:g} is not a ring number; is it --in kitti-bin?"
-                raise FormatError(found, source=self.file.name, line=done + int(bad[0]) + 1)
+                raise self.file.error(found, done + int(bad[0]) + 1)
             done += batch.size
             yield batch
 

@@ -249,7 +249,7 @@ class RecordFile(ColumnFile):
             filled = self.file.stream.readinto(data)  # type: ignore[attr-defined]
             if filled < len(data):
                 whole = done + filled // max(self.record.itemsize, 1)
-                raise FormatError(f"the file ends after {whole} of {count} rows", source=self.file.name)
+                raise self.file.error(f"the file ends after {whole} of {count} rows")
             yield StructuredBatch(np.frombuffer(data, self.record))
 
 
@@ -286,15 +286,15 @@ def check_declared(file: InputFile, count: int, size: int, what: str, *, last: b
     last: nothing else follows them, so that more data are an error too
     """
     if count and not size:
-        raise FormatError(f"the header says {count} {what} of 0 bytes each", source=file.name)
+        raise file.error(f"the header says {count} {what} of 0 bytes each")
     left = bytes_left(file.stream)
     if left is None:
         return
     problem = f"the header says {count} {what} of {size} bytes, the file holds {max(left, 0) // max(size, 1)}"
     if left < count * size:
-        raise FormatError(f"{problem}; is it whole?", source=file.name)
+        raise file.error(f"{problem}; is it whole?")
     if last and size and left >= (count + 1) * size:
-        raise FormatError(f"{problem}; correct the header", source=file.name)
+        raise file.error(f"{problem}; correct the header")
 
 
 def pieces(stream: BinaryIO) -> Iterator[bytes]:
@@ -310,7 +310,7 @@ def read_exactly(file: InputFile, size: int, what: str) -> bytes:
         found.append(piece)
         missing -= len(piece)
     if missing:
-        raise FormatError(f"the file ends within {what}, {missing} bytes are missing", source=file.name)
+        raise file.error(f"the file ends within {what}, {missing} bytes are missing")
     return b"".join(found)
 
 

@@ -107,7 +107,7 @@ class LasFile(column_file.ColumnFile):
         file.stream.seek(0)
         for what, at, size in RECORDS[: 1 + (head[MINOR_AT : MINOR_AT + 1] >= b"\x04")]:
             if (count := int.from_bytes(head[at : at + 4], "little")) * size > whole:
-                raise FormatError(f"the header says {count} {what}, in {whole} bytes", source=file.name)
+                raise file.error(f"the header says {count} {what}, in {whole} bytes")
         with column_file.translated(file.name):
             self.reader = laspy.open(_Clipped(file.stream, whole), closefd=False)
             header = self.header = self.reader.header
@@ -116,7 +116,7 @@ class LasFile(column_file.ColumnFile):
                 last = not (header.number_of_evlrs or header.start_of_waveform_data_packet_record)
                 column_file.check_declared(file, header.point_count, header.point_format.size, "points", last=last)
             elif header.point_count > whole * MOST_PACKED:
-                raise FormatError(f"the header says {header.point_count} points, in {whole} bytes", source=file.name)
+                raise file.error(f"the header says {header.point_count} points, in {whole} bytes")
             self.names = (*XYZ, *(name for name in header.point_format.dimension_names if name not in STORED))
             probe = laspy.ScaleAwarePointRecord.zeros(1, header=header)
             kinds = [np.array(probe[name]) for name in self.names]
@@ -138,7 +138,7 @@ class LasFile(column_file.ColumnFile):
                 points = self.reader.read_points(wanted)
             done += len(points)
             if len(points) < wanted:
-                raise FormatError(f"the file ends after {done} of {count} points", source=self.file.name)
+                raise self.file.error(f"the file ends after {done} of {count} points")
             yield LasBatch(points, self.names)
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> LasWriter:

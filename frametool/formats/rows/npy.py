@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.lib import format as npy
 
-from frametool.errors import FormatError
 from frametool.formats.rows import column_file
 
 if TYPE_CHECKING:
@@ -36,22 +35,22 @@ def read_header(file: InputFile) -> tuple[Kind, tuple[int, ...], bool]:
     """Return the type of an element, the shape, and whether it is in column-major order; raises FormatError."""
     head = file.stream.read(len(MAGIC) + 4)
     if not head.startswith(MAGIC):
-        raise FormatError("no NPY file: it does not begin with \\x93NUMPY", source=file.name)
+        raise file.error("no NPY file: it does not begin with \\x93NUMPY")
     version = head[len(MAGIC) : len(MAGIC) + 1]
     is_long = version > b"\x01"
     head += file.stream.read(2 * is_long)
     size = int.from_bytes(head[len(MAGIC) + 2 :], "little")
     if size > MOST_HEADER:
-        raise FormatError(f"the header says that it has {size} bytes; it is damaged", source=file.name)
+        raise file.error(f"the header says that it has {size} bytes; it is damaged")
     read = npy.read_array_header_2_0 if is_long else npy.read_array_header_1_0
     with column_file.translated(file.name, "the header cannot be read: {}"):
         shape, by_columns, kind = read(BytesIO(head[len(MAGIC) + 2 :] + file.stream.read(size)), MOST_HEADER)
         if version == UTF8 and kind.names is not None:
             kind.names = tuple(name.encode("latin-1").decode() for name in kind.names)
     if min(shape, default=0) < 0:
-        raise FormatError(f"the header has the shape {shape}", source=file.name)
+        raise file.error(f"the header has the shape {shape}")
     if kind.hasobject:
-        raise FormatError("it holds Python objects, which are never unpickled; save plain numbers", source=file.name)
+        raise file.error("it holds Python objects, which are never unpickled; save plain numbers")
     return kind, shape, by_columns
 
 
@@ -71,7 +70,7 @@ class NpyFile(column_file.RecordFile):
         elif columns > MOST_COLUMNS or columns * kind.itemsize > MOST_BYTES:
             problem = f"a row of {columns} columns; at most {MOST_COLUMNS} are read, of {MOST_BYTES} bytes"
         if problem:
-            raise FormatError(problem, source=file.name)
+            raise file.error(problem)
         record = kind if kind.names is not None else column_file.record_of([kind] * columns)
         super().__init__(file, kind.names, record, self.shape[0])
         column_file.check_declared(file, self.count, record.itemsize, "rows", last=True)

@@ -323,14 +323,14 @@ class PcdFile(CloudFile):
             plain = sum(field.size * field.values for field in fields)
             if size != points * plain:
                 said = f"the header says {points} points of {plain} bytes, the packed data says {size} bytes"
-                raise FormatError(said, source=file.name)
+                raise file.error(said)
         packed = column_file.read_exactly(file, packed_size, "the packed points")
         if file.stream.read(1):
-            raise FormatError("more bytes follow the packed points", source=file.name)
+            raise file.error("more bytes follow the packed points")
         try:
             data = np.frombuffer(unpack(packed, size), np.uint8)
         except ValueInvalid as error:
-            raise FormatError(f"the packed points cannot be unpacked: {error}", source=file.name) from None
+            raise file.error(f"the packed points cannot be unpacked: {error}") from None
         columns: list[Any] = []
         at = 0
         for field in fields:

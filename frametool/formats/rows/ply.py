@@ -146,7 +146,7 @@ class PlyFile(clouds.CloudFile):
         at = next((at for at, each in enumerate(elements) if each.name == VERTEX), None)
         if at is None:
             names = listing(each.name for each in elements) or "none"
-            raise FormatError(f"no element {VERTEX!r}; elements: {names}", source=file.name)
+            raise file.error(f"no element {VERTEX!r}; elements: {names}")
         before, vertex, self.after = elements[:at], elements[at], elements[at + 1 :]
         self.others = before + self.after
         _check_lists(before, vertex, self.order, file.name)
@@ -163,7 +163,7 @@ class PlyFile(clouds.CloudFile):
         else:
             self.before = self._lines(sum(each.instances for each in before))
             if not self.width:
-                raise FormatError(f"the {self.count} vertices have no properties", source=file.name)
+                raise file.error(f"the {self.count} vertices have no properties")
             line = (self.head + self.before).count(b"\n") + 1
             self.text = clouds.TextRows(self, range(self.width), self.width, line)
 
@@ -174,7 +174,7 @@ class PlyFile(clouds.CloudFile):
             lines.append(line)
             count -= bool(line.strip())
         if count:
-            raise FormatError(f"the file ends before its vertices, {count} lines early", source=self.file.name)
+            raise self.file.error(f"the file ends before its vertices, {count} lines early")
         return b"".join(lines)
 
     def moved_by(self, pose: Components | None) -> None:
@@ -229,7 +229,7 @@ class PlyFile(clouds.CloudFile):
         lines += bool(begun.strip())
         if lines != expected:
             said = f"after the vertices there are {lines} lines, the header says {expected}; correct the header"
-            raise FormatError(said, source=self.file.name)
+            raise self.file.error(said)
 
     def record_with(self, columns: Sequence[OutColumn]) -> Kind:
         """Return the type of a vertex with other columns."""

@@ -337,7 +337,7 @@ def error_at(file: InputFile, row: Written, message: str) -> FormatError:
     """Return the error for a pose of a file."""
     if row.path:
         return format_error(file.source, row.path, message)
-    return FormatError(message, source=file.name, line=row.line)
+    return file.error(message, row.line)
 
 
 def text_lines(file: InputFile) -> Iterator[tuple[int, str]]:
@@ -349,7 +349,7 @@ def text_lines(file: InputFile) -> Iterator[tuple[int, str]]:
 def whole_in(file: InputFile, line: int, word: str, what: str) -> int:
     """Read a word as an integer, which errors call `what`; raises FormatError."""
     if not re.fullmatch("[0-9]{1,18}", word):
-        raise FormatError(f"expected {what}, a whole number, found {shown(word)}", source=file.name, line=line)
+        raise file.error(f"expected {what}, a whole number, found {shown(word)}", line)
     return int(word)
 
 
@@ -358,7 +358,7 @@ def numbers_in(file: InputFile, line: int, words: Sequence[str]) -> list[float]:
     try:
         return [parse_number(word) for word in words]
     except ValueInvalid as error:
-        raise FormatError(str(error), source=file.name, line=line) from None
+        raise file.error(str(error), line) from None
 
 
 # --- COLMAP ---
@@ -383,14 +383,14 @@ def _colmap(file: InputFile, _options: Options) -> Iterator[Written]:
         numbered.add(re.match(NUMBER_BEFORE, pose.image) is not None)
         if len(numbered) > 1:
             message = f"only some pictures are called as {shown(pose.image)}; a number too many or too few in the line?"
-            raise FormatError(message, source=file.name, line=number)
+            raise file.error(message, number)
         yield pose
         if not of_frames:
             below, points = next(lines, (0, ""))
             words = points.split()
             if len(words) % 3 or not all(re.fullmatch("-1|[0-9]+", word) for word in words[2::3]):
                 message = f"expected points (X Y POINT3D_ID each) or an empty line, found {len(words)} words"
-                raise FormatError(message, source=file.name, line=below)
+                raise file.error(message, below)
 
 
 def _colmap_pose(file: InputFile, line: int, text: str, *, of_frame: bool) -> Written:
@@ -398,11 +398,11 @@ def _colmap_pose(file: InputFile, line: int, text: str, *, of_frame: bool) -> Wr
     data = text.split()[9:] if of_frame else []  # a count, and three words per item
     expected = FRAME_LINE if of_frame else f"10 words ({IMAGE_LINE})"
     if len(words) < 9 or (len(words) < 10 and not of_frame):
-        raise FormatError(f"expected {expected}, found {len(words)} words", source=file.name, line=line)
+        raise file.error(f"expected {expected}, found {len(words)} words", line)
     number = whole_in(file, line, words[0], "an id")
     whole_in(file, line, *((words[1], "RIG_ID") if of_frame else (words[8], "CAMERA_ID")))
     if data and len(data) != 1 + 3 * whole_in(file, line, data[0], "NUM_DATA_IDS"):
-        raise FormatError(f"expected {expected}, three words of each, found {len(data)}", source=file.name, line=line)
+        raise file.error(f"expected {expected}, three words of each, found {len(data)}", line)
     w, x, y, z, *position = numbers_in(file, line, words[1 + of_frame : 8 + of_frame])
     return Written((*position, w, x, y, z), number, line, "" if of_frame else words[9])
 
@@ -435,7 +435,7 @@ def _g2o(file: InputFile, options: Options) -> Iterator[Written]:
             yield _g2o_pose(file, number, words, kinds[words[0]], ids=1 + edges)
         elif not words[0][0].isupper():
             message = f"expected a tag as {next(iter(kinds))}, found {shown(words[0])}"
-            raise FormatError(message, source=file.name, line=number)
+            raise file.error(message, number)
         elif not re.fullmatch(NO_POSE, words[0]):
             unknown.setdefault(words[0], number)
     if unknown:
@@ -443,7 +443,7 @@ def _g2o(file: InputFile, options: Options) -> Iterator[Written]:
     if only_others > 0:
         as_poses = "edges in it, which measure and are no tree; as poses: frametool convert FILE --edges"
         found = "vertices in it; leave --edges out" if edges else as_poses
-        raise FormatError(f"only {found}", source=file.name, line=only_others)
+        raise file.error(f"only {found}", only_others)
 
 
 def _g2o_pose(file: InputFile, line: int, words: list[str], layout: str, *, ids: int) -> Written:
@@ -452,7 +452,7 @@ def _g2o_pose(file: InputFile, line: int, words: list[str], layout: str, *, ids:
     size = len(expected.split())
     kind, *rest = words
     if len(rest) != size and (ids == 1 or len(rest) != size + INFORMATION[layout]):
-        raise FormatError(f"expected {kind} {expected}, found {len(words)} words", source=file.name, line=line)
+        raise file.error(f"expected {kind} {expected}, found {len(words)} words", line)
     number, *_ = (whole_in(file, line, word, "the id of a vertex") for word in rest[:ids])
     numbers = numbers_in(file, line, rest[ids:size])
     if layout == IN_PLANE:

@@ -18,7 +18,6 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from frametool.errors import FormatError
 from frametool.frames.edge_log import CacheEntry, cache_entries, listed_motion
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge
@@ -45,7 +44,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         return
     text = re.sub(r"(?m)^[^\S\n]*//.*$", "", file.text)
     if not text.rstrip().endswith("}"):
-        raise FormatError("the drawing ends before its last }; is the file whole?", source=file.name)
+        raise file.error("the drawing ends before its last }; is the file whole?")
     for node, line in _with_lines(rf"(?m)^[^\S\n]*{_WORD}\s*;\s*$", text):
         if (name := _unquoted(node[1])) not in _SETTING:
             yield Edge(None, options.tally.names.bare(name), IDENTITY, line=line)

@@ -118,8 +118,7 @@ class Calibration:
             found = True
             yield edge
         if not found:
-            message = "no pose in it: expected P0: to P3:, Tr:, R: and T:, or R_01: and T_01:"
-            raise FormatError(message, source=self.file.name)
+            raise self.file.error("no pose in it: expected P0: to P3:, Tr:, R: and T:, or R_01: and T_01:")
 
     def _take(self, line: int, text: str) -> None:
         """Store the numbers of a line; raises FormatError with the place."""
@@ -161,7 +160,7 @@ class Calibration:
         """Return parent and child of the pose of R: and T: of the raw recordings, by the file's name or contents."""
         for name, other in (("R", "T"), ("T", "R")):
             if name not in self.fields:
-                raise FormatError(f"missing {name}: together with {other}:", source=self.file.name)
+                raise self.file.error(f"missing {name}: together with {other}:")
         chosen = self.options.answers.frames
         base = os.path.basename(self.file.name)
         if len(chosen) == 2:
@@ -220,17 +219,17 @@ def _read_kalibr(file: InputFile, options: Options) -> Iterator[Edge]:
         try:
             pose = _baseline(text, head, reading) if head["name"] else _matrix(text, head, reading)
         except ValueInvalid as error:
-            raise FormatError(f"{label}: {error}", source=file.name, line=lines[label]) from None
+            raise file.error(f"{label}: {error}", lines[label]) from None
         if target != source:  # as the first IMU relative to itself
             child = max(target, source, key=lambda name: (name[:3] == "cam", name[:3], len(name), name))
             both = target[:3] == source[:3] == "cam"
             stated.append(Stated(target, source, child, pose, (label,), chained=both))
     if not stated:
-        raise FormatError("no pose in it: it would be under baseline T_1_0 or T_ci", source=file.name)
+        raise file.error("no pose in it: it would be under baseline T_1_0 or T_ci")
     try:
         edges = edges_of(stated, reading)
     except Misfit as misfit:
-        raise FormatError(str(misfit), source=file.name, line=lines.get(str(misfit.path[0]), 0)) from None
+        raise file.error(str(misfit), lines.get(str(misfit.path[0]), 0)) from None
     for note in reading.notes:
         options.tally.note_each(f"{note.path[0]}: {note.message}", lines[str(note.path[0])], note.rule)
     yield from _named(edges, options, lines)
