@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from math import frexp, inf, ldexp, sqrt
 
-from frametool.errors import ValueInvalid, warn
+from frametool.errors import ValueInvalid
 from frametool.geometry import floats, quaternion
 from frametool.geometry.quaternion import EPS, SILENT, TOLERATED, largest_of, length
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from typing import Any
 
-    from frametool.geometry.types import Components, Condition, Four, Functions, N, Nine, Six
+    from frametool.geometry.types import Condition, Four, Functions, N, Nine, Six
 
 ORTHONORMAL = 8 * EPS  # of the Gram matrix: what rounding alone leaves on a correctly rounded rotation
 SINGULAR = 1e-12  # of det / (|row 1| |row 2| |row 3|): below, rounding decides which rotation is nearest
@@ -149,28 +149,16 @@ def explained(parts: Sequence[Any], halves: Sequence[Any], xp: Functions[Any]) -
     return made
 
 
-def check(*values: float, normalize: bool = False) -> Nine[float]:
-    """Return the rotation nearest to one matrix, nine entries row-major.
-
-    Orthonormal to 1e-6 silently, to 1e-3 with a warning; with `normalize` any with singular values in 0.9 .. 1.1.
-
-    Raises:
-        ValueInvalid: mirrored, singular, a scaled rotation, or not orthonormal.
-    """
-    entries = nine(values)
-    problem = complaint(*entries, normalize=normalize)
-    if problem:
-        raise problem
-    off = defect(*entries, floats)
-    if off <= ORTHONORMAL:
-        return entries
-    if off > SILENT and not normalize:
-        warn(f"matrix is orthonormal only to {off:.2g} and was replaced by the nearest rotation", rule="rounded")
-    return nearest(*entries, floats)
+def remark(*entries: float) -> str:
+    """Return the warning that a matrix was replaced."""
+    return f"matrix is orthonormal only to {defect(*nine(entries), floats):.2g} and was replaced by the nearest rotation"
 
 
 def complaint(*entries: float, normalize: bool) -> ValueInvalid | None:
-    """Return the error for a matrix that is refused; None if it is accepted."""
+    """Return the error for a matrix that is mirrored, singular, a multiple of a rotation or not orthonormal to 1e-3.
+
+    normalize: any with singular values in 0.9 .. 1.1 is accepted
+    """
     matrix = nine(entries)
     exponent = frexp(max(map(abs, matrix)))[1]
     scaled = nine(ldexp(part, -exponent) for part in matrix)  # by a power of two: no square leaves the range
@@ -236,21 +224,13 @@ def six_d_deviation(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) 
     return xp.where(sine > PARALLEL, 0.0, inf)
 
 
-def six_d_repaired(ax: N, ay: N, az: N, bx: N, by: N, bz: N, _xp: Functions[N]) -> Six[N]:
-    """Return two columns unchanged: `from_six_d` accepts any that span a plane."""
-    return ax, ay, az, bx, by, bz
-
-
-def check_six_d(*columns: float, normalize: bool = False) -> Components:  # noqa: ARG001 - any two that span a plane
-    """Check one pair of columns and return it.
-
-    Raises:
-        ValueInvalid: zero or parallel.
-    """
+def six_d_complaint(*columns: float, normalize: bool = False) -> ValueInvalid | None:  # noqa: ARG001
+    """Return the error for two columns that span no plane; else None."""
     ax, ay, az, bx, by, bz = columns
+    is_zero = not any((ax, ay, az)) or not any((bx, by, bz))
+    if not is_zero and not six_d_deviation(ax, ay, az, bx, by, bz, floats):
+        return None
     shown = f"columns {ax:g} {ay:g} {az:g} and {bx:g} {by:g} {bz:g}"
-    if not (ax or ay or az) or not (bx or by or bz):
-        raise ValueInvalid(f"{shown} span no plane: one is zero", rule="denormalized")
-    if six_d_deviation(ax, ay, az, bx, by, bz, floats):
-        raise ValueInvalid(f"{shown} span no plane: they are parallel", rule="denormalized")
-    return columns
+    return ValueInvalid(
+        f"{shown} span no plane: {'one is zero' if is_zero else 'they are parallel'}", rule="denormalized"
+    )

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from math import inf
 
-from frametool.errors import ValueInvalid, warn
+from frametool.errors import ValueInvalid
 from frametool.geometry import floats
 from frametool.geometry.floats import RADIAN, half_sincos, half_sincos_deg, incline
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
-    from frametool.geometry.types import Components, Condition, Four, Functions, N, Nine, Three, Two
+    from frametool.geometry.types import Condition, Four, Functions, N, Nine, Three, Two
 
 EPS = 2.0**-52
 UNIT = 4 * EPS  # one normalisation leaves |n^2 - 1| below 3 eps: within 4, bits are preserved
@@ -236,25 +236,9 @@ def repaired(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
     )  # fmt: skip
 
 
-def check(x: float, y: float, z: float, w: float, *, normalize: bool = False) -> tuple[float, float, float, float]:
-    """Check one quaternion and return it as a unit quaternion.
-
-    Silently within 1e-6 of norm 1, within 1e-3 with a warning; with `normalize` any non-zero finite one.
-
-    Raises:
-        ValueInvalid: zero, not finite, or not of norm 1.
-    """
-    if abs(x * x + y * y + z * z + w * w - 1.0) <= UNIT:
-        return x, y, z, w
-    off = deviation(x, y, z, w, floats)
-    problem = complaint(x, y, z, w, normalize=normalize)
-    if problem:
-        raise problem
-    if off > SILENT and not normalize:
-        warn(
-            f"quaternion {x:g} {y:g} {z:g} {w:g} has norm {_shown_norm(x, y, z, w)} and was normalised", rule="rounded"
-        )
-    return repaired(x, y, z, w, floats)
+def remark(x: float, y: float, z: float, w: float) -> str:
+    """Return the warning that a quaternion was normalised."""
+    return f"quaternion {x:g} {y:g} {z:g} {w:g} has norm {_shown_norm(x, y, z, w)} and was normalised"
 
 
 def _shown_norm(x: float, y: float, z: float, w: float) -> str:
@@ -264,15 +248,18 @@ def _shown_norm(x: float, y: float, z: float, w: float) -> str:
 
 
 def complaint(x: float, y: float, z: float, w: float, *, normalize: bool = False) -> ValueInvalid | None:
-    """Return the error for a quaternion that is refused; None if it is accepted."""
-    shown = f"quaternion {x:g} {y:g} {z:g} {w:g}"
+    """Return the error for a quaternion that is refused; None if it is accepted: with norm 1 to 1e-3.
+
+    normalize: any non-zero finite one is accepted
+    """
     off = deviation(x, y, z, w, floats)
+    if off <= TOLERATED or (normalize and off < inf):
+        return None
+    shown = f"quaternion {x:g} {y:g} {z:g} {w:g}"
     if x == y == z == w == 0.0:
         return ValueInvalid(f"{shown} has no direction; give a non-zero one", rule="denormalized")
     if not off < inf:
         return ValueInvalid(f"{shown} is not finite; give four finite numbers", rule="not-finite")
-    if normalize or off <= TOLERATED:
-        return None
     message = f"{shown} has norm {_shown_norm(x, y, z, w)}; a rotation needs norm 1 (normalize it with --normalize)"
     return ValueInvalid(message, rule="denormalized")
 
@@ -380,17 +367,14 @@ def as_rotvec(x: N, y: N, z: N, w: N, xp: Functions[N], *, degrees: bool = False
     return x / sine * angle, y / sine * angle, z / sine * angle
 
 
-def check_rotvec(*vector: float, what: str = "rotation vector", normalize: bool = False) -> Components:  # noqa: ARG001
-    """Check one rotation vector and return it.
-
-    Raises:
-        ValueInvalid: not finite, or so long that its square overflows.
-    """
-    x, y, z = vector
-    if not x * x + y * y + z * z < inf:
-        shown = f"{what} {x:g} {y:g} {z:g}"
-        raise ValueInvalid(f"{shown} is not finite or too long; give numbers below 1e+150", rule="not-finite")
-    return vector
+def rotvec_complaint(
+    x: float, y: float, z: float, *, what: str = "rotation vector", normalize: bool = False  # noqa: ARG001
+) -> ValueInvalid | None:
+    """Return the error for a rotation vector that is not finite, or so long that its square overflows; else None."""
+    if x * x + y * y + z * z < inf:
+        return None
+    problem = f"{what} {x:g} {y:g} {z:g} is not finite or too long; give numbers below 1e+150"
+    return ValueInvalid(problem, rule="not-finite")
 
 
 def from_axis_angle(ax: N, ay: N, az: N, angle: N, xp: Functions[N], *, degrees: bool = False) -> Four[N]:
@@ -411,15 +395,11 @@ def as_axis_angle(x: N, y: N, z: N, w: N, xp: Functions[N], *, degrees: bool = F
     return ux, uy, uz, angle * RADIAN if degrees else angle
 
 
-def check_axis_angle(*axis_and_angle: float, normalize: bool = False) -> Components:  # noqa: ARG001 - any length is an axis
-    """Check one axis and angle and return them.
-
-    Raises:
-        ValueInvalid: the axis is zero.
-    """
-    if not any(axis_and_angle[:3]):
-        raise ValueInvalid("axis 0 0 0 has no direction; give a non-zero one", rule="denormalized")
-    return axis_and_angle
+def axis_angle_complaint(*axis_and_angle: float, normalize: bool = False) -> ValueInvalid | None:  # noqa: ARG001
+    """Return the error for an axis of length 0; else None."""
+    if any(axis_and_angle[:3]):
+        return None
+    return ValueInvalid("axis 0 0 0 has no direction; give a non-zero one", rule="denormalized")
 
 
 def from_mrp(px: N, py: N, pz: N) -> Four[N]:

@@ -10,7 +10,7 @@ from functools import partial
 from math import inf, isfinite, tau
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid, did_you_mean, listing, nearest, shown
+from frametool.errors import ValueInvalid, did_you_mean, listing, nearest, shown, warn
 from frametool.geometry import euler, floats, matrix, quaternion
 
 if TYPE_CHECKING:
@@ -52,6 +52,7 @@ class BatchRule(NamedTuple):
     exact: the deviation up to which a row keeps its bits
     explained: function (components, halves, xp) that returns True if a row is a rotation up to half a unit of the last
         printed digit of each number; None if there is nothing to explain
+    remark: function of the components of one that returns the warning for a row that was repaired
     """
 
     what: str
@@ -59,6 +60,7 @@ class BatchRule(NamedTuple):
     repair: Kernel
     exact: float
     explained: Callable[..., Any] | None = None
+    remark: Callable[..., str] = str
 
 
 class Representation(NamedTuple):
@@ -67,7 +69,8 @@ class Representation(NamedTuple):
     columns: bare names of its numbers, in tables and messages; angles: the indices of those that are angles
     summary, label: a line of help; its name in text for people
     forward, backward: kernels (components, xp, degrees, axes) to and from a quaternion
-    check: takes the components of one rotation, and `normalize`; None if any finite numbers are a rotation
+    complaint: takes the components of one rotation, and `normalize`, and returns the error if they are refused; None if
+        any finite numbers are a rotation
     kept: takes a unit quaternion and preserves its sign; None if the notation has no such sign
     short: short names of its numbers, for people and as keys of a map; () for x y z, if there are three
     shape: how documents hold the numbers: LIST, MAP (a list is accepted too), NAMED (a map only), ROWS, or the
@@ -86,7 +89,7 @@ class Representation(NamedTuple):
     summary: str
     forward: Callable[..., Any] = _no_rotation
     backward: Callable[..., Any] = _no_rotation
-    check: Callable[..., Components] | None = None
+    complaint: Callable[..., ValueInvalid | None] | None = None
     kept: Callable[..., Components] | None = None
     shape: str | tuple[tuple[str, int], ...] = LIST
     short: tuple[str, ...] = ()
@@ -134,7 +137,14 @@ class Representation(NamedTuple):
             numbers = " ".join(f"{value:g}" for value in components)
             what = self.label or self.name
             raise ValueInvalid(f"{what} {numbers} is not finite; give finite numbers", rule="not-finite")
-        return tuple(components) if self.check is None else self.check(*components, normalize=normalize)
+        if self.complaint and (problem := self.complaint(*components, normalize=normalize)):
+            raise problem
+        rule = self.batch
+        if rule is None or (off := rule.deviation(*components, floats)) <= rule.exact:
+            return tuple(components)
+        if off > quaternion.SILENT and not normalize:
+            warn(rule.remark(*components), rule="rounded")
+        return rule.repair(*components, floats)
 
 
 def _arithmetic(kernel: Callable[..., Components]) -> Callable[..., Components]:
@@ -205,13 +215,15 @@ HOMOGENEOUS = Whole(
     tuple(f"m{row}{column}" for row in range(1, 5) for column in range(1, 5)), _homogeneous, _of_homogeneous, LAST_ROW
 )
 QUATERNIONS = BatchRule(
-    "quaternions", quaternion.deviation, quaternion.repaired, quaternion.UNIT, quaternion.explained
+    "quaternions", quaternion.deviation, quaternion.repaired, quaternion.UNIT, quaternion.explained, quaternion.remark
 )
-MATRICES = BatchRule("matrices", matrix.deviation, matrix.nearest, matrix.ORTHONORMAL, matrix.explained)
+MATRICES = BatchRule(
+    "matrices", matrix.deviation, matrix.nearest, matrix.ORTHONORMAL, matrix.explained, matrix.remark
+)
 RPY, EULER_COLUMNS = ("roll", "pitch", "yaw"), ("euler_1", "euler_2", "euler_3")
 XYZW = Representation(
     ("qx", "qy", "qz", "qw"), (), "unit quaternion, scalar last", short=("x", "y", "z", "w"), label="quaternion",
-    forward=_arithmetic(_xyzw), backward=_plain(quaternion.from_quaternion), check=quaternion.check, kept=_xyzw,
+    forward=_arithmetic(_xyzw), backward=_plain(quaternion.from_quaternion), complaint=quaternion.complaint, kept=_xyzw,
     batch=QUATERNIONS,
 )  # fmt: skip
 
@@ -228,9 +240,10 @@ ROTATIONS = _named({
     "wxyz": Representation(
         ("qw", "qx", "qy", "qz"), (), "unit quaternion, scalar first", short=("w", "x", "y", "z"), label="quaternion",
         forward=_arithmetic(_of_wxyz(_xyzw)), backward=_plain(_as_wxyz(quaternion.from_quaternion)),
-        check=_as_wxyz(_of_wxyz(quaternion.check)), kept=_wxyz,
+        complaint=_of_wxyz(quaternion.complaint), kept=_wxyz,
         batch=QUATERNIONS._replace(
-            deviation=_of_wxyz(quaternion.deviation), repair=_as_wxyz(_of_wxyz(quaternion.repaired))
+            deviation=_of_wxyz(quaternion.deviation), repair=_as_wxyz(_of_wxyz(quaternion.repaired)),
+            remark=_of_wxyz(quaternion.remark),
         ),
     ),
     "rpy": Representation(
@@ -247,29 +260,29 @@ ROTATIONS = _named({
         ("axis_x", "axis_y", "axis_z", "angle"), (3,), "axis of any length, then the angle about it",
         short=("x", "y", "z", "angle"), label="axis-angle", shape=(("axis", 3), ("angle", 1)), overview=("_rad",),
         forward=_angular(quaternion.from_axis_angle), backward=_angular(quaternion.as_axis_angle),
-        check=quaternion.check_axis_angle,
+        complaint=quaternion.axis_angle_complaint,
     ),
     "rotvec": Representation(
         ("rotvec_x", "rotvec_y", "rotvec_z"), (0, 1, 2), "rotation vector: unit axis times angle",
-        label="rotation vector", check=quaternion.check_rotvec,
+        label="rotation vector", complaint=quaternion.rotvec_complaint,
         forward=_angular(quaternion.from_rotvec), backward=_angular(quaternion.as_rotvec),
     ),
     "matrix": Representation(
         ("r11", "r12", "r13", "r21", "r22", "r23", "r31", "r32", "r33"), (), "rotation matrix, row by row",
         shape=ROWS, whole=HOMOGENEOUS, overview=("",),
-        forward=_plain(matrix.to_quaternion), backward=_arithmetic(quaternion.to_matrix), check=matrix.check,
-        batch=MATRICES,
+        forward=_plain(matrix.to_quaternion), backward=_arithmetic(quaternion.to_matrix),
+        complaint=matrix.complaint, batch=MATRICES,
     ),
     "mrp": Representation(
         ("mrp_x", "mrp_y", "mrp_z"), (), "modified Rodrigues parameters: unit axis times tan(angle/4)",
         forward=_arithmetic(quaternion.from_mrp), backward=_plain(quaternion.as_mrp),
-        check=partial(quaternion.check_rotvec, what="mrp"),
+        complaint=partial(quaternion.rotvec_complaint, what="mrp"),
     ),
     "six_d": Representation(
         ("r11", "r21", "r31", "r12", "r22", "r32"), (), "first two columns of the matrix (Zhou's continuous 6D)",
         label="6d", searched=False,
-        forward=_plain(matrix.from_six_d), backward=_arithmetic(matrix.as_six_d), check=matrix.check_six_d,
-        batch=BatchRule("pairs of columns", matrix.six_d_deviation, matrix.six_d_repaired, inf),
+        forward=_plain(matrix.from_six_d), backward=_arithmetic(matrix.as_six_d), complaint=matrix.six_d_complaint,
+        batch=BatchRule("pairs of columns", matrix.six_d_deviation, lambda *columns: columns[:-1], inf),
     ),
     "rpy_unreal": Representation(
         RPY, (0, 1, 2), "degrees, as Unreal's FRotator and CARLA turn their own axes",

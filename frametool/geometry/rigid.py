@@ -154,7 +154,8 @@ def check_twist(vx: float, vy: float, vz: float, wx: float, wy: float, wz: float
     """Raise ValueInvalid for a twist that is not finite, or so large that no digit of its angle is left."""
     if not all(isfinite(value) for value in (vx, vy, vz)):
         raise ValueInvalid(f"twist {vx:g} {vy:g} {vz:g} is not finite; give finite numbers")
-    quaternion.check_rotvec(wx, wy, wz)
+    if problem := quaternion.rotvec_complaint(wx, wy, wz):
+        raise problem
 
 
 def exp(vx: N, vy: N, vz: N, wx: N, wy: N, wz: N, xp: Functions[N]) -> Seven[N]:

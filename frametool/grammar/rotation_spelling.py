@@ -177,7 +177,7 @@ def read_spelled(
 def rotation_of(notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading) -> Quaternion:
     """Convert one text per component into x, y, z, w, in the unit that applies, checked to be a rotation."""
     numbers, degrees = read_components(notation, texts, places, reading)
-    if notation.representation.check is None:
+    if notation.representation.complaint is None:
         return notation.to_quaternion(tuple(numbers), floats, degrees=degrees)
     return _checked(notation, numbers, reading, degrees=degrees)
 
