@@ -151,7 +151,8 @@ def explained(parts: Sequence[Any], halves: Sequence[Any], xp: Functions[Any]) -
 
 def remark(*entries: float) -> str:
     """Return the warning that a matrix was replaced."""
-    return f"matrix is orthonormal only to {defect(*nine(entries), floats):.2g} and was replaced by the nearest rotation"
+    off = defect(*nine(entries), floats)
+    return f"matrix is orthonormal only to {off:.2g} and was replaced by the nearest rotation"
 
 
 def complaint(*entries: float, normalize: bool) -> ValueInvalid | None:

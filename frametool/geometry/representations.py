@@ -7,7 +7,7 @@ kernels this calls, nowhere else. Knows no file syntax.
 from __future__ import annotations
 
 from functools import partial
-from math import inf, isfinite, tau
+from math import inf, isfinite, isqrt, tau
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, did_you_mean, listing, nearest, shown, warn
@@ -403,6 +403,21 @@ class Notation:
             ValueInvalid: wrong count, not finite, or not a rotation.
         """
         return self.to_quaternion(self.representation.checked(components, normalize=normalize), xp, degrees=degrees)
+
+    def spelled(self, numbers: Sequence[Any]) -> Any:
+        """Return the numbers of a rotation, or of a whole pose, in the shape in which documents hold them."""
+        row = self.representation
+        if isinstance(row.shape, tuple):
+            entry: dict[str, Any] = {"axes": self.axes} if row.axes == NAMED_AXES else {}
+            first = 0
+            for key, count in row.shape:
+                entry[key] = list(numbers[first : first + count]) if count > 1 else numbers[first]
+                first += count
+            return entry
+        if row.shape == ROWS:
+            return list(map(list, zip(*[iter(numbers)] * isqrt(len(numbers)), strict=True)))
+        found: Any = list(numbers) if row.shape == LIST else dict(zip(self.names, numbers, strict=True))
+        return numbers[0] if row.axes == OF_WORLD else found
 
     def bound_axes(self) -> str:
         """Return the Euler axes; raise ValueInvalid if they have to be named and were not."""

@@ -13,10 +13,10 @@ from math import radians
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid, did_you_mean, shown
-from frametool.geometry import uncertainty
+from frametool.geometry import placed, uncertainty
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, places_in, read_number, read_texts, within
 from frametool.text.numbers import ANGLES as UNITS_OF_ANGLE
-from frametool.text.numbers import BRACKETS, read_number_or_angle
+from frametool.text.numbers import BRACKETS, parse_number, read_number_or_angle
 from frametool.text.numbers import LENGTHS as UNITS_OF_LENGTH
 
 if TYPE_CHECKING:
@@ -165,6 +165,25 @@ def _sigma(text: Any, degrees: bool | None) -> float:  # noqa: FBT001 - None: it
     if number < 0.0:
         raise NotARotation(f"sigma is negative: {text}")
     return number
+
+
+def read_scale(value: Any) -> float:
+    """Read the scale of a similarity; raises Misfit, and NotARotation for one that is not positive."""
+    scale = within(("scale",), read_number, value)
+    if scale <= 0.0:
+        raise NotARotation(f"scale is {value}; it must be positive", ("scale",))
+    return float(scale)
+
+
+def refuse_scale(value: Any) -> None:
+    """Refuse a scale unless it is 1, or three of them: a scaled transform is not a pose."""
+    parts = value if type(value) is list else [*value.values()] if type(value) is dict else [value]
+    try:
+        is_one = {parse_number(part) for part in parts} == {1.0}
+    except (ValueInvalid, TypeError):
+        is_one = False
+    if not is_one:
+        raise NotARotation(placed.SIMILARITY, ("scale",))
 
 
 def of_sigmas(sigmas: Sequence[Any]) -> Components:

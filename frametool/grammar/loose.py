@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 from frametool.errors import bare
 from frametool.geometry.representations import RPY
 from frametool.grammar.names import COLUMN_WORDS
-from frametool.grammar.pose import POSE_KEYS, Pose, read_pose
+from frametool.grammar.pose import POSE_KEYS, POSITION_WORDS, ROTATION_WORDS, Pose, is_position, own_key, read_pose
 from frametool.grammar.readers import Misfit, Reading, Unclear, kind, within
-from frametool.grammar.rotation_spelling import POSITION_WORDS, ROTATION_WORDS, is_position, own_key
 
 if TYPE_CHECKING:
     from collections.abc import Collection

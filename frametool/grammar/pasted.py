@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from frametool.errors import ValueInvalid, shown
 from frametool.geometry.representations import notation
-from frametool.grammar.rotation_spelling import spelled
 from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:
@@ -396,7 +395,7 @@ def _entry(cells: Sequence[str], rep: Notation) -> dict[str, Any]:
         (parse_angle if index in row.angles else parse_number)(cell)
     unit = "" if rep.degrees is None else "_deg" if rep.degrees else "_rad"
     rep.bound_axes()
-    entry = {f"{row.name}{unit}": spelled(rep, list(cells[-size:]))}  # type: ignore[arg-type]
+    entry = {f"{row.name}{unit}": rep.spelled(cells[-size:])}
     return {"xyz": list(cells[:-size]), **entry} if len(cells) > size else entry
 
 

@@ -20,8 +20,7 @@ from frametool.geometry.place import ECEF, ENU, GRID, GRIDDED, LLA, LOCAL, NED, 
 from frametool.geometry.representations import HEADING, POSITIONS
 from frametool.geometry.transverse_mercator import NORTH, SOUTH, ZONES, standard_zone, utm, zone_number
 from frametool.grammar.names import EARTH_FRAMES, FLAT
-from frametool.grammar.readers import Misfit, Reading, kind, read_number, read_numbers, within
-from frametool.grammar.rotation_spelling import AXES_KEY
+from frametool.grammar.readers import AXES_KEY, Misfit, Reading, kind, read_number, read_numbers, within
 from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:

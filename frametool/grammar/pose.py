@@ -4,17 +4,20 @@
     {name: camera, parent: base, xyz: [0, 0, 1], quaternion: {x: 0, y: 0, z: 0, w: 1}}
 
 The mapping is the pose of `name` in `parent`: parent_from_name. Values are dicts, lists and text as documents
-have them; everything is checked here.
+have them; everything is checked here.  The shapes of rotations are those of their representations.
 """
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid, did_you_mean, shown
-from frametool.geometry import placed
-from frametool.geometry.representations import REPRESENTATIONS, ROTATIONS, notation
+from frametool.errors import ValueInvalid, bare, did_you_mean, overheard, shown
+from frametool.geometry import floats, placed, quaternion
+from frametool.geometry.representations import LIST, NAMED, NAMED_AXES, REPRESENTATIONS, ROTATIONS, ROWS, axes_name
+from frametool.geometry.representations import notation as parse_notation
 from frametool.grammar.readers import (
+    AXES_KEY,
     INDICES,
     NAME_KEYS,
     PARENT_NAMES,
@@ -22,26 +25,13 @@ from frametool.grammar.readers import (
     NotARotation,
     Reading,
     kind,
+    places_in,
     read_number,
     read_numbers,
+    read_texts,
     within,
 )
-from frametool.grammar.rotation_spelling import (
-    AGREEMENT,
-    AXES_KEY,
-    LISTED_WORDS,
-    POSITION_WORDS,
-    ROTATION_KEYS,
-    XYZ,
-    agreeing_rotation,
-    is_position,
-    is_rotation,
-    read_rotation,
-    read_spelled,
-    rotation_of,
-    spelled,
-)
-from frametool.text.numbers import parse_length, parse_number
+from frametool.text.numbers import half_unit, parse_angle, parse_length, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
@@ -50,8 +40,28 @@ if TYPE_CHECKING:
     from frametool.geometry.representations import Notation
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Components, Rigid
-    from frametool.grammar.readers import Quaternion, Vector
+    from frametool.grammar.readers import Path, Quaternion, Vector
 
+    Spelled = tuple[Notation, Sequence[Any], Sequence[Path]]  # notation, one text per component, the path of each
+
+# names of other tools (OpenCV, COLMAP) for a position in metres and a rotation, and the key of the grammar; "" if the
+# shape of the value decides.  They need a list or mapping: `t` alone may be a time, and `T` is also a 4x4 matrix
+POSITION_WORDS = ("tvec", "trans", "pos", "t", "T")
+ROTATION_WORDS = {
+    "rvec": "rotvec_rad", "qvec": "wxyz", "R": "matrix", "T": "matrix", "rotation_matrix": "matrix",
+    "rot": "", "quat": "", "rotation": "", "orientation": "",
+}  # fmt: skip
+LISTED_WORDS = frozenset((*POSITION_WORDS, *ROTATION_WORDS)).difference(("rotation", "orientation"))
+XYZ = ("x", "y", "z")
+TURN = 2.0 * math.pi
+AGREEMENT = 1e-6  # radians, metres: the largest difference between two notations in one entry
+
+
+ROTATION_KEYS = {  # with and without a unit
+    key: parse_notation(key) for name, row in ROTATIONS.items()
+    for key in ((name, f"{name}_deg", f"{name}_rad") if row.angles else (name,))
+}  # fmt: skip
+ROTATION_KEYS |= {word: ROTATION_KEYS[name or "quaternion"] for word, name in ROTATION_WORDS.items()}
 POSITION_KEYS = {"xyz": 1.0, "translation": 1.0, "position": 1.0, "xyz_mm": 0.001, "xyz_cm": 0.01}
 POSITION_KEYS |= dict.fromkeys(POSITION_WORDS, 1.0)
 TIMES = ("stamp_ns", "source_stamp_ns", "fixed")
@@ -141,6 +151,8 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
     rotation: Quaternion | None = None
     outer_degrees = reading.degrees
     if SCALE in mapping:
+        from frametool.grammar.covariance import refuse_scale
+
         refuse_scale(mapping[SCALE])
     if "angles" in mapping:
         reading.degrees = read_angle_unit(mapping["angles"])
@@ -220,25 +232,6 @@ def _read_choice(key: str, value: Any, yes: str, no: str) -> bool:
     return bool(value == yes)
 
 
-def read_scale(value: Any) -> float:
-    """Read the scale of a similarity; raises Misfit, and NotARotation for one that is not positive."""
-    scale = within((SCALE,), read_number, value)
-    if scale <= 0.0:
-        raise NotARotation(f"scale is {value}; it must be positive", (SCALE,))
-    return float(scale)
-
-
-def refuse_scale(value: Any) -> None:
-    """Refuse a scale unless it is 1, or three of them: a scaled transform is not a pose."""
-    parts = value if type(value) is list else [*value.values()] if type(value) is dict else [value]
-    try:
-        is_one = {parse_number(part) for part in parts} == {1.0}
-    except (ValueInvalid, TypeError):
-        is_one = False
-    if not is_one:
-        raise NotARotation(placed.SIMILARITY, (SCALE,))
-
-
 def read_position(value: Any, unit: float, *, bare: bool = False) -> Vector:
     """Read [x, y, z] or {x, y, z}, in metres or in the unit, such as 0.001; bare: numbers without units only."""
     parts = round(1.0 / unit)  # dividing rounds once: 0.1 from 100
@@ -298,7 +291,7 @@ def pose_of_numbers(texts: Sequence[str], default: Notation | None, reading: Rea
 
     Raises NotARotation for an invalid rotation, ValueInvalid for a list that is not such numbers.
     """
-    rep = _notation_of(texts, default)
+    rep = notation_of(texts, default)
     whole, size = rep.representation.whole, len(rep.representation.columns)
     if whole and len(texts) == _ROWS_OF_A_POSE:
         from frametool.grammar.pasted import matrix_pose
@@ -313,26 +306,294 @@ def pose_of_numbers(texts: Sequence[str], default: Notation | None, reading: Rea
     return Pose((x, y, z) if len(texts) > size else None, rotation)
 
 
-def mapping_of_numbers(texts: Sequence[str], default: Notation | None) -> str:
-    """Return the mapping with the same meaning as bare numbers that `pose_of_numbers` has read."""
-    from frametool.documents.json import dump
-    from frametool.documents.source import Verbatim
-
-    rep = _notation_of(texts, default)
-    whole = rep.representation.whole
-    size = len(texts) if whole and len(texts) == len(whole.columns) else len(rep.representation.columns)
-    unit = "" if rep.degrees is None else "_deg" if rep.degrees else "_rad"
-    numbers: Any = list(map(Verbatim, texts))  # texts in place of numbers, read as such
-    mapping = {"xyz": numbers[:-size]} if len(texts) > size else {}
-    mapping[rep.representation.name + unit] = spelled(rep, numbers[-size:])
-    return dump(mapping)
-
-
-def _notation_of(texts: Sequence[str], default: Notation | None) -> Notation:
+def notation_of(texts: Sequence[str], default: Notation | None) -> Notation:
     """Return the notation of bare numbers; only a matrix is known by their number."""
     if default is not None:
         return default
     if len(texts) in (9, _ROWS_OF_A_POSE, 16):
-        return notation("matrix")
+        return parse_notation("matrix")
     choices = ", ".join(REPRESENTATIONS)
     raise ValueInvalid(f"{len(texts)} numbers do not say what they are; add --from with one of {choices}")
+
+
+# --- rotations ---
+
+
+def is_position(key: str, value: Any) -> bool:
+    """Return True if a key with this value is a position: names of other tools need a list or mapping."""
+    if key in ("t", "T"):
+        return type(value) is list and len(value) in (1, 3) and len(places_in(value)) == len(XYZ)
+    return key not in LISTED_WORDS or type(value) in (list, dict)
+
+
+def is_rotation(key: str, value: Any) -> bool:
+    """Return True if a key with this value is a rotation; never raises: errors are reported when it is read."""
+    if key not in LISTED_WORDS:
+        return key in ROTATION_KEYS or (key == AXES_KEY and type(value) is str)
+    if key not in ROTATION_WORDS or type(value) not in (list, dict):
+        return False
+    if key in ("R", "T"):
+        return type(value) is list and (key == "R" or len(value) == 16 or (len(value) in (3, 4) and _is_rows(value)))
+    return True
+
+
+def _is_rows(value: list[Any]) -> bool:
+    return all(type(row) is list and len(row) > 1 for row in value)
+
+
+def own_key(key: str, value: Any) -> str:
+    """Return the key of the grammar for a rotation key and its value.
+
+    Raises Misfit for three or four numbers under a key that does not state their notation.
+    """
+    is_short = key == "R" and len(value) in (3, 4) and not _is_rows(value)
+    if (meant := ROTATION_WORDS.get(key, key)) and not is_short:
+        return meant
+    if type(value) is dict:
+        return "rpy" if not {"roll", "pitch", "yaw"}.isdisjoint(value) else "quaternion"
+    if type(value) is list and (len(value) == 9 or (value and _is_rows(value))):
+        return "matrix"
+    if type(value) is list and len(value) == 3:
+        numbers = bare(", ".join(map(str, value)))
+        raise Misfit(f"{key} [{numbers}] does not say what it is; write rpy: [..], rpy_deg: [..] or rotvec: [..]")
+    return "quaternion"
+
+
+def read_rotation(key: str, value: Any, reading: Reading) -> tuple[Vector | None, Quaternion]:
+    """Read the value of a rotation key as x, y, z, w; a 4x4 matrix also has a position.
+
+    Raises Misfit or ValueInvalid: wrong shape, not a number, not a rotation, or several that do not agree.
+    """
+    if key == AXES_KEY:
+        return None, _read_axes(value)
+    if not _is_several(key, value):
+        return read_spelled(*shape_of(key, value), reading)
+    read = [within((index,), read_rotation, key, each, reading) for index, each in enumerate(value)]
+    for _, turned in read[1:]:
+        agreeing_rotation(read[0][1], turned)
+    return None, read[0][1]
+
+
+def agreeing_rotation(first: Quaternion, second: Quaternion) -> Quaternion:
+    """Accept a second notation of the rotation if both agree; return the first."""
+    apart = quaternion.distance(*first, *second, floats)
+    if apart > AGREEMENT:
+        raise NotARotation(f"two rotations in one entry disagree by {math.degrees(apart):.6g} degrees; keep one")
+    return first
+
+
+def _is_several(key: str, value: Any) -> bool:
+    """Return True for a list of Euler angles about different axes, False for a single rotation."""
+    row = ROTATION_KEYS[key].representation
+    return row.axes == NAMED_AXES and type(value) is list and bool(value) and all(type(each) is dict for each in value)
+
+
+def shape_of(key: str, value: Any) -> Spelled:
+    """Split the value of a rotation key: its notation, one text per component, and the path of each below it.
+
+    For several rotations under one key it returns the first; its numbers have no paths, so that they are not replaced.
+    """
+    if key == AXES_KEY:
+        return parse_notation("quaternion"), [repr(part) for part in _read_axes(value)], [(name,) for name in "xyzw"]
+    if _is_several(key, value):
+        bound, texts, places = shape_of(key, value[0])
+        return bound, texts, [("", *place) for place in places]
+    notation = ROTATION_KEYS[own_key(key, value)]
+    shape = notation.representation.shape
+    if shape == NAMED and type(value) is list:
+        raise _without_order(key, notation, value)
+    if isinstance(shape, tuple):
+        return _take_parts(notation, value, dict(shape))
+    return _take_rows(notation, value) if shape == ROWS else _list_or_map(notation, value)
+
+
+def _read_axes(value: Any) -> Quaternion:
+    """Read the name of a change of axes: `optical`, `ned_from_enu`."""
+    from frametool.geometry.conventions import named_rotation
+
+    if type(value) is not str:
+        raise Misfit(f"expected the name of axes like optical or ned_from_enu, found {kind(value)}")
+    rotation: Quaternion = named_rotation(value).components
+    return rotation
+
+
+def read_spelled(
+    notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading
+) -> tuple[Vector | None, Quaternion]:
+    """Read one text per component: a rotation, or the numbers of a whole pose."""
+    whole = notation.representation.whole
+    if whole is None or len(texts) != len(whole.columns):
+        return None, rotation_of(notation, texts, places, reading)
+    numbers, degrees = read_components(notation, texts, places, reading)
+    end = len(numbers) - len(whole.tail)
+    if tuple(numbers[end:]) != whole.tail:
+        found = " ".join(f"{number:g}" for number in numbers[end:])
+        tail = " ".join(f"{number:g}" for number in whole.tail)
+        raise NotARotation(f"the last row of a 4x4 pose is {tail}, found {found}", rule="denormalized")
+    position, rotation = whole.split(numbers)
+    return position, _checked(notation, rotation, reading, degrees=degrees)
+
+
+def rotation_of(notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading) -> Quaternion:
+    """Convert one text per component into x, y, z, w, in the unit that applies, checked to be a rotation."""
+    numbers, degrees = read_components(notation, texts, places, reading)
+    if notation.representation.complaint is None:
+        return notation.to_quaternion(tuple(numbers), floats, degrees=degrees)
+    return _checked(notation, numbers, reading, degrees=degrees)
+
+
+def _checked(notation: Notation, numbers: Sequence[float], reading: Reading, *, degrees: bool = False) -> Quaternion:
+    """Return the quaternion of numbers that are a rotation; record warnings."""
+    try:
+        rotation, warnings = overheard(
+            notation.checked_quaternion, numbers, floats, degrees=degrees, normalize=reading.normalize
+        )
+    except ValueInvalid as error:
+        raise NotARotation(str(error), rule=error.rule) from None
+    for rule, message in warnings:
+        reading.note(message, rule=rule)
+    return rotation
+
+
+def read_components(
+    notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading
+) -> tuple[list[float], bool]:
+    """Read the components of a rotation; return them with the unit of the angles (True: degrees)."""
+    degrees = reading.degrees if notation.degrees is None else notation.degrees
+    try:
+        numbers = list(map(parse_number, texts))
+    except (ValueInvalid, TypeError):
+        return _read_one_by_one(notation, texts, places, degrees=degrees, bare=reading.bare_numbers)
+    if notation.degrees is None and not degrees and notation.representation.angles:
+        _note_degrees(notation, numbers, places, reading)
+    return as_meant(notation, numbers, texts, reading), degrees
+
+
+FEW_DIGITS = "a rotation is off by {:.2g}, which its few digits explain, and was normalised"
+
+
+def as_meant(notation: Notation, numbers: list[float], texts: Sequence[str], reading: Reading) -> list[float]:
+    """Return the nearest rotation to numbers written with few digits, if rounding alone makes them invalid.
+
+    Beyond 1e-3 this is a note all the same.
+    """
+    row, rule = notation.representation, notation.representation.batch
+    if rule is None or rule.explained is None:
+        return numbers
+    is_whole = row.whole is not None and len(numbers) == len(row.whole.columns)
+    at = list(row.whole.split(range(len(numbers)))[1]) if row.whole and is_whole else list(range(len(numbers)))
+    own = [numbers[index] for index in at]
+    off = rule.deviation(*own, floats) if len(own) == len(row.columns) else 0.0
+    if not (off > quaternion.SILENT and rule.explained(own, [half_unit(texts[index]) for index in at], floats)):
+        return numbers
+    if quaternion.TOLERATED < off < math.inf and not reading.normalize:
+        reading.note(FEW_DIGITS.format(off), rule="rounded")
+    meant = dict(zip(at, rule.repair(*own, floats), strict=True))
+    return [meant.get(index, number) for index, number in enumerate(numbers)]
+
+
+def _read_one_by_one(
+    notation: Notation, texts: Sequence[Any], places: Sequence[Path], *, degrees: bool, bare: bool
+) -> tuple[list[float], bool]:
+    """Read components if an angle has its own unit or one is not a number: then the error states where.
+
+    The result is in degrees if all angles other than 0 are, else in radians.
+    """
+    angles = () if bare else notation.representation.angles
+    read = [
+        within(place, _with_unit, text, notation if at in angles else None)
+        for at, (text, place) in enumerate(zip(texts, places, strict=False))
+    ]
+    numbers = [number for number, _ in read]
+    in_degrees = [at for at in angles if (read[at][1] or ("deg" if degrees else "rad")) == "deg"]
+    if all(at in in_degrees or numbers[at] == 0.0 for at in angles):
+        return numbers, True
+    for at in in_degrees:
+        numbers[at] = math.radians(numbers[at])
+    return numbers, False
+
+
+def _with_unit(text: Any, notation: Notation | None) -> tuple[float, str | None]:
+    """Read a number, or an angle of a notation with its own unit; raises ValueInvalid if its key has another one."""
+    if notation is None or type(text) is not str:
+        return read_number(text), None
+    number, unit = parse_angle(text)
+    own = "degrees" if "deg" in text or "°" in text else "radians"
+    other = {True: "degrees", False: "radians", None: own}[notation.degrees]
+    if unit and own != other:
+        raise ValueInvalid(f"{shown(text)} is in {own}, but {notation.spec} is in {other}")
+    return number, unit
+
+
+def _note_degrees(notation: Notation, numbers: Sequence[float], places: Sequence[Path], reading: Reading) -> None:
+    """Warn about bare angles beyond a full turn."""
+    index = max(notation.representation.angles, key=lambda index: abs(numbers[index]))
+    if abs(numbers[index]) > TURN:
+        name = notation.representation.name
+        message = f"{name} {numbers[index]:g} is more than a full turn in radians; degrees? write {name}_deg"
+        reading.note(message, notation.spec, *places[index], rule="degrees")
+
+
+def _list_or_map(notation: Notation, value: Any) -> Spelled:
+    """Read a list in column order, or a mapping by column names in which missing angles count as 0."""
+    row = notation.representation
+    is_whole = row.whole is not None and type(value) is list and len(value) == len(row.whole.columns)
+    columns = row.whole.columns if row.whole and is_whole else row.columns
+    if row.shape == NAMED or (type(value) is dict and value.keys() == {*row.names}):
+        columns = row.names
+    texts = read_texts(value, columns, partial=bool(row.angles))
+    return notation, texts, places_in(value) if type(value) is list else [(name,) for name in columns]
+
+
+def _without_order(key: str, notation: Notation, value: list[Any]) -> Misfit:
+    """Return the error for a list whose order only names could state."""
+    others = [
+        f"{name}: [..]" for name, row in ROTATIONS.items()
+        if row.shape == LIST and set(row.columns) == set(notation.representation.columns)
+    ]  # fmt: skip
+    numbers, named = bare(", ".join(map(str, value))), ", ".join(f"{name}:" for name in notation.names)
+    return Misfit(f"{key} [{numbers}] has no order; write {', '.join(others)} or {{{named}}}")
+
+
+def _take_parts(notation: Notation, value: Any, parts: dict[str, int]) -> Spelled:
+    """Read a mapping whose keys hold several numbers each, with `axes`, or `order` and `frame`, if axes are named."""
+    named = notation.representation.axes == NAMED_AXES
+    keys = ", ".join(f"{key}: [..]" if count > 1 else f"{key}: 90deg" for key, count in parts.items())
+    expected = f"expected {{{'axes: rzyx, ' * named}{keys}}}"
+    if type(value) is not dict:
+        raise Misfit(f"{expected}, found {kind(value)}")
+    of_axes = () if not named else ("axes",) if value.keys().isdisjoint(("order", "frame")) else ("order", "frame")
+    if unknown := [key for key in value if key not in parts and key not in of_axes]:
+        raise Misfit(f"unknown key {shown(unknown[0])}; {expected}", (unknown[0],), key=True)
+    if missing := [key for key in (*of_axes, *parts) if key not in value]:
+        raise Misfit(f"missing {missing[0]}; {expected}")
+    if wrong := next((key for key in of_axes if type(value[key]) is not str), ""):
+        raise Misfit(f"expected {wrong} like {'intrinsic' if wrong == 'frame' else 'rzyx'}", (wrong,))
+    if of_axes:
+        axes = value["axes"] if "axes" in value else axes_name(value["order"], value["frame"])
+        notation = parse_notation(f"{notation.spec}:{axes}")
+    texts: list[Any] = []
+    places: list[Path] = []
+    for key, count in parts.items():
+        names = notation.representation.names[len(texts) : len(texts) + count]
+        texts += within((key,), read_texts, value[key], names) if count > 1 else [value[key]]
+        steps = range(count) if type(value[key]) is list else names
+        places += [(key, step) for step in steps] if count > 1 else [(key,)]
+    return notation, texts, places
+
+
+def _take_rows(notation: Notation, value: Any) -> Spelled:
+    """Read the rows of a rotation or of a whole pose, or all their numbers in one list."""
+    row = notation.representation
+    counts = {len(each): math.isqrt(len(each)) for each in (row.columns, *([row.whole.columns] if row.whole else []))}
+    expected = " or ".join(f"{size} rows of {size}{' numbers' * (not at)}" for at, size in enumerate(counts.values()))
+    if type(value) is not list:
+        raise Misfit(f"expected {expected}, found {kind(value)}")
+    if len(value) in counts and not any(type(each) is list for each in value):
+        return notation, value, INDICES
+    size = len(value)
+    if size not in counts.values() or any(type(each) is not list or len(each) != size for each in value):
+        lengths = ", ".join(str(len(each)) if type(each) is list else "no list" for each in value)
+        raise Misfit(f"expected {expected}, found {size} rows of lengths {bare(lengths)}")
+    places = [(at, column) for at in range(size) for column in range(size)]
+    return notation, [text for each in value for text in each], places

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     Quaternion = tuple[float, float, float, float]
 
 
+AXES_KEY = "axes"  # a constant rotation by name instead of numbers; the axes at a position on the Earth
 NAME_KEYS = ("child_frame_id", "child_frame", "child", "name")  # the frame whose pose it is
 PARENT_NAMES = ("parent", "parent_frame_id", "parent_frame", "frame_id")  # the frame that it is expressed in
 INDICES: tuple[Path, ...] = tuple((index,) for index in range(16))

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.errors import ValueInvalid, shown, warn
 from frametool.geometry import euler, floats, quaternion
 from frametool.geometry.representations import EARTH_FRAMES, notation
-from frametool.grammar.pose import NAMES, SCALE, Pose
-from frametool.grammar.rotation_spelling import AXES_KEY, spelled
+from frametool.grammar.pose import NAMES, SCALE, Pose, notation_of
+from frametool.grammar.readers import AXES_KEY
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -298,7 +298,22 @@ def rotation_entry(pose: Pose, notation: Notation, style: Style) -> tuple[str, A
     """Return the key and the value of a notation, in the shape that the grammar reads."""
     row = notation.representation
     key = f"{row.name}_deg" if row.angles and style.in_degrees(notation) else row.name
-    return key, spelled(notation, pose_numbers(pose, notation, style)[1])
+    return key, notation.spelled(pose_numbers(pose, notation, style)[1])
+
+
+def mapping_of_numbers(texts: Sequence[str], default: Notation | None) -> str:
+    """Return the mapping with the same meaning as bare numbers that `pose_of_numbers` has read."""
+    from frametool.documents.json import dump
+    from frametool.documents.source import Verbatim
+
+    rep = notation_of(texts, default)
+    whole = rep.representation.whole
+    size = len(texts) if whole and len(texts) == len(whole.columns) else len(rep.representation.columns)
+    unit = "" if rep.degrees is None else "_deg" if rep.degrees else "_rad"
+    numbers: Any = list(map(Verbatim, texts))  # texts in place of numbers, read as such
+    mapping = {"xyz": numbers[:-size]} if len(texts) > size else {}
+    mapping[rep.representation.name + unit] = rep.spelled(numbers[-size:])
+    return dump(mapping)
 
 
 METRES = 3

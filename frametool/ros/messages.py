@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FormatError, shown
 from frametool.frames.stamps import BILLION, NotATime, parse_stamp
+from frametool.grammar.pose import read_rotation
 from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
-from frametool.grammar.rotation_spelling import read_rotation
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -19,10 +19,9 @@ from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.frames.topology import own_parent
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge
-from frametool.grammar.pose import Pose
+from frametool.grammar.pose import ROTATION_KEYS, Pose, rotation_of
 from frametool.grammar.readers import INDICES, Reading, read_number
 from frametool.grammar.result import edge_results, rotation_numbers
-from frametool.grammar.rotation_spelling import ROTATION_KEYS, rotation_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

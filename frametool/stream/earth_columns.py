@@ -51,8 +51,7 @@ from frametool.grammar.place import (
 )
 from frametool.grammar.place import FIELDS as PLACE_FIELDS
 from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose
-from frametool.grammar.readers import Misfit, NotARotation, Reading, within
-from frametool.grammar.rotation_spelling import AXES_KEY
+from frametool.grammar.readers import AXES_KEY, Misfit, NotARotation, Reading, within
 from frametool.stream.faults import ZONES, RowNote
 from frametool.stream.header import Columns, Header, PoseColumns, find_positions, find_rotations, listed, places_named
 from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape, place_of

@@ -15,7 +15,7 @@ from frametool.geometry import arrays, floats, quaternion, uncertainty
 from frametool.geometry.batch_validation import read_rotations
 from frametool.geometry.representations import UPPER_ROWS
 from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
-from frametool.grammar.rotation_spelling import FEW_DIGITS
+from frametool.grammar.pose import FEW_DIGITS
 from frametool.stream.faults import DEGREES, NULL, STOP, Fault, RowNote
 from frametool.stream.layout import Const, In, Instead, Out, Word
 from frametool.stream.request import PAIR, START, no_step, thing_pose

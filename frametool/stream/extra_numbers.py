@@ -24,9 +24,11 @@ from frametool.grammar.covariance import (
     in_unit,
     of_sigmas,
     read_covariance,
+    read_scale,
+    refuse_scale,
 )
 from frametool.grammar.names import RATES
-from frametool.grammar.pose import LEFT_OUT, SCALE, read_angle_unit, read_scale, refuse_scale
+from frametool.grammar.pose import LEFT_OUT, SCALE, read_angle_unit
 from frametool.grammar.readers import Misfit, NotARotation, read_number, within
 from frametool.ros.messages import whole_list
 from frametool.stream.layout import Kept, New

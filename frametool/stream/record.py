@@ -25,29 +25,27 @@ from frametool.grammar.names import (
     may_be_uncertain,
 )
 from frametool.grammar.pose import (
+    AXES_KEY,
     COVARIANCE_KEYS,
+    LISTED_WORDS,
     MOST_CHOICES,
     POSE_KEYS,
     POSITION_KEYS,
+    ROTATION_KEYS,
     SCALE,
     Pose,
-    length_reader,
-    read_angle_unit,
-    read_position,
-    unknown_keys,
-)
-from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, places_in, read_numbers, within
-from frametool.grammar.rotation_spelling import (
-    AXES_KEY,
-    LISTED_WORDS,
-    ROTATION_KEYS,
     as_meant,
     is_position,
     is_rotation,
+    length_reader,
+    read_angle_unit,
     read_components,
+    read_position,
     read_rotation,
     shape_of,
+    unknown_keys,
 )
+from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, places_in, read_numbers, within
 from frametool.stream.row_layout import ACCEL, PARTS, POINT, POSE, TURN, VECTOR, Shape, checked_rotation, doubt
 from frametool.stream.stamp_source import key_path
 from frametool.text.numbers import parse_number, read_number_or_angle

@@ -14,9 +14,9 @@ from frametool.documents.yaml_writer import quoted
 from frametool.errors import ValueInvalid, shown
 from frametool.geometry.representations import ROTATIONS
 from frametool.grammar.names import EARTH_FRAMES, PLACE_KEYS
-from frametool.grammar.pose import Pose
+from frametool.grammar.pose import LISTED_WORDS, ROTATION_KEYS, Pose
+from frametool.grammar.readers import AXES_KEY
 from frametool.grammar.result import Result, Style, with_entries
-from frametool.grammar.rotation_spelling import AXES_KEY, LISTED_WORDS, ROTATION_KEYS
 from frametool.stream.layout import Const, IfLocked, Item, Out, Renamed, Word
 from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ
 from frametool.stream.row_layout import POINT, POSE, SIX, TURNED, VECTOR, count_of

@@ -17,7 +17,7 @@ from frametool.grammar.names import (
     stamp_places,
     without_mark,
 )
-from frametool.grammar.rotation_spelling import AXES_KEY
+from frametool.grammar.readers import AXES_KEY
 from frametool.stream.evaluate import Plan
 from frametool.stream.header import (
     XYZ,

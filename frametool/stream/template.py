@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 from frametool.documents.json import JSON_NUMBER
 from frametool.errors import FrametoolError
 from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, may_be_uncertain
-from frametool.grammar.pose import DESCRIPTIVE, POSE_KEYS
-from frametool.grammar.rotation_spelling import AXES_KEY, LISTED_WORDS, ROTATION_KEYS
+from frametool.grammar.pose import DESCRIPTIVE, LISTED_WORDS, POSE_KEYS, ROTATION_KEYS
+from frametool.grammar.readers import AXES_KEY
 from frametool.stream.layout import Const, Renamed
 from frametool.stream.record import POINT_KEYS
 from frametool.stream.record_text import cut

@@ -10,7 +10,6 @@ from samples import LATTICE, quaternions, random_quaternions, turned
 from frametool.geometry import euler, floats
 from frametool.geometry.representations import ROTATIONS as TABLE
 from frametool.geometry.representations import notation
-from frametool.grammar.rotation_spelling import spelled
 
 ROTATIONS = random_quaternions(12, seed=12)
 HOSTILE = [
@@ -35,7 +34,7 @@ def rotation(spec: str, xyzw: tuple[float, float, float, float]) -> dict[str, An
     """Write a rotation in a notation, as a member of a pose."""
     form = notation(spec)
     numbers = list(form.from_quaternion(*xyzw, floats))
-    return {form.representation.name + ("_deg" if form.degrees else ""): spelled(form, numbers)}
+    return {form.representation.name + ("_deg" if form.degrees else ""): form.spelled(numbers)}
 
 
 def position(random: Random) -> list[float]:

@@ -16,8 +16,8 @@ from frametool.documents.source import Source
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats
 from frametool.geometry.representations import REPRESENTATIONS, Notation, notation
-from frametool.grammar.pose import Pose, mapping_of_numbers
-from frametool.grammar.result import Result, Style
+from frametool.grammar.pose import Pose
+from frametool.grammar.result import Result, Style, mapping_of_numbers
 from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:

@@ -28,9 +28,8 @@ from frametool.geometry.representations import notation
 from frametool.geometry.rigid import IDENTITY
 from frametool.geometry.transform import Transform
 from frametool.geometry.validation import as_numbers, scalars, single
-from frametool.grammar.pose import read_pose
+from frametool.grammar.pose import read_pose, rotation_of
 from frametool.grammar.readers import INDICES, Misfit, Reading, as_mapping, kind
-from frametool.grammar.rotation_spelling import rotation_of
 from frametool.text.numbers import parse_angle, parse_length
 
 TYPE_CHECKING = False

@@ -29,9 +29,8 @@ from frametool.geometry.quaternion import unit_vector
 from frametool.geometry.representations import notation
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
-from frametool.grammar.pose import Pose
+from frametool.grammar.pose import TURN, Pose, agreeing_rotation
 from frametool.grammar.result import Style, rotation_numbers
-from frametool.grammar.rotation_spelling import TURN, agreeing_rotation
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence

@@ -47,9 +47,8 @@ from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.loose import WORDS, read_loose_pose
-from frametool.grammar.pose import read_angle_unit
+from frametool.grammar.pose import read_angle_unit, read_rotation
 from frametool.grammar.readers import Misfit, Reading, Unclear, as_mapping, kind, read_numbers, within
-from frametool.grammar.rotation_spelling import read_rotation
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

@@ -22,8 +22,8 @@ from frametool.frames.lookups import FrameTree
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Answers, Edge
+from frametool.grammar.pose import AGREEMENT, rotation_of
 from frametool.grammar.readers import Misfit, Reading, Unclear, kind, read_numbers
-from frametool.grammar.rotation_spelling import AGREEMENT, rotation_of
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence

@@ -13,8 +13,8 @@ from frametool.geometry.camera import CAMERA_MODELS
 from frametool.geometry.representations import MAP, NAMED, POSITIONS
 from frametool.grammar.loose import WORDS
 from frametool.grammar.place import EARTH_KEYS
-from frametool.grammar.pose import NAMES, POSITION_KEYS
-from frametool.grammar.rotation_spelling import AXES_KEY, LISTED_WORDS, ROTATION_KEYS, ROTATION_WORDS
+from frametool.grammar.pose import LISTED_WORDS, NAMES, POSITION_KEYS, ROTATION_KEYS, ROTATION_WORDS
+from frametool.grammar.readers import AXES_KEY
 from frametool.ros.messages import MARKS
 
 if TYPE_CHECKING:

@@ -36,8 +36,8 @@ from frametool.geometry import quaternion, rigid
 from frametool.geometry.representations import notation
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
+from frametool.grammar.pose import read_spelled, rotation_of
 from frametool.grammar.readers import INDICES, Misfit, Reading, read_numbers
-from frametool.grammar.rotation_spelling import read_spelled, rotation_of
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:

@@ -22,9 +22,17 @@ from frametool.frames.stamps import parse_stamp
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Diagnostics, Edge, Options
 from frametool.grammar.names import EARTH_FRAMES, may_be_on_earth
-from frametool.grammar.pose import COVARIANCE_KEYS, NAMES, POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
+from frametool.grammar.pose import (
+    AXES_KEY,
+    COVARIANCE_KEYS,
+    NAMES,
+    POSE_KEYS,
+    Pose,
+    read_angle_unit,
+    read_name,
+    read_pose,
+)
 from frametool.grammar.readers import Misfit, Reading, Unclear, as_mapping, kind, tell, within
-from frametool.grammar.rotation_spelling import AXES_KEY
 from frametool.ros import messages
 from frametool.text.numbers import parse_number
 
