@@ -8,7 +8,7 @@
 lat and lon are degrees, lat in [-90, 90], lon in [-180, 360] as input and (-180, 180] as output; alt is metres above
 the ellipsoid, as in NavSatFix, not above sea level.  ECEF is the Earth's frame: x to lat 0 lon 0, z to the north pole.
 A single position is plain floats, without numpy; arrays broadcast, and results are arrays of their shape.  Raises
-ValueInvalid for an invalid position.  The kernels are in `geometry.earth` and `geometry.transverse_mercator`.
+ValueInvalid for an invalid position.  The kernels are in `geometry.earth`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid, shown
 from frametool.geometry import earth, validation
-from frametool.geometry import transverse_mercator as mercator
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
@@ -51,7 +50,7 @@ def earth_pose(
         raise ValueInvalid(f"unknown axes {shown(axes)}; axes: {', '.join(earth.AXES)}")
     if axes == "grid":
         zoned = _zone(zone, *argument[:2]), *argument
-        return Transform.of(*validation.checked(mercator.grid_pose, 7, zoned, "place", mercator.check_utm))
+        return Transform.of(*validation.checked(earth.grid_pose, 7, zoned, "place", earth.check_utm))
     if zone is not None:
         raise ValueInvalid(f"zone {shown(zone)} is one of a grid; axes {axes!r} have none")
 
@@ -70,19 +69,19 @@ def utm_from_lla(lat: Numbers, lon: Numbers, zone: Numbers | str | None = None) 
     """
     argument = _columns(lat=lat, lon=lon)
     zoned = _zone(zone, *argument), *argument
-    found = validation.checked(mercator.utm, 4, zoned, "place", mercator.check_utm)
+    found = validation.checked(earth.utm, 4, zoned, "place", earth.check_utm)
     if validation.single(found):
-        return (mercator.ZONES[int(zoned[0])], *found)
+        return (earth.ZONES[int(zoned[0])], *found)
     import numpy as np
 
-    names = np.array(mercator.ZONES)[np.asarray(zoned[0]).astype(np.int64)]
+    names = np.array(earth.ZONES)[np.asarray(zoned[0]).astype(np.int64)]
     return (np.full(found[0].shape, names), *found)
 
 
 def lla_from_utm(zone: Numbers | str, easting: Numbers, northing: Numbers) -> Any:
     """Return lat, lon of positions in a zone, such as `32N` (`32S` south of the equator), or with a zone each."""
     argument = _zone(zone), *_columns(easting=easting, northing=northing)
-    return validation.checked(mercator.lat_lon, 2, argument, "utm", mercator.check_grid)
+    return validation.checked(earth.lat_lon, 2, argument, "utm", earth.check_grid)
 
 
 def _columns(**values: Numbers) -> Components:
@@ -93,14 +92,14 @@ def _columns(**values: Numbers) -> Components:
 def _zone(argument: Any, *place: Any) -> Any:
     """Return the number of a zone, or of many; by default that of the position, if it is known."""
     if argument is None and place:
-        return validation.number(mercator.standard_zone, place)
+        return validation.number(earth.standard_zone, place)
     if not isinstance(argument, (list, tuple)) and not getattr(argument, "shape", ()):
-        return mercator.zone_number(argument)
+        return earth.zone_number(argument)
     import numpy as np
 
     try:
         names = np.asarray(argument).astype(str)
     except ValueError:
         raise ValueInvalid("zone: the rows differ in length; expected an array of names such as 32N") from None
-    numbers = {name: mercator.zone_number(name) for name in dict.fromkeys(names.ravel().tolist())}
+    numbers = {name: earth.zone_number(name) for name in dict.fromkeys(names.ravel().tolist())}
     return np.array([numbers[name] for name in names.ravel().tolist()]).reshape(names.shape)

@@ -14,9 +14,9 @@ from frametool.cli.command import asking, inputs, misuse, refuse
 from frametool.documents.source import Source
 from frametool.errors import FormatError, warn
 from frametool.geometry.conventions import world_of
+from frametool.geometry.earth import zone_number
 from frametool.geometry.place import LLA, UTM, Earth, Origin, Place, kernels
 from frametool.geometry.representations import POSITIONS, Notation
-from frametool.geometry.transverse_mercator import zone_number
 from frametool.grammar.place import read_at
 from frametool.grammar.readers import Misfit, Reading, tell
 

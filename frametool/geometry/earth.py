@@ -1,21 +1,30 @@
-"""Kernels of positions on the Earth, WGS84: latitude and longitude in degrees, metres above the ellipsoid, and ECEF.
+"""Kernels of positions on the Earth, WGS84: latitude and longitude in degrees, metres above the ellipsoid, ECEF, UTM.
 
 `ecef` is the Earth's frame: x to lat 0 lon 0, z to the north pole.  Only + - * / and square roots, and this package's
-own sines and arc tangents: floats and arrays give the same bits.  Invalid positions become NaN; `check_lla` and
-`check_ecef` return the reason.  Knows numbers only; components are floats or arrays of one shape.
+own sines and arc tangents: floats and arrays give the same bits.  Invalid positions become NaN; `check_lla`,
+`check_ecef`, `check_utm` and `check_grid` raise the reason.  Knows numbers only; components are floats or arrays of one
+shape.
+
+A zone of UTM is a number, 1 to 60, negative for the south: 32.0 is 32N, -32.0 is 32S; lat 0 is north.  Krueger's series
+to n^6, whose truncation is below a nanometre 30 degrees from the meridian.
+
+Source: Krueger 1912; Karney 2011, Transverse Mercator with an accuracy of a few nanometers, eq. 7 to 36;
+Karney 2024, On auxiliary latitudes, for the conformal latitude.
 """
 
 from __future__ import annotations
 
-from math import nan
+from math import factorial, isnan, nan
 
-from frametool.errors import ValueInvalid
-from frametool.geometry import quaternion
-from frametool.geometry.floats import RADIAN, SQRT_HALF, bearing, half_sincos_deg, incline
+from frametool.errors import ValueInvalid, shown
+from frametool.geometry import floats, quaternion
+from frametool.geometry.floats import RADIAN, SQRT_HALF, bearing, half_sincos_deg, incline, nearest, polynomial
 from frametool.geometry.quaternion import TINY
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from frametool.geometry.types import Four, Functions, N, Seven, Three, Two
 
 A, F = 6378137.0, 1.0 / 298.257223563  # the equator's radius in metres, and the flattening
@@ -154,8 +163,215 @@ def check_lla(lat: float, lon: float, alt: float = 0.0) -> None:  # noqa: ARG001
 def check_ecef(x: float, y: float, z: float) -> None:
     """Raise ValueInvalid unless finite numbers have a latitude."""
     squared = x * x + y * y + z * z
-    shown = f"ecef {x:.9g} {y:.9g} {z:.9g}"
+    place = f"ecef {x:.9g} {y:.9g} {z:.9g}"
     if squared < NEAREST:
-        raise ValueInvalid(f"{shown} is within 100 km of the Earth's centre and has no lat; are these metres?")
+        raise ValueInvalid(f"{place} is within 100 km of the Earth's centre and has no lat; are these metres?")
     if not squared <= FURTHEST:
-        raise ValueInvalid(f"{shown} is farther than 1e+20 m from the Earth; are these metres?")
+        raise ValueInvalid(f"{place} is farther than 1e+20 m from the Earth; are these metres?")
+
+
+# --- UTM ---
+
+SOUTH, NORTH, REACH = -80.0, 84.0, 30.0  # degrees: where UTM ends, and how far a fixed zone may reach
+SLACK = 1e-4  # degrees, 11 m: a position at the edge that was written in whole metres can still be read
+WIDEST = 0.6  # Krueger's eta in radians, above that of 30 degrees on the equator, 0.55
+FALSE_EASTING, FALSE_NORTHING = 5e5, 1e7
+ZONES = "", *(f"{zone}N" for zone in range(1, 61)), *(f"{zone}S" for zone in range(60, 0, -1))  # -32 is 32S too
+N3 = F / (2.0 - F)  # the third flattening, called n
+RADIUS = 0.9996 * A / (1.0 + N3) * (1.0 + N3**2 / 4 + N3**4 / 64 + N3**6 / 256)  # of the meridian, scaled
+
+
+def _in_powers(factors: Sequence[float], slope: float) -> tuple[float, ...]:
+    """Return the polynomial sum of f_k p_k(x), where p_0 = 1, p_1 = slope x and p_k+1 = 2x p_k - p_k-1.
+
+    Chebyshev's: of slope 1 cos kt = T_k(cos t), of slope 2 sin (k + 1)t = sin t U_k(cos t).
+    """
+    before, now = [0.0] * len(factors), [1.0] + [0.0] * (len(factors) - 1)
+    total = [0.0] * len(factors)
+    for k, factor in enumerate(factors):
+        total = [part + factor * each for part, each in zip(total, now, strict=True)]
+        step = 2.0 if k else slope
+        before, now = now, [step * up - old for up, old in zip([0.0, *now], before, strict=False)]
+    return tuple(total)
+
+
+def _sums(*rows: tuple[float, ...]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the polynomials in cos 2x that are the sum of c_k sin 2kx over sin 2x, and its derivative.
+
+    Row k holds the factors of n^k and of the following powers in c_k.
+    """
+    series = [N3**power * polynomial(N3, (*row, 0.0)) for power, row in enumerate(rows, 1)]
+    return _in_powers(series, 2.0), _in_powers([0.0, *(2.0 * k * part for k, part in enumerate(series, 1))], 1.0)
+
+
+# of conformal coordinates along the meridian, and back (Karney 2011, eq. 35 and 36)
+ALONG, ALONG_SLOPE = _sums(
+    (1 / 2, -2 / 3, 5 / 16, 41 / 180, -127 / 288, 7891 / 37800),
+    (13 / 48, -3 / 5, 557 / 1440, 281 / 630, -1983433 / 1935360),
+    (61 / 240, -103 / 140, 15061 / 26880, 167603 / 181440), (49561 / 161280, -179 / 168, 6601661 / 7257600),
+    (34729 / 80640, -3418889 / 1995840), (212378941 / 319334400,),
+)  # fmt: skip
+BACK, _ = _sums(
+    (-1 / 2, 2 / 3, -37 / 96, 1 / 360, 81 / 512, -96199 / 604800),
+    (-1 / 48, -1 / 15, 437 / 1440, -46 / 105, 1118711 / 3870720), (-17 / 480, 37 / 840, 209 / 4480, -5569 / 90720),
+    (-4397 / 161280, 11 / 504, 830251 / 7257600), (-4583 / 161280, 108847 / 3991680), (-20648693 / 638668800,),
+)  # fmt: skip
+# the conformal latitude minus the latitude, and the latitude minus the conformal one (Karney 2024)
+CONFORMAL, _ = _sums(
+    (-2, 2 / 3, 4 / 3, -82 / 45, 32 / 45, 4642 / 4725), (5 / 3, -16 / 15, -13 / 9, 904 / 315, -1522 / 945),
+    (-26 / 15, 34 / 21, 8 / 5, -12686 / 2835), (1237 / 630, -12 / 5, -24832 / 14175),
+    (-734 / 315, 109598 / 31185), (444337 / 155925,),
+)  # fmt: skip
+GEODETIC, _ = _sums(
+    (2, -2 / 3, -2, 116 / 45, 26 / 45, -2854 / 675), (7 / 3, -8 / 5, -227 / 45, 2704 / 315, 2323 / 945),
+    (56 / 15, -136 / 35, -1262 / 105, 73814 / 2835), (4279 / 630, -332 / 35, -399572 / 14175),
+    (4174 / 315, -144838 / 6237), (601676 / 22275,),
+)  # fmt: skip
+HYPERBOLIC = tuple(1.0 / (2 * k + 1) for k in range(15))  # atanh(t)/t in t^2, t <= tanh 0.3
+SINH = tuple(1.0 / factorial(2 * k + 1) for k in range(11))  # sinh(y)/y in y^2, y <= 1.2
+
+
+def standard_zone(lat: N, lon: N, xp: Functions[N]) -> N:
+    """Return the zone of a position: six degrees each, except 32V of Norway and four zones over Svalbard."""
+    lon = eastward(lon, xp)
+    sixth = _steps(lon, 6.0, xp) + 31.0
+    zone = xp.where(sixth > 60.0, 1.0, sixth)  # lon 180
+    high = (lat >= 56.0) & (lon >= 0.0) & (lon < 42.0)
+    if xp.some(high):
+        norway = high & (lat < 64.0) & (lon >= 3.0) & (lon < 12.0)
+        svalbard = xp.where(high & (lat >= 72.0), 31.0 + 2.0 * _steps(lon + 3.0, 12.0, xp), zone)
+        zone = xp.where(norway, 32.0, svalbard)
+    return xp.where(lat < 0.0, 0.0 - zone, zone)
+
+
+def zone_number(name: object) -> float:
+    """Return the number of a zone written as `32N` or `32S`, negative for the south.
+
+    Raises:
+        ValueInvalid: not a zone, no hemisphere, or the letter of a band.
+    """
+    text = "".join(name.split()).lstrip("0").upper() if isinstance(name, str) else str(name)
+    if text in ZONES[1:]:
+        place = ZONES.index(text)
+        return float(place if place <= 60 else place - len(ZONES))
+    number, letter = text[:-1], text[-1:]
+    if f"{number}N" in ZONES and letter in "CDEFGHJKLMPQRTUVWX":
+        raise ValueInvalid(f"{shown(name)}: a band letter; write {number}N, or {number}S south of the equator")
+    if f"{text}N" in ZONES:
+        raise ValueInvalid(f"zone {shown(name)} has no hemisphere; write {text}N, or {text}S south of the equator")
+    raise ValueInvalid(f"unknown zone {shown(name)}; zones: 1N to 60N, and 1S to 60S south of the equator")
+
+
+def _steps(x: N, width: float, xp: Functions[N]) -> N:
+    """Return the number of whole steps of a width from 0, rounded down; exact at every edge."""
+    whole = nearest(x / width)
+    return whole - xp.where(whole * width > x, 1.0, 0.0)
+
+
+def beside_meridian(lon: N, zone: N) -> N:
+    """Return the degrees of a longitude east of a zone's meridian, by one subtraction that rounds."""
+    meridian = 6.0 * abs(zone) - 183.0
+    return lon - (meridian + 360.0 * nearest((lon - meridian) / 360.0))
+
+
+def utm(zone: N, lat: N, lon: N, xp: Functions[N]) -> Four[N]:
+    """Return easting, northing, convergence in degrees and grid scale of a position in a zone.
+
+    Convergence is the angle of grid north clockwise of true north.  Accurate to 5e-9 m in each zone, 30 degrees wide.
+    The conformal latitude needs no logarithm: chi = lat + sum c_k sin 2k lat; on the sphere sin chi and cos chi
+    give xi and eta, and Krueger's series in xi + i eta the rest; its derivative gives convergence and scale.
+    """
+    s, c = sincos_deg(within(lat, SOUTH, NORTH, xp), xp)
+    east, front = sincos_deg(within(beside_meridian(within(lon, -180.0, 360.0, xp), zone), -REACH, REACH, xp), xp)
+    sx, cx = _turned(s, c, (2.0 * s * c) * polynomial((c - s) * (c + s), CONFORMAL))
+    u = cx * east
+    squared = 1.0 - u * u
+    root = xp.sqrt(squared)
+    sp, cp = sx / root, cx * front / root
+    s2, c2, sh2, ch2 = 2.0 * sp * cp, (cp - sp) * (cp + sp), 2.0 * u / squared, (1.0 + u * u) / squared
+    x, y = c2 * ch2, 0.0 - s2 * sh2
+    north, east_by = _product(s2 * ch2, c2 * sh2, *_complex_polynomial(x, y, ALONG))
+    slope, tilt = _complex_polynomial(x, y, ALONG_SLOPE)
+    half = u / (1.0 + root)
+    eta = 2.0 * half * polynomial(half * half, HYPERBOLIC)
+    xi = incline(sp, cp, xp)
+    slope = 1.0 + slope
+    across, ahead = sx * east * slope - front * tilt, front * slope + sx * east * tilt
+    length = xp.sqrt((slope * slope + tilt * tilt) * squared)
+    convergence = xp.doubled_arctan(across / (length + ahead)) * RADIAN
+    scale = (RADIUS / A) * length / squared * xp.sqrt(1.0 - E2 * s * s) * (cx / c)
+    south = xp.where(zone < 0.0, FALSE_NORTHING, 0.0)
+    return RADIUS * (eta + east_by) + FALSE_EASTING, RADIUS * (xi + north) + south, convergence + 0.0, scale
+
+
+def lat_lon(zone: N, easting: N, northing: N, xp: Functions[N]) -> Two[N]:
+    """Return latitude and longitude in degrees of a position in a zone; lon in (-180, 180]."""
+    eta = within((easting - FALSE_EASTING) / RADIUS, -WIDEST, WIDEST, xp)
+    xi = within((northing - xp.where(zone < 0.0, FALSE_NORTHING, 0.0)) / RADIUS, -1.5, 1.5, xp)
+    s2, c2 = floats.half_sincos(4.0 * xi, xp)
+    sh2, ch2 = _sinh_cosh(2.0 * eta, xp)
+    x, y = _product(s2 * ch2, c2 * sh2, *_complex_polynomial(c2 * ch2, 0.0 - s2 * sh2, BACK))
+    s, c = floats.half_sincos(2.0 * (xi + x), xp)
+    sh, ch = _sinh_cosh(eta + y, xp)
+    hyp = xp.sqrt(sh * sh + c * c)
+    lon = xp.doubled_arctan(sh / (hyp + c)) * RADIAN
+    sx, cx = s / ch, hyp / ch
+    chi = xp.doubled_arctan(s / (ch + hyp))
+    lat = (chi + (2.0 * sx * cx) * polynomial((cx - sx) * (cx + sx), GEODETIC)) * RADIAN
+    lat = within(lat, SOUTH - SLACK, NORTH + SLACK, xp)
+    lon = within(lon, -REACH - SLACK, REACH + SLACK, xp)
+    return lat + 0.0, eastward(lon + (6.0 * abs(zone) - 183.0), xp)
+
+
+def _turned(s: N, c: N, d: N) -> Two[N]:
+    """Return sine and cosine of an angle increased by d, below 0.004 radians."""
+    squared = d * d
+    sine = d - (d * squared) * (1 / 6 - squared * (1 / 120))
+    rest = squared * (0.5 - squared * (1 / 24))
+    return s + (c * sine - s * rest), c - (s * sine + c * rest)
+
+
+def _sinh_cosh(y: N, xp: Functions[N]) -> Two[N]:
+    sinh = y * polynomial(y * y, SINH)
+    return sinh, xp.sqrt(1.0 + sinh * sinh)
+
+
+def _product(a: N, b: N, c: N, d: N) -> Two[N]:
+    """Multiply a + ib by c + id."""
+    return a * c - b * d, a * d + b * c
+
+
+def _complex_polynomial(x: N, y: N, coefficients: tuple[float, ...]) -> Two[N]:
+    """Evaluate a real polynomial at x + iy, lowest coefficient first.
+
+    Source: Knuth, TAOCP 4.6.4 (3): two real products a coefficient, where a complex one takes four.
+    """
+    twice, squared = x + x, x * x + y * y
+    first, *others, last = coefficients
+    now, before = others.pop() + twice * last, 0.0 * x + last
+    for coefficient in reversed(others):
+        now, before = coefficient + twice * now - squared * before, now
+    return first + x * now - squared * before, y * now
+
+
+def grid_pose(zone: N, lat: N, lon: N, alt: N, xp: Functions[N]) -> Seven[N]:
+    """Return ecef_from_axes of the axes of a zone's grid at a position: x along grid east, y along grid north, z up."""
+    return pose(lat, lon, alt, "grid", xp, utm(zone, lat, lon, xp)[2])
+
+
+def check_utm(zone: float, lat: float, lon: float, alt: float = 0.0) -> None:
+    """Raise ValueInvalid unless finite numbers are a position within UTM and 30 degrees of the zone's meridian."""
+    check_lla(lat, lon, alt)
+    if not SOUTH <= lat <= NORTH:
+        raise ValueInvalid(f"lat {lat!r}: UTM ends at 84 N and 80 S; use lla, ecef or enu")
+    off = abs(beside_meridian(lon, zone))
+    if off > REACH:
+        name = ZONES[int(zone)]
+        raise ValueInvalid(f"lon {lon!r} is {off:.6g} degrees from the meridian of zone {name}; it reaches 30")
+
+
+def check_grid(zone: float, easting: float, northing: float) -> None:
+    """Raise ValueInvalid unless a position in a zone is covered by UTM."""
+    if isnan(sum(lat_lon(zone, easting, northing, floats))):
+        place = f"utm {ZONES[int(zone)]} {easting!r} {northing!r}"
+        raise ValueInvalid(f"{place} is beyond 84 N, 80 S or 30 degrees of the meridian; easting and northing swapped?")

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import earth, floats, quaternion, rigid
-from frametool.geometry import transverse_mercator as mercator
 from frametool.geometry.floats import RADIAN, SQRT_HALF, nearest
 from frametool.geometry.representations import POSITIONS
 
@@ -152,7 +151,7 @@ class Place(NamedTuple):
     def words(self) -> dict[int, tuple[str, ...]]:
         """Return the words for numbers that are written as words, by the index of the field: zones."""
         fields = [field for each in self.all for field in each.fields]
-        return {at: mercator.ZONES for at, field in enumerate(fields) if field == ZONE}
+        return {at: earth.ZONES for at, field in enumerate(fields) if field == ZONE}
 
     def with_grid(self, *, gridded: bool) -> Place:
         """Return the same with or without convergence and scale in addition to UTM."""
@@ -215,7 +214,7 @@ class Place(NamedTuple):
 
     def _turn_at(self, lat: Any, lon: Any, zone: Any, xp: Namespace) -> Components:
         """Return the rotation of its axes at a latitude and longitude."""
-        convergence = mercator.utm(_held(zone, lat, lon, xp), lat, lon, xp)[2] if self.axes == GRID else None
+        convergence = earth.utm(_held(zone, lat, lon, xp), lat, lon, xp)[2] if self.axes == GRID else None
         return earth.ecef_from_axes(lat, lon, self.axes, xp, convergence)
 
     def _zone_of(self, numbers: Sequence[Any]) -> Any:
@@ -225,12 +224,12 @@ class Place(NamedTuple):
         """Raise ValueInvalid unless floats are a valid position."""
         named = self.named(numbers)
         if self.name == UTM:
-            mercator.check_grid(named[ZONE] if self.zone is None else self.zone, named["easting"], named["northing"])
+            earth.check_grid(named[ZONE] if self.zone is None else self.zone, named["easting"], named["northing"])
         elif kernels(self.name).is_angular:
             earth.check_lla(*self.lla(numbers))
         if GRID in (self.axes, AXES in named and earth.AXES[int(named[AXES])]):
             lat, lon, _ = self.lla(numbers)
-            mercator.check_utm(_held(self._zone_of(numbers), lat, lon, floats), lat, lon)
+            earth.check_utm(_held(self._zone_of(numbers), lat, lon, floats), lat, lon)
 
     # --- writing ---
 
@@ -285,7 +284,7 @@ class Place(NamedTuple):
                 earth.check_ecef(x, y, z)
             if each.name == UTM or each.axes == GRID:
                 lat, lon, _ = earth.lla(x, y, z, floats)
-                mercator.check_utm(_held(each.zone, lat, lon, floats), _edged(lat, END, floats), lon)
+                earth.check_utm(_held(each.zone, lat, lon, floats), _edged(lat, END, floats), lon)
 
     def entry(self, numbers: Sequence[Any]) -> dict[str, Any]:
         """Return its numbers as the keys of a mapping."""
@@ -294,7 +293,7 @@ class Place(NamedTuple):
         for each in self.all:
             own = dict(zip(each.fields, rest, strict=False))
             if each.name == UTM:
-                own = {UTM: own | {ZONE: own[ZONE] if own[ZONE] == SAMPLE else mercator.ZONES[int(own[ZONE])]}}
+                own = {UTM: own | {ZONE: own[ZONE] if own[ZONE] == SAMPLE else earth.ZONES[int(own[ZONE])]}}
             found |= {ECEF: [*own.values()]} if each.name == ECEF else own
         return found
 
@@ -349,14 +348,14 @@ def _read_lla(_: Place, named: dict[str, Any], _xp: Namespace) -> Vector:
 def _read_utm(place: Place, named: dict[str, Any], xp: Namespace) -> Vector:
     east = named["easting"]
     zone = named[ZONE] if place.zone is None else place.zone + (east - east)
-    return *mercator.lat_lon(zone, east, named["northing"], xp), _height(named, east)
+    return *earth.lat_lon(zone, east, named["northing"], xp), _height(named, east)
 
 
 def _write_utm(place: Place, lla: Components, xp: Namespace) -> Components:
     lat, lon, alt = lla
     zone = _held(place.zone, lat, lon, xp)
     ends = xp.where(abs(lat) > 79.5, _edged(lat, END, xp), lat)
-    easting, northing, *grid = mercator.utm(zone, ends, lon, xp)
+    easting, northing, *grid = earth.utm(zone, ends, lon, xp)
     return zone, easting, northing, alt, *grid
 
 
@@ -419,7 +418,7 @@ class Earth(NamedTuple):
 def _held(zone: Any, lat: Any, lon: Any, xp: Namespace) -> Any:
     """Return the fixed zone, or that of each position; one at an edge is inside in spite of rounding."""
     if zone is None:
-        return mercator.standard_zone(_edged(lat, EDGE, xp), _edged(lon, EDGE, xp), xp)
+        return earth.standard_zone(_edged(lat, EDGE, xp), _edged(lon, EDGE, xp), xp)
     return zone + (lat - lat)
 
 

@@ -20,10 +20,10 @@ from frametool.documents.json import JSON_NUMBER
 from frametool.errors import FormatError, Misused, ValueInvalid, shown, warn
 from frametool.geometry import uncertainty
 from frametool.geometry.earth import AXES as AXES_AT
+from frametool.geometry.earth import ZONES as ZONE_NAMES
+from frametool.geometry.earth import zone_number
 from frametool.geometry.place import AXES, ECEF, ENU, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Earth, Place, kernels
 from frametool.geometry.representations import HEADING, POSITIONS, Notation, notation
-from frametool.geometry.transverse_mercator import ZONES as ZONE_NAMES
-from frametool.geometry.transverse_mercator import zone_number
 from frametool.grammar.covariance import check, entries_of
 from frametool.grammar.names import (
     EARTH_FRAMES,

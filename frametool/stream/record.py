@@ -25,7 +25,6 @@ from frametool.grammar.names import (
     may_be_uncertain,
 )
 from frametool.grammar.pose import (
-    AXES_KEY,
     COVARIANCE_KEYS,
     LISTED_WORDS,
     MOST_CHOICES,
@@ -45,7 +44,17 @@ from frametool.grammar.pose import (
     shape_of,
     unknown_keys,
 )
-from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, places_in, read_numbers, within
+from frametool.grammar.readers import (
+    AXES_KEY,
+    INDICES,
+    Misfit,
+    NotARotation,
+    Reading,
+    kind,
+    places_in,
+    read_numbers,
+    within,
+)
 from frametool.stream.row_layout import ACCEL, PARTS, POINT, POSE, TURN, VECTOR, Shape, checked_rotation, doubt
 from frametool.stream.stamp_source import key_path
 from frametool.text.numbers import parse_number, read_number_or_angle

@@ -321,7 +321,7 @@ class RecordText:
                 found.append(RowNote(line + self.line, wide.rule, wide.message))
                 break
         if answers and (place := answers[0].entry.target.place) is not None:
-            from frametool.geometry.transverse_mercator import ZONES as ZONE_NAMES
+            from frametool.geometry.earth import ZONES as ZONE_NAMES
 
             numbers = written(answers[0])
             found += [RowNote(line + self.line, ZONES, ZONE_NAMES[int(numbers[at])]) for at in place.words]

@@ -11,7 +11,7 @@ import pytest
 import samples
 
 from frametool.geometry import arrays, earth, euler, floats, matrix, quaternion, rigid
-from frametool.geometry import transverse_mercator as mercator
+from frametool.geometry import earth as mercator
 from frametool.geometry.representations import ROTATIONS, notation
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform

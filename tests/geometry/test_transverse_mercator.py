@@ -15,8 +15,8 @@ from mpmath import mpf
 
 import frametool
 from frametool.errors import ValueInvalid
+from frametool.geometry import earth as mercator
 from frametool.geometry import floats
-from frametool.geometry import transverse_mercator as mercator
 
 GOLDEN = json.loads((Path(__file__).parent.parent / "golden" / "earth.json").read_text())
 METRES, DEGREES, SCALE = 5e-9, 1e-12, 1e-14

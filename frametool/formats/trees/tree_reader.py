@@ -23,7 +23,6 @@ from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Diagnostics, Edge, Options
 from frametool.grammar.names import EARTH_FRAMES, may_be_on_earth
 from frametool.grammar.pose import (
-    AXES_KEY,
     COVARIANCE_KEYS,
     NAMES,
     POSE_KEYS,
@@ -32,7 +31,7 @@ from frametool.grammar.pose import (
     read_name,
     read_pose,
 )
-from frametool.grammar.readers import Misfit, Reading, Unclear, as_mapping, kind, tell, within
+from frametool.grammar.readers import AXES_KEY, Misfit, Reading, Unclear, as_mapping, kind, tell, within
 from frametool.ros import messages
 from frametool.text.numbers import parse_number
 
