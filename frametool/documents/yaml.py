@@ -19,16 +19,7 @@ from __future__ import annotations
 import re
 
 import yaml
-from yaml.error import MarkedYAMLError
-from yaml.events import (
-    AliasEvent,
-    MappingEndEvent,
-    MappingStartEvent,
-    ScalarEvent,
-    SequenceEndEvent,
-    SequenceStartEvent,
-    StreamEndEvent,
-)
+from yaml import AliasEvent, MappingStartEvent, ScalarEvent, SequenceStartEvent, StreamEndEvent
 
 from frametool import sizes
 from frametool.documents.source import (
@@ -145,7 +136,7 @@ _HINTS = {
 
 def translated(source: Source, error: Exception) -> FormatError:
     """Convert an error of the parser: lower case, with its place, and a hint if one is known."""
-    if isinstance(error, MarkedYAMLError) and (mark := error.problem_mark or error.context_mark):
+    if isinstance(error, yaml.MarkedYAMLError) and (mark := error.problem_mark or error.context_mark):
         line = mark.line + 1
         message = _message(error, line_of(source.text, line), mark.column + 1)
         return error_at(source, mark.index, message + _suspicion(source, line))
@@ -172,7 +163,7 @@ def _one_line(text: str) -> str:
     return " ".join(text.split()).lower()
 
 
-def _message(error: MarkedYAMLError, line: str, column: int) -> str:
+def _message(error: yaml.MarkedYAMLError, line: str, column: int) -> str:
     """Return what is wrong at a column of a line, from the parser's problem and its context."""
     problem, context = _one_line(error.problem or ""), _one_line(error.context or "")
     if "maximum nesting depth" in problem:  # of libyaml, which reads ahead
@@ -191,13 +182,13 @@ _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _ITEM = object()  # in place of the key while a list is filled
 _NULLS = frozenset(("", "~", "null", "Null", "NULL"))
 _ODD_KEYS = frozenset(("", "<<"))
+_ENDS = (yaml.MappingEndEvent, yaml.SequenceEndEvent)
 _KINDS: dict[type, int] = {
     ScalarEvent: LEAF,
     AliasEvent: LEAF,
     SequenceStartEvent: LIST,
     MappingStartEvent: MAP,
-    SequenceEndEvent: END,
-    MappingEndEvent: END,
+    **dict.fromkeys(_ENDS, END),
 }
 _MOST_DIRECTIVES = 100  # libyaml compares each new %TAG with all previous ones
 
@@ -281,7 +272,7 @@ class _Builder:
         `current` is the dict or list being filled and `key` the key waiting for its value: None if a key is next, _ITEM
         in a list.  A single function, because two million events pass through it for 100 000 frames.
         """
-        stack, nulls, refused_keys, item, aside = self.open, _NULLS, _ODD_KEYS, _ITEM, self.aside
+        stack, nulls, refused_keys, item, aside, ends = self.open, _NULLS, _ODD_KEYS, _ITEM, self.aside, _ENDS
         current: Any = self.documents
         key: Any = item
         room = MOST_CONTAINERS
@@ -309,7 +300,7 @@ class _Builder:
                 room -= 1
                 if len(stack) >= DEEPEST or not room:
                     raise self._error(event, too_much(len(stack)))
-            elif kind is MappingEndEvent or kind is SequenceEndEvent:
+            elif kind in ends:
                 current, key = stack.pop()
                 continue
             elif kind is AliasEvent:

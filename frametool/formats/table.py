@@ -173,7 +173,7 @@ _ARROW = _arrays("", "frametool.formats.rows.arrow", texts=True)
 FORMATS = {
     "yaml": Format(
         "YAML: trees, poses, documents parted by ---", suffixes=(".yaml", ".yml"), reads=("tree", "records"),
-        reader=_TREE, writes=("poses", "points", "tree", "report"), writer="frametool.formats.trees.written_poses",
+        reader=_TREE, writes=("poses", "points", "tree", "report"), writer="frametool.grammar.result",
         magic=(
             ("own key", "frames|children"),
             ("line", r"\{ *[A-Za-z_][\w.]*: "),  # not JSON, whatever the suffix: its keys have quotes
@@ -184,7 +184,7 @@ FORMATS = {
     "json": Format(
         "JSON: trees, one object a line, or an array", suffixes=(".json", ".jsonl", ".ndjson"),
         reads=("tree", "records"), reader=_TREE, writes=("poses", "points", "tree", "report"),
-        writer="frametool.formats.trees.written_poses",
+        writer="frametool.grammar.result",
         magic=(("json key", "frames"), ("begin", r"""\s*(?:\{\s*["}]|\[\s*(?:[\[{"\]]|-?\d|$))""")),
     ),
     "csv": Format(

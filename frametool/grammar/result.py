@@ -1,6 +1,9 @@
 """Poses as the mappings that machine formats write: the inverse of the grammar in `frametool.grammar.pose`.
 
-Drawings show an edge in short: millimetres and hundredths of a degree.
+YAML and JSON have one document or line per result; metres, radians unless the key states degrees; numbers as Python's
+repr.  Other formats have the numbers: angles read back to the same rotation if possible, matrices to the last bits,
+because a quaternion has more bits than either preserves.  Drawings show an edge in short: millimetres and hundredths of
+a degree.
 """
 
 from __future__ import annotations
@@ -8,8 +11,8 @@ from __future__ import annotations
 from copy import copy
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid, shown, warn
-from frametool.geometry import euler, floats, quaternion
+from frametool.errors import ValueInvalid, listing, shown, warn
+from frametool.geometry import euler, floats, quaternion, rigid
 from frametool.geometry.representations import EARTH_FRAMES, notation
 from frametool.grammar.pose import NAMES, SCALE, Pose, notation_of
 from frametool.grammar.readers import AXES_KEY
@@ -22,6 +25,8 @@ if TYPE_CHECKING:
     from frametool.geometry.place import Place
     from frametool.geometry.representations import Notation
     from frametool.geometry.transform import Transform
+    from frametool.geometry.types import Rigid, Three
+    from frametool.grammar.readers import Quaternion
 
 INFINITE = float("inf")
 ROUNDED_TO_ZERO = 1e-12  # below it, on a screen
@@ -364,3 +369,80 @@ def _rounded(value: float, decimals: int) -> str:
         return f"{value:.1e}"
     text = f"{value + 0.0:.{decimals}f}"
     return text.rstrip("0").rstrip(".") if decimals else text
+
+
+# --- texts in YAML and JSON, and the numbers of other formats ---
+
+
+def write_poses(results: Iterable[Result | dict[str, Any]], style: Style) -> str:
+    """Return one line per result in JSON, else the results as documents separated by `---`."""
+    records = (each.mapping(style) if isinstance(each, Result) else each for each in results)
+    if style.format == "json":
+        from frametool.documents.json import dump
+
+        return "".join(f"{dump(record, style.number)}\n" for record in records)
+    from frametool.documents.yaml_writer import dump
+
+    return "---\n".join(dump(record, style.number) for record in records)
+
+
+write_points = write_poses
+
+
+def write_tree(tree: Frames, style: Style) -> str:
+    """Return the tree in list form, roots first; JSON on one line."""
+    if style.format == "json":
+        from frametool.documents.json import dump
+
+        return f"{dump({'frames': list(tree_entries(tree, style))}, style.number)}\n"
+    from frametool.documents.yaml_writer import flow
+
+    entries = "".join(f"  - {flow(entry, style.number)}\n" for entry in tree_entries(tree, style))
+    return f"frames:\n{entries}"
+
+
+MOST_DECIMALS = 17
+
+
+def refuse_motion(tree: Frames, fmt: str) -> None:
+    """Raise ValueInvalid for a tree that moves, which a format cannot hold."""
+    if moving := next((track.child for track in tree.tracks() if not track.is_static), None):
+        raise ValueInvalid(f"{fmt} holds no moving frames, and {shown(moving)} moves; give --at TIME")
+
+
+def static_edges(tree: Frames, fmt: str) -> list[tuple[str, str, Rigid]]:
+    """Return parent, child and pose of the edges of a tree; warns about frames that nothing is connected to.
+
+    Raises ValueInvalid if it moves, or has none.
+    """
+    refuse_motion(tree, fmt)
+    edges = [(track.parent, track.child, track.components) for track in tree.tracks()]
+    if not edges:
+        raise ValueInvalid(f"{fmt} holds poses, and the tree has none: {listing(tree.frames)}")
+    parents = {parent for parent, _, _ in edges}
+    if lonely := [frame for frame in tree.roots if frame not in parents]:
+        warn(f"{fmt} cannot store frames without a pose: {', '.join(map(shown, lonely[:5]))} left out")
+    return edges
+
+
+def angles_of(rotation: Quaternion) -> Three[float]:
+    """Return roll, pitch, yaw of a rotation: with the fewest decimals that give the same bits, else the nearest."""
+    original = quaternion.from_quaternion(*rotation, floats)
+    exact: Three[float] = euler.from_quaternion(*original, "sxyz", floats)
+    for decimals in range(MOST_DECIMALS):
+        roll, pitch, yaw = (round(angle, decimals) for angle in exact)
+        if of_angles((roll, pitch, yaw)) == original:
+            return roll, pitch, yaw
+    return exact
+
+
+def of_angles(angles: Iterable[float]) -> Quaternion:
+    """Return the rotation that roll, pitch and yaw are read as."""
+    roll, pitch, yaw = angles
+    return quaternion.canonical(*euler.to_quaternion(roll, pitch, yaw, "sxyz", floats), floats)
+
+
+def rows_of(pose: Rigid) -> list[list[float]]:
+    """Return the rows of the 4x4 matrix of a pose."""
+    numbers = rigid.to_homogeneous(*pose[:3], *quaternion.from_quaternion(*pose[3:], floats), floats)
+    return [[number + 0.0 for number in numbers[at : at + 4]] for at in (0, 4, 8, 12)]  # avoids -0.0

@@ -12,9 +12,8 @@ from frametool import sizes
 from frametool.documents.document import parse_nodes
 from frametool.errors import FormatError, FrametoolError
 from frametool.formats.rows.csv import cells_of, row
-from frametool.formats.trees.written_poses import write_poses
 from frametool.grammar.pose import Pose
-from frametool.grammar.result import NoResult
+from frametool.grammar.result import NoResult, write_poses
 from frametool.stream.faults import STOP, Outcome
 from frametool.stream.record_text import nulled
 from frametool.stream.record_values import plain

@@ -17,10 +17,10 @@ from frametool.stream.row_layout import NOWHERE
 from frametool.stream.row_poses import NO_STAMP, texts_of
 from frametool.stream.rows import numbered, read_each
 from frametool.stream.stamp_source import read_header_stamp, read_stamp
-from frametool.text.digits import TENS, ZEROS, first_point, not_digits, read_eight_digits
 from frametool.text.numbers import parse_number
 from frametool.text.parse import LOWEST, parse_floats, trimmed
 from frametool.text.spans import windows
+from frametool.text.write import TENS, ZEROS, first_point, not_digits, read_eight_digits
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -31,10 +31,10 @@ from frametool.formats.rows.pose_rows import (
     turned,
 )
 from frametool.formats.table import FORMATS
-from frametool.formats.trees import written_poses
 from frametool.frames.stamps import BILLION
 from frametool.geometry import arrays, floats, quaternion, rigid
 from frametool.geometry.representations import notation
+from frametool.grammar import result
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.result import Result, with_entries
@@ -257,7 +257,7 @@ class TextWriter:
             cells = cells_of(probe, style)
             return Alike(in_table(cells, cells, style), columns, row(cells, style).encode())
         parting = "---\n" if style.format == "yaml" else ""
-        return Alike(in_document(parting + written_poses.write_poses([probe], style), style), columns)
+        return Alike(in_document(parting + result.write_poses([probe], style), style), columns)
 
     def _probe(self, block: RowPoses) -> Any:
         """Make a result with what this block's have; what differs from row to row is marked."""

@@ -16,7 +16,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.frames.stamps import BILLION
-from frametool.text.digits import (
+from frametool.text.numbers import half_unit
+from frametool.text.spans import Spans, windows
+from frametool.text.write import (
     LEAST_POWER,
     TENS,
     ZEROS,
@@ -27,10 +29,8 @@ from frametool.text.digits import (
     powers_of_ten,
     product_error,
     read_eight_digits,
+    shortest_decimals,
 )
-from frametool.text.numbers import half_unit
-from frametool.text.spans import Spans, windows
-from frametool.text.write import shortest_decimals
 
 if TYPE_CHECKING:
     from frametool.text.spans import Bytes, Flags, Floats, Ints, Words

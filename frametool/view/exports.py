@@ -32,7 +32,7 @@ from frametool.view.stills import SIZE
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from frametool.formats.robots.solids import Solid
+    from frametool.formats.robots.model import Solid
     from frametool.frames.track import MovingTrack
     from frametool.geometry.types import Rigid
     from frametool.view.scene import FrameScene

@@ -16,7 +16,7 @@ from console import ROOT
 
 import frametool
 from frametool.documents.source import InputFile
-from frametool.formats.robots.solids import Solid, read_solids
+from frametool.formats.robots.model import Solid, read_solids
 from frametool.view.exports import EXTRAS
 
 if TYPE_CHECKING:

@@ -123,7 +123,7 @@ def _for_a_person(term: Term, style: Style) -> str:
     if type_.kind in (POINT, VECTOR):
         result = plain_result(term, style)
         if type_.kind not in result:  # at a place on the Earth
-            from frametool.formats.trees.written_poses import write_poses as write_documents
+            from frametool.grammar.result import write_poses as write_documents
 
             return write_documents([result], style)
         return write_points([result], style)

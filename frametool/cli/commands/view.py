@@ -19,7 +19,7 @@ from frametool.frames.stamps import format_stamp
 
 if TYPE_CHECKING:
 
-    from frametool.formats.robots.solids import Solid
+    from frametool.formats.robots.model import Solid
     from frametool.view.scene import FrameScene
 
     Eye = tuple[float, float]
@@ -153,7 +153,7 @@ def _content(
 
 def _solids(tree: str) -> list[Solid]:
     """Return the solids of a robot's file, and say which are not drawn as they are; its frames were read before."""
-    from frametool.formats.robots.solids import read_solids
+    from frametool.formats.robots.model import read_solids
 
     if not os.path.isfile(tree_file(tree)):
         return []

@@ -17,12 +17,13 @@ that of its class.
 from __future__ import annotations
 
 from itertools import islice
+from math import dist
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.xml import Element, read_xml
 from frametool.errors import FormatError, alternatives, shown
 from frametool.formats.robots.joints import JointSample, JointState
-from frametool.formats.robots.model import Joint, JointValue, Link
+from frametool.formats.robots.model import SHAPES, SIZES, Joint, JointValue, Link, Solid
 from frametool.geometry import floats, matrix, quaternion, rigid
 from frametool.geometry.floats import DEGREE, half_sincos, half_sincos_deg
 from frametool.geometry.quaternion import cross, unit_vector
@@ -328,13 +329,14 @@ def _turning_z(x: float, y: float, z: float) -> Quaternion:
     return quaternion.between(0.0, 0.0, 1.0, x, y, z, floats)
 
 
-SIZES = {"floating": 7, "ball": 4}  # numbers of a joint in qpos; the others have one
+SHOWN_GROUPS = 3  # of geoms; MuJoCo's viewer draws those below
+IN_QPOS = {"floating": 7, "ball": 4}  # numbers of a joint in qpos; the others have one
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the edges of a model, with joint values from options, default at their references."""
-    model = MjcfModel(read_xml(file, "mujoco"), options)
-    yield from JointState.of(model.links.values(), options, file.name).edges(model.links.values())
+    links = MjcfModel(read_xml(file, "mujoco"), options).links.values()
+    yield from JointState.of(links, options, file.name).edges(links)
 
 
 def read_joints(file: InputFile, state: str) -> Iterator[JointSample]:
@@ -348,7 +350,7 @@ def read_joints(file: InputFile, state: str) -> Iterator[JointSample]:
     key = _key(root, state)
     if not key.attribute("qpos"):
         raise key.error(f"key {shown(state)} has no qpos")
-    sizes = [SIZES.get(joint.kind, 1) for joint in joints]
+    sizes = [IN_QPOS.get(joint.kind, 1) for joint in joints]
     numbers = iter(key.numbers(sum(sizes), "qpos"))
 
     def refuse(problem: str, _path: Path) -> FormatError:
@@ -357,6 +359,36 @@ def read_joints(file: InputFile, state: str) -> Iterator[JointSample]:
     for joint, size in zip(joints, sizes, strict=True):
         value = _value(joint, list(islice(numbers, size)), refuse)
         yield JointSample(joint.name, value, None, refuse)
+
+
+class _Geoms(MjcfModel):
+    """A model, read for its geoms."""
+
+    def __init__(self, root: Element) -> None:
+        self.solids: list[Solid] = []
+        super().__init__(root, Options(Diagnostics(), Topics()))
+
+    def _take(self, node: Element, inside: _Inside) -> _Inside | None:
+        if node.tag != "geom":
+            return super()._take(node, inside)
+        attributes = self.attributes(node, inside.around)
+        usual = "mesh" if "mesh" in attributes else "sphere"
+        kind = attributes["type"].attribute("type") if "type" in attributes else usual
+        if numbers_of(attributes, "group", "0")[0] >= SHOWN_GROUPS or kind not in SHAPES:
+            return None
+        size = numbers_of(attributes, "size", attributes["size"].attribute("size") if "size" in attributes else "")
+        if "fromto" in attributes:
+            ends = numbers_of(attributes, "fromto", "0 0 0 0 0 0")
+            size = (*size[:1], 0.5 * dist(ends[:3], ends[3:]))
+        size = tuple(2.0 * number if kind == "box" or at == 1 else number for at, number in enumerate(size))
+        pose = rigid.compose(*inside.frame, *self.pose_of_site(attributes))
+        self.solids.append(Solid(inside.body, kind, size[: SIZES.get(kind, 0)], pose))
+        return None
+
+
+def read_solids(file: InputFile) -> list[Solid]:
+    """Return the geoms of a model."""
+    return _Geoms(read_xml(file, "mujoco")).solids
 
 
 def _key(root: Element, state: str) -> Element:
@@ -375,7 +407,7 @@ def _key(root: Element, state: str) -> Element:
 
 def _value(joint: Joint, numbers: list[float], refuse: Callable[[str, Path], FormatError]) -> Any:
     """Return the value of a joint: a number, or a mapping with a pose; quaternions w first."""
-    if joint.kind not in SIZES:
+    if joint.kind not in IN_QPOS:
         return JointValue(numbers[0])
     w, x, y, z = numbers[-4:]
     if w == x == y == z == 0.0:

@@ -14,6 +14,7 @@ Knows neither files of values nor times: those are in `frametool.formats.robots.
 from __future__ import annotations
 
 from functools import reduce
+from importlib import import_module
 from itertools import repeat
 from operator import and_
 from typing import Any, NamedTuple, TypeAlias
@@ -21,6 +22,7 @@ from typing import Any, NamedTuple, TypeAlias
 from frametool.documents.document import parse_documents
 from frametool.documents.source import Source
 from frametool.errors import FormatError, UnknownFrame, ValueInvalid, alternatives, listing, shown
+from frametool.formats.table import FORMATS
 from frametool.frames.topology import edges_between
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.floats import DEGREE, RADIAN
@@ -34,8 +36,9 @@ from frametool.text.numbers import parse_angle, parse_length
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
+    from frametool.documents.source import InputFile
     from frametool.documents.xml import Element
     from frametool.geometry.types import Components, Condition, Namespace, Number, Numbers, Rigid
     from frametool.grammar.edges import Options
@@ -249,6 +252,44 @@ def _check_freedom(joint: Joint, components: Rigid) -> None:
         if max(abs(along), tilt) > OUT_OF_PLANE * (1.0 + max(map(abs, (tx, ty, tz)))):
             normal = f"{ax:g} {ay:g} {az:g}"
             raise Misfit(f"joint {shown(joint.name)} is planar: this pose leaves the plane across {normal}")
+
+
+# --- solids, as files draw them ---
+
+SIZES = {"box": 3, "cylinder": 2, "capsule": 2, "sphere": 1}  # numbers of each
+SHAPES = (*SIZES, "mesh")
+PARTS = {"size": 3, "radius": 1, "length": 1}  # what states how large a shape is, and with how many numbers
+
+
+class Solid(NamedTuple):
+    """A solid in a frame: a kind of SHAPES, its pose, and its size in metres; axes are z, the middle is the origin.
+
+    size: lengths of the edges of a box; radius and length, a capsule's without its caps; radius; of a mesh nothing
+    """
+
+    frame: str
+    kind: str
+    size: tuple[float, ...]
+    pose: Rigid = IDENTITY
+
+
+def read_solids(file: InputFile, fmt: str) -> list[Solid]:
+    """Return the solids of a file whose frames were read; none of a format without any.  Raises FormatError."""
+    read = getattr(import_module(FORMATS[fmt].reader), "read_solids", None)
+    return [*read(file)] if read else []
+
+
+def solids_of(
+    name: str, link: Element, pose_of: Callable[[Element], Rigid], numbers_of: Callable[[Element], Iterable[float]]
+) -> list[Solid]:
+    """Return what a link shows; of one that shows only meshes the simple shapes it collides with, if there are any."""
+    visual, collision = (
+        [Solid(name, shape.tag, tuple(numbers_of(shape)), pose_of(node))
+         for node in link.all(tag) for geometry in node.all("geometry") for shape in geometry.all(*SHAPES)]
+        for tag in ("visual", "collision")
+    )  # fmt: skip
+    simple = [each for each in collision if each.kind != "mesh"]
+    return simple if visual and simple and all(each.kind == "mesh" for each in visual) else visual
 
 
 class Robot:

@@ -24,19 +24,19 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.documents.xml import Element, read_xml
 from frametool.errors import alternatives, shown
 from frametool.formats.robots.joints import JointState
-from frametool.formats.robots.model import Joint, Link, Mimic, read_quaternion
+from frametool.formats.robots.model import PARTS, Joint, Link, Mimic, Solid, read_quaternion, solids_of
 from frametool.frames.lookups import FrameTree
 from frametool.frames.topology import Groups
 from frametool.geometry import euler, floats, quaternion, rigid
 from frametool.geometry.quaternion import unit_vector
 from frametool.geometry.rigid import IDENTITY
+from frametool.grammar.edges import Diagnostics, Edge, Options, Topics
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Edge, Options
     from frametool.grammar.readers import Vector
 
 
@@ -273,6 +273,19 @@ class SdfJoint(NamedTuple):
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the edges of a world or model, with joint values from options, default as in the file."""
     yield from _SdfTree(read_xml(file, "sdf"), options).edges()
+
+
+def read_solids(file: InputFile) -> Iterator[Solid]:
+    """Yield the solids of the links."""
+    frames = SdfFrames(read_xml(file, "sdf"), Options(Diagnostics(), Topics()))
+
+    def numbers(shape: Element) -> Iterator[float]:
+        for part in shape.all(*PARTS):
+            yield from part.numbers(PARTS[part.tag])
+
+    for frame in frames.all.values():
+        if frame.kind == "link":
+            yield from solids_of(frame.name, frame.holder, lambda node: read_pose(node, frames.options)[0], numbers)
 
 
 class _SdfTree(SdfFrames):

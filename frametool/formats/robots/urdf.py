@@ -21,14 +21,15 @@ from frametool.errors import BadTopology, FormatError, ValueInvalid, alternative
 from frametool.formats.detect import UNSUPPORTED
 from frametool.formats.load import FrameFile, refuse_unknown_joints
 from frametool.formats.robots.joints import JointState
-from frametool.formats.robots.model import Joint, Link, Mimic, Robot, read_quaternion
+from frametool.formats.robots.model import PARTS as PARTS_OF_SHAPES
+from frametool.formats.robots.model import Joint, Link, Mimic, Robot, Solid, read_quaternion, solids_of
 from frametool.formats.table import FORMATS
 from frametool.frames.topology import two_parents
 from frametool.geometry import euler, floats
 from frametool.geometry.quaternion import unit_vector
 from frametool.geometry.representations import notation
 from frametool.geometry.rigid import IDENTITY
-from frametool.grammar.edges import Edge, Options
+from frametool.grammar.edges import Diagnostics, Edge, Options, Topics
 from frametool.grammar.pose import TURN, Pose, agreeing_rotation
 from frametool.grammar.result import Style, rotation_numbers
 
@@ -196,6 +197,23 @@ def _connected(
             options.report(element.error(message))
 
 
+def read_solids(file: InputFile) -> Iterator[Solid]:
+    """Yield the solids of the links."""
+    options = Options(Diagnostics(), Topics())
+
+    def pose(node: Element) -> Rigid:
+        origin = node.first("origin")
+        return IDENTITY if origin is None else _origin(origin, options)
+
+    def numbers(shape: Element) -> Iterator[float]:
+        for part in PARTS_OF_SHAPES:
+            if part in shape.attributes:
+                yield from shape.numbers(PARTS_OF_SHAPES[part], part)
+
+    for link in read_xml(file, "robot").all("link"):
+        yield from solids_of(link.attribute("name").lstrip("/"), link, pose, numbers)
+
+
 def load_robot(path: str | PathLike[str]) -> Robot:
     """Read the robot of a URDF file, `-` for standard input.
 
@@ -235,7 +253,7 @@ def write_tree(tree: Frames, style: Style) -> str:
     Raises ValueInvalid for what URDF cannot hold: moving frames, several roots, names with characters not allowed in
     XML.
     """
-    from frametool.formats.trees.written_poses import refuse_motion
+    from frametool.grammar.result import refuse_motion
 
     refuse_motion(tree, "URDF")
     if len(tree.roots) > 1:
@@ -248,7 +266,7 @@ def write_tree(tree: Frames, style: Style) -> str:
 
 def _joint(parent: str, child: str, components: Rigid, style: Style) -> str:
     """Write one edge."""
-    from frametool.formats.trees.written_poses import angles_of, of_angles
+    from frametool.grammar.result import angles_of, of_angles
 
     angles = angles_of(components[3:])
     origin = f'xyz="{_numbers(components[:3], style)}" rpy="{_numbers(angles, style)}"'

@@ -42,13 +42,13 @@ from frametool.documents.yaml_writer import flow, quoted
 from frametool.errors import FormatError, ValueInvalid, bare, listing, shown, warn
 from frametool.formats.trees.matrices import FRAME_KEYS, Meaning, directed, meaning_of
 from frametool.formats.trees.tree_reader import XYZ, document_edges, named
-from frametool.formats.trees.written_poses import angles_of, static_edges
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.loose import WORDS, read_loose_pose
 from frametool.grammar.pose import read_angle_unit, read_rotation
 from frametool.grammar.readers import Misfit, Reading, Unclear, as_mapping, kind, read_numbers, within
+from frametool.grammar.result import angles_of, static_edges
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

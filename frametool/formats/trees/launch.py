@@ -25,8 +25,8 @@ from frametool.documents.document import format_error, locate_many, parse_docume
 from frametool.documents.xml import Element, read_xml
 from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.formats.detect import Beginning
-from frametool.formats.trees.written_poses import refuse_motion
 from frametool.grammar.readers import Misfit, kind
+from frametool.grammar.result import refuse_motion
 from frametool.ros import publisher
 from frametool.ros.publisher import CALL
 

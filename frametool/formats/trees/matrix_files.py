@@ -43,10 +43,10 @@ from frametool.formats.trees.matrices import (
     whole_pose,
 )
 from frametool.formats.trees.tree_reader import document_edges, dotted, named, remember
-from frametool.formats.trees.written_poses import rows_of, static_edges
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.pose import read_spelled
 from frametool.grammar.readers import Misfit, Reading, Unclear, answerable, as_mapping, kind, within
+from frametool.grammar.result import rows_of, static_edges
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
