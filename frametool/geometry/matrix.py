@@ -220,18 +220,15 @@ def as_six_d(x: N, y: N, z: N, w: N) -> Six[N]:
 
 def six_d_deviation(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> N:
     """Return 0 if two columns span a plane, else inf."""
-    first, second = quaternion.unit_vector(ax, ay, az, xp), quaternion.unit_vector(bx, by, bz, xp)
-    sine = length(*quaternion.cross(*first, *second), xp)
-    return xp.where(sine > PARALLEL, 0.0, inf)
+    ax, ay, az, first = quaternion.direction(ax, ay, az, xp)
+    bx, by, bz, second = quaternion.direction(bx, by, bz, xp)
+    sine = length(*quaternion.cross(ax, ay, az, bx, by, bz), xp)
+    return xp.where((sine > PARALLEL) & (first > 0.0) & (second > 0.0), 0.0, inf)
 
 
-def six_d_complaint(*columns: float, normalize: bool = False) -> ValueInvalid | None:  # noqa: ARG001
-    """Return the error for two columns that span no plane; else None."""
+def six_d_complaint(*columns: float, normalize: bool = False) -> ValueInvalid:  # noqa: ARG001
+    """Return the error for two columns that span no plane."""
     ax, ay, az, bx, by, bz = columns
-    is_zero = not any((ax, ay, az)) or not any((bx, by, bz))
-    if not is_zero and not six_d_deviation(ax, ay, az, bx, by, bz, floats):
-        return None
+    why = "they are parallel" if any((ax, ay, az)) and any((bx, by, bz)) else "one is zero"
     shown = f"columns {ax:g} {ay:g} {az:g} and {bx:g} {by:g} {bz:g}"
-    return ValueInvalid(
-        f"{shown} span no plane: {'one is zero' if is_zero else 'they are parallel'}", rule="denormalized"
-    )
+    return ValueInvalid(f"{shown} span no plane: {why}", rule="denormalized")

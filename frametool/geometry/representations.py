@@ -7,7 +7,7 @@ kernels this calls, nowhere else. Knows no file syntax.
 from __future__ import annotations
 
 from functools import partial
-from math import inf, isfinite, isqrt, tau
+from math import isfinite, isqrt, tau
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, did_you_mean, listing, nearest, shown, warn
@@ -137,10 +137,12 @@ class Representation(NamedTuple):
             numbers = " ".join(f"{value:g}" for value in components)
             what = self.label or self.name
             raise ValueInvalid(f"{what} {numbers} is not finite; give finite numbers", rule="not-finite")
+        rule = self.batch
+        if rule and (off := rule.deviation(*components, floats)) <= rule.exact:
+            return tuple(components)
         if self.complaint and (problem := self.complaint(*components, normalize=normalize)):
             raise problem
-        rule = self.batch
-        if rule is None or (off := rule.deviation(*components, floats)) <= rule.exact:
+        if rule is None:
             return tuple(components)
         if off > quaternion.SILENT and not normalize:
             warn(rule.remark(*components), rule="rounded")
@@ -282,7 +284,7 @@ ROTATIONS = _named({
         ("r11", "r21", "r31", "r12", "r22", "r32"), (), "first two columns of the matrix (Zhou's continuous 6D)",
         label="6d", searched=False,
         forward=_plain(matrix.from_six_d), backward=_arithmetic(matrix.as_six_d), complaint=matrix.six_d_complaint,
-        batch=BatchRule("pairs of columns", matrix.six_d_deviation, lambda *columns: columns[:-1], inf),
+        batch=BatchRule("pairs of columns", matrix.six_d_deviation, lambda *columns: columns[:-1], 0.0),
     ),
     "rpy_unreal": Representation(
         RPY, (0, 1, 2), "degrees, as Unreal's FRotator and CARLA turn their own axes",
