@@ -10,6 +10,7 @@ import re
 from collections import Counter
 from copy import copy
 from functools import lru_cache, partial
+from itertools import product
 from os.path import commonprefix
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -21,7 +22,7 @@ from frametool.stream.row_layout import POINT, POSE, SIX, TWIST, WRENCH, Shape, 
 from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Container, Iterable, Iterator, Sequence
 
     from frametool.geometry.representations import Notation, Representation
     from frametool.stream.request import Request
@@ -33,7 +34,11 @@ XYZ = ("x", "y", "z")
 POSITIONS = (XYZ, ("tx", "ty", "tz"), ("px", "py", "pz"))
 TURNED = ("rvec_", "qvec_", "quat_", "rot_")  # x, y and z behind these are no position
 TELLING = ("position", "translation", "point", "vector")
-LETTERS = {TWIST: ("vx vy vz wx wy wz",), WRENCH: ("fx fy fz tx ty tz", "fx fy fz mx my mz")}
+FORCES = ("fx", "fy", "fz")
+LETTERS = {
+    TWIST: (("vx", "vy", "vz", "wx", "wy", "wz"),),
+    WRENCH: ((*FORCES, "tx", "ty", "tz"), (*FORCES, "mx", "my", "mz")),
+}
 NO_UNIT = ("", "-", "1")
 MOST_SHOWN, MOST_LISTED = 8, 40  # columns in a message
 LONGEST_RANGE = 40  # characters: more digits name no column
@@ -117,7 +122,7 @@ class Header:
                 behind = said.end() if said else end
                 key = folded[: token.start()], folded[behind:]
                 self.affixes.setdefault(key, (bare[: token.start()], bare[behind:]))
-                unit = bracket[1] if bracket else (said[1] or said[2]) if said else "rad" * word.startswith("rvec_")
+                unit = _unit(bracket, said) or "rad" * word.startswith("rvec_")
                 by_key = self.found.setdefault(COLUMN_WORDS.get(word, word), {})
                 by_key.setdefault(key, {}).setdefault(unit, (place, unit))
 
@@ -183,25 +188,30 @@ def find_positions(header: Header) -> list[Columns]:
 
 def _position(columns: Columns) -> Columns:
     """Read the units of a position's columns, of which one may be absent."""
-    units = [1.0 if spot is None else LENGTHS.get(spot[1], 0.0) for spot in columns.spots]
-    if 0.0 in units:
-        spot = next(spot for spot in columns.spots if spot and spot[1] not in LENGTHS)
-        name = columns.names[columns.places.index(spot[0])]
-        known = ", ".join(filter(None, LENGTHS))
-        wrong = f"column {shown(name)}: unknown unit {shown(spot[1])} of a length; known are {known}"
-        return columns._replace(unit=1.0, wrong=wrong)
-    x, y, z = units
-    return columns._replace(unit=x if x == y == z else (x, y, z))
+    columns = _with_unknown(columns, range(3), LENGTHS, f"of a length; known are {', '.join(filter(None, LENGTHS))}")
+    x, y, z = units = [LENGTHS.get(spot[1] if spot else "", 1.0) for spot in columns.spots]
+    return columns._replace(unit=x if x == y == z else tuple(units))
+
+
+def _with_unknown(columns: Columns, places: Iterable[int], known: Container[str], of: str) -> Columns:
+    """Say what is wrong where one of some columns has a unit that is not known."""
+    spot = next((spot for at in places if (spot := columns.spots[at]) and spot[1] not in known), None)
+    if spot is None:
+        return columns
+    name = columns.names[columns.places.index(spot[0])]
+    return columns._replace(wrong=f"column {shown(name)}: unknown unit {shown(spot[1])} {of}")
 
 
 def find_rotations(header: Header, expected: Notation | None) -> list[Columns]:
     """Return every set of columns that can be a rotation, of the expected notation if there is one."""
-    rows = SEARCHED if expected is None else _searched(expected)
+    rows = _searched(expected)
     found: dict[frozenset[int], Columns] = {}  # qvec_w .. are found by either of two names
     for row in rows:
-        maps = _named_maps(header, bare=expected is not None) if row.shape == NAMED else ()
-        for each in (*_of_representation(row, header, expected), *(_rotation(match, row, expected) for match in maps)):
-            found[frozenset(each.places)] = each
+        matches = [*header.match(row.columns, row.angles)]
+        matches += _named_maps(header, bare=expected is not None) if row.shape == NAMED else ()
+        wholes = header.match(row.whole.columns) if row.whole else ()
+        matches += [match._replace(whole=True, unit=1.0) for match in wholes]
+        found |= {frozenset(match.places): _rotation(match, row, expected) for match in matches}
     best: dict[int, int] = {}  # where several share a column, an axis with an angle and an angle_deg, the nearest
     for each in found.values():
         for place in each.places:
@@ -210,60 +220,48 @@ def find_rotations(header: Header, expected: Notation | None) -> list[Columns]:
     return nearest or [each for row in rows for each in _standing_alone(row, header, expected)]
 
 
-def _searched(expected: Notation) -> list[Representation]:
+SEARCHED = {frozenset(row.columns): row for row in reversed(ROTATIONS.values()) if row.searched}
+
+
+def _searched(expected: Notation | None) -> list[Representation]:
     """Return the representations whose columns are looked for, of those that share their columns the first."""
-    same = [row for row in ROTATIONS.values() if row.searched and {*row.columns} == {*expected.representation.columns}]
-    return same[:1] if expected.representation.searched else [expected.representation]
+    own = expected.representation if expected else None
+    return [*SEARCHED.values()][::-1] if own is None else [SEARCHED[frozenset(own.columns)] if own.searched else own]
 
 
-SEARCHED = [*{frozenset(row.columns): row for row in reversed(ROTATIONS.values()) if row.searched}.values()][::-1]
+def _named_maps(header: Header, *, bare: bool = False) -> list[Columns]:
+    """Return the columns called as the keys of a map, x y z w: with affixes, or alone, or where they may be `bare`."""
+    words = ROTATIONS["quaternion"].names
+    found = header.match(words)
+    return [each for each in found if bare or each.prefix or each.suffix or len(header.names) == len(words)]
 
 
-def _named_maps(header: Header, *, bare: bool = False) -> Iterator[Columns]:
-    """Yield the columns called as the keys of a map, x y z w: with affixes, or alone, or where they may be `bare`."""
-    for row in ROTATIONS.values():
-        for match in header.match(row.names) if row.shape == NAMED else ():
-            if bare or match.prefix or match.suffix or len(header.names) == len(row.names):
-                yield match
-
-
-def _of_representation(row: Representation, header: Header, expected: Notation | None) -> Iterator[Columns]:
-    """Find a representation's columns: those of a rotation, or of a whole pose."""
-    for match in header.match(row.columns, row.angles):
-        yield _rotation(match, row, expected)
-    for match in header.match(row.whole.columns) if row.whole else ():
-        yield _rotation(match, row, expected)._replace(whole=True, unit=1.0)
-
-
-def _standing_alone(row: Representation, header: Header, expected: Notation | None) -> Iterator[Columns]:
+def _standing_alone(row: Representation, header: Header, expected: Notation | None) -> list[Columns]:
     """Find the column that says a rotation by itself, where none of the others is there: `yaw`, `theta`."""
-    alone = [match for word in row.alone for match in header.match((word,), (0,))]
-    if alone:
-        partly = [each for each in header.match(row.columns, partly=True) if any(each.spots[:-1])]
-        others = {(each.prefix, each.suffix) for each in partly}
-        for match in alone:
-            if (match.prefix, match.suffix) not in others and header.is_plain(match):
-                spots = (*[None] * (len(row.columns) - 1), *match.spots)
-                yield _rotation(match._replace(spots=spots), row, expected)
+    alone = [match for word in row.alone for match in header.match((word,), (0,)) if header.is_plain(match)]
+    partly = header.match(row.columns, partly=True) if alone else ()
+    others = {(each.prefix, each.suffix) for each in partly if any(each.spots[:-1])}
+    absent = (None,) * (len(row.columns) - 1)
+    return [
+        _rotation(match._replace(spots=(*absent, *match.spots)), row, expected)
+        for match in alone
+        if (match.prefix, match.suffix) not in others
+    ]
 
 
 def _rotation(columns: Columns, row: Representation, expected: Notation | None) -> Columns:
     """Read the units of a rotation's columns: those of angles, each as its name says."""
-    said: list[bool | None] = []
-    for at, spot in enumerate(columns.spots):
-        unit = spot[1].lower() if spot else ""
-        angle = at in row.angles
-        if unit not in NO_UNIT and not (angle and unit in ANGLES):
-            kind = "of an angle; known are deg, rad" if angle else "of a number that has none"
-            name = columns.names[columns.places.index(spot[0])] if spot else ""
-            columns = columns._replace(wrong=f"column {shown(name)}: unknown unit {shown(unit)} {kind}")
-        said.append(ANGLES.get(unit) if angle else None)
+    columns = columns._replace(spots=tuple(spot and (spot[0], spot[1].lower()) for spot in columns.spots))
+    numbers = {*range(len(columns.spots))}.difference(row.angles)
+    columns = _with_unknown(columns, numbers, NO_UNIT, "of a number that has none")
+    columns = _with_unknown(columns, row.angles, (*NO_UNIT, *ANGLES), "of an angle; known are deg, rad")
+    said = tuple(ANGLES.get(spot[1]) if spot and at in row.angles else None for at, spot in enumerate(columns.spots))
     units = {said[at] for at in row.angles if columns.spots[at]}
     suffix = "_deg" if units == {True} else "_rad" if units == {False} else ""
     axes = f":{expected.axes}" if expected is not None and expected.axes else ""
     notation = expected if expected and row.angles and not suffix else parse_notation(f"{row.name}{suffix}{axes}")
     absent = tuple(at for at, spot in enumerate(columns.spots) if spot is None)
-    return columns._replace(notation=notation, degrees=tuple(said), absent=absent)
+    return columns._replace(notation=notation, degrees=said, absent=absent)
 
 
 def find_poses(names: Sequence[str], expected: Notation | None, count: int, source: str) -> list[PoseColumns]:
@@ -273,11 +271,10 @@ def find_poses(names: Sequence[str], expected: Notation | None, count: int, sour
     if len(positions) > 1:
         positions = [each for each in positions if each.names not in NORMALS]
     if len(positions) <= 1 and len(rotations) <= 1 and count == 1:
-        if not rotations and (half := _half_rotation(header, expected)):
-            raise _refusal(half, source)
-        if not (positions or rotations):
-            none = f"no columns of a point or pose among: {listed(header.names)}; name them with --columns"
-            raise _refusal(none, source)
+        none = f"no columns of a point or pose among: {listed(names)}; name them with --columns"
+        half = "" if rotations else _half_rotation(header, expected)
+        if half or not (positions or rotations):
+            raise _refusal(half or none, source)
         return [_joined(header, positions, rotations)]
     poses = _paired(positions, rotations) if max(len(positions), len(rotations)) <= count else []
     if len(poses) == count:
@@ -331,14 +328,14 @@ def _half_rotation(header: Header, expected: Notation | None) -> str:
     for row in ROTATIONS.values() if expected is None else ():
         if not row.searched and (match := next(header.match(row.columns), None)):
             return f"columns {match.shown} may be {row.name}; then add --from {row.spelling}"
-    if expected is None and (match := next(_named_maps(header, bare=True), None)):
+    for match in _named_maps(header, bare=True) if expected is None else ():
         may_be = f"{match.shown} may be a quaternion or a point and a number"
         return f"{may_be}; add --from xyzw, or --columns with the three"
     for match in header.match(XYZ) if expected is None else ():
         if match.prefix.lower().endswith("rot_"):
             axes = "name them roll, pitch, yaw or rotvec_x, rotvec_y, rotvec_z"
             return f"columns {match.shown} do not say what they are; {axes}"
-    for row in SEARCHED if expected is None else _searched(expected):
+    for row in _searched(expected):
         for match in header.match(row.columns, partly=True):
             if len(match.places) > 1 or (row.alone and header.is_plain(match)):
                 absent = [word for word, spot in zip(row.columns, match.spots, strict=True) if spot is None]
@@ -350,17 +347,14 @@ def _half_rotation(header: Header, expected: Notation | None) -> str:
 
 def _other_names(header: Header) -> str:
     """Recognise four columns that are a quaternion under names nobody has agreed upon: `ox oy oz ow`, `q0 .. q3`."""
-    if len(header.names) < 4:
-        return ""
     folded = {name.lower(): name for name in reversed(header.names)}
     stems = [name[:-1] for name in folded if name[-1:] == "w" and len(name) > 1] + ["q", "q_"]
-    pairs = [(stem, letters) for stem in stems for letters in ("xyzw", "0123", "1234")]
-    for stem, letters in pairs:
-        if (stem, letters) != ("q", "xyzw") and all(stem + letter in folded for letter in letters):
-            shown = [folded[stem + letter] for letter in letters]
+    for stem, letters in product(stems, ("xyzw", "0123", "1234")):
+        found = [folded[stem + letter] for letter in letters if stem + letter in folded]
+        if len(found) == len(letters) and (stem, letters) != ("q", "xyzw"):
             return (
-                f"no qx, qy, qz, qw: {' '.join(shown)} look like a quaternion under other names; name them so, or "
-                f"add --columns x,y,z,{','.join(shown)} --from xyzw (or wxyz)"
+                f"no qx, qy, qz, qw: {' '.join(found)} look like a quaternion under other names; name them so, or "
+                f"add --columns x,y,z,{','.join(found)} --from xyzw (or wxyz)"
             )
     return ""
 
@@ -404,15 +398,13 @@ def _kinship(rotation: Columns, position: Columns) -> tuple[bool, int]:
 
 def find_six(names: Sequence[str], kind: str) -> Columns | None:
     """Find the columns of a twist or a wrench, by the words of its parts; by usual letters only where asked."""
-    if len(names) < 6:
-        return None
     folded = [re.sub(r"[./]", "_", re.sub(BRACKETS, "", name).strip().lower()) for name in names]
-    for each in LETTERS if kind == "" else (kind,):
-        for base in [six_names(each), *(base.split() for base in LETTERS.get(each, ()) * bool(kind))]:
-            for prefix in [name.removesuffix(base[0]) for name in folded if re.fullmatch(f"(.*_)?{base[0]}", name)]:
-                wanted = [prefix + word for word in base]
-                if set(wanted) <= set(folded):
-                    return _six([folded.index(name) for name in wanted], names, each)
+    kinds = [kind] if kind else LETTERS
+    for found, base in [(each, base) for each in kinds for base in (six_names(each), *LETTERS.get(kind, ()))]:
+        for prefix in [name.removesuffix(base[0]) for name in folded if re.fullmatch(f"(.*_)?{base[0]}", name)]:
+            wanted = [prefix + word for word in base]
+            if {*wanted} <= {*folded}:
+                return _six([folded.index(name) for name in wanted], names, found)
     return None
 
 
@@ -429,7 +421,7 @@ def row_shape(pose: PoseColumns, request: Request) -> Shape:
         if not request.operation.moves:
             raise Misused(f"a {position.kind} cannot be taken for a pose; apply moves it")
         return Shape(position.kind, None)
-    unit = position.unit if position else None
+    unit = position.unit if position and not (rotation and rotation.whole) else None
     if rotation is None or rotation.notation is None:
         moved = request.operation.takes_points and request.kind != POSE
         return Shape((request.kind or POINT) if moved else POSE, unit)
@@ -446,9 +438,9 @@ def row_shape(pose: PoseColumns, request: Request) -> Shape:
     first = 0 if unit is None else len(XYZ)
     absent = (*(position.absent if position else ()), *(first + at for at in rotation.absent))
     multiple = request.operation.multiples and notation.representation.whole is not None
-    if rotation.whole:
-        return Shape(POSE, None, notation, degrees, whole=True, multiple=multiple)
-    return Shape(POSE, unit, notation, degrees, radians_at=radians_at, absent=absent, multiple=multiple)
+    return Shape(
+        POSE, unit, notation, degrees, rotation.whole, radians_at=radians_at, absent=absent, multiple=multiple
+    )  # fmt: skip
 
 
 def named_pose(
@@ -461,18 +453,15 @@ def named_pose(
     Raises Misused for names that are not there, or a count that says nothing.
     """
     called, places = places_named(spec, names, width)
-    header = Header(called)
-    if twice := sorted(header.names[place] for place, count in Counter(places).items() if count > 1):
-        raise Misused(f"--columns: {', '.join(twice)} appears twice")
     if kind in SIX:
-        return PoseColumns(_six(places, header.names, kind), None)
+        return PoseColumns(_six(places, called, kind), None)
+    header = Header(called)
     count, rotation = _chosen_rotation(header, places, expected)
     if count == len(places):
         return PoseColumns(None, rotation)
     match = _chosen(header, places[: len(places) - count])
-    if len(match.spots) < len(XYZ):
-        match = match._replace(spots=(*match.spots, None), absent=(2,))
-    return PoseColumns(_position(match), rotation)
+    absent = (2,) * (len(match.spots) < len(XYZ))
+    return PoseColumns(_position(match._replace(spots=(*match.spots, *[None] * len(absent)), absent=absent)), rotation)
 
 
 def wholes_of(expected: Notation | None) -> list[Notation]:
@@ -484,30 +473,33 @@ def wholes_of(expected: Notation | None) -> list[Notation]:
 
 def _chosen(header: Header, places: Sequence[int]) -> Columns:
     """Take columns as they were chosen, with the units that their names say."""
-    spots = []
-    for place in places:
-        name = header.names[place]
-        bracket, said = re.search(BRACKETS, name), UNITS.match(name.lower(), max(name.rfind("_"), 0))
-        spots.append((place, bracket[1] if bracket else (said[1] or said[2]) if said else ""))
-    return header.columns(spots)
+    names = [header.names[place] for place in places]
+    said = [(re.search(BRACKETS, name), UNITS.match(name.lower(), max(name.rfind("_"), 0))) for name in names]
+    return header.columns([(place, _unit(*each)) for place, each in zip(places, said, strict=True)])
+
+
+def _unit(bracket: re.Match[str] | None, said: re.Match[str] | None) -> str:
+    """Return the unit that is in brackets, else that behind an underscore."""
+    return bracket[1] if bracket else (said[1] or said[2]) if said else ""
 
 
 def _chosen_rotation(header: Header, places: Sequence[int], expected: Notation | None) -> tuple[int, Columns | None]:
     """Return how many of the chosen columns, from the last, are a rotation, and which: by name, as set, by count."""
-    for count in (len(places), len(places) - 3, len(places) - 2):
+    size = len(places)
+    for count in (size, size - 3, size - 2):
         found = _by_names(header, places[-count:], expected) if count > 0 else None
-        if found is not None and (count != len(places) - 2 or found.absent):
+        if found is not None and (count != size - 2 or found.absent):
             return count, found
-    if expected is None and len(places) == len(XYZ):
+    if expected is None and size == len(XYZ):
         return 0, None
     for notation in wholes_of(expected):
-        if notation.representation.whole and len(places) == len(notation.representation.whole.columns):
-            found = _rotation(_chosen(header, places), notation.representation, expected)
-            return len(places), found._replace(whole=True, unit=1.0, notation=notation)
+        row = notation.representation
+        if row.whole and size == len(row.whole.columns):
+            return size, _rotation(_chosen(header, places), row, notation)._replace(whole=True, unit=1.0)
     if expected is None:
-        raise Misused(f"--columns: {len(places)} columns do not say what they are; add --from REP")
-    if len(places) not in expected.counts:
-        raise Misused(f"--columns: {expected.counted}; found {len(places)}")
+        raise Misused(f"--columns: {size} columns do not say what they are; add --from REP")
+    if size not in expected.counts:
+        raise Misused(f"--columns: {expected.counted}; found {size}")
     size = len(expected.representation.columns)
     return size, _rotation(_chosen(header, places[-size:]), expected.representation, expected)
 
@@ -515,13 +507,9 @@ def _chosen_rotation(header: Header, places: Sequence[int], expected: Notation |
 def _by_names(header: Header, places: Sequence[int], expected: Notation | None) -> Columns | None:
     """Return the rotation whose columns these are, in their order."""
     chosen = Header([header.names[place] for place in places])
-    for row in dict.fromkeys([*([expected.representation] if expected is not None else ()), *ROTATIONS.values()]):
-        own = expected if expected is not None and expected.representation is row else None
-        if not (row.searched or own):
-            continue
-        for each in (*_of_representation(row, chosen, own), *_standing_alone(row, chosen, own)):
-            if each.places == tuple(range(len(places))):
-                return each._replace(places=tuple(places), prefix="", suffix="")
+    for each in [each for own in dict.fromkeys((expected, None)) for each in find_rotations(chosen, own)]:
+        if each.places == tuple(range(len(places))):
+            return each._replace(places=tuple(places), prefix="", suffix="")
     return None
 
 
@@ -529,7 +517,10 @@ def places_named(spec: str, names: Sequence[str] | None, width: int) -> tuple[Se
     """Return what columns are called, and the places of those that are chosen by names, numbers or ranges from 1."""
     numbers = {name: place for place, name in reversed([*enumerate(names or ())])}
     places = [place for word in spec.split(",") for place in _places(word.strip(), numbers, width)]
-    return names or [f"column {place + 1}" for place in range(width)], places
+    called = names or [f"column {place + 1}" for place in range(width)]
+    if twice := sorted(called[place] for place, count in Counter(places).items() if count > 1):
+        raise Misused(f"--columns: {', '.join(twice)} appears twice")
+    return called, places
 
 
 def _places(word: str, numbers: dict[str, int], width: int) -> list[int]:
