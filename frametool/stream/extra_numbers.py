@@ -30,18 +30,15 @@ from frametool.grammar.names import RATES
 from frametool.grammar.pose import LEFT_OUT, SCALE, read_angle_unit
 from frametool.grammar.readers import Misfit, NotARotation, read_number, within
 from frametool.ros.messages import whole_list
-from frametool.stream.layout import Kept, New
-from frametool.stream.row_layout import IDENTITY, MOVERS, PARTS, POINT, POSE, RATE, TWIST, VECTOR, WRENCH, Shape
+from frametool.stream.row_layout import IDENTITY, MOVERS, NORMAL, PARTS, POINT, POSE, RATE, TWIST, VECTOR, WRENCH, Shape
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from frametool.geometry.types import Components, Namespace
     from frametool.grammar.readers import Path, Reading
-    from frametool.stream.layout import Column
     from frametool.stream.record import Record, RecordPlace
-    from frametool.stream.request import Request
-    from frametool.stream.row_layout import Target
+    from frametool.stream.request import Operation, Request
     from frametool.stream.table import Table
 
 
@@ -204,37 +201,29 @@ def _refuse_extra(table: Table, axes: str, others: str, source: str) -> None:
         raise FormatError(message, source=source, line=1)
 
 
-def with_rates(
-    table: Table, request: Request, shapes: Sequence[Shape], targets: Sequence[Target], places: Sequence[int],
-    columns: Sequence[Column], source: str,
-) -> tuple[tuple[Shape, ...], tuple[Target, ...], tuple[int, ...], list[Column]]:  # fmt: skip
-    """Add the velocities and rates in a table's columns, three by three, which turn with the axes of poses.
+def find_rates(
+    names: Sequence[str], taken: Collection[int], operation: Operation, source: str
+) -> list[tuple[tuple[int, ...], str]]:
+    """Find the velocities and rates in a table's columns, three by three, which turn with the axes of poses.
 
     Warns of those that are taken to be along the axes of the world, and of those that stay.
     """
-    names, rates = table.names or (), dict[tuple[str, ...], list[int]]()
-    for name, place in sorted(zip(names, range(table.width), strict=True)):
-        if (match := re.fullmatch(RATES, name)) and place not in places:
+    rates: dict[tuple[str, ...], list[int]] = {}
+    for name, place in sorted(zip(names, range(len(names)), strict=True)):
+        if (match := re.fullmatch(RATES, name)) and place not in taken:
             rates.setdefault(match.groups(""), []).append(place)
-    turned = [] if request.columns or request.operation.mirrors else [each for each in rates.values() if len(each) == 3]
-    stay = [] if request.columns else [names[at] for each in rates.values() if each not in turned for at in each]
-    if stay:
+    turned = [] if operation.mirrors else [tuple(each) for each in rates.values() if len(each) == 3]
+    if stay := [names[at] for each in rates.values() if tuple(each) not in turned for at in each]:
         warn(f"{source}: {listing(stay, 9)} keep to the old axes: poses and covariances turn alone")
-    kinds = [VECTOR if names[each[0]][0] in "vV" else RATE for each in turned]
-    at_world = [names[at] for each, kind in zip(turned, kinds, strict=True) if kind == VECTOR for at in each]
-    if at_world and request.operation.right:
+    kinds = [NORMAL if names[each[0]][0] in "vV" else RATE for each in turned]
+    at_world = [names[at] for each, kind in zip(turned, kinds, strict=True) if kind == NORMAL for at in each]
+    if at_world and operation.right:
         warn(f"{source}: {listing(at_world, 9)} are along the axes of the world; call those of the body body_vx ..")
-    first = 1 + max((each.number for each in columns if isinstance(each, New)), default=-1)
-    number = {place: first + at for at, place in enumerate(place for each in turned for place in each)}
-    more = tuple(map(Shape, kinds))
-    made = {place: New(at, request.prefix + names[place]) for place, at in number.items()}
-    columns = [made.get(each.place, each) if isinstance(each, Kept) and not request.keep else each for each in columns]
-    columns += made.values() if request.keep else ()
-    return (*shapes, *more), (*targets, *map(request.target, more)), (*places, *number), columns
+    return [*zip(turned, kinds, strict=True)]
 
 
 MIRRORED = "the covariance cannot be carried through axes that mirror; leave it out"
-SCALED_ALONE = (POINT, VECTOR, POSE)  # what a similarity moves
+SCALED_ALONE = (POINT, VECTOR, NORMAL, POSE)  # what a similarity moves
 
 
 def with_own(
@@ -300,7 +289,7 @@ def move(shape: Shape, own: Components, extra: Components, mover: Components, *,
         x, y, z = own
         return (*MOVERS[kind](*pose, s * x, s * y, s * z), *extra)
     moved = MOVERS[kind](*pose, *own)
-    if len(mover) > EXACT:
+    if len(mover) > EXACT and kind != NORMAL:
         if kind not in (POINT, VECTOR):
             raise ValueInvalid(f"the covariance cannot be carried through to a {kind}; leave --covariance out")
         size = sum(shape.covariance[:1])

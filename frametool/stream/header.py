@@ -517,10 +517,7 @@ def places_named(spec: str, names: Sequence[str] | None, width: int) -> tuple[Se
     """Return what columns are called, and the places of those that are chosen by names, numbers or ranges from 1."""
     numbers = {name: place for place, name in reversed([*enumerate(names or ())])}
     places = [place for word in spec.split(",") for place in _places(word.strip(), numbers, width)]
-    called = names or [f"column {place + 1}" for place in range(width)]
-    if twice := sorted(called[place] for place, count in Counter(places).items() if count > 1):
-        raise Misused(f"--columns: {', '.join(twice)} appears twice")
-    return called, places
+    return names or [f"column {place + 1}" for place in range(width)], places
 
 
 def _places(word: str, numbers: dict[str, int], width: int) -> list[int]:

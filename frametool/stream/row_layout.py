@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 POINT, VECTOR, POSE, TWIST, WRENCH, ACCEL = "point", "vector", "pose", "twist", "wrench", "accel"
 ROTATION = "rotation"  # without a position, which no move gives it
-RATE = "rate"  # a vector along the axes of a body
+NORMAL, RATE = "normal", "rate"  # vectors that turn along with a point or pose; the one along the axes of its body
 ATTITUDE = "attitude"  # a rotation of the frame itself, seen from a fixed world
 TURNED = (POSE, ROTATION, ATTITUDE)
 PARTS = {TWIST: ("linear", "angular"), WRENCH: ("force", "torque"), ACCEL: ("linear", "angular")}
@@ -29,6 +29,7 @@ MOVERS: dict[str, Callable[..., Components]] = {  # by a pose, whose seven numbe
     "": lambda *_: (),
     POINT: rigid.apply,
     VECTOR: lambda _x, _y, _z, *numbers: quaternion.rotate(*numbers),
+    NORMAL: lambda _x, _y, _z, *numbers: quaternion.rotate(*numbers),
     RATE: lambda _x, _y, _z, *numbers: quaternion.rotate(*numbers),
     ROTATION: rigid.compose,
     ATTITUDE: lambda *numbers: rigid.compose(*(*numbers[7:], *rigid.inverse(*numbers[:7]))),

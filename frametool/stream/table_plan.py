@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, Misused, ValueInvalid, alternatives, shown
 from frametool.grammar.names import (
     NAME_KEYS,
-    NORMALS,
     PARENT_COLUMNS,
     PARENT_KEYS,
     in_nanoseconds,
@@ -21,6 +21,7 @@ from frametool.grammar.readers import AXES_KEY
 from frametool.stream.evaluate import Plan
 from frametool.stream.header import (
     XYZ,
+    Columns,
     PoseColumns,
     find_poses,
     find_six,
@@ -31,8 +32,8 @@ from frametool.stream.header import (
     wholes_of,
 )
 from frametool.stream.layout import NAME, PARENT, Fixed, Kept, Layout, Named, New, lay_out, refuse_repeated
-from frametool.stream.request import PLAIN
-from frametool.stream.row_layout import POINT, POSE, RATE, SIX, VECTOR, Shape, place_of, six_names
+from frametool.stream.request import PAIR, PLAIN
+from frametool.stream.row_layout import NORMAL, POINT, POSE, RATE, SIX, Shape, place_of, six_names
 from frametool.stream.table import rename_of
 from frametool.text.numbers import number_or_none
 
@@ -45,10 +46,13 @@ if TYPE_CHECKING:
     from frametool.stream.table import Table
 
 
-def plan_table(table: Table, request: Request, source: str, *, stamped: bool) -> tuple[Plan, Layout]:
+def plan_table(
+    table: Table, request: Request, source: str, normals: Sequence[tuple[str, ...]], *, stamped: bool
+) -> tuple[Plan, Layout]:
     """Choose the columns that are read and written; raises FormatError that names the columns there are.
 
-    Where all numbers are wanted no text is put together; stamped: a column with the name of a stamp is one then.
+    Where all numbers are wanted no text is put together.
+    normals: the columns of vectors that turn with points; stamped: a column with the name of a stamp is one
     """
     poses = _find_if_read(table, request, source)
     only_turned = not request.operation.moves and request.keeps_position and request.gathered is None
@@ -56,26 +60,29 @@ def plan_table(table: Table, request: Request, source: str, *, stamped: bool) ->
     on_earth = bool(poses) and poses[0].position is not None and place_of(poses[0].position.unit) is not None
     if request.poses == 1 and only_turned and not (request.all_numbers or on_earth):
         poses = [_without_position(poses[0], request, table, source)]
-    places: tuple[int, ...] = ()
-    for columns in [columns for pose in poses for columns in pose if columns]:
-        if columns.wrong:
-            raise _refusal(columns.wrong, source)
-        places += columns.places
+    if wrong := next((each.wrong for pose in poses for each in pose if each and each.wrong), ""):
+        raise _refusal(wrong, source)
+    names = table.names or ()
     asked = tuple(_place(name, _names_or_numbers(table), source) for name in request.operation.columns)
     shapes = _shapes(poses, request, len(asked))
     if on_earth or request.place is not None:
         from frametool.stream.earth_columns import readers_of, settle
 
-        request, shapes = settle(request, shapes, table.names or (), source, on_earth=on_earth)
+        request, shapes = settle(request, shapes, names, source, on_earth=on_earth)
     extra: tuple[int, ...] = ()
-    if any(map(may_be_uncertain, table.names or ())):
+    if any(map(may_be_uncertain, names)):
         from frametool.stream.extra_numbers import covariance_columns
 
         extra, shapes = covariance_columns(table, request, shapes, source)
     request = request.for_kind(shapes[0].kind) if shapes else request
-    several = request.operation.moves and len(shapes) > 1
-    targets = tuple(map(request.target, shapes)) if several else (request.target(shapes[0] if shapes else Shape(POSE)),)
-    places += (*extra, *asked)
+    own = [*chain.from_iterable(map(_places_of, poses)), *extra]
+    if twice := sorted({table.name(place) for place in own if own.count(place) > 1}):
+        raise Misused(f"--columns: {', '.join(twice)} appears twice")
+    along = _turning_along(names, poses, request, normals, source)
+    poses, shapes = [*poses, *(pose for pose, _ in along)], (*shapes, *(Shape(kind) for _, kind in along))
+    has_one = not shapes or request.operation.of == PAIR  # what becomes of a row is one thing
+    targets = tuple(map(request.target, shapes[:1] or (Shape(POSE),) if has_one else shapes))
+    places = (*own, *asked, *chain.from_iterable(_places_of(pose) for pose, _ in along))
     frames = _frame_columns(table, request, source, on_earth=on_earth)
     stays = not request.poses or (request.operation.moves and request.rename is None)
     name = None if stays else _first_called(NAME_KEYS, table)
@@ -85,26 +92,24 @@ def plan_table(table: Table, request: Request, source: str, *, stamped: bool) ->
     words, marked = readers_of(shapes[0]) if on_earth else ({}, dict.fromkeys(asked_at, number_or_none))
     named = ({frames[0]: PARENT} if frames and request.poses else {}) | ({} if name is None else {name: NAME})
     poses = [_written(pose) for pose in poses] if on_earth else poses
-    if several:
-        written = _several(table, poses, shapes, targets, request, named)
-    else:
-        written = _columns(table, poses, shapes, targets[0], request, named, extra)
-    if request.operation.turns and table.names and poses and poses[0].rotation:
-        from frametool.stream.extra_numbers import with_rates
-
-        shapes, targets, places, written = with_rates(table, request, shapes, targets, places, written, source)
+    written = _columns(table, poses, shapes, targets, request, named, extra)
     if table.header:
-        refuse_repeated(written, table.names or ())
+        refuse_repeated(written, names)
     time = _time_column(table, request, source)
-    below = None if time is None or not table.names else nanoseconds_beside(table.names, time)
+    below = None if time is None or not names else nanoseconds_beside(names, time)
     if stamped and request.all_numbers and time is None:
         time, below = _usual_stamps(table, request, places, frames)
     pieces, stretches = ((), ()) if request.all_numbers else lay_out(written, table.width, table.delimiter)
-    layout = Layout(tuple(written), tuple(places), frames, stretches, time, below, name)
+    layout = Layout(tuple(written), places, frames, stretches, time, below, name)
     return Plan(
         shapes, targets, request, tuple(map(table.name, places)), pieces, b"" if table.delimiter else b"nan", edge_of,
         frame_column=table.name(frames[0]) if len(frames) == 1 else "", words=words, marked=marked,
     ), layout  # fmt: skip
+
+
+def _places_of(pose: PoseColumns) -> tuple[int, ...]:
+    """Return where the numbers of a point or pose are."""
+    return tuple(place for each in pose if each is not None for place in each.places)
 
 
 def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
@@ -185,29 +190,29 @@ def _find_named(names: Sequence[str], request: Request, source: str) -> list[Pos
     return find_poses(others, request.given, request.poses, source)
 
 
-def with_vectors(
-    names: Sequence[str] | None, request: Request, vectors: Sequence[tuple[str, ...]] = NORMALS
-) -> Request:
-    """Ask for the vectors that turn with the points of a file, where its points are not named otherwise."""
-    known, operation = {*(names or ())}, request.operation
-    if not known >= {*XYZ} or request.columns or request.kind not in ("", POINT):
-        return request
-    there = [columns for columns in vectors if known >= {*columns}]
-    if not there:
-        return request
-    if operation.turns and (operation.left is not None or operation.mirrors):
+def _turning_along(
+    names: Sequence[str], poses: Sequence[PoseColumns], request: Request, normals: Sequence[tuple[str, ...]],
+    source: str,
+) -> list[tuple[PoseColumns, str]]:  # fmt: skip
+    """Find the vectors that turn along with the point or pose of a row, each with its kind."""
+    operation, known = request.operation, {*names}
+    if not poses or request.columns or operation.formula is not None:
+        return []
+    there = [each for each in normals if known >= {*each}] if known >= {*XYZ} and request.kind in ("", POINT) else []
+    if there and operation.turns and (operation.left is not None or operation.mirrors):
         named = ", ".join(map(" ".join, there))
         raise Misused(f"{named} would keep to the old axes; --columns x,y,z turns the points alone, apply all of them")
-    if not operation.moves:
-        return request
-    columns = (",".join(XYZ), *(",".join(each) for each in there))
-    kinds = (POINT, *[VECTOR] * len(there))
-    return request._replace(columns=columns, kinds=kinds, poses=len(columns), notations=())
+    found = [(tuple(map(names.index, each)), NORMAL) for each in there if operation.moves]
+    if operation.turns and poses[0].rotation:
+        from frametool.stream.extra_numbers import find_rates
+
+        found += find_rates(names, _places_of(poses[0]), operation, source)
+    return [(PoseColumns(Columns(at, tuple(names[each] for each in at)), None), kind) for at, kind in found]
 
 
 def own_count(plan: Plan, width: int) -> int:
     """Return how many of the numbers of a row's result are not those of vectors that turn along."""
-    has_vectors = plan.shapes and plan.shapes[-1].kind in (VECTOR, RATE)
+    has_vectors = plan.shapes and plan.shapes[-1].kind in (NORMAL, RATE)
     return width - len(XYZ) * (len(plan.targets) - 1) if has_vectors else width
 
 
@@ -319,37 +324,49 @@ def _names_or_numbers(table: Table) -> Sequence[str]:
 
 
 def _columns(
-    table: Table, poses: Sequence[PoseColumns], shapes: Sequence[Shape], target: Target, request: Request,
+    table: Table, poses: Sequence[PoseColumns], shapes: Sequence[Shape], targets: Sequence[Target], request: Request,
     named: Mapping[int, int], covariance: Sequence[int],
 ) -> list[Column]:  # fmt: skip
-    """Put the results where they belong; `named` are the columns of names and their roles."""
-    position, rotation, extras = _new_columns(poses, target, request, shapes[0] if shapes else Shape(POSE))
-    ours = [columns for pose in poses for columns in pose if columns is not None]
+    """Put results where they come from, number for number where these are the same; else to the first of their columns.
+
+    named: the columns of names and their roles.  Raises Misused for several that have other numbers.
+    """
     columns: list[Column] = [Kept(place) for place in range(table.width)]
     only_turned = request.operation.changes_nothing and not request.operation.moves and request.place is None
-    if only_turned and request.by_default and not (request.all_numbers or target.notations or request.keep):
+    if only_turned and request.by_default and not (request.all_numbers or targets[0].notations or request.keep):
         return columns
-    if request.keep or request.operation.only_adds or not ours:
-        return _extra(table, columns, [*position, *rotation, *extras], request.operation.shown or PLAIN)
-    if rename_of(request) is not None:
-        for place, role in named.items():
-            columns[place] = Named(place, role)
-    at: dict[int, list[Column]] = {place: [] for each in ours for place in each.places}
-    if covariance:  # its entries are the last numbers of the result
-        last = len(extras) - len(request.operation.carried(shapes[0]))
-        extras, entries = extras[:last], extras[last:]
-    pose = poses[0]
-    if _in_place(pose, shapes[0], target, request):
-        _put(at, [place for each in ours for place in each.places], [*position, *rotation])
-        at[max(at)] += extras
-    elif pose.position and pose.rotation and target.unit is not None and len(poses) == 1:
-        places = pose.position.places
-        _put(at, places, [*map(Kept, places), *position[len(places) :]] if only_turned else position)
-        at[min(pose.rotation.places)] += [*rotation, *extras]
-    else:
-        at[min(at)] += [*position, *rotation, *extras]
-    if covariance:
-        at |= {place: entries if place == min(covariance) else [] for place in covariance}
+    at: dict[int, list[Column]] = {place: [] for pose in poses for place in _places_of(pose)}
+    adds = request.keep or request.operation.only_adds or not at
+    if not adds and rename_of(request) is not None:
+        at = {place: [Named(place, role)] for place, role in named.items()} | at
+    added: list[Column] = []
+    first = 0
+    for number, target in enumerate(targets):
+        pose = poses[number] if len(poses) == len(targets) else PoseColumns(None, None)  # of a pair
+        shape, places = shapes[number] if shapes else Shape(POSE), _places_of(pose) or tuple(at)
+        position, rotation, extras = _new_columns(pose, target, request, shape, first, several=len(targets) > 1)
+        first += sum(isinstance(each, New) for each in (*position, *rotation, *extras))
+        in_place = _in_place(pose, shape, target)
+        if request.poses > 1 and len(targets) > 1 and (request.notations or not in_place):
+            raise Misused("several --columns are moved as they are written; for --to, or a rotation alone, give one")
+        if adds:
+            added += [*position, *rotation, *extras]
+            continue
+        if covariance and not number:  # its entries are the last numbers of the result
+            last = len(extras) - len(request.operation.carried(shape))
+            at |= {place: extras[last:] if place == min(covariance) else [] for place in covariance}
+            extras = extras[:last]
+        if in_place:
+            _put(at, places, [*position, *rotation])
+            at[max(places)] += extras
+        elif pose.position and pose.rotation and target.unit is not None:
+            places = pose.position.places
+            _put(at, places, [*map(Kept, places), *position[len(places) :]] if only_turned else position)
+            at[min(pose.rotation.places)] += [*rotation, *extras]
+        else:
+            at[min(places)] += [*position, *rotation, *extras]
+    if adds:
+        return _extra(table, columns, added, request.operation.shown or PLAIN)
     return [column for place, old in enumerate(columns) for column in at.get(place, [old])]
 
 
@@ -367,36 +384,8 @@ def _extra(table: Table, columns: Sequence[Column], extras: Sequence[Column], sh
     return [*mixed, *more.values()]
 
 
-def _several(
-    table: Table, poses: Sequence[PoseColumns], shapes: Sequence[Shape], targets: Sequence[Target], request: Request,
-    named: Mapping[int, int],
-) -> list[Column]:  # fmt: skip
-    """Put each of several results where it comes from; raises Misused where it has other numbers."""
-    columns: list[Column] = [Kept(place) for place in range(table.width)]
-    for place, role in named.items() if rename_of(request) is not None else ():
-        columns[place] = Named(place, role)
-    ours = [place for pose in poses for each in pose if each for place in each.places]
-    if twice := sorted({table.name(place) for place in ours if ours.count(place) > 1}):
-        raise Misused(f"--columns: {', '.join(twice)} appears twice")
-    first = 0
-    for pose, shape, target in zip(poses, shapes, targets, strict=True):
-        if request.notations or not _in_place(pose, shape, target, request._replace(poses=1)):
-            raise Misused("several --columns are moved as they are written; for --to, or a rotation alone, give one")
-        places = [place for each in pose if each for place in each.places]
-        for at, place in enumerate(places, first):
-            new = New(at, request.prefix + table.name(place))
-            if request.keep:
-                columns.append(new)
-            else:
-                columns[place] = new
-        first += target.size
-    return columns
-
-
-def _in_place(pose: PoseColumns, shape: Shape, target: Target, request: Request) -> bool:
+def _in_place(pose: PoseColumns, shape: Shape, target: Target) -> bool:
     """Return True if each number of the result is where one of the input did."""
-    if request.poses != 1:
-        return False
     same = not target.notations or shape.notation is None or _same(pose, target)
     placed = (shape.unit is None) == (target.unit is None) and len(shape.absent) == len(target.absent)
     placed = placed and shape.place is target.place is None
@@ -409,30 +398,29 @@ def _same(pose: PoseColumns, target: Target) -> bool:
 
 
 def _new_columns(
-    poses: Sequence[PoseColumns], target: Target, request: Request, shape: Shape
+    pose: PoseColumns, target: Target, request: Request, shape: Shape, first: int, *, several: bool
 ) -> list[list[Column]]:
-    """Name the numbers of the result of rows of a shape: position, rotation, what else there is."""
-    pose = poses[0] if poses else PoseColumns(None, None)
-    rotation, alone = pose.rotation, not request.prefix and len(poses) == 1
+    """Name the numbers of a result, from the one at `first`: position, rotation, what else there is.
+
+    several: there are others, so that its names are those of its columns
+    """
+    rotation, alone, prefix = pose.rotation, not request.prefix or several, request.prefix
     if rotation and alone and _same(pose, target) and rotation.whole == target.whole:
-        turned = list(rotation.names)
+        turned = [prefix + name for name in rotation.names]
     else:
-        prefix, suffix = (rotation.prefix, rotation.suffix) if rotation and alone else (request.prefix, "")
-        turned = [prefix + name + suffix for name in target.names]
-    moved = [request.prefix + name for name in target.position_columns]
-    if target.plain and pose.position:
-        moved = [request.prefix + name for name in pose.position.names]
-    if moved and pose.position and alone and target.place == shape.place:
+        around = (rotation.prefix, rotation.suffix) if rotation and alone else (prefix, "")
+        turned = [name.join(around) for name in target.names]
+    moved = target.position_columns
+    if pose.position and (target.plain or (moved and alone and target.place == shape.place)):
         moved = list(pose.position.names)
-        if target.place is None:
-            moved += [f"{pose.position.prefix}z{pose.position.suffix}"] * (len(moved) < len(XYZ) and not target.absent)
-    extras = [request.prefix + name for name in request.extras(shape)]
+        if target.place is None and not (target.plain or target.absent):
+            moved += [f"{pose.position.prefix}z{pose.position.suffix}"] * (len(moved) < len(XYZ))
     words = (request.operation.shown or target.place or PLAIN).words
-    named = [*enumerate((*moved, *turned, *extras))]
-    new: list[Column] = [New(at, name, words.get(at, ())) for at, name in named]
-    first, last = len(moved), len(moved) + len(turned)
+    names = [*(prefix + name for name in moved), *turned, *(prefix + name for name in request.extras(shape))]
+    new: list[Column] = [New(first + at, name, words.get(at, ())) for at, name in enumerate(names)]
+    begin, end = len(moved), len(moved) + len(turned)
     axes: list[Column] = []
     if target.place is not None and turned and not (target.place == shape.place and AXES_KEY in target.place.fields):
-        axes = [Fixed(target.place.axes, request.prefix + AXES_KEY)]
-    extra = [column for column, (_, name) in zip(new[last:], named[last:], strict=True) if name not in turned]
-    return [[*new[:first], *axes], new[first:last], extra]
+        axes = [Fixed(target.place.axes, prefix + AXES_KEY)]
+    extra = [column for column, name in zip(new[end:], names[end:], strict=True) if name not in turned]
+    return [[*new[:begin], *axes], new[begin:end], extra]

@@ -29,7 +29,7 @@ from frametool.stream.table import (
     table_block,
     without_comments,
 )
-from frametool.stream.table_plan import own_count, plan_table, with_vectors
+from frametool.stream.table_plan import own_count, plan_table
 from frametool.text.cells import RecordEnds, torn_record
 from frametool.text.lines import read_blocks, whole_lines
 
@@ -104,17 +104,16 @@ class PlannedRows:
     """
 
     def __init__(
-        self, table: Table, request: Request, source: str, vectors: Sequence[tuple[str, ...]] = NORMALS, *,
+        self, table: Table, request: Request, source: str, normals: Sequence[tuple[str, ...]] = NORMALS, *,
         stamped: bool = True,
     ) -> None:  # fmt: skip
         """Plan the rows of a table; raises FormatError or Misused where they do not fit what is asked for.
 
-        vectors: the columns of vectors that turn with points; stamped: a column with the name of a stamp is one
+        normals: the columns of vectors that turn with points; stamped: a column with the name of a stamp is one
         """
         self.table = table
-        request = with_vectors(table.names, request, vectors)
         self.request, self.unasked = settle_stamps(table, request, source)
-        self.plan, self.layout = plan_table(table, self.request, source, stamped=stamped)
+        self.plan, self.layout = plan_table(table, self.request, source, normals, stamped=stamped)
         self.shape = self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
         self.naming = Naming(table, self.layout, self.request.for_kind(self.shape.kind), self.shape)
         if request.gathered is not None:
