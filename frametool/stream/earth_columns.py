@@ -113,17 +113,14 @@ def _find(groups: Groups, earth: Earth, expected: str) -> PoseColumns | None:
     expected: the representation that --from names.
     Raises ValueInvalid for several, for heights that are not above the ellipsoid, and for units that are not known.
     """
-    found = [
-        (spots, columns)
-        for spots in groups.values()
-        for kind in ((expected,) if expected else POSITIONS)
-        if (columns := _position(kind, spots, groups, earth)) is not None
-    ]
+    kinds = (expected,) if expected else POSITIONS
+    found = [(spots, _position(kind, spots, groups, earth)) for spots in groups.values() for kind in kinds]
+    found = [each for each in found if each[1] is not None]
     plain = [each for each in found if each[0] is groups.get("")] or found
     if len(plain) > 1:
-        several = "; ".join(columns.shown for _, columns in plain)
+        several = "; ".join(columns.shown for _, columns in plain if columns)
         raise ValueInvalid(f"several positions on the Earth: {several}; choose with --columns NAMES --from lla")
-    return PoseColumns(plain[0][1], _heading(*plain[0])) if plain else None
+    return PoseColumns(plain[0][1], _heading(plain[0][0])) if plain else None
 
 
 def _position(kind: str, spots: dict[str, NamedColumn], groups: Groups, earth: Earth) -> Columns | None:
@@ -155,8 +152,8 @@ def _columns(kind: str, fields: dict[str, NamedColumn], spots: dict[str, NamedCo
             what = f"column {shown(spot.name)}: unknown unit {shown(spot.unit)} of a length here; known is m"
             raise ValueInvalid(what)
     refuse_not_read(spots)
-    staying = {name: spots[name] for name in (STATUS, PARENT) if name in spots}
-    fields = fields | {name: spots[name] for name in (AXES,) if name in spots} | staying
+    staying = [name for name in (STATUS, PARENT) if name in spots]
+    fields = fields | {name: spots[name] for name in (AXES, *staying) if name in spots}
     axes, origin = (earth.axes or kind, earth.origin) if kind in LOCAL else (earth.axes, None)
     place = Place(kind, (*fields,), axes, earth.zone if kind == UTM and ZONE not in fields else None, origin)
     places, names, _ = zip(*fields.values(), strict=True)
@@ -170,14 +167,14 @@ def _in_radians(spot: NamedColumn) -> bool:
     return DEGREES[spot.unit]
 
 
-def _heading(spots: dict[str, NamedColumn], position: Columns) -> Columns | None:
+def _heading(spots: dict[str, NamedColumn]) -> Columns | None:
     """Return the rotation that a heading with its unit says."""
     spot = spots.get("heading")
-    if spot is None or spot.unit == "" or position.unit is None:
+    if spot is None or spot.unit == "":
         return None
-    radians = _in_radians(spot)
-    heading = Notation(f"heading_{'rad' if radians else 'deg'}", HEADING, NED, degrees=not radians)
-    return Columns((spot.place,), (spot.name,), notation=heading, degrees=(not radians,))
+    degrees = not _in_radians(spot)
+    heading = Notation(f"heading_{'deg' if degrees else 'rad'}", HEADING, NED, degrees=degrees)
+    return Columns((spot.place,), (spot.name,), notation=heading, degrees=(degrees,))
 
 
 def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumns | None:
@@ -189,7 +186,7 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
     every = sorted((spot, field) for spots in groups.values() for field, spot in spots.items())
     earth, expected = request.earth or Earth(), request.given_place
     in_ecef = {spot.place for spot, field in every if field in ECEF_COLUMNS and not expected}
-    positions = find_positions(Header(["" if at in in_ecef else name for at, name in enumerate(names)]))
+    positions = find_positions(_header_of(names, in_ecef))
     if not expected and positions:
         said = [spot.name for spot, field in every if may_be_on_earth(spot.name) or field == "lon"]
         if not request.operation.keeps_frames and said:
@@ -200,14 +197,13 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
         found = _find(groups, earth, expected)
         if found is None and (place := Place.of_xyz(expected, earth)) and positions:
             found = PoseColumns(positions[0]._replace(unit=place), None)
-        if problem := _problem(found, names, {field for _, field in every}, request):
-            raise ValueInvalid(problem)  # noqa: TRY301 - so that it gets its place as others do
+        _check_found(found, names, {field for _, field in every}, request)
     except ValueInvalid as error:
         raise FormatError(str(error), source=source, line=1) from None
     if found is None or found.position is None:
         return None
-    taken = {*found.position.places, *(found.rotation.places if found.rotation else ())}
-    turned = find_rotations(Header(["" if at in taken else name for at, name in enumerate(names)]), request.given)
+    taken = {place for columns in found if columns for place in columns.places}
+    turned = find_rotations(_header_of(names, taken), request.given)
     turned += [found.rotation] if found.rotation else []
     if len(turned) > 1:
         several = " and ".join(each.shown for each in turned)
@@ -218,31 +214,30 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
     return PoseColumns(found.position, next(iter(turned), None))
 
 
-def _problem(found: PoseColumns | None, names: Sequence[str], fields: Collection[str], request: Request) -> str:
-    """Return why the place of --from, or an incomplete one, cannot be read; "" where all is well."""
+def _header_of(names: Sequence[str], taken: Collection[int]) -> Header:
+    """Return a header without some of its columns, which keep their places."""
+    return Header(["" if at in taken else name for at, name in enumerate(names)])
+
+
+def _check_found(found: PoseColumns | None, names: Sequence[str], fields: Collection[str], request: Request) -> None:
+    """Raise ValueInvalid for an incomplete position, for the one of --from that is not there, and for an idle zone."""
     expected = request.given_place
-    if found is None and (row := POSITIONS.get(expected)):
-        return f"no columns of {expected} ({' '.join(row.columns)}) among: {listed(names)}; name them with --columns"
-    if found is None:
-        return _half(names, fields)
-    place = place_of(found.position.unit) if found.position else None
-    is_held = request.earth is not None and request.earth.zone is not None
-    asked = [each.name for each in request.place.all] if request.place else []
-    if is_held and expected == UTM and place and ZONE in place.fields and UTM not in asked:
-        return "--zone has no effect: each row says its zone"
-    return ""
-
-
-def _half(names: Iterable[str], fields: Collection[str]) -> str:
-    """Return what is missing of a position that is there by half; "" if absent."""
-    if any(name.lower().rpartition(".")[2] == "mgrs" for name in names):
-        return NOT_READ["mgrs"]
-    if ("lat" in fields) != ("lon" in fields):
+    if found is not None:
+        place = place_of(found.position.unit) if found.position else None
+        says_zone = expected == UTM and place is not None and ZONE in place.fields
+        is_asked = request.place is not None and UTM in [each.name for each in request.place.all]
+        if says_zone and not is_asked and request.earth is not None and request.earth.zone is not None:
+            raise ValueInvalid("--zone has no effect: each row says its zone")
+    elif row := POSITIONS.get(expected):
+        what = f"no columns of {expected} ({' '.join(row.columns)}) among: {listed(names)}"
+        raise ValueInvalid(f"{what}; name them with --columns")
+    elif any(name.lower().rpartition(".")[2] == "mgrs" for name in names):
+        raise ValueInvalid(NOT_READ["mgrs"])
+    elif ("lat" in fields) != ("lon" in fields):
         missing = "lon" if "lat" in fields else "lat"
-        return f"half a place on the Earth: no {missing}; add it, or choose with --columns"
-    if {"east", "north"} <= {*fields}:
-        return "east, north and up or down are of an origin; give --origin '{lat: .., lon: ..}'"
-    return ""
+        raise ValueInvalid(f"half a place on the Earth: no {missing}; add it, or choose with --columns")
+    elif {"east", "north"} <= {*fields}:
+        raise ValueInvalid("east, north and up or down are of an origin; give --origin '{lat: .., lon: ..}'")
 
 
 def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Request) -> PoseColumns:
@@ -254,7 +249,7 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
     kind, earth = request.given_place, request.earth or Earth()
     most = _count(kind, earth)
     fields = POSITIONS[kind].names[-most:]
-    own = places[:most]
+    own, behind = places[:most], places[most:]
     if len(own) < (kernels(kind).least or len(fields)) - (kind == UTM and earth.zone is not None):
         raise Misused(f"--columns: {kind} has {most} numbers ({' '.join(fields)}); found {len(own)}")
     spots = [NamedColumn(place, called[place], "") for place in own]
@@ -262,11 +257,9 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
         position = _columns(kind, dict(zip(fields, spots, strict=False)), {}, earth)
     except ValueInvalid as error:
         raise Misused(f"--columns: {error}") from None
-    behind = places[most:]
-    turned = find_rotations(Header([name if at in behind else "" for at, name in enumerate(called)]), None)
+    turned = find_rotations(_header_of(called, {*range(width)}.difference(behind)), None)
     if behind and len(turned) != 1:
-        others = ", ".join(called[at] for at in behind)
-        raise Misused(f"--columns: {others} are no rotation behind {request.given_place}")
+        raise Misused(f"--columns: {', '.join(called[at] for at in behind)} are no rotation behind {kind}")
     return PoseColumns(position, turned[0] if turned else None)
 
 
@@ -349,40 +342,6 @@ def doubt_band(place: Place, columns: Sequence[Floats], line_of: Callable[[int],
     return [RowNote(line_of(row), "band-s", band_s(float(zone[row]), float(northing[row])), ZONE) for row in rows]
 
 
-def check_rows(
-    request: Request, shapes: tuple[Shape, ...], names: Sequence[str], source: str
-) -> tuple[Request, tuple[Shape, ...]]:
-    """Check what rows on the Earth need: axes for rotations, a height; a heading is one in those axes.
-
-    Raises FormatError for a rotation whose axes nobody says.
-    """
-    (shape,) = shapes
-    place = shape.place
-    if place is None:
-        return request, shapes
-    reads = request.operation.moves or not request.operation.keeps_frames or request.place is not None
-    if shape.kind == VECTOR:
-        raise Misused("a vector has no place on the Earth; leave --as vector out")
-    if place.name in (LLA, UTM) and not {"alt", "msl"}.intersection(place.fields) and (reads or request.all_numbers):
-        warn(f"{source}: {NO_ALT}")
-    if request.gathered is not None:
-        request.gathered.frame = ECEF
-    if request.operation.keeps_frames and request.place is None:
-        bare = shape.notation is None and all(each.representation.name == "quaternion" for each in request.notations)
-        request = request._replace(place=Place.written((ECEF,), Earth()), by_default=request.by_default or bare)
-    if shape.notation is None and not (request.operation.inverse or request.operation.similar):
-        has_idle_axes = request.earth and request.earth.axes and request.operation.keeps_frames
-        if has_idle_axes and not (request.all_numbers or any(map(may_be_uncertain, names))):
-            raise Misused("--local-axes has no effect: the rows have no rotation")
-        return request, shapes
-    if shape.notation is None or not (place.axes or AXES in place.fields):
-        raise FormatError(UNSAID, source=source, line=1)
-    level = shape.notation.representation is HEADING
-    if level and place.axes == ECEF:
-        raise FormatError("a heading is clockwise from north, which axes ecef do not have", source=source, line=1)
-    return request, (shape._replace(unit=place._replace(level=level)),)
-
-
 def settle(
     request: Request, shapes: tuple[Shape, ...], names: Sequence[str], source: str, *, on_earth: bool
 ) -> tuple[Request, tuple[Shape, ...]]:
@@ -390,22 +349,53 @@ def settle(
 
     Raises FormatError, CalcError.
     """
-    if on_earth:
-        request, shapes = check_rows(request, shapes, names, source)
     operation = request.operation
+    if on_earth and shapes[0].place is not None:
+        request, shape = _check_rows(request, shapes[0], shapes[0].place, names, source)
+        shapes = (shape,)
     is_formula = operation.formula is not None
     stays = not (is_formula or operation.moves)
     says_itself = stays and (on_earth or not {*PARENT_COLUMNS}.isdisjoint(names))
-    if says_itself or (not is_formula and (request.place is None or request.frames)):
+    if says_itself or request.place is None or (not is_formula and request.frames):
         return request, shapes  # a look-up looks at each row, an expression at its own frames
     rename = (request.for_kind(shapes[0].kind) if shapes else request).rename
     frame = None if stays or rename is None else rename(ECEF if on_earth and is_formula else None, None)[0]
     try:
-        if request.place is not None:
-            check_in_ecef(frame, request.place)
+        check_in_ecef(frame, request.place)
     except ValueInvalid as error:
         raise FormatError(str(error), source=source, line=1) from None
     return request, shapes
+
+
+def _check_rows(
+    request: Request, shape: Shape, place: Place, names: Sequence[str], source: str
+) -> tuple[Request, Shape]:
+    """Check what rows on the Earth need: axes for rotations, a height; a heading is one in those axes.
+
+    Raises FormatError for a rotation whose axes nobody says.
+    """
+    operation = request.operation
+    reads = operation.moves or not operation.keeps_frames or request.place is not None or request.all_numbers
+    if shape.kind == VECTOR:
+        raise Misused("a vector has no place on the Earth; leave --as vector out")
+    if place.name in (LLA, UTM) and not {"alt", "msl"}.intersection(place.fields) and reads:
+        warn(f"{source}: {NO_ALT}")
+    if request.gathered is not None:
+        request.gathered.frame = ECEF
+    if operation.keeps_frames and request.place is None:
+        bare = shape.notation is None and all(each.representation.name == "quaternion" for each in request.notations)
+        request = request._replace(place=Place.written((ECEF,), Earth()), by_default=request.by_default or bare)
+    if shape.notation is None and not (operation.inverse or operation.similar):
+        has_idle_axes = request.earth and request.earth.axes and operation.keeps_frames
+        if has_idle_axes and not (request.all_numbers or any(map(may_be_uncertain, names))):
+            raise Misused("--local-axes has no effect: the rows have no rotation")
+        return request, shape
+    if shape.notation is None or not (place.axes or AXES in place.fields):
+        raise FormatError(UNSAID, source=source, line=1)
+    level = shape.notation.representation is HEADING
+    if level and place.axes == ECEF:
+        raise FormatError("a heading is clockwise from north, which axes ecef do not have", source=source, line=1)
+    return request, shape._replace(unit=place._replace(level=level))
 
 
 # --- records ---

@@ -189,8 +189,8 @@ def find_positions(header: Header) -> list[Columns]:
 def _position(columns: Columns) -> Columns:
     """Read the units of a position's columns, of which one may be absent."""
     columns = _with_unknown(columns, range(3), LENGTHS, f"of a length; known are {', '.join(filter(None, LENGTHS))}")
-    x, y, z = units = [LENGTHS.get(spot[1] if spot else "", 1.0) for spot in columns.spots]
-    return columns._replace(unit=x if x == y == z else tuple(units))
+    x, y, z = [LENGTHS.get(spot[1] if spot else "", 1.0) for spot in columns.spots]
+    return columns._replace(unit=x if x == y == z else (x, y, z))
 
 
 def _with_unknown(columns: Columns, places: Iterable[int], known: Container[str], of: str) -> Columns:
@@ -443,20 +443,22 @@ def row_shape(pose: PoseColumns, request: Request) -> Shape:
     )  # fmt: skip
 
 
-def named_pose(
-    spec: str, names: Sequence[str] | None, width: int, expected: Notation | None, kind: str = ""
-) -> PoseColumns:
+def named_pose(spec: str, names: Sequence[str] | None, width: int, request: Request, kind: str) -> PoseColumns:
     """Take columns by name or by position from 1 (`2-8`): x y z, a rotation's, or first the one and then the other.
 
     kind: what --as says; a twist or a wrench has six.
 
     Raises Misused for names that are not there, or a count that says nothing.
     """
+    if request.given_place:
+        from frametool.stream.earth_columns import chosen_pose
+
+        return chosen_pose(spec, names, width, request)
     called, places = places_named(spec, names, width)
     if kind in SIX:
         return PoseColumns(_six(places, called, kind), None)
     header = Header(called)
-    count, rotation = _chosen_rotation(header, places, expected)
+    count, rotation = _chosen_rotation(header, places, request.given)
     if count == len(places):
         return PoseColumns(None, rotation)
     match = _chosen(header, places[: len(places) - count])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from itertools import chain
 from typing import TYPE_CHECKING
 
@@ -54,7 +55,10 @@ def plan_table(
     Where all numbers are wanted no text is put together.
     normals: the columns of vectors that turn with points; stamped: a column with the name of a stamp is one
     """
-    poses = _find_if_read(table, request, source)
+    formula, poses = request.operation.formula, list[PoseColumns]()
+    is_needed = formula is None or formula.reads_row or bool(request.columns)
+    with suppress(*() if is_needed else (FormatError,)):
+        poses = _find(table, request, source)
     only_turned = not request.operation.moves and request.keeps_position and request.gathered is None
     only_turned = only_turned and not (request.operation.turns and poses and poses[0].rotation is None)  # a point
     on_earth = bool(poses) and poses[0].position is not None and place_of(poses[0].position.unit) is not None
@@ -120,7 +124,8 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
         if len(request.columns) != request.poses:
             raise Misused(f"--columns is given {len(request.columns)} times, for {request.poses} poses in a row")
         kinds = request.kinds or (request.kind,) * request.poses
-        return [_chosen(spec, table, request, kind) for spec, kind in zip(request.columns, kinds, strict=True)]
+        chosen = zip(request.columns, kinds, strict=True)
+        return [named_pose(spec, table.names, table.width, request, kind) for spec, kind in chosen]
     if table.pose is not None and request.given is None and request.poses == 1:
         return [table.pose]
     if table.names:
@@ -128,7 +133,7 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
         names = ["" if name == known or may_be_uncertain(name) else name for name in table.names]
         return _find_named(names, request, source)
     if spec := _by_width(table.width, request):
-        return [_chosen(spec, table, request, request.kind)]
+        return [named_pose(spec, None, table.width, request, request.kind)]
     reason = f"{table.width} columns without names do not say what they are; give --from REP, or --columns"
     if request.poses == 1 and request.given:
         reason = f"{request.given.counted}; found {table.width} columns without names; or give --columns"
@@ -138,16 +143,6 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
 def _refusal(reason: str, source: str) -> FormatError:
     """Return the error that columns are not what is wanted; the first line names them."""
     return FormatError(reason, source=source, line=1)
-
-
-def _chosen(spec: str, table: Table, request: Request, kind: str) -> PoseColumns:
-    """Return the columns of a point or pose that are chosen by name or number."""
-    if request.given_place:
-        from frametool.stream.earth_columns import chosen_pose
-
-        return chosen_pose(spec, table.names, table.width, request)
-    notation = None if kind in SIX and not request.columns else request.given
-    return named_pose(spec, table.names, table.width, notation, kind)
 
 
 def _by_width(width: int, request: Request) -> str:
@@ -164,8 +159,7 @@ def _by_width(width: int, request: Request) -> str:
 
         return of_width(width, request)
     if (notation := request.given) is None:
-        wholes = [each.representation.whole for each in wholes_of(None)]
-        return f"1-{width}" if width in (len(XYZ), *(len(whole.columns) for whole in wholes if whole)) else ""
+        return f"1-{width}" if width in (len(XYZ), *(each.counts[-1] for each in wholes_of(None))) else ""
     return f"1-{width}" if width in notation.counts else f"2-{width}" if width - 1 in notation.counts[1:] else ""
 
 
@@ -214,17 +208,6 @@ def own_count(plan: Plan, width: int) -> int:
     """Return how many of the numbers of a row's result are not those of vectors that turn along."""
     has_vectors = plan.shapes and plan.shapes[-1].kind in (NORMAL, RATE)
     return width - len(XYZ) * (len(plan.targets) - 1) if has_vectors else width
-
-
-def _find_if_read(table: Table, request: Request, source: str) -> list[PoseColumns]:
-    """Find the columns of the poses; an expression that does not read the row needs none."""
-    formula = request.operation.formula
-    try:
-        return _find(table, request, source)
-    except FormatError:
-        if formula is None or formula.reads_row or request.columns:
-            raise
-        return []
 
 
 def _shapes(poses: Sequence[PoseColumns], request: Request, asked: int) -> tuple[Shape, ...]:
@@ -335,15 +318,16 @@ def _columns(
     only_turned = request.operation.changes_nothing and not request.operation.moves and request.place is None
     if only_turned and request.by_default and not (request.all_numbers or targets[0].notations or request.keep):
         return columns
-    at: dict[int, list[Column]] = {place: [] for pose in poses for place in _places_of(pose)}
-    adds = request.keep or request.operation.only_adds or not at
-    if not adds and rename_of(request) is not None:
-        at = {place: [Named(place, role)] for place, role in named.items()} | at
+    ours: dict[int, list[Column]] = {place: [] for pose in poses for place in _places_of(pose)}
+    adds = request.keep or request.operation.only_adds or not ours
+    renamed = named.items() if not adds and rename_of(request) is not None else ()
+    at: dict[int, list[Column]] = {place: [Named(place, role)] for place, role in renamed}
+    at |= ours
     added: list[Column] = []
     first = 0
     for number, target in enumerate(targets):
         pose = poses[number] if len(poses) == len(targets) else PoseColumns(None, None)  # of a pair
-        shape, places = shapes[number] if shapes else Shape(POSE), _places_of(pose) or tuple(at)
+        shape, places = shapes[number] if shapes else Shape(POSE), _places_of(pose) or tuple(ours)
         position, rotation, extras = _new_columns(pose, target, request, shape, first, several=len(targets) > 1)
         first += sum(isinstance(each, New) for each in (*position, *rotation, *extras))
         in_place = _in_place(pose, shape, target)

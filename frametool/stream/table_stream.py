@@ -68,31 +68,25 @@ def _first_rows(blocks: Iterator[bytes]) -> bytes | None:
 
 def settle_stamps(table: Table, request: Request, source: str) -> tuple[Request, Timed | None]:
     """Find the column of stamps that a request needs; or, where no option names one, the one nobody asked for."""
-    timed = request.timed
-    extra = request.extra_column
-    if (request.window or request.offset_ns) and extra is None and not (timed and timed.name):
-        extra = ""
-    if extra == "":
-        who = "a velocity" if request.operation.velocity else "--start, --stop, --time-offset"
-        request = request._replace(extra_column=_stamp_column(table, source, who))
-    if timed is None:
-        return request, None
-    if request.operation.formula is not None and not request.operation.shown:
-        name = timed.name or _stamp_column(table, source, "@ row")
-        return request._replace(timed=timed._replace(name=name)), None
-    if timed.name:
-        return request, None
+    timed, extra, operation = request.timed, request.extra_column, request.operation
     found, _ = stamp_places(table.names)
+
+    def stamps(who: str) -> str:
+        if found is None:
+            known = f"; columns: {listing(table.names)}" if table.names else ""
+            message = f"{who}: no column looks like stamps; name it with --time-column{known}"
+            raise Misused(message, source=source, line=1)
+        return table.name(found)
+
+    is_cut = (request.window or request.offset_ns) and extra is None and not (timed and timed.name)
+    if extra == "" or is_cut:
+        who = "a velocity" if operation.velocity else "--start, --stop, --time-offset"
+        request = request._replace(extra_column=stamps(who))
+    if timed is None or timed.name:
+        return request, None
+    if operation.formula is not None and not operation.shown:
+        return request._replace(timed=timed._replace(name=stamps("@ row"))), None
     return request._replace(timed=None), None if found is None else timed._replace(name=table.name(found))
-
-
-def _stamp_column(table: Table, source: str, who: str) -> str:
-    """Name the column of stamps that somebody asks for; raises Misused where none looks so."""
-    found, _ = stamp_places(table.names)
-    if found is None:
-        known = f"; columns: {listing(table.names)}" if table.names else ""
-        raise Misused(f"{who}: no column looks like stamps; name it with --time-column{known}", source=source, line=1)
-    return table.name(found)
 
 
 class PlannedRows:
