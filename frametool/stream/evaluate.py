@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
-from frametool.errors import FrametoolError, ValueInvalid
+from frametool.errors import FrametoolError
 from frametool.frames.stamps import BILLION
 from frametool.geometry import arrays, floats, quaternion, uncertainty
 from frametool.geometry.batch_validation import read_rotations
@@ -39,8 +39,6 @@ from frametool.text.spans import Spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
-
-    from numpy.typing import NDArray
 
     from frametool.geometry.representations import BatchRule
     from frametool.geometry.types import Components, Rigid
@@ -110,17 +108,18 @@ class Run:
         self.off = 0.0
         self.count = len(block.places)
         self.columns = [*np.ascontiguousarray(self._read().T)]
-        if any(shape.covariance for shape in plan.shapes):
-            self._check_covariances()
+        self._check_covariances()
         is_cut = self.count and (self.request.window or block.gone is not None)
         self.outside = self._outside() if is_cut else set[int]()
         self.lone = set[int]()
         with np.errstate(all="ignore"):
-            self.moved = self._compute(self._movers(), state)
+            self.moved = self._compute(state)
             self._doubt_turns()
             self.results, self.locked = self._results()
-        if self.request.weighs and self.count:
-            self._check_weights(block.stamps[0])
+        weights = block.stamps[0] if self.request.weighs and self.count else None
+        if weights is not None and weights.dtype == np.float64:  # labels may be any
+            for row in np.flatnonzero(weights < 0.0).tolist():
+                self._blame(row, self.request.extra_column or "", f"weight {weights[row]:g} is negative")
         if self.outside:
             self.reasons = {row: why for row, why in self.reasons.items() if row not in self.outside}
             self.mended = [row for row in self.mended if row not in self.outside]
@@ -130,7 +129,6 @@ class Run:
         self._note_block()
         if self.request.gathered:
             kept = np.isin(np.arange(self.count), self.rows)
-            weights = block.stamps[0] if self.request.weighs and self.count else None
             for shape, parts in zip(plan.shapes, self.moved, strict=False):
                 self.request.gathered.take(shape, parts, kept, weights, block.line_of)
         if self.request.unwrap and len(self.rows):
@@ -183,22 +181,15 @@ class Run:
             at = first + shape.own_size
             for size in shape.covariance if not shape.multiple else ():
                 own = self.columns[at : at + size]
-                reasons: dict[int, str] = {}
-                if not shape.sigma and size > 1:
-                    reasons = uncertainty.problems(np.stack(own, axis=1))
+                what = "sigma is negative: {:g}" if shape.sigma else "scale is {:g}; it must be positive"
                 for number, column in enumerate(own if shape.sigma or size == 1 else (), at):
                     for row in np.flatnonzero(column < 0.0 if shape.sigma else column <= 0.0).tolist():
-                        what = "sigma is negative: {:g}" if shape.sigma else "scale is {:g}; it must be positive"
                         self._blame(row, self.plan.names[number], what.format(column[row]))
-                for row, reason in reasons.items():
-                    self._blame(row, self.plan.names[at], reason)
+                if not shape.sigma and size > 1:
+                    for row, reason in uncertainty.problems(np.stack(own, axis=1)).items():
+                        self._blame(row, self.plan.names[at], reason)
                 at += size
             first += shape.size
-
-    def _check_weights(self, weights: NDArray[Any]) -> None:
-        """Refuse rows with a negative weight; labels may be any."""
-        for row in np.flatnonzero(weights < 0.0).tolist() if weights.dtype == np.float64 else ():
-            self._blame(row, self.request.extra_column or "", f"weight {weights[row]:g} is negative")
 
     def _note_block(self) -> None:
         """Warn of what holds for the block, and of its zones of UTM: of a southern one that looks like a band too."""
@@ -226,17 +217,12 @@ class Run:
                     self.notes.append(RowNote(self.block.line_of(row), uncertainty.WIDE_RULE, message))
                     break
 
-    def _movers(self) -> list[Rigid | None]:
-        """Return the pose that moves each point or pose of the rows: of its own frame, at its own time, or none."""
-        shapes, frames = max(len(self.plan.shapes), 1), self.block.frames
-        if not self.count or (self.operation.formula is not None and not self.operation.shown):
-            return [None] * shapes
-        movers = [self._mover(at, each) for at, each in enumerate(frames)]
-        return movers * (shapes // len(movers))  # the rows of a table have one stamp and one frame for all their points
-
-    def _mover(self, at: int, frames: Sequence[str | None]) -> Rigid | None:
-        """Return the pose that moves one of the points or poses of the rows, by the frames that it is expressed in."""
-        plan, timed = self.plan, self.request.timed
+    def _mover(self, at: int) -> Rigid | None:
+        """Return the pose that moves one of the points or poses of the rows: of its frame, at its time, or none."""
+        plan, timed, formula = self.plan, self.request.timed, self.operation.formula
+        if not self.count or (formula is not None and not self.operation.shown):
+            return None
+        frames = self.block.frames[at]
         if timed is not None and len(self.block.stamps) > at and self.block.stamps[at] is not None:
             rows = np.delete(np.arange(self.count), [*self.reasons])
             return by_time(timed, self._times(at), rows, frames, self._blame, plan.frame_column)
@@ -246,15 +232,17 @@ class Run:
             return by_frame(plan.edge_of, frames, self._blame, plan.frame_column)
         return plan.edge_of(frames[0])
 
-    def _compute(self, movers: Sequence[Rigid | None], state: State) -> list[Components]:
+    def _compute(self, state: State) -> list[Components]:
         """Apply the operation to each point or pose of the rows."""
         shapes, operation = self.plan.shapes, self.operation
         if operation.of == PAIR or not shapes:
             poses = [thing_pose(shape, own[: shape.own_size], turn) for shape, own, turn in self._things()]
-            return [operation.pose(poses or [NOWHERE], movers[0], arrays)]
+            return [operation.pose(poses or [NOWHERE], self._mover(0), arrays)]
         needs_time = operation.formula is not None and operation.formula.needs_time
-        found = []
-        for at, (mover, (shape, numbers, rotation)) in enumerate(zip(movers, self._things(), strict=False)):
+        found, mover = [], None
+        for at, (shape, numbers, rotation) in enumerate(self._things()):
+            if at < len(self.block.frames):  # the rows of a table have one stamp and one frame for all their points
+                mover = self._mover(at)
             parts = operation.result(
                 shape, numbers, mover, arrays, rotation=rotation,
                 compared=lambda pose: self._with_before(pose, state) if operation.looks_back else [pose],
@@ -405,27 +393,26 @@ class Run:
 
     def _why_not_finite(self, row: int) -> tuple[str, str | FrametoolError]:
         """Return the column and the reason why a row has no finite result."""
-        operation, first = self.operation, 0
-        for at, (shape, columns, _) in enumerate(self._things()):
-            own = tuple(float(column[row]) for column in columns)
-            times = int(self._times(at)[row]) if operation.formula and operation.formula.needs_time else None
-            try:
+        operation, first, column = self.operation, 0, ""
+        try:
+            for at, (shape, columns, _) in enumerate(self._things()):
+                own = tuple(float(each[row]) for each in columns)
                 if operation.formula:  # for one row alone, it says so itself
                     operation.result(
-                        shape, own, None, floats, times_ns=times, compared=lambda pose: [pose], seconds=float,
-                        rotation=partial(_checked, shape),
+                        shape, own, None, floats, compared=lambda pose: [pose], seconds=float,
+                        times_ns=int(self._times(at)[row]) if operation.formula.needs_time else None,
+                        rotation=lambda own, shape=shape: checked_rotation(shape, own, normalize=True)[0],
                     )  # fmt: skip
                 elif shape.place is not None:
+                    column = self.plan.names[first]
                     shape.place.check(own[: shape.place.size])
-            except FrametoolError as error:
-                return "" if operation.formula else self.plan.names[first], error
-            first += shape.size
-        for target, parts in zip(self.plan.targets, self.moved, strict=True):
-            try:
+                first += shape.size
+            column = ""
+            for target, parts in zip(self.plan.targets, self.moved, strict=True):
                 if target.place is not None and not operation.formula:
                     target.place.check_result(*(float(np.broadcast_to(part, self.count)[row]) for part in parts[:3]))
-            except ValueInvalid as error:
-                return "", error
+        except FrametoolError as error:
+            return column, error
         return "", "the result is not finite: the numbers are too large"
 
     def refuse(self, wrong: Flags, reason: str) -> None:
@@ -485,11 +472,6 @@ class Run:
         for row, (column, reason) in self.reasons.items():
             found.append(Fault.of(self.block.line_of(row), column, reason))
         return sorted(found)
-
-
-def _checked(shape: Shape, own: Components) -> Components:
-    """Return the quaternion of one row's numbers, which was checked before."""
-    return checked_rotation(shape, own, normalize=True)[0]
 
 
 def _without_result(piece: Piece, null: bytes) -> Piece:

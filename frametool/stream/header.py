@@ -93,6 +93,12 @@ class PoseColumns(NamedTuple):
     position: Columns | None
     rotation: Columns | None
 
+    @property
+    def places(self) -> tuple[int, ...]:
+        """Return where their numbers are."""
+        first = self.position.places if self.position else ()
+        return first + self.rotation.places if self.rotation else first
+
 
 class Header:
     """The names of a table's columns, taken apart once: which words of ours each holds, and in which unit.
@@ -195,11 +201,11 @@ def _position(columns: Columns) -> Columns:
 
 def _with_unknown(columns: Columns, places: Iterable[int], known: Container[str], of: str) -> Columns:
     """Say what is wrong where one of some columns has a unit that is not known."""
-    spot = next((spot for at in places if (spot := columns.spots[at]) and spot[1] not in known), None)
-    if spot is None:
-        return columns
-    name = columns.names[columns.places.index(spot[0])]
-    return columns._replace(wrong=f"column {shown(name)}: unknown unit {shown(spot[1])} {of}")
+    for at in places:
+        if (spot := columns.spots[at]) and spot[1] not in known:
+            name = columns.names[columns.places.index(spot[0])]
+            return columns._replace(wrong=f"column {shown(name)}: unknown unit {shown(spot[1])} {of}")
+    return columns
 
 
 def find_rotations(header: Header, expected: Notation | None) -> list[Columns]:
@@ -207,11 +213,11 @@ def find_rotations(header: Header, expected: Notation | None) -> list[Columns]:
     rows = _searched(expected)
     found: dict[frozenset[int], Columns] = {}  # qvec_w .. are found by either of two names
     for row in rows:
-        matches = [*header.match(row.columns, row.angles)]
-        matches += _named_maps(header, bare=expected is not None) if row.shape == NAMED else ()
-        wholes = header.match(row.whole.columns) if row.whole else ()
-        matches += [match._replace(whole=True, unit=1.0) for match in wholes]
-        found |= {frozenset(match.places): _rotation(match, row, expected) for match in matches}
+        named = _named_maps(header, bare=expected is not None) if row.shape == NAMED else ()
+        for match in (*header.match(row.columns, row.angles), *named):
+            found[frozenset(match.places)] = _rotation(match, row, expected)
+        for match in header.match(row.whole.columns) if row.whole else ():
+            found[frozenset(match.places)] = _rotation(match, row, expected)._replace(whole=True, unit=1.0)
     best: dict[int, int] = {}  # where several share a column, an axis with an angle and an angle_deg, the nearest
     for each in found.values():
         for place in each.places:
@@ -229,24 +235,23 @@ def _searched(expected: Notation | None) -> list[Representation]:
     return [*SEARCHED.values()][::-1] if own is None else [SEARCHED[frozenset(own.columns)] if own.searched else own]
 
 
-def _named_maps(header: Header, *, bare: bool = False) -> list[Columns]:
-    """Return the columns called as the keys of a map, x y z w: with affixes, or alone, or where they may be `bare`."""
+def _named_maps(header: Header, *, bare: bool = False) -> Iterator[Columns]:
+    """Yield the columns called as the keys of a map, x y z w: with affixes, or alone, or where they may be `bare`."""
     words = ROTATIONS["quaternion"].names
-    found = header.match(words)
-    return [each for each in found if bare or each.prefix or each.suffix or len(header.names) == len(words)]
+    for match in header.match(words):
+        if bare or match.prefix or match.suffix or len(header.names) == len(words):
+            yield match
 
 
-def _standing_alone(row: Representation, header: Header, expected: Notation | None) -> list[Columns]:
+def _standing_alone(row: Representation, header: Header, expected: Notation | None) -> Iterator[Columns]:
     """Find the column that says a rotation by itself, where none of the others is there: `yaw`, `theta`."""
-    alone = [match for word in row.alone for match in header.match((word,), (0,)) if header.is_plain(match)]
-    partly = header.match(row.columns, partly=True) if alone else ()
-    others = {(each.prefix, each.suffix) for each in partly if any(each.spots[:-1])}
     absent = (None,) * (len(row.columns) - 1)
-    return [
-        _rotation(match._replace(spots=(*absent, *match.spots)), row, expected)
-        for match in alone
-        if (match.prefix, match.suffix) not in others
-    ]
+    for word in row.alone:
+        for match in header.match((word,), (0,)):
+            partly = header.match(row.columns, partly=True)
+            others = ((each.prefix, each.suffix) for each in partly if any(each.spots[:-1]))
+            if header.is_plain(match) and (match.prefix, match.suffix) not in others:
+                yield _rotation(match._replace(spots=(*absent, *match.spots)), row, expected)
 
 
 def _rotation(columns: Columns, row: Representation, expected: Notation | None) -> Columns:
@@ -271,10 +276,11 @@ def find_poses(names: Sequence[str], expected: Notation | None, count: int, sour
     if len(positions) > 1:
         positions = [each for each in positions if each.names not in NORMALS]
     if len(positions) <= 1 and len(rotations) <= 1 and count == 1:
-        none = f"no columns of a point or pose among: {listed(names)}; name them with --columns"
-        half = "" if rotations else _half_rotation(header, expected)
-        if half or not (positions or rotations):
-            raise _refusal(half or none, source)
+        reason = "" if rotations else _half_rotation(header, expected)
+        if not (positions or rotations or reason):
+            reason = f"no columns of a point or pose among: {listed(names)}; name them with --columns"
+        if reason:
+            raise _refusal(reason, source)
         return [_joined(header, positions, rotations)]
     poses = _paired(positions, rotations) if max(len(positions), len(rotations)) <= count else []
     if len(poses) == count:
@@ -398,6 +404,8 @@ def _kinship(rotation: Columns, position: Columns) -> tuple[bool, int]:
 
 def find_six(names: Sequence[str], kind: str) -> Columns | None:
     """Find the columns of a twist or a wrench, by the words of its parts; by usual letters only where asked."""
+    if len(names) < 6:
+        return None
     folded = [re.sub(r"[./]", "_", re.sub(BRACKETS, "", name).strip().lower()) for name in names]
     kinds = [kind] if kind else LETTERS
     for found, base in [(each, base) for each in kinds for base in (six_names(each), *LETTERS.get(kind, ()))]:

@@ -79,14 +79,16 @@ def plan_table(
 
         extra, shapes = covariance_columns(table, request, shapes, source)
     request = request.for_kind(shapes[0].kind) if shapes else request
-    own = [*chain.from_iterable(map(_places_of, poses)), *extra]
-    if twice := sorted({table.name(place) for place in own if own.count(place) > 1}):
+    places = *chain.from_iterable(pose.places for pose in poses), *extra
+    if len({*places}) < len(places):
+        twice = sorted({table.name(place) for place in places if places.count(place) > 1})
         raise Misused(f"--columns: {', '.join(twice)} appears twice")
     along = _turning_along(names, poses, request, normals, source)
-    poses, shapes = [*poses, *(pose for pose, _ in along)], (*shapes, *(Shape(kind) for _, kind in along))
+    places += asked
+    for pose, kind in along:
+        poses, shapes, places = [*poses, pose], (*shapes, Shape(kind)), places + pose.places
     has_one = not shapes or request.operation.of == PAIR  # what becomes of a row is one thing
     targets = tuple(map(request.target, shapes[:1] or (Shape(POSE),) if has_one else shapes))
-    places = (*own, *asked, *chain.from_iterable(_places_of(pose) for pose, _ in along))
     frames = _frame_columns(table, request, source, on_earth=on_earth)
     stays = not request.poses or (request.operation.moves and request.rename is None)
     name = None if stays else _first_called(NAME_KEYS, table)
@@ -109,11 +111,6 @@ def plan_table(
         shapes, targets, request, tuple(map(table.name, places)), pieces, b"" if table.delimiter else b"nan", edge_of,
         frame_column=table.name(frames[0]) if len(frames) == 1 else "", words=words, marked=marked,
     ), layout  # fmt: skip
-
-
-def _places_of(pose: PoseColumns) -> tuple[int, ...]:
-    """Return where the numbers of a point or pose are."""
-    return tuple(place for each in pose if each is not None for place in each.places)
 
 
 def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
@@ -200,7 +197,7 @@ def _turning_along(
     if operation.turns and poses[0].rotation:
         from frametool.stream.extra_numbers import find_rates
 
-        found += find_rates(names, _places_of(poses[0]), operation, source)
+        found += find_rates(names, poses[0].places, operation, source)
     return [(PoseColumns(Columns(at, tuple(names[each] for each in at)), None), kind) for at, kind in found]
 
 
@@ -318,7 +315,7 @@ def _columns(
     only_turned = request.operation.changes_nothing and not request.operation.moves and request.place is None
     if only_turned and request.by_default and not (request.all_numbers or targets[0].notations or request.keep):
         return columns
-    ours: dict[int, list[Column]] = {place: [] for pose in poses for place in _places_of(pose)}
+    ours: dict[int, list[Column]] = {place: [] for pose in poses for place in pose.places}
     adds = request.keep or request.operation.only_adds or not ours
     renamed = named.items() if not adds and rename_of(request) is not None else ()
     at: dict[int, list[Column]] = {place: [Named(place, role)] for place, role in renamed}
@@ -327,11 +324,12 @@ def _columns(
     first = 0
     for number, target in enumerate(targets):
         pose = poses[number] if len(poses) == len(targets) else PoseColumns(None, None)  # of a pair
-        shape, places = shapes[number] if shapes else Shape(POSE), _places_of(pose) or tuple(ours)
-        position, rotation, extras = _new_columns(pose, target, request, shape, first, several=len(targets) > 1)
-        first += sum(isinstance(each, New) for each in (*position, *rotation, *extras))
+        shape, places = shapes[number] if shapes else Shape(POSE), pose.places or tuple(ours)
+        several = len(targets) > 1 and (request.poses > 1 or number > 0)
+        position, rotation, extras = _new_columns(pose, target, request, shape, first, several=several)
+        first += request.result_size(shape, target)
         in_place = _in_place(pose, shape, target)
-        if request.poses > 1 and len(targets) > 1 and (request.notations or not in_place):
+        if several and (not in_place or (request.notations and request.poses > 1)):
             raise Misused("several --columns are moved as they are written; for --to, or a rotation alone, give one")
         if adds:
             added += [*position, *rotation, *extras]
@@ -386,7 +384,7 @@ def _new_columns(
 ) -> list[list[Column]]:
     """Name the numbers of a result, from the one at `first`: position, rotation, what else there is.
 
-    several: there are others, so that its names are those of its columns
+    several: it is one of several, so that its names are those of its columns
     """
     rotation, alone, prefix = pose.rotation, not request.prefix or several, request.prefix
     if rotation and alone and _same(pose, target) and rotation.whole == target.whole:
