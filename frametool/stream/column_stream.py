@@ -290,15 +290,16 @@ def _in_other_format(
     new = iter(made_of(columns, rows, results))
     found = {}
     for column in columns:
-        if column.passed is None:
+        place = column.passed
+        if place is None:
             made = next(new)
-            found[column.name] = made if isinstance(made.values, np.ndarray) else Made(objects(made.values))
+            made = made if isinstance(made.values, np.ndarray) else Made(objects(made.values))
         elif column.kind is not None and column.kind.kind in FLOATS:
-            values, nulls = batch.numbers(column.passed)
-            absent = None if nulls is None else nulls[results.rows]
-            found[column.name] = Made(values.astype(column.kind)[results.rows], absent)
+            values, nulls = batch.numbers(place)
+            made = Made(values.astype(column.kind)[results.rows], None if nulls is None else nulls[results.rows])
         else:
-            found[column.name] = Made(taken(batch.column(column.passed), results.rows))
+            made = Made(taken(batch.column(place), results.rows))
+        found[column.name] = made
     return found
 
 

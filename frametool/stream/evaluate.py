@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import partial
+from operator import itemgetter
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -401,7 +402,7 @@ class Run:
                     operation.result(
                         shape, own, None, floats, compared=lambda pose: [pose], seconds=float,
                         times_ns=int(self._times(at)[row]) if operation.formula.needs_time else None,
-                        rotation=lambda own, shape=shape: checked_rotation(shape, own, normalize=True)[0],
+                        rotation=partial(_checked, shape),
                     )  # fmt: skip
                 elif shape.place is not None:
                     column = self.plan.names[first]
@@ -468,10 +469,15 @@ class Run:
 
     def faults(self) -> list[Fault]:
         """Return what is wrong, line by line."""
-        found = [fault for _, fault in self.block.broken]
+        found = [*map(itemgetter(1), self.block.broken)]
         for row, (column, reason) in self.reasons.items():
             found.append(Fault.of(self.block.line_of(row), column, reason))
         return sorted(found)
+
+
+def _checked(shape: Shape, own: Components) -> Components:
+    """Return the quaternion of one row's numbers, which was checked before."""
+    return checked_rotation(shape, own, normalize=True)[0]
 
 
 def _without_result(piece: Piece, null: bytes) -> Piece:

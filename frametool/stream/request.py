@@ -148,7 +148,7 @@ class Operation(NamedTuple):
         passes = self.formula is not None or stays
         if passes or shape.kind not in (POSE, POINT, VECTOR):
             return ()
-        sizes = {len(each) for each in (self.left, *self.right, self.fixed) if each is not None}
+        sizes = {*map(len, filter(None, (self.left, *self.right, self.fixed)))}
         if SCALED in sizes or 1 in shape.covariance or shape.multiple:
             return () if self.moves else (SCALE,)
         of_position = shape.kind == POSE and 9 in shape.covariance and not shape.rewritten  # it stays what it is
@@ -214,14 +214,11 @@ class Operation(NamedTuple):
         """Return True if positions stay as they are written."""
         return self.changes_nothing or (self.turns and self.left is None and not (self.mirrors or self.inverse))
 
-    @property
-    def _of_body(self) -> Components | None:
-        """Return what turns a vector along the axes of the body."""
-        return rigid.inverse(*self.right[0]) if self.right else None
-
     def move(self, shape: Shape, own: Components, extra: Components, edge: Components | None) -> Components:
         """Move what is no pose, with its covariances, by `edge`, else by `left`; what else comes with it stays."""
-        mover = self._of_body if shape.kind == RATE else edge or self.left
+        mover = edge or self.left
+        if shape.kind == RATE:  # along the axes of the body
+            mover = rigid.inverse(*self.right[0]) if self.right else None
         if self.mirrors:
             own = (own[0], -own[1], *own[2:])
         if mover is not None and len(mover) == EXACT and not shape.covariance:
@@ -264,7 +261,9 @@ class Operation(NamedTuple):
         elif shape.unit is not None:
             own = shape.position(own)
         if self.formula is not None:
-            return self.formula.result(shape.kind, self._moved(own, edge), extra, times_ns, xp)
+            mover: Any = edge or self.left
+            parts = own if mover is None else rigid.apply(*mover, *own[:3]) if own else mover
+            return self.formula.result(shape.kind, parts, extra, times_ns, xp)
         if shape.kind != POSE:
             return self._with_place(shape, numbers, self.move(shape, own, extra, edge))
         if shape.covariance:
@@ -276,11 +275,6 @@ class Operation(NamedTuple):
             last = EXACT + len(RELATIVE_EXTRAS)
             found = (*_with_velocity(found[:last], seconds(), xp), *found[last:])
         return self._with_place(shape, numbers, (*found, *extra))
-
-    def _moved(self, own: Components, edge: Components | None) -> Components:
-        """Return the point that a formula is given, or the pose that would move one."""
-        mover: Any = edge or self.left
-        return own if mover is None else rigid.apply(*mover, *own[:3]) if own else mover
 
     def _with_place(self, shape: Shape, numbers: Components, found: Components) -> Components:
         """Add to a result on the Earth that nothing moves the numbers that it was read as."""
@@ -439,24 +433,20 @@ class Request(NamedTuple):
             return Target(self._unit(shape), (), three=True)
         there = shape.whole or shape.unit is not None
         placed = there or (self.shifts and kind == POSE)
-        unit = self._unit(shape) or 1.0
         if self.notations or shape.notation is None or shape.notation.representation is HEADING:
             stays = shape.notation is None and self._only_turns_around and (self.by_default or not self.notations)
             notations = () if stays else self.notations or (notation("quaternion"),)
-            scaled = self._is_scaled(shape, notations)
-            whole = there and len(notations) == 1 and notations[0].representation.whole is not None
             written = tuple((each, self.in_degrees(each)) for each in notations)
-            return Target(unit if placed and not whole else None, written, self.keep_sign, whole, scaled=scaled)
-        first = 3 * (placed and shape.unit is None)  # a position comes in front
-        return Target(
-            None if shape.whole or not placed else unit,
-            ((shape.notation, shape.degrees),),
-            self.keep_sign,
-            shape.whole,
-            radians_at=shape.radians_at,
-            absent=tuple(at + first * (not shape.whole) for at in shape.absent),
-            scaled=self._is_scaled(shape, (shape.notation,)),
-        )
+            whole = there and len(notations) == 1 and notations[0].representation.whole is not None
+            target = Target(None, written, self.keep_sign, whole)
+        else:
+            first = 3 * (placed and shape.unit is None and not shape.whole)  # a position comes in front
+            absent = tuple(at + first for at in shape.absent)
+            written = ((shape.notation, shape.degrees),)
+            target = Target(None, written, self.keep_sign, shape.whole, radians_at=shape.radians_at, absent=absent)
+        is_matrix = len(written) == 1 and written[0][0].representation.whole is not None
+        scaled = is_matrix and self.operation.carried(shape) == (SCALE,)  # the scale of results is in the matrix
+        return target._replace(unit=(self._unit(shape) or 1.0) if placed and not target.whole else None, scaled=scaled)
 
     def _unit(self, shape: Shape) -> Unit | None:
         """Return how positions are written: as asked for, as they were read, or in metres, as those of places are."""
@@ -464,11 +454,6 @@ class Request(NamedTuple):
             return self.place
         own = shape.unit if shape.place is None else 1.0
         return 1.0 if own is not None and self.all_numbers and (self.notations or shape.notation is None) else own
-
-    def _is_scaled(self, shape: Shape, notations: Sequence[Notation]) -> bool:
-        """Return True if the scale of results is in the one matrix that is written of each."""
-        is_matrix = len(notations) == 1 and notations[0].representation.whole is not None
-        return is_matrix and self.operation.carried(shape) == (SCALE,)
 
     def extras(self, shape: Shape) -> tuple[str, ...]:
         """Name the numbers that come with a result as columns or keys of their own."""
@@ -497,8 +482,8 @@ class Request(NamedTuple):
     def _only_turns_around(self) -> bool:
         """Return True if things without a rotation have none afterwards."""
         operation = self.operation
-        bare = operation.left is None and not operation.right and not operation.of and operation.formula is None
-        return (bare or operation.turns) and not self.by_row
+        changed = operation.left or operation.right or operation.of or operation.formula
+        return bool(operation.turns or not changed) and not self.by_row
 
     def for_kind(self, kind: str) -> Request:
         """Return what is asked of rows of one kind: how an expression names its result depends on it."""

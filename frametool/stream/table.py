@@ -51,9 +51,10 @@ class Naming:
         self.layout, self.delimiter = layout, table.delimiter
         self.earth = EARTH_FRAMES[0] if shape.place is not None else None
         self.places = (layout.frames[0] if layout.frames else None, layout.name) if request.poses else (None, None)
-        self.column = next((table.name(place) for place in self.places if place is not None), "")
+        named = self.places[self.places[0] is None]
+        self.column = "" if named is None else table.name(named)
         may_count = layout.frames and table.name(layout.frames[0]) == COUNTER and COUNTER not in request.frames
-        self.counts = request.counts if may_count else None
+        self.counts = request.counts if may_count else lambda _: False
         self.rename = rename_of(request)
         self.consecutive = request.operation.looks_back
         self.before: str | None = None
@@ -80,13 +81,14 @@ class Naming:
                 results[at] = self._result(*pair)
             except FrametoolError as error:
                 bad |= dict.fromkeys(np.flatnonzero(of_row == at).tolist(), (self.column, error))
-            if frame := self._lost(pair, results[at]):
-                lost[int((of_row == at).argmax())] = frame
+            for place, old, new in zip(self.places, pair, results[at], strict=True):
+                if place is not None and old and not new:  # a cell named a frame, and the result does not
+                    lost.setdefault(int((of_row == at).argmax()), old)
         for row, parent in enumerate(parents.each() if self.consecutive else ()):
             self.before = parent if self.before is None else self.before
             if parent != self.before:
                 bad[row] = self.column, f"given in another frame than {self.before!r}, as the rows before are"
-        known = [None if not text or self._is_counter(text) else text for text in parents.texts]
+        known = [None if not text or self.counts(text) else text for text in parents.texts]
         frames = [self.earth] if self.earth else [known[code] for code in parents.codes.tolist()]
         return frames, BlockNames(pairs, results, of_row, dict(sorted(lost.items())[:1])), bad
 
@@ -99,21 +101,13 @@ class Naming:
         known = zip(self.places, unnamed, strict=True)
         return [[name] if place is None else names.texts(role, rows) for role, (place, name) in enumerate(known)]
 
-    def _is_counter(self, name: str) -> bool:
-        return self.counts is not None and self.counts(name)
-
     def _result(self, parent: str, name: str) -> Texts:
         """Return the texts of a result's names; a counter stays, and what is not known is left empty."""
         if self.rename is None:
             return parent, name
-        counter = self._is_counter(parent)
+        counter = self.counts(parent)
         new = self.rename(None if counter else parent or None, name or None)
         return parent if counter else new[0] or "", new[1] or ""
-
-    def _lost(self, pair: Texts, result: Texts) -> str:
-        """Return the frame that a cell named and the result does not; "" if absent."""
-        named = zip(self.places, pair, result, strict=True)
-        return next((old for place, old, new in named if place is not None and old and not new), "")
 
     def spans(self, cells: Cells, role: int, names: BlockNames) -> Spans:
         """Write names as cells; one that does not change stays as it is written."""
@@ -249,8 +243,7 @@ def open_table(
     numeric = [_is_number(_unquoted(cell)) for cell in cells]
     own = header and not (all(numeric) if delimiter else any(numeric))
     if named is not None and not (own and has_pose_column(map(_unquoted, cells))):
-        head, titles, title, end = named
-        return Table(delimiter, tuple(map(_unquoted, titles)), len(titles), mark + head, titles, title, end), rest
+        return named._replace(head=mark + named.head), rest
     if not own:
         if header and not expected and delimiter and not row.columns and len(cells) != len(FORMATS["tum"].columns):
             raise FormatError("the first line holds numbers and no names; give --no-header", source=source, line=1)
@@ -271,13 +264,8 @@ def without_comments(text: bytes) -> bytes:
     return text[end:]
 
 
-def _named_comment(
-    comments: bytes, delimiter: bytes, width: int
-) -> tuple[bytes, tuple[bytes, ...], bytes, bytes] | None:
-    """Take the last comment for the header if it has a word for each column and one of them is a name of ours.
-
-    Returns what is before its words, the words, their line, and what follows up to the first row.
-    """
+def _named_comment(comments: bytes, delimiter: bytes, width: int) -> Table | None:
+    """Take the last comment for the header if it has a word for each column and one of them is a name of ours."""
     lines = [line for line in comments.splitlines(keepends=True) if line.strip()]
     if not lines:
         return None
@@ -285,10 +273,11 @@ def _named_comment(
     text = lines[-1].rstrip(b"\r\n")
     words = text.lstrip(b"# \t")
     cells = cells_of(words, delimiter)
-    if not cells or (width and len(cells) != width) or not has_pose_column(map(_unquoted, cells)):
+    names = tuple(map(_unquoted, cells))
+    if not cells or (width and len(cells) != width) or not has_pose_column(names):
         return None
-    before = comments[: start + len(text) - len(words)]
-    return before, tuple(cells), words, comments[start + len(text) :]
+    before, behind = comments[: start + len(text) - len(words)], comments[start + len(text) :]
+    return Table(delimiter, names, len(cells), before, tuple(cells), words, behind)
 
 
 def _first_record(text: bytes, delimiter: bytes) -> bytes:

@@ -317,8 +317,9 @@ def _columns(
         return columns
     ours: dict[int, list[Column]] = {place: [] for pose in poses for place in pose.places}
     adds = request.keep or request.operation.only_adds or not ours
-    renamed = named.items() if not adds and rename_of(request) is not None else ()
-    at: dict[int, list[Column]] = {place: [Named(place, role)] for place, role in renamed}
+    at: dict[int, list[Column]] = {}
+    for place, role in named.items() if not adds and rename_of(request) is not None else ():
+        at[place] = [Named(place, role)]
     at |= ours
     added: list[Column] = []
     first = 0
@@ -326,8 +327,8 @@ def _columns(
         pose = poses[number] if len(poses) == len(targets) else PoseColumns(None, None)  # of a pair
         shape, places = shapes[number] if shapes else Shape(POSE), pose.places or tuple(ours)
         several = len(targets) > 1 and (request.poses > 1 or number > 0)
+        first += request.result_size(shapes[number - 1], targets[number - 1]) if number else 0
         position, rotation, extras = _new_columns(pose, target, request, shape, first, several=several)
-        first += request.result_size(shape, target)
         in_place = _in_place(pose, shape, target)
         if several and (not in_place or (request.notations and request.poses > 1)):
             raise Misused("several --columns are moved as they are written; for --to, or a rotation alone, give one")

@@ -283,3 +283,14 @@ def test_a_covariance_of_another_size_is_refused_where_it_is_only_copied(run: An
         assert (done.status, done.out) == (1, "")
         assert f"covariance has {count} numbers; 36 are needed" in done.err.splitlines()[0]
     assert run("convert", f"{{{entry}, covariance: {[0] * 36}}}").status == 0
+
+
+@pytest.mark.parametrize("normals", ["nx,ny,nz", "normal_x,normal_y,normal_z"])
+def test_normals_turn_along_with_points_that_get_a_covariance(run: Run, normals: str) -> None:
+    text = f"x,y,z,{normals}\n1.0,2.0,3.5,0.0,0.0,1.0\n"
+    exact, unsure = (
+        next(csv.DictReader(io.StringIO(run("apply", *option, "--transform", UNSURE, stdin=text).out)))
+        for option in ((), ("--covariance",))
+    )
+    assert unsure == exact | {name: unsure[name] for name in NAMES if name in unsure}
+    assert sum(name in unsure for name in NAMES) == 9
