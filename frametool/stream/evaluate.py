@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import partial
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -109,7 +109,8 @@ class Run:
         self.off = 0.0
         self.count = len(block.places)
         self.columns = [*np.ascontiguousarray(self._read().T)]
-        self._check_covariances()
+        if any(map(attrgetter("covariance"), plan.shapes)):
+            self._check_covariances()
         is_cut = self.count and (self.request.window or block.gone is not None)
         self.outside = self._outside() if is_cut else set[int]()
         self.lone = set[int]()

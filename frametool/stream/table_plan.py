@@ -59,10 +59,10 @@ def plan_table(
     is_needed = formula is None or formula.reads_row or bool(request.columns)
     with suppress(*() if is_needed else (FormatError,)):
         poses = _find(table, request, source)
-    only_turned = not request.operation.moves and request.keeps_position and request.gathered is None
-    only_turned = only_turned and not (request.operation.turns and poses and poses[0].rotation is None)  # a point
     on_earth = bool(poses) and poses[0].position is not None and place_of(poses[0].position.unit) is not None
-    if request.poses == 1 and only_turned and not (request.all_numbers or on_earth):
+    is_point = request.operation.turns and poses and poses[0].rotation is None
+    passes = not (request.operation.moves or request.all_numbers or is_point or request.gathered)
+    if request.poses == 1 and not on_earth and passes and request.keeps_position:
         poses = [_without_position(poses[0], request, table, source)]
     if wrong := next((each.wrong for pose in poses for each in pose if each and each.wrong), ""):
         raise _refusal(wrong, source)
@@ -101,10 +101,7 @@ def plan_table(
     written = _columns(table, poses, shapes, targets, request, named, extra)
     if table.header:
         refuse_repeated(written, names)
-    time = _time_column(table, request, source)
-    below = None if time is None or not names else nanoseconds_beside(names, time)
-    if stamped and request.all_numbers and time is None:
-        time, below = _usual_stamps(table, request, places, frames)
+    time, below = _stamp_columns(table, request, places, frames, source, stamped=stamped)
     pieces, stretches = ((), ()) if request.all_numbers else lay_out(written, table.width, table.delimiter)
     layout = Layout(tuple(written), places, frames, stretches, time, below, name)
     return Plan(
@@ -274,28 +271,28 @@ def _place(name: str, names: Sequence[str], source: str) -> int:
     return names.index(name)
 
 
-def _time_column(table: Table, request: Request, source: str) -> int | None:
-    """Find the column of the stamps, by its name or, where there are none, by its number from 1."""
-    name = request.timed.name if request.timed else request.extra_column
-    if name is None:
-        return None
-    place = _place(name, _names_or_numbers(table), source)
-    if request.gathered is None:  # else it is a weight
-        try:
-            in_nanoseconds(table.name(place))
-        except ValueInvalid as error:
-            raise Misused(str(error), source=source, line=1) from None
-    return place
-
-
-def _usual_stamps(
-    table: Table, request: Request, places: Sequence[int], frames: Sequence[int]
+def _stamp_columns(
+    table: Table, request: Request, places: Sequence[int], frames: Sequence[int], source: str, *, stamped: bool
 ) -> tuple[int | None, int | None]:
-    """Find the column of stamps that no option names, and that of the nanoseconds of such stamps."""
-    time, below = stamp_places(table.names)
+    """Find the column of stamps, or of weights, by its name or number, and that of the nanoseconds of such stamps.
+
+    Where all numbers are wanted it may be one that no option names.
+    """
+    name = request.timed.name if request.timed else request.extra_column
+    if name is not None:
+        time = _place(name, _names_or_numbers(table), source)
+        if request.gathered is None:  # else it is a weight
+            try:
+                in_nanoseconds(table.name(time))
+            except ValueInvalid as error:
+                raise Misused(str(error), source=source, line=1) from None
+        return time, nanoseconds_beside(table.names, time) if table.names else None
+    if not (stamped and request.all_numbers):
+        return None, None
+    usual, below = stamp_places(table.names)
     if not (table.names or request.columns) and min(places, default=0) == 1:
-        time = 0  # what is before the numbers that --from speaks of
-    return (None, None) if time in frames else (time, below)
+        usual = 0  # what is before the numbers that --from speaks of
+    return (None, None) if usual in frames else (usual, below)
 
 
 def _names_or_numbers(table: Table) -> Sequence[str]:
@@ -388,11 +385,10 @@ def _new_columns(
     several: it is one of several, so that its names are those of its columns
     """
     rotation, alone, prefix = pose.rotation, not request.prefix or several, request.prefix
+    before, behind = (rotation.prefix, rotation.suffix) if rotation and alone else (prefix, "")
+    turned = [before + name + behind for name in target.names]
     if rotation and alone and _same(pose, target) and rotation.whole == target.whole:
         turned = [prefix + name for name in rotation.names]
-    else:
-        around = (rotation.prefix, rotation.suffix) if rotation and alone else (prefix, "")
-        turned = [name.join(around) for name in target.names]
     moved = target.position_columns
     if pose.position and (target.plain or (moved and alone and target.place == shape.place)):
         moved = list(pose.position.names)
