@@ -200,7 +200,7 @@ def _position(columns: Columns) -> Columns:
 
 
 def _with_unknown(columns: Columns, places: Iterable[int], known: Container[str], of: str) -> Columns:
-    """Say what is wrong where one of some columns has a unit that is not known."""
+    """Store what is wrong where one of some columns has a unit that is not known."""
     for at in places:
         if (spot := columns.spots[at]) and spot[1] not in known:
             name = columns.names[columns.places.index(spot[0])]
@@ -458,10 +458,6 @@ def named_pose(spec: str, names: Sequence[str] | None, width: int, request: Requ
 
     Raises Misused for names that are not there, or a count that says nothing.
     """
-    if request.given_place:
-        from frametool.stream.earth_columns import chosen_pose
-
-        return chosen_pose(spec, names, width, request)
     called, places = places_named(spec, names, width)
     if kind in SIX:
         return PoseColumns(_six(places, called, kind), None)

@@ -118,8 +118,7 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
         if len(request.columns) != request.poses:
             raise Misused(f"--columns is given {len(request.columns)} times, for {request.poses} poses in a row")
         kinds = request.kinds or (request.kind,) * request.poses
-        chosen = zip(request.columns, kinds, strict=True)
-        return [named_pose(spec, table.names, table.width, request, kind) for spec, kind in chosen]
+        return [_chosen(spec, table, request, kind) for spec, kind in zip(request.columns, kinds, strict=True)]
     if table.pose is not None and request.given is None and request.poses == 1:
         return [table.pose]
     if table.names:
@@ -127,7 +126,7 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
         names = ["" if name == known or may_be_uncertain(name) else name for name in table.names]
         return _find_named(names, request, source)
     if spec := _by_width(table.width, request):
-        return [named_pose(spec, None, table.width, request, request.kind)]
+        return [_chosen(spec, table, request, request.kind)]
     reason = f"{table.width} columns without names do not say what they are; give --from REP, or --columns"
     if request.poses == 1 and request.given:
         reason = f"{request.given.counted}; found {table.width} columns without names; or give --columns"
@@ -137,6 +136,15 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
 def _refusal(reason: str, source: str) -> FormatError:
     """Return the error that columns are not what is wanted; the first line names them."""
     return FormatError(reason, source=source, line=1)
+
+
+def _chosen(spec: str, table: Table, request: Request, kind: str) -> PoseColumns:
+    """Return the columns of a point or pose that are chosen by name or number."""
+    if not request.given_place:
+        return named_pose(spec, table.names, table.width, request, kind)
+    from frametool.stream.earth_columns import chosen_pose
+
+    return chosen_pose(spec, table.names, table.width, request)
 
 
 def _by_width(width: int, request: Request) -> str:
