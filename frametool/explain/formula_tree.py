@@ -10,18 +10,21 @@ import math
 import operator
 import re
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
     Leaf = Callable[[str], str]
 
-NOISE = 2e-15  # of the largest term: what the rounding of a few terms leaves where they cancel
+NOISE = 2e-15  # of the larger term: what the rounding of a few terms leaves where they cancel
 FAR = 16.0  # radians: a larger angle is as written, not a multiple of a rounded pi
 SUM, PRODUCT, SIGN, POWER = 1, 2, 3, 4  # precedence of operators
-BINDS = {ast.Add: SUM, ast.Sub: SUM, ast.Mult: PRODUCT, ast.Div: PRODUCT, ast.Pow: POWER}
-TEXT = {ast.Add: " + ", ast.Sub: " - ", ast.Mult: "·", ast.Div: "/", ast.Pow: "^"}
+# operator -> precedence, text, function
+OPERATORS: dict[type[ast.operator], tuple[int, str, Callable[[float, float], float]]] = {
+    ast.Add: (SUM, " + ", operator.add), ast.Sub: (SUM, " - ", operator.sub), ast.Mult: (PRODUCT, "·", operator.mul),
+    ast.Div: (PRODUCT, "/", operator.truediv), ast.Pow: (POWER, "^", lambda a, b: a ** int(b)),
+}  # fmt: skip
 # readers recompute a line with their own library: the values are those of `math`, not of the kernels
 FUNCTIONS: dict[str, Callable[..., float]] = {
     "sin": math.sin, "cos": math.cos, "sqrt": math.sqrt, "atan2": math.atan2, "hypot": math.hypot, "abs": abs,
@@ -36,77 +39,48 @@ PI = "pi"
 EXPONENT = re.compile(r"e([+-]?)0*(\d+)$")
 
 
-class Value(NamedTuple):
-    """A number, and the magnitude of the numbers whose rounding affects it."""
-
-    number: float
-    size: float
-
-    @property
-    def settled(self) -> float:
-        """Return the number, or 0 if it is only the rounding error of terms that cancel."""
-        return 0.0 if abs(self.number) <= NOISE * self.size else self.number
-
-
 @lru_cache(maxsize=1024)
 def parsed(formula: str) -> ast.expr:
     """Return the syntax tree of a formula."""
     return ast.parse(formula, mode="eval").body
 
 
-def evaluated(node: ast.expr, values: Mapping[str, float]) -> Value:
-    """Return the value of a tree; raises KeyError for a name without a value, ArithmeticError as `math` does."""
-    if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
-        return Value(float(node.value), abs(float(node.value)))
-    if isinstance(node, ast.Name):
-        number = math.pi if node.id == PI else values[node.id]
-        return Value(number, abs(number))
-    if isinstance(node, ast.UnaryOp):
-        number, size = evaluated(node.operand, values)
-        return Value(-number, size)
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-        return _called(node.func.id, [evaluated(each, values) for each in node.args])
-    if isinstance(node, ast.BinOp):
-        return _joined(node.op, evaluated(node.left, values), evaluated(node.right, values))
+def evaluated(node: ast.expr, values: Mapping[str, float], noise: float = 0.0) -> float:
+    """Return the value of a tree; raises KeyError for a name without a value, ArithmeticError as `math` does.
+
+    noise: a sum of terms that cancel is 0 if it is no larger than this share of them; so are a sine and a cosine,
+        relative to their angle
+    """
+    match node:
+        case ast.Constant(value=int() | float() as number):
+            return float(number)
+        case ast.Name(id=name):
+            return math.pi if name == PI else values[name]
+        case ast.UnaryOp(operand=operand):
+            return -evaluated(operand, values, noise)
+        case ast.Call(func=ast.Name(id=name), args=nodes):
+            arguments = [evaluated(each, values, noise) for each in nodes]
+            number = float(FUNCTIONS[name](*arguments))
+            return cleaned(number, noise, min(abs(arguments[0]), FAR)) if name in ("sin", "cos") else number
+        case ast.BinOp(left=left, op=sign, right=right):
+            a, b = evaluated(left, values, noise), evaluated(right, values, noise)
+            number = OPERATORS[type(sign)][2](a, b)
+            return cleaned(number, noise, max(abs(a), abs(b))) if isinstance(sign, (ast.Add, ast.Sub)) else number
     raise ValueError(ast.dump(node))
+
+
+def cleaned(number: float, noise: float, size: float) -> float:
+    """Return a number, or 0 if it is only the rounding error of numbers of a size."""
+    return 0.0 if abs(number) <= noise * size else number
 
 
 def holds(condition: str, values: Mapping[str, float]) -> bool:
     """Return True if a comparison holds, or if a single number is not 0."""
     node = parsed(condition)
     if not isinstance(node, ast.Compare):
-        return evaluated(node, values).number != 0.0
-    left, right = (evaluated(each, values).number for each in (node.left, *node.comparators))
+        return evaluated(node, values) != 0.0
+    left, right = (evaluated(each, values) for each in (node.left, *node.comparators))
     return COMPARISONS[type(node.ops[0])](left, right)
-
-
-def _joined(sign: ast.operator, left: Value, right: Value) -> Value:
-    """Apply an operator, and to first order the effect of rounding on its result."""
-    (a, size_a), (b, size_b) = left, right
-    if isinstance(sign, (ast.Add, ast.Sub)):
-        return Value(a + b if isinstance(sign, ast.Add) else a - b, max(size_a, size_b))
-    if isinstance(sign, ast.Mult):
-        return Value(a * b, max(size_a * abs(b), abs(a) * size_b))
-    if isinstance(sign, ast.Div):
-        return Value(a / b, max(size_a / abs(b), abs(a / b) * size_b / abs(b)))
-    number = a ** int(b)
-    return Value(number, max(abs(number), b * size_a * abs(a) ** (int(b) - 1)))
-
-
-def _called(name: str, arguments: list[Value]) -> Value:
-    """Call a function; the magnitude follows from its derivative."""
-    number = float(FUNCTIONS[name](*(each.number for each in arguments)))
-    x, size = arguments[0]
-    if name in ("sin", "cos"):
-        slope = math.cos(x) if name == "sin" else math.sin(x)
-        return Value(number, max(abs(number), abs(slope) * min(size, FAR)))
-    if name == "sqrt":
-        return Value(number, max(number, size / (2.0 * number)) if number else math.sqrt(size))
-    if name == "atan2":
-        other, other_size = arguments[1]
-        squared = x * x + other * other
-        return Value(number, max(abs(number), (abs(other) * size + abs(x) * other_size) / squared if squared else 0.0))
-    return Value(number, max(abs(number), *(each.size for each in arguments)))
 
 
 def as_text(
@@ -134,9 +108,9 @@ def as_text(
         text = rf"\frac{{{write(node.left)}}}{{{write(node.right)}}}"
         loose = outer > PRODUCT + 1
     else:
-        binds = BINDS[type(node.op)]
+        binds, sign, _ = OPERATORS[type(node.op)]
         first, second = write(node.left, outer=binds), write(node.right, outer=binds + 1, right=True)
-        text = first + TEXT[type(node.op)] + second
+        text = first + sign + second
         if latex and isinstance(node.op, ast.Pow):
             text = f"{first}^{{{second}}}"
         elif latex and isinstance(node.op, ast.Mult):

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from frametool.errors import ValueInvalid
-from frametool.explain.formula_tree import Value, evaluated, holds, parsed
+from frametool.explain.formula_tree import NOISE, cleaned, evaluated, holds, parsed
 from frametool.geometry import floats
 from frametool.geometry import matrix as kernel
 from frametool.geometry.quaternion import to_matrix
@@ -121,7 +121,7 @@ class Sheet:
 
     def __init__(self, digits: int | None = DIGITS, *, clean: bool) -> None:
         """Create an empty sheet."""
-        self.digits, self.clean = digits, clean
+        self.digits, self.noise = digits, NOISE * clean
         self.items: list[Item] = []
         self.reach = 1.0
         self.stretch = 1.0
@@ -143,15 +143,14 @@ class Sheet:
         """Format numbers separated by blanks."""
         return " ".join(map(self.number, values))
 
-    def settled(self, value: Value) -> float:
-        """Return a number as used by the following steps.
+    def settled(self, number: float, size: float = 0.0) -> float:
+        """Return a number as used by the following steps; 0 if it is only the rounding error of numbers of a size.
 
         Raises ValueInvalid if it is not finite.
         """
-        number = value.settled if self.clean else value.number
-        if not abs(number) < float("inf"):
+        if not abs(number) < math.inf:
             raise ValueInvalid(TOO_LARGE)
-        return number + 0.0
+        return cleaned(number, self.noise, size) + 0.0
 
     def heading(self, text: str) -> None:
         """Begin a part."""
@@ -228,7 +227,7 @@ class Sheet:
         Raises ValueInvalid if it is not finite.
         """
         try:
-            return self.settled(evaluated(parsed(formula), values))
+            return self.settled(evaluated(parsed(formula), values, self.noise))
         except ArithmeticError:
             raise ValueInvalid(TOO_LARGE) from None
 
@@ -255,7 +254,7 @@ class Sheet:
         name, formula, unit = _parts(line)
         minus, prefix, transposed, *vectors = MATRIX_STEP.fullmatch(formula).groups("")  # type: ignore[union-attr]
         x, y, z, w = (values[prefix + each] for each in "xyzw")
-        matrix = rows([self.settled(Value(entry, 1.0)) for entry in to_matrix(x, y, z, w)])
+        matrix = rows([self.settled(entry, 1.0) for entry in to_matrix(x, y, z, w)])
         if transposed:
             matrix = [list(column) for column in zip(*matrix, strict=True)]
         arm, *shift = ([values[each + axis] for axis in "xyz"] for each in vectors if each)
@@ -271,10 +270,7 @@ class Sheet:
     def inner(self, row: Sequence[float], column: Sequence[float], *more: float) -> float:
         """Return the sum of products in their order, and of further terms: an entry of a product of matrices."""
         terms = [*(a * b for a, b in zip(row, column, strict=True)), *more]
-        total = terms[0]
-        for term in terms[1:]:
-            total += term
-        return self.settled(Value(total, max(map(abs, terms))))
+        return self.settled(sum(terms[1:], terms[0]), max(map(abs, terms)))
 
     def result(self, text: str, rows: Sequence[Row]) -> None:
         """End with the result."""
