@@ -189,7 +189,7 @@ class TreeFit:
             else:
                 break
             tried.add(kept.tobytes())
-            bodies = problem.placed([problem.tree(np.flatnonzero(kept).tolist())])[0]
+            bodies = problem.placed(problem.tree(np.flatnonzero(kept).tolist()))
             fit = TreeFit(problem, problem.selected(bodies, kept, fit.found.noise, robust=True))
         if undecided:
             raise ValueInvalid(fit.open_loop(*undecided))

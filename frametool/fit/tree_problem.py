@@ -15,11 +15,11 @@ import numpy as np
 from frametool.errors import ValueInvalid, alternatives, first_of, listing, printable, shown
 from frametool.fit import least_squares as lsq
 from frametool.frames.topology import Groups
-from frametool.geometry.rigid import IDENTITY
+from frametool.geometry.rigid import IDENTITY, compose
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
     from typing import Any
 
     from frametool.frames.lookups import Frames
@@ -156,7 +156,6 @@ def _require_connected(names: Iterable[str], edges: Iterable[tuple[str, str]]) -
 
 TREES = 200
 SINGULAR = 1e-12  # of the correlations: the least eigenvalue of a valid covariance
-ROWS_AT_ONCE = 20_000  # of trees that are tried together
 STEPS = 100
 MOST_DAMPED = 1e12
 REST = 1e-12  # of the extent, radians, and of a sigma: convergence of steps
@@ -226,6 +225,9 @@ class TreeProblem:
         self._stated = np.stack([_information(each, self.place(row)) for row, each in enumerate(measurements)])
         self.pairs = list(zip(self.parent.tolist(), self.child.tolist(), strict=True))
         self.arm = max(float(np.median(lsq.length(self.measured.xyz))), lsq.LEAST)
+        across = self.in_parent @ self.measured @ self.in_child.inverse()  # parent_from_child, of bodies
+        both = across.inverse(), across
+        self._across = [[*zip(*(part.tolist() for part in each.components), strict=True)] for each in both]
         self._moves = (self.parent != self.child)[:, None, None]  # a row within a body has no effect
 
     def place(self, row: int) -> str:
@@ -268,36 +270,30 @@ class TreeProblem:
         rows = range(self.size)
         best = lsq.stacked([Transform.identity()] * self.count)
         least, closest = math.inf, np.full(self.size, math.inf)
-        orders = [rows, *(sorted(rows, key=[shuffled.random() for _ in rows].__getitem__) for _ in range(trees - 1))]
-        at_once = max(1, ROWS_AT_ONCE // max(self.size, self.count))
-        while orders:
-            some, orders = [self.tree(order) for order in orders[:at_once]], orders[at_once:]
-            placed = self.placed(some)
-            for at, tree in enumerate(some):
-                off = np.log1p(self.u(self.errors(placed[at]), Noise()) ** 2)
-                if (sum_off := float(off.sum())) < least:
-                    best, least = placed[at], sum_off
-                off[tree.row[1:]] = math.inf  # a tree agrees with its own rows
-                closest = np.minimum(closest, off)
-            if not orders and trees > 1:
-                orders, trees = [np.argsort(closest, kind="stable").tolist()], 1
+
+        def orders() -> Iterator[Sequence[int]]:
+            yield rows
+            for _ in range(trees - 1):
+                yield sorted(rows, key=[shuffled.random() for _ in rows].__getitem__)
+            if trees > 1:
+                yield np.argsort(closest, kind="stable").tolist()
+
+        for tree in map(self.tree, orders()):
+            placed = self.placed(tree)
+            off = np.log1p(self.u(self.errors(placed), Noise()) ** 2)
+            if (sum_off := float(off.sum())) < least:
+                best, least = placed, sum_off
+            off[tree.row[1:]] = math.inf  # a tree agrees with its own rows
+            closest = np.minimum(closest, off)
         return best
 
-    def placed(self, trees: list[SpanningTree]) -> Transform:
-        """Return the poses of bodies in trees of rows, (trees, bodies): paths to the root by doubling."""
-        above, row = np.array([tree.above for tree in trees]), np.array([tree.row for tree in trees])
-        across = self.in_parent @ self.measured @ self.in_child.inverse()
-        forth, back = across[row].components, across.inverse()[row].components
-        down = self.child[row] == np.arange(self.count)
-        parts = [np.where(down, one, other) for one, other in zip(forth, back, strict=True)]
-        for part, own in zip(parts, IDENTITY, strict=True):
-            part[:, 0] = own
-        poses = Transform.of(*parts)
-        each = np.arange(len(trees))[:, None]
-        while above.any():
-            poses = poses[each, above] @ poses
-            above = above[each, above]
-        return poses
+    def placed(self, tree: SpanningTree) -> Transform:
+        """Return the poses of the bodies in a tree of rows."""
+        poses = [IDENTITY] * self.count
+        for body in tree.order[1:]:
+            row = tree.row[body]
+            poses[body] = compose(*poses[tree.above[body]], *self._across[self.pairs[row][1] == body][row])
+        return Transform.of(*map(np.array, zip(*poses, strict=True)))
 
     # Gauss-Newton
 
@@ -435,7 +431,7 @@ class TreeProblem:
         tree = self.tree(np.lexsort((u, ~kept)).tolist() if not kept.all() else range(self.size))
         reached = np.isin(np.arange(self.size), tree.row)
         if (reached & ~kept).any():
-            kept, bodies = kept | reached, self.placed([tree])[0]
+            kept, bodies = kept | reached, self.placed(tree)
         alone = np.isin(np.arange(self.size), list(bridges(tree, self.pairs, np.flatnonzero(kept).tolist())))
         estimate = bool((kept & ~alone & ~self.stated).any()) and kept.sum() > self.unknown
         few_loops = bool((kept & ~alone).sum() <= 2 * (self.unknown - alone.sum()))
