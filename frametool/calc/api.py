@@ -23,7 +23,7 @@ from frametool.grammar.result import Result
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from frametool.geometry.types import Array, Components
     from frametool.grammar.result import Style
@@ -49,7 +49,7 @@ class Measure(float):
 class Framed:
     """A value with its frames: a pose `target<-source`, or a point, vector, twist or angles in `target`.
 
-    kind: pose, point, vector, twist, angles, list.  An unknown frame is None.
+    kind: pose, point, vector, twist, angles.  An unknown frame is None.
     """
 
     __slots__ = ("_term",)
@@ -101,22 +101,8 @@ class Framed:
 
         return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
-    def __iter__(self) -> Iterator[Any]:
-        """Iterate over a list."""
-        if self.kind != LIST:
-            raise TypeError(f"{self._term.type.named} is not a list")
-        return map(_result, self._term.items)
-
-    def __len__(self) -> int:
-        """Return the length of a list."""
-        if self.kind != LIST:
-            raise TypeError(f"{self._term.type.named} has no length")
-        return len(self._term.items)
-
     def __repr__(self) -> str:
         """Show kind, frames and numbers."""
-        if self.kind == LIST:
-            return f"<list of {len(self)}>"
         frames = str(self._term.type) if self.kind == POSE else f"in {frame_text(self.target)}"
         return f"<{self.kind} {frames} {self.components}>"
 
@@ -129,7 +115,7 @@ def calc(
     tree: for look-ups without a tree name.  names: values for use in the expression: trees, transforms, rotations,
     numbers, three numbers (a point), six (a twist), lists of transforms, results of other expressions.
     degrees, normalize: how literals of poses are read.
-    Returns a Measure, which is a float, or a Framed: `.transform`, `.xyz`, `.target`, `.source`.
+    Returns a Measure, which is a float, or a Framed: `.transform`, `.xyz`, `.target`, `.source`; for a list a list of them.
     Raises CalcError for frames or units that do not match, LookupFailed.
     """
     terms = {name: _term(name, value) for name, value in names.items()}
@@ -143,6 +129,8 @@ def _result(term: Term) -> Any:
     """Return the Python value of a term."""
     if term.type.kind == TREE:
         return term.tree
+    if term.type.kind == LIST:
+        return [*map(_result, term.items)]
     if term.type.kind != NUMBER:
         return Framed(term)
     (value,) = in_radians(term).at(None)

@@ -354,27 +354,14 @@ BETWEEN_WORDS = " \t()[]{},*^@+="
 WORDS = ("row", "pi", "ans", "as ", "in ")
 
 
-class Completer:
-    """Completes frames on both sides of an arrow, names, and functions with their bracket."""
-
-    def __init__(self, scope: Scope, line: Any) -> None:
-        """Store the scope, and readline, which knows the line."""
-        self.scope = scope
-        self.line = line
-
-    def __call__(self, text: str, state: int) -> str | None:
-        """Return one completion after another."""
-        found = self.completions(text, self.line.get_line_buffer()[: self.line.get_begidx()])
-        return found[state] if state < len(found) else None
-
-    def completions(self, text: str, before: str) -> list[str]:
-        """Return all completions of a word after the rest of a line."""
-        opened = re.search(r"(\w+) *\[$", before)  # the bracket of a named tree
-        asked = self.scope.names[opened[1]].tree if opened and opened[1] in self.scope.names else None
-        tree = asked or self.scope.tree
-        frames = sorted(map(frame_text, tree.frames)) if tree else []
-        head, arrow, tail = text.partition("<-")
-        if arrow:
-            return [f"{head}<-{frame}" for frame in frames if frame.startswith(tail)]
-        words = () if asked else (*self.scope.names, *(f"{name}(" for name in FUNCTIONS), *WORDS)
-        return [word for word in (*words, *(f"{frame}<-" for frame in frames)) if word.startswith(text)]
+def completions(scope: Scope, text: str, before: str) -> list[str]:
+    """Return what a word after the rest of a line may become: frames on both sides of an arrow, names, functions."""
+    opened = re.search(r"(\w+) *\[$", before)  # the bracket of a named tree
+    asked = scope.names[opened[1]].tree if opened and opened[1] in scope.names else None
+    tree = asked or scope.tree
+    frames = sorted(map(frame_text, tree.frames)) if tree else []
+    head, arrow, tail = text.partition("<-")
+    if arrow:
+        return [f"{head}<-{frame}" for frame in frames if frame.startswith(tail)]
+    words = () if asked else (*scope.names, *(f"{name}(" for name in FUNCTIONS), *WORDS)
+    return [word for word in (*words, *(f"{frame}<-" for frame in frames)) if word.startswith(text)]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from frametool.calc.evaluate import Completer, Scope
+from frametool.calc.evaluate import Scope, completions
 from frametool.calc.values import TREE, Term, Type
 from frametool.formats.load import load
 
@@ -149,13 +149,12 @@ def test_without_readline_the_prompt_is_plain(tmp_path: Path) -> None:
 def test_words_are_completed_where_they_fit() -> None:
     scope = Scope(tree=load(EXAMPLES / "robot.yaml"))
     scope.names["d"] = Term(Type(TREE), (), tree=load(EXAMPLES / "drive.yaml"))
-    completer = Completer(scope, None)
-    assert completer.completions("map<-cam", "inv(") == ["map<-camera_link", "map<-camera_optical"]
-    assert completer.completions("li", "2 * ") == ["lidar<-"]
-    assert completer.completions("gri", "d[") == ["gripper<-"]
-    assert completer.completions("map<-gri", "1 + d[") == ["map<-gripper"]
-    assert completer.completions("di", "") == ["dist("]
-    assert completer.completions("a", "x") == ["angle(", "asin(", "acos(", "atan(", "ans", "as ", "arm_base_link<-"]
+    assert completions(scope, "map<-cam", "inv(") == ["map<-camera_link", "map<-camera_optical"]
+    assert completions(scope, "li", "2 * ") == ["lidar<-"]
+    assert completions(scope, "gri", "d[") == ["gripper<-"]
+    assert completions(scope, "map<-gri", "1 + d[") == ["map<-gripper"]
+    assert completions(scope, "di", "") == ["dist("]
+    assert completions(scope, "a", "x") == ["angle(", "asin(", "acos(", "atan(", "ans", "as ", "arm_base_link<-"]
 
 
 def test_the_shell_completes_frames_of_the_trees_that_were_named(run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:

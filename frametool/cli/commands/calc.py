@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.calc.api import line_of_value, machine_table, machine_text, plain_result
-from frametool.calc.evaluate import BETWEEN_WORDS, Completer, Scope, evaluate_line, read_line
+from frametool.calc.evaluate import BETWEEN_WORDS, Scope, completions, evaluate_line, read_line
 from frametool.calc.functions import FUNCTIONS
 from frametool.calc.parser import Line, mentions_row, walk
 from frametool.calc.values import LIST, POINT, POSE, TREE, VECTOR, Term, Type, wanted
@@ -84,7 +84,7 @@ def _offer_words(ctx: click.Context, incomplete: str) -> Mapping[str, str]:
         file_named_in(each, scope)
     cut = max(incomplete.rfind(mark) for mark in BETWEEN_WORDS) + 1
     before, word = incomplete[:cut], incomplete[cut:]
-    return dict.fromkeys((before + each for each in Completer(scope, None).completions(word, before)), "")
+    return dict.fromkeys((before + each for each in completions(scope, word, before)), "")
 
 
 EXPRESSION = Text(offers=_offer_words)
@@ -217,8 +217,13 @@ def _readline(scope: Scope) -> Iterator[None]:
         return
     state = os.environ.get("XDG_STATE_HOME") or os.path.expanduser("~/.local/state")  # as the XDG base directories
     path = os.path.join(state, "frametool_history")
+
+    def complete(text: str, state: int) -> str | None:
+        found = completions(scope, text, readline.get_line_buffer()[: readline.get_begidx()])
+        return found[state] if state < len(found) else None
+
     readline.set_completer_delims(BETWEEN_WORDS)
-    readline.set_completer(Completer(scope, readline))
+    readline.set_completer(complete)
     is_editline = "libedit" in (readline.__doc__ or "")
     readline.parse_and_bind("bind ^I rl_complete" if is_editline else "tab: complete")
     readline.set_history_length(LONGEST_HISTORY)
