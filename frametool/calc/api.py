@@ -115,7 +115,7 @@ def calc(
     tree: for look-ups without a tree name.  names: values for use in the expression: trees, transforms, rotations,
     numbers, three numbers (a point), six (a twist), lists of transforms, results of other expressions.
     degrees, normalize: how literals of poses are read.
-    Returns a Measure, which is a float, or a Framed: `.transform`, `.xyz`, `.target`, `.source`; for a list a list of them.
+    Returns a Measure, which is a float, or a Framed: `.transform`, `.xyz`, `.target`, `.source`; of a list a list.
     Raises CalcError for frames or units that do not match, LookupFailed.
     """
     terms = {name: _term(name, value) for name, value in names.items()}

@@ -321,11 +321,6 @@ class ClockOffset(NamedTuple):
     score: float
     rival: float | None = None
 
-    def shifted(self, change: float, shift_ns: int) -> ClockOffset:
-        """Return the offset refined by a change, for clocks that had been shifted."""
-        rival = None if self.rival is None else self.rival + shift_ns / 1e9
-        return ClockOffset(self.seconds + change + shift_ns / 1e9, self.score, rival)
-
 
 def clock_offset(
     ref: Trajectory, est: Trajectory, *, limit_s: float = LIMIT_S, kind: str = "sim3", by_turning: bool = False
@@ -353,20 +348,19 @@ def clock_offset(
             continue
         best = max(best, _best_lag(courses[0], courses[1], step, limit_s), key=lambda found: found.score)
         if by_turning and turning and best.score > 0:
-            return best.shifted(_refined_speeds(courses[0], courses[1], best.seconds, step) - best.seconds, shift)
-    change = _refined(ref, est, shift, best.seconds, step, kind) - best.seconds if best.score > 0 else 0.0
-    return best.shifted(change, shift)
+            seconds = _refined_speeds(courses[0], courses[1], best.seconds, step)
+            break
+    else:
+        seconds = _refined(ref, est, shift, best.seconds, step, kind) if best.score > 0 else 0.0
+    return ClockOffset(seconds + shift / 1e9, best.score, None if best.rival is None else best.rival + shift / 1e9)
 
 
 def _speeds(each: Trajectory, times: Array, *, turning: bool) -> tuple[Array, Array] | None:
     """Return the intervals between poses and the angular speed or speed there; None if there is none."""
     if turning and each.rotation is None:
         return None
-    if turning:
-        rotation = each.rotation
-        moved = rotation[:-1].distance(rotation[1:])  # type: ignore[index]
-    else:
-        moved = length(np.diff(each.xyz, axis=0))
+    rotation = each.rotation if turning else None
+    moved = length(np.diff(each.xyz, axis=0)) if rotation is None else rotation[:-1].distance(rotation[1:])
     speed = moved / np.diff(times)
     return None if np.std(speed) < 1e-6 * max(TINY, np.max(speed)) else ((times[1:] + times[:-1]) / 2, speed)
 

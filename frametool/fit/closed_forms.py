@@ -28,25 +28,18 @@ MOST_TRIED = 200  # poses that are tried as the middle of the others
 LEAST_GAP = 1e-9  # between the two largest eigenvalues, relative to their sum
 
 
-class Spread(NamedTuple):
-    """Distances from a mean, in metres and radians: the weighted root mean square, and the largest."""
-
-    distance_rms: float
-    distance_max: float
-    angle_rms: float
-    angle_max: float
-
-
 class MeanFit(NamedTuple):
     """The mean of the inliers and their distances from it.
 
+    rms, most: the weighted root mean square and the largest distance of the inliers, metres and radians
     used: the inliers; left_out: outliers with a weight; u: the residual of each in sigmas
     residuals: [t_i - t, Log(R_i R')], (n, 6); sigma: of each axis of a pose of weight 1, metres and radians
     dof: 3 n - 3 of the inliers, for each sigma; covariance: of one pose, 6x6 as in ROS, None for a single pose
     """
 
     transform: Transform
-    spread: Spread
+    rms: tuple[float, float]
+    most: tuple[float, float]
     used: Mask
     left_out: Mask
     u: Array
@@ -78,14 +71,16 @@ def solve_mean(
         raise ValueInvalid("the rotations lie so far apart that none is their mean; leave some out, or give weights")
     mean = inliers.mean(None if weights is None else shares)
     apart = np.stack(mean.distance(inliers))
-    rms, most = np.sqrt((shares * apart * apart).sum(1) / shares.sum()).tolist(), apart.max(1).tolist()
+    rms, most = np.sqrt((shares * apart * apart).sum(1) / shares.sum()), apart.max(1)
     off = lsq.errors(poses, mean)
     count, kept = int(used.sum()), roots[used] * off[used]
     s_t, s_r = lsq.fitted_sigmas(kept, np.ones(count), 3).tolist()
     covariance = kept.T @ kept * (count / shares.sum() / (count - 1)) if count > 1 else None
     u = lsq.deviations(roots * off, np.array([s_t, s_r]))
-    spread = Spread(rms[0], most[0], rms[1], most[1])
-    return MeanFit(mean, spread, used, counts & ~used, u, off, (s_t, s_r), 3 * count - 3, covariance)
+    return MeanFit(
+        mean, tuple(rms.tolist()), tuple(most.tolist()), used, counts & ~used, u, off, (s_t, s_r), 3 * count - 3,
+        covariance,
+    )  # fmt: skip
 
 
 def _agreeing(poses: Transform, mass: Array) -> Mask:
@@ -297,7 +292,7 @@ def mean_of_rows(gathered: Gathered, values: list[float] | None, *, robust: bool
 
     weights = gathered.weights if values is None else values
     found = solve_mean(gathered.transforms, weights=weights, robust=robust)
-    spread, covariance = found.spread, found.covariance
+    (metres, radians), (farthest, widest), covariance = found.rms, found.most, found.covariance
     extras: dict[str, Any] = {"count": len(found.used)} | ({"used": int(found.used.sum())} if robust else {})
     left_out: list[str] = []
     for row in found.left_out.nonzero()[0].tolist() if robust else ():
@@ -305,10 +300,10 @@ def mean_of_rows(gathered: Gathered, values: list[float] | None, *, robust: bool
         left_out.append(f"{gathered.places[row]}: left out, {off} off (u {found.u[row]:.1f})")
     pose = Pose.of(found.transform.components)
     if gathered.placed:
-        extras |= {"distance_rms": spread.distance_rms, "distance_max": spread.distance_max}
+        extras |= {"distance_rms": metres, "distance_max": farthest}
     if gathered.turned:
-        extras |= {"angle_rms": spread.angle_rms, "angle_rms_deg": degrees(spread.angle_rms)}
-        extras |= {"angle_max": spread.angle_max, "angle_max_deg": degrees(spread.angle_max)}
+        extras |= {"angle_rms": radians, "angle_rms_deg": degrees(radians)}
+        extras |= {"angle_max": widest, "angle_max_deg": degrees(widest)}
     if covariance is not None:
         if gathered.placed:
             roots = [sqrt(covariance[at, at]) for at in range(3)]

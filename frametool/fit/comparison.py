@@ -15,7 +15,7 @@ from frametool.fit.least_squares import require_near
 from frametool.fit.numbers import ROUNDING, absolute_errors, all_pairs, chained, relative_errors, segment_errors
 from frametool.frames.stamps import format_stamp
 from frametool.frames.trajectory import way
-from frametool.geometry import earth, quaternion
+from frametool.geometry import earth
 from frametool.geometry.place import ENU, Origin
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
@@ -200,6 +200,7 @@ def _on_the_ground(
     origin = Origin()
     origin.settle(*both[first].xyz.T)
     pose = origin.pose(ENU)
+    turn = Transform.of(*pose).rotation.inverse()
     lat, lon, alt = origin.place or (0.0, 0.0, 0.0)
     there = f"lat {lat!r}, lon {lon!r}, alt {alt!r}, the first of {names[first]}"
     hints.append(f"compared along east, north, up of {there}")
@@ -207,10 +208,8 @@ def _on_the_ground(
     for at, each in enumerate(both):
         if on_earth[at]:
             xyz = np.stack(earth.seen_from(*pose, *each.xyz.T), -1)
-            found[at] = each._replace(xyz=xyz, world=ENU)
-            if each.xyzw is not None:
-                turned = quaternion.compose(*quaternion.conjugate(*pose[3:]), *each.xyzw.T)
-                found[at] = found[at]._replace(xyzw=np.stack(turned, -1))
+            xyzw = None if each.rotation is None else np.stack((turn @ each.rotation).components, -1)
+            found[at] = each._replace(xyz=xyz, xyzw=xyzw, world=ENU)
     return found
 
 

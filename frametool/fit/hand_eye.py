@@ -120,7 +120,7 @@ def solve_hand_eye(
         raise _unfitting(rms)
     _require_two_axes(turns, s_r, holder, names[2])
     covariance = lsq.inverse(model.hessian)
-    warnings = _way_warnings(medians, others, count, eye_to_hand=eye_to_hand) + _warnings(turns, count, holder)
+    warnings = _warnings(turns, count, holder, others.prod() <= BETTER**2 * medians.prod())
     warnings += _scale_warnings(samples.at(found.kept), model.x)
     for warning in warnings:
         warn(warning)
@@ -315,13 +315,14 @@ def _require_two_axes(turns: _Turns, s_r: float, holder: str, camera: str) -> No
         )
 
 
-def _warnings(turns: _Turns, count: int, holder: str) -> list[str]:
+def _warnings(turns: _Turns, count: int, holder: str, fits_both: bool) -> list[str]:  # noqa: FBT001 - of a triple
     notes = []
     if turns.rms[1] < SLIGHT:
         small = f"{degrees(turns.rms[1]):.1f} deg rms, first axis {turns.axis} in {holder}"
         notes.append(f"turns about a second axis are small ({small}): turn more")
     if count < FEWEST_CERTAIN:
-        notes.append(f"{count} samples say little of their own noise: the sigmas are rough; take 8 or more")
+        both = " fit with and without --eye-to-hand, and" * fits_both
+        notes.append(f"{count} samples{both} say little of their own noise: the sigmas are rough; take 8 or more")
     return notes
 
 
@@ -331,14 +332,6 @@ def _require_this_way(medians: Array, others: Array, names: tuple[str, str, str,
             f"the samples do not fit ({_off(medians)}); they do ({_off(others)}) {'without' if eye_to_hand else 'with'}"
             f" --eye-to-hand, or with TARGET inverted ({names[3]}<-{names[2]})"
         )
-
-
-def _way_warnings(medians: Array, others: Array, count: int, *, eye_to_hand: bool) -> list[str]:
-    """Warn if few samples fit the other setting about as well; three always do."""
-    if count >= FEWEST_CERTAIN or others.prod() > BETTER**2 * medians.prod():
-        return []
-    more = "a fourth sample" if count == FEWEST else "more samples"
-    return [f"{count} samples fit about as well {'without' if eye_to_hand else 'with'} --eye-to-hand: take {more}"]
 
 
 def _unfitting(off: Array) -> ValueInvalid:

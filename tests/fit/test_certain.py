@@ -63,16 +63,16 @@ def test_one_loop_does_not_tell_metres_from_radians() -> None:
 # hand-eye
 
 
-@pytest.mark.parametrize(("eye_to_hand", "other"), [(False, "with"), (True, "without")])
-def test_three_samples_fit_either_setting_and_say_so(eye_to_hand: bool, other: str) -> None:  # noqa: FBT001 - of a test
+@pytest.mark.parametrize("eye_to_hand", [False, True])
+def test_three_samples_fit_either_setting_and_say_so(eye_to_hand: bool) -> None:  # noqa: FBT001 - of a test
     made = rig("target", seed=3, count=3, turn=0.5)
     found = solve_hand_eye(made.gripper, made.target, eye_to_hand=eye_to_hand)
-    assert f"3 samples fit about as well {other} --eye-to-hand: take a fourth sample" in found.warnings
+    assert any(each.startswith("3 samples fit with and without --eye-to-hand") for each in found.warnings)
 
 
 def test_enough_samples_fit_one_setting() -> None:
     made = rig("target", seed=3, count=5, turn=0.5)
-    assert not any("as well" in each for each in solve_hand_eye(made.gripper, made.target).warnings)
+    assert not any("without" in each for each in solve_hand_eye(made.gripper, made.target).warnings)
 
 
 # clocks

@@ -308,7 +308,7 @@ def test_three_samples_do_not_look_certain() -> None:
         found = solved(made)
         off = np.array([*(found.x.xyz - made.x.xyz), *(found.x.rotation @ made.x.rotation.inverse()).as_rotvec()])
         sizes.append(off @ np.linalg.solve(found.covariance_x, off) / 6)
-        assert found.warnings[-1] == "3 samples say little of their own noise: the sigmas are rough; take 8 or more"
+        assert found.warnings[-1].endswith(" say little of their own noise: the sigmas are rough; take 8 or more")
     assert 0.2 < np.median(sizes) < 5.0
 
 
