@@ -23,7 +23,7 @@ from frametool.errors import FormatError, ValueInvalid, alternatives, shown
 from frametool.formats.detect import detect
 from frametool.formats.rows.csv import split_line
 from frametool.frames.stamps import BILLION, FURTHEST_NS, format_stamp, parse_time
-from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
+from frametool.grammar.readers import Misfit, as_mapping, kind, read_number, read_numbers, within
 from frametool.ros.message_stream import NOISE
 from frametool.sim.drivers import KEYS
 from frametool.sim.turtle import Twist
@@ -44,21 +44,13 @@ LONGEST = FURTHEST_NS // BILLION  # seconds: the range of the buffer's stamps
 FLAGS = {"true": "1", "false": "0"}  # as in turtlesim's services
 
 
-def guarded(call: Callable[..., Value], *arguments: Any, **options: Any) -> Value:
-    """Call a function that refuses values, so that its error can be placed."""
-    try:
-        return call(*arguments, **options)
-    except ValueInvalid as error:
-        raise Misfit(str(error)) from None
-
-
 def text_reader(parse: Callable[[str], Value], what: str) -> Callable[[Any], Value]:
     """Return the reader of values for a parser of text; `what` is the expected value in errors."""
 
     def read(value: Any) -> Value:
         if type(value) is not str:
             raise Misfit(f"expected {what}, found {kind(value)}")
-        return guarded(parse, value)
+        return parse(value)
 
     return read
 
@@ -96,28 +88,27 @@ def _whole(text: str, most: int) -> int:
     return int(text)
 
 
-read_number = text_reader(parse_number, "a number")
 read_byte = text_reader(partial(_whole, most=255), "a whole number 0 .. 255")
 read_angle = text_reader(partial(read_number_or_angle, degrees=False), "an angle in radians, or like 90deg")
 read_time = text_reader(_time, "a time in seconds")
 read_duration = text_reader(
     lambda text: None if text in ("inf", ".inf") else _time(text), "a duration in seconds, or inf"
 )
-read_boolean = one_of(FLAGS)
 read_flag = text_reader(lambda text: parse_number(FLAGS.get(text, text)), "true or false")
 read_seed = text_reader(partial(_whole, most=1 << 64), "a whole number")
 
 
-def parse_spawn(text: str) -> Place:
-    """Parse X,Y or X,Y,THETA: metres, radians; the angle may have a unit.
+def read_place(value: Any) -> Place:
+    """Read [x, y] or [x, y, theta]: metres, radians; the angle may have a unit."""
+    if type(value) is not list or len(value) not in (2, 3):
+        raise Misfit(f"expected [x, y, theta], found {kind(value)}")
+    x, y = (within((index,), read_number, value[index]) for index in (0, 1))
+    return x, y, within((2,), read_angle, value[2]) if len(value) == 3 else 0.0
 
-    Raises ValueInvalid.
-    """
-    cells = [cell.strip() for cell in text.split(",")]
-    if len(cells) not in (2, 3):
-        raise ValueInvalid(f"expected X,Y,THETA, found {shown(text)}")
-    theta = read_number_or_angle(cells[2], degrees=False) if len(cells) == 3 else 0.0
-    return parse_number(cells[0]), parse_number(cells[1]), theta
+
+def parse_spawn(text: str) -> Place:
+    """Parse X,Y or X,Y,THETA; raises ValueInvalid."""
+    return read_place([cell.strip() for cell in text.split(",")])
 
 
 def nanoseconds(name: str, seconds: float) -> int:

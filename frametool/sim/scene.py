@@ -18,10 +18,10 @@ from frametool.documents.document import format_error, parse_documents
 from frametool.documents.source import Source, read_text
 from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.frames.stamps import BILLION
-from frametool.grammar.readers import Misfit, as_mapping, kind, within
+from frametool.grammar.readers import Misfit, as_mapping, kind, read_number, within
 from frametool.sim import readers
 from frametool.sim.drivers import LAWS, LEADERS, TARGETS, FollowController, built_in, scripted
-from frametool.sim.readers import guarded, known_keys, nanoseconds
+from frametool.sim.readers import known_keys, nanoseconds
 from frametool.sim.turtle import CENTRE, SERVICES, TICK_NS, VARIANTS, complete
 
 if TYPE_CHECKING:
@@ -132,21 +132,13 @@ def _name(value: Any) -> str:
     return value
 
 
-def _place(value: Any) -> Place:
-    """Read [x, y] or [x, y, theta]: metres, radians."""
-    if type(value) is not list or len(value) not in (2, 3):
-        raise Misfit(f"expected [x, y, theta], found {kind(value)}")
-    x, y = (within((index,), readers.read_number, value[index]) for index in (0, 1))
-    return x, y, within((2,), readers.read_angle, value[2]) if len(value) == 3 else 0.0
-
-
 # key, also of a service's argument -> its reader; others are numbers
 READERS: dict[str, Callable[[Any], Any]] = {
     "duration": readers.read_duration,
     "turtlesim": readers.one_of(VARIANTS),
-    "holonomic": readers.read_boolean,
+    "holonomic": readers.read_flag,
     "seed": readers.read_seed,
-    "spawn": _place,
+    "spawn": readers.read_place,
     "follow": _name,
     "law": readers.one_of(LAWS),
     "target": readers.one_of(TARGETS),
@@ -163,7 +155,7 @@ READERS: dict[str, Callable[[Any], Any]] = {
 
 def _field(mapping: Mapping[str, Any], key: str, default: Any = None) -> Any:
     """Read the value of a key, or its default."""
-    return within((key,), READERS.get(key, readers.read_number), mapping.get(key, default))
+    return within((key,), READERS.get(key, read_number), mapping.get(key, default))
 
 
 def read_scene(source: Source, *, seed: int | None = None) -> Scene:
@@ -186,7 +178,7 @@ def _scene(value: Any, source: Source, seed: int | None) -> Scene:
     if "turtles" not in scene:
         raise Misfit(f"no turtles; expected {', '.join(SCENE_KEYS)}")
     own = _field(scene, "seed", "0")
-    variant, holonomic = _field(scene, "turtlesim", "ros1"), _field(scene, "holonomic", "false") == "true"
+    variant, holonomic = _field(scene, "turtlesim", "ros1"), bool(_field(scene, "holonomic", "false"))
     calls = within(("events",), _calls, scene.get("events") or [], source)
     entries = within(("turtles",), as_mapping, scene["turtles"], "the turtles by name")
     turtles = [
@@ -233,7 +225,7 @@ def _follow(name: str, entry: Mapping[str, Any]) -> Follow:
     law = _field(entry, "law", "ros1")
     numbers = {key: _field(entry, key) for key in CONTROLLER_KEYS if key in entry}
     for key, number in numbers.items():
-        within((key,), guarded, FollowController, law, **{key: number})
+        within((key,), FollowController, law, **{key: number})
     target, delay_ns = _field(entry, "target", "leader"), _field(entry, "delay", "0")
     return Follow(leader, FollowController(law, **numbers), target, delay_ns)
 
@@ -262,5 +254,5 @@ def _call(value: Any) -> ServiceCall:
 def _arguments(service: str, value: Any) -> dict[str, float | str]:
     """Read a service's arguments and check that none is missing."""
     arguments = {key: _field(value, key) for key in known_keys(value, SERVICES[service], f"the arguments of {service}")}
-    guarded(complete, service, arguments)
+    complete(service, arguments)
     return arguments

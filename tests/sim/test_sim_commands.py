@@ -92,7 +92,7 @@ def test_the_example_scene_has_three_turtles_that_come_together(run: Run) -> Non
     [
         (("follow", "--leader", "circel"), 2, "did you mean 'circle'? leaders: "),
         (("follow", "--leader", "missing.csv"), 5, "missing.csv: no such file"),
-        (("follow", "--spawn", "1"), 2, "expected X,Y,THETA"),
+        (("follow", "--spawn", "1"), 2, "expected [x, y, theta]"),
         (("follow", "--rate", "0"), 2, "rate must be"),
         (("follow", "--gain-linear", "nan"), 2, "is not finite"),
         (("follow", "--duration", "-1"), 2, "duration must be 0 .. "),
