@@ -13,7 +13,6 @@ import sys
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from itertools import groupby, pairwise
-from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TextIO
 
 from click import echo_via_pager
@@ -109,6 +108,8 @@ def in_colour(text: str, marks: Iterable[str]) -> str:
 
 def show(text: str, *, paged: bool) -> None:
     """Write a help or the like to standard output; on a terminal in styles, and paged where it is longer."""
+    from shutil import get_terminal_size
+
     is_seen = sys.stdout.isatty() and os.environ.get("TERM") != "dumb"
     if is_seen and paged and text.count("\n") >= get_terminal_size().lines:
         check()

@@ -34,7 +34,7 @@ _STAMP = r"(?i)[#% ]*+(?:.*[._])?(?:stamp|timestamp|time|t)(?:_[nmuµ]?s)?\s*(?:
 _UNIT = r"_([nmuµ]?s)$|[\[(]\s*+((?:\s*+[^\[\]()\s]++)*+)\s*+[\])]$"
 _WHOLE_SECONDS = r"(|.*[._])(?:secs?|seconds)"
 _UNITS = {"ns": 1, "us": 10**3, "µs": 10**3, "ms": 10**6} | dict.fromkeys(("s", "sec", "seconds", ""), 0)
-_EARTH = r"(?i)(?:^|[^a-z])(?:lat(?:itude)?(?![a-z])|lla$|ecef|utm|easting|north|mgrs|at$)"
+_EARTH = r"(?:^|[^a-z])(?:lat(?:itude)?(?![a-z])|lla$|ecef|utm|easting|north|mgrs|at$)"
 PLACE_KEYS = frozenset((
     "lat", "latitude", "lon", "longitude", "lng", "alt", "altitude", "ecef", "utm", "easting", "northing", "east",
     "north", "up", "down",
@@ -97,7 +97,7 @@ def _is_known(name: str) -> bool:
 
 def may_be_on_earth(name: str) -> bool:
     """Return True if a key or column may be a position on the Earth: a latitude, ECEF, UTM, north."""
-    return re.search(_EARTH, name) is not None or name in FLAT_KEYS
+    return re.search(_EARTH, name.lower()) is not None or name in FLAT_KEYS
 
 
 def may_be_uncertain(name: str) -> bool:
