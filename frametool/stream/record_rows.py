@@ -311,74 +311,50 @@ def plain_of(text: str, node: Node) -> Any:
     return plain(parse_nodes(f"{node.quote}{text}{node.quote}")[0]) if "\\" in text else text
 
 
-class Filling:
-    """Puts what the rows of a batch say in the place of marks."""
-
-    def __init__(self, batch: RecordBatch) -> None:
-        """Take the rows."""
-        self.batch = batch
-        size = len(batch.places)
-        self.known = {
-            mark: each if len(each) == size else [*each] * size
-            for mark, each in ((PARENT, batch.parents), (NAME, batch.names))
-        }
-        self.numbers = batch.results.tolist()
-        self.stamps = [] if batch.stamps_ns is None else batch.stamps_ns.tolist()
-        self.leaves: dict[str, list[Any]] = {}
-
-    def filled(self, part: Any, row: int) -> Any:
-        """Return a plain value without marks."""
-        if type(part) is dict:
-            return {key: self.filled(each, row) for key, each in part.items()}
-        if type(part) is list:
-            return [self.filled(each, row) for each in part]
-        if isinstance(part, float):
-            return self.numbers[row][self.batch.marked.numbers[repr(part + 0.0)]]
-        if isinstance(part, str):
-            return self.text(part, row)
-        return self.stamps[row] if part == STAMP_NS else part
-
-    def text(self, mark: str, row: int) -> Any:
-        """Return what replaces a text, if that is a mark."""
-        if mark in self.known:
-            return self.known[mark][row]
-        if mark not in self.leaves:
-            leaf = LEAF.fullmatch(mark)
-            self.leaves[mark] = [mark] * len(self.numbers) if leaf is None else plain_texts(self.batch, int(leaf[1]))
-        return self.leaves[mark][row]
+def column_of(batch: RecordBatch, part: Any) -> list[Any]:
+    """Return what each row says where the result of all has a part, whose marks are scalars of rows."""
+    size = len(batch.places)
+    if type(part) is dict:
+        columns = [column_of(batch, each) for each in part.values()]
+        return [dict(zip(part, row, strict=True)) for row in zip(*columns, strict=True)] if columns else [{}] * size
+    if type(part) is list:
+        return [[*row] for row in zip(*[column_of(batch, each) for each in part], strict=True)] if part else [[]] * size
+    is_stamp = part == STAMP_NS and batch.stamps_ns is not None
+    if isinstance(part, float) or is_stamp:
+        numbers: Any = batch.stamps_ns if is_stamp else batch.results[:, batch.marked.numbers[repr(part + 0.0)]]
+        return [*numbers.tolist()]
+    if part in (PARENT, NAME):
+        known = batch.parents if part == PARENT else batch.names
+        return [*known] * (1 if len(known) == size else size)
+    leaf = LEAF.fullmatch(part) if isinstance(part, str) else None
+    return [part] * size if leaf is None else plain_texts(batch, int(leaf[1]))
 
 
 def rows_as_values(batch: RecordBatch) -> Iterator[Value]:
     """Yield the rows of a batch as single results; their numbers are position and quaternion."""
     value = batch.marked.value
-    filling = Filling(batch)
-    for row, numbers in enumerate(filling.numbers):
-        if not isinstance(value, Result):
-            yield filling.filled(value, row)
-            continue
-        pose = value.pose
+    if not isinstance(value, Result):
+        yield from column_of(batch, value)
+        return
+    pose = value.pose
+    said = column_of(batch, [pose.name, pose.parent, pose.scale if pose.scale != 1.0 else None, value.extras])
+    for numbers, (name, parent, scale, extras) in zip(batch.results.tolist(), said, strict=True):
         own = pose._replace(
             position=None if pose.position is None else tuple(numbers[:3]),
             rotation=None if pose.rotation is None else tuple(numbers[3:7]),
-            name=filling.filled(pose.name, row),
-            parent=filling.filled(pose.parent, row),
-            scale=pose.scale if pose.scale == 1.0 else filling.filled(pose.scale, row),
-        )
-        yield Result(own, filling.filled(value.extras, row))
+            name=name, parent=parent, scale=scale or 1.0,
+        )  # fmt: skip
+        yield Result(own, extras)
 
 
 def poses_of(batch: RecordBatch) -> RowPoses | None:
     """Return the rows of a batch as a block of poses; None where they are points, on the Earth, or scaled."""
-    value, rows = batch.marked.value, range(len(batch.places))
+    value = batch.marked.value
     if not isinstance(value, Result) or None in (value.pose.position, value.pose.rotation) or AS_READ in value.extras:
         return None
     if value.pose.scale != 1.0:
         return None
-    filling = Filling(batch)
-    named = (filling.known.get(each or "") or [filling.filled(each, row) for row in rows] for each in value.pose[2:4])
-    names, parents = (each[:1] if len(set(each)) == 1 else each for each in named)
-    extras = {
-        key: objects(filling.filled(each, row) for row in rows)
-        for key, each in value.extras.items() if key != "stamp_ns"
-    }  # fmt: skip
-    return RowPoses(batch.results[:, :7] + 0.0, batch.stamps_ns, np.arange(len(rows)), parents, names, extras)
+    names, parents = (column_of(batch, each) for each in value.pose[2:4])
+    names, parents = (each[:1] if len({*each}) == 1 else each for each in (names, parents))
+    extras = {key: objects(column_of(batch, each)) for key, each in value.extras.items() if key != "stamp_ns"}
+    return RowPoses(batch.results[:, :7] + 0.0, batch.stamps_ns, np.arange(len(batch.places)), parents, names, extras)
