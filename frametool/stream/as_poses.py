@@ -34,7 +34,7 @@ from frametool.stream.row_poses import RowPoses, kept
 from frametool.stream.rows import Block, spans_of
 from frametool.stream.table import rename_of
 from frametool.stream.table_stream import TableRows
-from frametool.stream.writers import LEARNED, TextWriter
+from frametool.stream.writers import LEARNED, RowsWriter, TextWriter
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Sequence
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from frametool.text.spans import Ints
 
     Step: TypeAlias = tuple[RowPoses, Outcome]  # what a block became, and what is reported about it
-    BlockWriter: TypeAlias = "TextWriter | ArrayWriter | RecordingWriter"
+    BlockWriter: TypeAlias = "TextWriter | RowsWriter | ArrayWriter | RecordingWriter"
 
 QUATERNION = notation("quaternion")
 AS_VALUES = Style("json")  # of results that are not written
@@ -68,7 +68,7 @@ def writer_for(style: Style, kind: str = POSE, extras: Sequence[str] = (), *, pl
         from frametool.stream.recording_writer import RecordingWriter
 
         return RecordingWriter(style, kind, extras, placed=placed)
-    return TextWriter(style, kind, extras, placed=placed)
+    return (RowsWriter if style.format in LEARNED else TextWriter)(style, kind, extras, placed=placed)
 
 
 class FormatConverter:

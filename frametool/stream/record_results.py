@@ -1,22 +1,17 @@
-"""Streams of records in another format: what is alike becomes rows together, all else a result at a time."""
+"""Results in another format, block by block: what is alike becomes rows together, all else a result at a time."""
 
 from __future__ import annotations
 
 import re
 from itertools import chain
 from operator import itemgetter
-from tempfile import SpooledTemporaryFile
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
 
 from frametool import sizes
-from frametool.documents.document import parse_nodes
-from frametool.errors import FormatError, FrametoolError
+from frametool.errors import FrametoolError, ValueInvalid, listing
 from frametool.formats.rows.csv import cells_of, row
-from frametool.grammar.pose import Pose
-from frametool.grammar.result import NoResult, write_poses
+from frametool.grammar.result import write_poses
 from frametool.stream.faults import STOP, Outcome
-from frametool.stream.record_text import nulled
-from frametool.stream.record_values import plain
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterable, Iterator, Sequence
@@ -25,13 +20,14 @@ if TYPE_CHECKING:
     from frametool.stream.record_rows import RecordBatch
     from frametool.stream.record_values import Value
     from frametool.stream.row_poses import RowPoses
+    from frametool.stream.writers import PoseBatch
     from frametool.text.spans import Ints, Spans
 
 
 class BlockResults(NamedTuple):
-    """What the records of a block became: rows of those that are alike, and single results, each with its place."""
+    """What the rows or records of a block became: those that are alike together, and single results, by place."""
 
-    batches: Sequence[RecordBatch]
+    batches: Sequence[RecordBatch | PoseBatch]
     values: list[tuple[int, Value]]
 
     def posed(self) -> RowPoses | None:
@@ -40,7 +36,7 @@ class BlockResults(NamedTuple):
             return None
         from frametool.stream.record_rows import poses_of
 
-        return poses_of(self.batches[0])
+        return poses_of(cast("RecordBatch", self.batches[0]))
 
     def in_order(self) -> Iterator[Value]:
         """Yield all results as values, in the order of their records."""
@@ -48,26 +44,10 @@ class BlockResults(NamedTuple):
         if self.batches:
             from frametool.stream.record_rows import rows_as_values
 
-            rows = (zip(batch.places.tolist(), rows_as_values(batch), strict=True) for batch in self.batches)
+            batches = cast("Sequence[RecordBatch]", self.batches)
+            rows = (zip(batch.places.tolist(), rows_as_values(batch), strict=True) for batch in batches)
             found = sorted(chain(found, *rows), key=itemgetter(0))
         yield from map(itemgetter(1), found)
-
-
-def no_result(record: bytes, fmt: str, style: Style) -> NoResult:
-    """Return what a bad record says besides its numbers; in a table those are empty cells under names of their own."""
-    try:
-        text = record.decode()
-        said = plain(parse_nodes(nulled(text, json=fmt == "json") or text)[0])
-    except (FormatError, UnicodeDecodeError, IndexError, TypeError):  # broken: no parser has taken it before
-        said = None
-    kept = said if type(said) is dict else {}
-    return NoResult(Pose(), {key: value for key, value in kept.items() if style.format != "csv" or _says(value)})
-
-
-def _says(value: Any) -> bool:
-    """Return True if there is more than null in a value."""
-    inner = value.values() if type(value) is dict else value if type(value) is list else None
-    return value is not None if inner is None else any(map(_says, inner))
 
 
 LINE = re.compile(rb'((?:[^"\n]|"[^"]*")*+)\n')
@@ -90,6 +70,7 @@ class ResultWriter(Protocol):
 
     def end(self) -> Iterable[bytes]:
         """Yield what comes behind the last block."""
+        return ()
 
 
 def written_by(writer: ResultWriter, outcomes: Iterator[Outcome], on_error: str) -> Generator[Outcome]:
@@ -110,7 +91,7 @@ def written_by(writer: ResultWriter, outcomes: Iterator[Outcome], on_error: str)
         yield outcome._replace(text=text)
 
 
-class Documents:
+class Documents(ResultWriter):
     """Write results as lines of JSON or as documents of YAML."""
 
     def __init__(self, style: Style) -> None:
@@ -132,36 +113,30 @@ class Documents:
         begun, self.begun = self.begun, self.begun or bool(found)
         return found if begun else found[len(self.parting) :]
 
-    def end(self) -> Iterable[bytes]:
-        """Yield nothing more."""
-        return ()
 
-
-class CsvTable:
-    """Put results together as one table, which is written at the end, when its columns are known."""
+class CsvRows(ResultWriter):
+    """Write results as one table, block after block; its columns are those of the first."""
 
     def __init__(self, style: Style) -> None:
         """Begin without columns."""
         self.style = style
         self.columns: dict[str, None] = {}
-        self.waiting = SpooledTemporaryFile(sizes.TABLE)  # noqa: SIM115 - closed with the table
-        self.sizes: list[tuple[int, int]] = []  # of each block the columns that it has, and its bytes
 
-    def end(self) -> Iterator[bytes]:
-        """Yield the table of all blocks."""
-        with self.waiting:
-            if not self.columns:
-                return
-            yield row(self.columns, self.style).encode()
-            self.waiting.seek(0)
-            for count, size in self.sizes:
-                text = self.waiting.read(size)
-                missing = len(self.columns) - max(count, 1)  # a row without cells is a line all the same
-                yield LINE.sub(rb"\1" + b"," * missing + b"\n", text) if missing else text
+    def header(self) -> bytes:
+        """Return the line that names the columns."""
+        return row(self.columns, self.style).encode()
 
     def of_block(self, block: BlockResults) -> bytes:
-        """Add the rows of a block; nothing is written yet."""
-        rows: list[tuple[int, dict[str, Any], RecordBatch | None]] = [
+        """Return the text of a block; raises ValueInvalid for columns that the first one does not have."""
+        begun = [*self.columns]
+        text = self.rows(block)
+        if begun and (others := [*self.columns][len(begun) :]):
+            raise ValueInvalid(f"{listing(others)}: the first rows have no such columns; write json or yaml")
+        return text if begun else self.header() + text
+
+    def rows(self, block: BlockResults) -> bytes:
+        """Return the rows of a block, and add its columns."""
+        rows: list[tuple[int, dict[str, Any], RecordBatch | PoseBatch | None]] = [
             (place, cells_of(value, self.style), None) for place, value in block.values
         ]
         for batch in block.batches:
@@ -178,13 +153,41 @@ class CsvTable:
                 from frametool.stream.text_rows import in_table
 
                 groups.append((alike.places, alike.text(in_table(cells, self.columns, self.style), self.style)))
-        text = text_of(lines, groups)
+        return text_of(lines, groups)
+
+
+class CsvTable(CsvRows):
+    """Put results together as one table, which is written at the end, when its columns are known."""
+
+    def __init__(self, style: Style) -> None:
+        """Begin without columns."""
+        from tempfile import SpooledTemporaryFile
+
+        super().__init__(style)
+        self.waiting = SpooledTemporaryFile(sizes.TABLE)  # noqa: SIM115 - closed with the table
+        self.sizes: list[tuple[int, int]] = []  # of each block the columns that it has, and its bytes
+
+    def of_block(self, block: BlockResults) -> bytes:
+        """Add the rows of a block; nothing is written yet."""
+        text = self.rows(block)
         self.waiting.write(text)
         self.sizes.append((len(self.columns), len(text)))
         return b""
 
+    def end(self) -> Iterator[bytes]:
+        """Yield the table of all blocks."""
+        with self.waiting:
+            if not self.columns:
+                return
+            yield self.header()
+            self.waiting.seek(0)
+            for count, size in self.sizes:
+                text = self.waiting.read(size)
+                missing = len(self.columns) - max(count, 1)  # a row without cells is a line all the same
+                yield LINE.sub(rb"\1" + b"," * missing + b"\n", text) if missing else text
 
-class CollectedResults:
+
+class CollectedResults(ResultWriter):
     """Keep results, for formats that are written of all of them at once."""
 
     def __init__(self) -> None:
@@ -195,7 +198,3 @@ class CollectedResults:
         """Keep those of a block; nothing is written."""
         self.values += block.in_order()
         return b""
-
-    def end(self) -> Iterable[bytes]:
-        """Yield nothing more."""
-        return ()

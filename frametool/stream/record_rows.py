@@ -39,6 +39,7 @@ from frametool.stream.text_rows import (
     NUMBERS,
     PARENT,
     STAMP_NS,
+    Marked,
     filled,
     leaf_mark,
     words,
@@ -46,7 +47,7 @@ from frametool.stream.text_rows import (
 from frametool.text.spans import MARGIN, Spans
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.grammar.result import Style
     from frametool.stream.evaluate import Plan, Run
@@ -59,19 +60,6 @@ if TYPE_CHECKING:
 QUATERNIONS = ((notation("quaternion"), False),)
 MOST_ENTRIES = 8  # points or poses of a record: each is looked at for itself
 LAST_ASCII = 127
-
-
-class Marked(NamedTuple):
-    """The result of one of the records of a template, with marks in the place of what differs.
-
-    value: the result; numbers: which column of results stands for a number of it, by its text; size: the columns
-    stamp: which scalar is its stamp, if it has no header, and whether it counts nanoseconds
-    """
-
-    value: Value
-    numbers: Mapping[str, int]
-    size: int
-    stamp: tuple[int, int] | None = None
 
 
 class RecordBatch(NamedTuple):

@@ -14,12 +14,15 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from frametool import sizes
+from frametool.documents.document import parse_nodes
 from frametool.errors import FormatError, FrametoolError
+from frametool.grammar.pose import Pose
+from frametool.grammar.result import NoResult
 from frametool.stream import stamp_source
 from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote
-from frametool.stream.record_results import BlockResults, no_result
-from frametool.stream.record_text import ROUNDED, Outside, RecordText, attempt, column_in, fault_at, null_of
-from frametool.stream.record_values import values_of_text
+from frametool.stream.record_results import BlockResults
+from frametool.stream.record_text import ROUNDED, Outside, RecordText, attempt, column_in, fault_at, null_of, nulled
+from frametool.stream.record_values import plain, values_of_text
 from frametool.stream.splitter import ARRAY, NO_END, Splitter
 from frametool.text.lines import Pieces, read_blocks
 
@@ -323,6 +326,23 @@ class RecordBlocks:
         return outcome._replace(text=written([*groups, texts_as_rows(texts)] if texts else groups))
 
 
+def _no_result(record: bytes, fmt: str, style: Style) -> NoResult:
+    """Return what a bad record says besides its numbers; in a table those are empty cells under names of their own."""
+    try:
+        text = record.decode()
+        said = plain(parse_nodes(nulled(text, json=fmt == "json") or text)[0])
+    except (FormatError, UnicodeDecodeError, IndexError, TypeError):  # broken: no parser has taken it before
+        said = None
+    kept = said if type(said) is dict else {}
+    return NoResult(Pose(), {key: value for key, value in kept.items() if style.format != "csv" or _says(value)})
+
+
+def _says(value: Any) -> bool:
+    """Return True if there is more than null in a value."""
+    inner = value.values() if type(value) is dict else value if type(value) is list else None
+    return value is not None if inner is None else any(map(_says, inner))
+
+
 def _put(text: bytes, part: Part, row: bytes) -> tuple[int, bytes]:
     """Return a record with what goes with it, and its place."""
     return part.begin, text[part.begin : part.start] + row + text[part.end : part.after]
@@ -354,7 +374,7 @@ class RecordResults(RecordBlocks):
 
     def without(self, text: bytes, part: Part) -> Iterable[tuple[int, Any]]:
         """Return what a bad record says besides its numbers; in a table those are empty cells under own names."""
-        return [(part.start, no_result(text[part.start : part.end], self.fmt, self.style))]
+        return [(part.start, _no_result(text[part.start : part.end], self.fmt, self.style))]
 
     def plan(self, template: Template) -> Plan:
         """Return what is done to the records of a template."""

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from frametool.grammar.result import Style
+    from frametool.stream.record_values import Value
     from frametool.text.spans import Floats
 
 # marks: of numbers (those of a pose; more of them are 0.7310585786300049 + n), stamps, names, and scalars
@@ -42,6 +43,19 @@ CELL = Syntax("", b'",\\\r\n', lambda value: quoted("" if value is None else str
 IN_CELL = Syntax('""', b'"\\', lambda value: json.dump(value).replace('"', '""'))
 JSON = Syntax('"', b'"\\', json.dump)
 YAML = Syntax('"', bytes(range(128)), lambda value: quoted_in_yaml(value) if type(value) is str else json.dump(value))
+
+
+class Marked(NamedTuple):
+    """The result of one of many rows that are alike, with marks in the place of what differs.
+
+    value: the result; numbers: which column of results stands for a number of it, by its text; size: the columns
+    stamp: which scalar of a record is its stamp, if it has no header, and whether it counts nanoseconds
+    """
+
+    value: Value
+    numbers: Mapping[str, int]
+    size: int
+    stamp: tuple[int, int] | None = None
 
 
 def leaf_mark(number: int) -> str:

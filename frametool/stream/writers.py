@@ -6,9 +6,7 @@ be, the format writes row after row as it writes single results.  Other columns 
 
 from __future__ import annotations
 
-from functools import partial
 from importlib import import_module
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -34,11 +32,11 @@ from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
 from frametool.geometry import arrays, floats, quaternion, rigid
 from frametool.geometry.representations import notation
-from frametool.grammar import result
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.result import Result, with_entries
 from frametool.stream.layout import Const, In, Out
+from frametool.stream.record_results import BlockResults, CsvRows, Documents
 from frametool.stream.row_layout import POSE, SIX, Target
 from frametool.stream.row_poses import (
     block_of,
@@ -58,16 +56,15 @@ from frametool.stream.text_rows import (
     NUMBERS,
     PARENT,
     STAMP_NS,
+    Marked,
     filled,
-    in_document,
-    in_table,
     leaf_mark,
     words,
 )
 from frametool.text.spans import Spans, join
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from frametool.geometry.place import Place
     from frametool.geometry.types import Components
@@ -75,7 +72,7 @@ if TYPE_CHECKING:
     from frametool.stream.layout import Piece
     from frametool.stream.row_poses import RowPoses
     from frametool.stream.text_rows import Syntax
-    from frametool.text.spans import Floats
+    from frametool.text.spans import Flags, Floats, Ints
 
 LEARNED = ("csv", "json", "yaml")
 
@@ -105,8 +102,15 @@ def columns_of(block: RowPoses, *, placed: bool = True) -> Components:
     return columns if placed else (*[columns[0] * 0.0] * 3, *columns)
 
 
+def values_of(block: RowPoses, kind: str, extras: Sequence[str], target: Target, *, placed: bool) -> Sequence[Any]:
+    """Return the rows of a block as single results of some kind."""
+    if kind == POSE:
+        return results_of(block, extras, placed=placed)
+    return points_of(block, kind, extras, target.place)
+
+
 class TextWriter:
-    """Write blocks of poses, points or vectors as text; `end` says what comes behind the last."""
+    """Write blocks of poses, points or vectors in formats whose rows are fixed, or one by one as single results."""
 
     def __init__(self, style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> None:
         """Choose how the format of a style is written.
@@ -114,7 +118,7 @@ class TextWriter:
         kind: pose, point or vector; extras: the numbers with each; placed: whether poses have a position
         Raises ValueInvalid for what the format does not hold, and for notations that it does not have.
         """
-        if kind in SIX and style.format not in LEARNED:
+        if kind in SIX:
             raise ValueInvalid(f"{style.format} is not written of rows of a {kind}; write csv, json or yaml")
         if kind != POSE and "points" not in FORMATS[style.format].writes:
             raise ValueInvalid(f"{style.format} holds poses; a {kind} has no rotation")
@@ -128,40 +132,23 @@ class TextWriter:
         self.extras = tuple(extras)
         self.placed = placed or kind != POSE
         self.target = target_in(style, kind, placed=placed)
-        far = 1.0 if self.target.place is None else 1e6  # nothing near the Earth's centre has a latitude
-        size = {POSE: 7, **dict.fromkeys(SIX, 6)}.get(kind, 3)
-        self.probe = (*(far * part for part in NUMBERS[:3]), *NUMBERS[3:size])
-        self.more = [MORE_NUMBERS + at for at in range(len(self.extras))]
         self.count = 0
         self.dropped: dict[str, None] = {}
-        self.known: dict[tuple[Any, ...], Alike | None] = {}
         self.first: Any = None
-        self.empty: RowPoses | None = None  # a block without rows says what columns there are
 
     def of_block(self, block: RowPoses) -> bytes:
         """Return the text of a block of poses; numbers are metres and x y z w."""
         if not len(block.numbers):
-            self.empty = block
             return b""
         if (place := self.style.place) is not None:
             if self.fixed is not None:
                 names = ", ".join(each.name for each in (place, *place.more))
                 raise ValueInvalid(f"{self.style.format} holds x, y, z; leave --to {names} out, or write csv or json")
             settle(place, block)
-        if self.style.format not in LEARNED:
-            self.dropped |= dict.fromkeys((*self.extras, *block.extras))
-            refuse_scale_in(self.style.format, self.dropped)
-        absent = np.isnan(block.numbers[:, 0])
-        cuts = [0, *(np.flatnonzero(np.diff(absent)) + 1).tolist(), len(absent)]
-        text = b""
-        for start, end in pairwise(cuts):
-            run = block if len(cuts) == 2 else kept(block, slice(start, end))
-            if self.fixed:
-                text += self._fixed(self.fixed, run)
-            else:
-                alike = None if absent[start] else self._alike(run)
-                text += self._one_by_one(run) if alike is None else self._filled(alike, run)
-            self.count += end - start
+        self.dropped |= dict.fromkeys((*self.extras, *block.extras))
+        refuse_scale_in(self.style.format, self.dropped)
+        text = self._fixed(self.fixed, block) if self.fixed else self._one_by_one(block)
+        self.count += len(block.numbers)
         return text
 
     def end(self) -> Iterator[bytes]:
@@ -169,11 +156,17 @@ class TextWriter:
         if self.fixed is None or self.dropped_fields is None:
             if self.dropped:
                 warn(f"{self.style.format}: {listing(self.dropped, MOST_NAMED)} left out")
-            if self.style.format == "csv" and not self.count and self.empty is not None:
-                yield self._learned(self.empty).head
             return
         self.dropped_fields.tell()
         yield self.fixed.tail if self.count else self.fixed.head + self.fixed.tail
+
+    def _one_by_one(self, block: RowPoses) -> bytes:
+        """Write the rows as the format does for single results."""
+        results = values_of(block, self.kind, self.extras, self.target, placed=self.placed)
+        first = self.first = self.first or results[0]
+        known = self.write([first], self.style) if self.count else ""
+        text = self.write([first, *results] if self.count else results, self.style)
+        return text[len(known) :].encode()
 
     def _fixed(self, fmt: RowForm, block: RowPoses) -> bytes:
         dropped = self.dropped_fields
@@ -193,7 +186,7 @@ class TextWriter:
         tx, ty, tz, x, y, z, w = rigid.inverse(*pose) if FORMATS[self.style.format].poses.inverse else pose
         turn = (x, y, z, w) if self.style.keep_sign else quaternion.from_quaternion(x, y, z, w, arrays)
         values = np.array(fmt.numbers(tx, ty, tz, *turn)).T + 0.0  # none is -0.0
-        _refuse_infinite(values)
+        refuse_infinite(values)
         pieces: list[Piece] = [Const(fmt.between)] if fmt.between else []
         parts: list[Spans] = []
         first = 0
@@ -230,67 +223,22 @@ class TextWriter:
         stamps: list[int] = block.stamps_ns.tolist()
         return stamps
 
-    # --- formats whose rows depend on what is written ---
 
-    def _alike(self, block: RowPoses) -> Alike | None:
-        """Return how rows are written that are alike; None where they are not, or angles are not unique."""
-        alone = [each[0] if len(each) == 1 else len(each) > 0 for each in (block.names, block.parents)]
-        varies = bool(block.extras) or True in alone
-        is_worded = self.target.place is not None and bool(self.target.place.words)
-        if self.style.format not in LEARNED or (self.style.format == "yaml" and varies) or is_worded:
-            return None
-        locked = self.target.locked(columns_of(block, placed=self.placed)[:7])
-        if locked is not None and bool(np.any(locked)):
-            return None
-        key = (*alone, *block.extras, block.stamps_ns is None)
-        if key not in self.known:
-            alike, first = self._learned(block), kept(block, slice(0, 1))
-            self.known[key] = alike if self._filled(alike, first) == self._one_by_one(first) else None
-        return self.known[key]
+class PoseBatch(NamedTuple):
+    """Rows of a block that are written alike; values: (n, k) the numbers that are written of each."""
 
-    def _learned(self, block: RowPoses) -> Alike:
-        """Write a result whose numbers, and what differs from row to row, are marks."""
-        style, probe = self.style.changed(precision=None, screen=False), self._probe(block)
-        numbers = [*self.target.written(self.probe, floats), *self.more]
-        columns = {repr(number): at for at, number in enumerate(numbers) if type(number) is float}
-        if style.format == "csv":
-            cells = cells_of(probe, style)
-            return Alike(in_table(cells, cells, style), columns, row(cells, style).encode())
-        parting = "---\n" if style.format == "yaml" else ""
-        return Alike(in_document(parting + result.write_poses([probe], style), style), columns)
+    marked: Marked
+    places: Ints
+    values: Floats
+    block: RowPoses
 
-    def _probe(self, block: RowPoses) -> Any:
-        """Make a result with what this block's have; what differs from row to row is marked."""
-        name, parent = (
-            each[0] if len(each) == 1 else mark for mark, each in ((NAME, block.names), (PARENT, block.parents))
-        )
-        extras: dict[str, Any] = dict(zip(self.extras, self.more, strict=True))
-        if self.style.format != "csv":
-            extras = with_entries(extras)
-        if block.stamps_ns is not None:
-            extras["stamp_ns"] = STAMP_NS
-        extras |= {name: Verbatim(leaf_mark(at)) for at, name in enumerate(block.extras)}
-        if self.kind == POSE:
-            pose = Pose.of(self.probe, name, parent)
-            return Result(pose if self.placed else pose._replace(position=None), extras)
-        if self.target.place is not None:
-            from frametool.grammar.place import point_entry
+    def text(self, parts: Sequence[tuple[str, Syntax]], style: Style) -> list[Spans]:
+        """Return the rows as text; parts: the text of the result with marks."""
+        return filled(parts, style, self.marked.numbers, self.values, self._scalar)
 
-            return point_entry(EARTH_FRAMES[0], self.probe, self.target.place) | extras
-        return ({} if parent is None else {"frame": parent}) | spelled(self.kind, self.probe) | extras
-
-    def _filled(self, alike: Alike, block: RowPoses) -> bytes:
-        """Put the rows of a block in the places of marks."""
-        numbers = self.target.written(block.unmoved(columns_of(block, placed=self.placed)), arrays)
-        values = np.stack(np.broadcast_arrays(*numbers), axis=-1) + 0.0  # none is -0.0
-        _refuse_infinite(values)
-        text = join(filled(alike.parts, self.style, alike.columns, values, partial(self._scalar, block)))
-        if self.count:
-            return text
-        return alike.head + text[4 * (self.style.format == "yaml") :]
-
-    def _scalar(self, block: RowPoses, mark: str, syntax: Syntax) -> tuple[Spans, str]:
+    def _scalar(self, mark: str, syntax: Syntax) -> tuple[Spans, str]:
         """Return what rows have in the place of a mark, as it is written there."""
+        block = self.block
         if mark == str(STAMP_NS) and block.stamps_ns is not None:
             return spans_of([b"%d" % stamp for stamp in block.stamps_ns.tolist()]), ""
         if mark in (NAME, PARENT):
@@ -302,28 +250,84 @@ class TextWriter:
             return spans_of([known[text] for text in texts]), ""
         return spans_of([dump(value).encode() for value in plain_cells(cells)]), ""
 
-    def _one_by_one(self, block: RowPoses) -> bytes:
-        """Write the rows as the format does for single results."""
-        results: list[Any]
+
+class RowsWriter:
+    """Write blocks of poses, points or vectors as CSV, JSON or YAML; rows that are alike are written together."""
+
+    def __init__(self, style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> None:
+        """Take the style and what rows are, as `TextWriter`."""
+        self.style, self.kind, self.extras, self.placed = style, kind, tuple(extras), placed or kind != POSE
+        self.target = target_in(style, kind, placed=placed)
+        self.more = [MORE_NUMBERS + at for at in range(len(self.extras))]
+        self.rows = CsvRows(style) if style.format == "csv" else Documents(style)
+        self.empty: RowPoses | None = None  # a block without rows says what columns there are
+
+    def of_block(self, block: RowPoses) -> bytes:
+        """Return the text of a block of poses; numbers are metres and x y z w."""
+        if not len(block.numbers):
+            self.empty = block
+            return b""
+        if self.style.place is not None:
+            settle(self.style.place, block)
+        alone = self._alone(block)
+        alike, singles = np.flatnonzero(~alone), np.flatnonzero(alone)
+        batches = [self._batch(kept(block, alike) if len(singles) else block, alike)] if len(alike) else []
+        some = kept(block, singles) if len(alike) else block
+        values = values_of(some, self.kind, self.extras, self.target, placed=self.placed) if len(singles) else ()
+        return self.rows.of_block(BlockResults(batches, [*zip(singles.tolist(), values, strict=True)]))
+
+    def end(self) -> Iterator[bytes]:
+        """Yield the names of the columns if there were no rows."""
+        if isinstance(self.rows, CsvRows) and not self.rows.columns and self.empty is not None:
+            yield row(cells_of(self._marked(self.empty).value, self.style), self.style).encode()
+
+    def _alone(self, block: RowPoses) -> Flags:
+        """Return which rows are written one by one: without a result, and those whose angles are not unique."""
+        varies = block.extras or any(len(each) > 1 for each in (block.names, block.parents))
+        is_worded = self.target.place is not None and self.target.place.words
+        if self.style.screen or is_worded or (varies and self.style.format == "yaml"):
+            return np.ones(len(block.numbers), np.bool_)
+        absent = np.isnan(block.numbers[:, 0])
+        with np.errstate(invalid="ignore"):
+            locked = self.target.locked(columns_of(block, placed=self.placed)[:7])
+        return absent if locked is None else absent | (locked != 0)
+
+    def _batch(self, block: RowPoses, places: Ints) -> PoseBatch:
+        """Return rows that are alike, with the numbers that are written of them."""
+        numbers = self.target.written(block.unmoved(columns_of(block, placed=self.placed)), arrays)
+        values = np.stack(np.broadcast_arrays(*numbers), axis=-1) + 0.0  # none is -0.0
+        refuse_infinite(values)
+        return PoseBatch(self._marked(block), places, values, block)
+
+    def _marked(self, block: RowPoses) -> Marked:
+        """Make a result with what this block's have; what differs from row to row is marked."""
+        far = 1.0 if self.target.place is None else 1e6  # nothing near the Earth's centre has a latitude
+        size = {POSE: 7, **dict.fromkeys(SIX, 6)}.get(self.kind, 3)
+        own = (*(far * part for part in NUMBERS[:3]), *NUMBERS[3:size])
+        numbers = [*self.target.written(own, floats), *self.more]
+        columns = {repr(number): at for at, number in enumerate(numbers) if type(number) is float}
+        name, parent = (
+            each[0] if len(each) == 1 else mark for mark, each in ((NAME, block.names), (PARENT, block.parents))
+        )
+        extras: dict[str, Any] = dict(zip(self.extras, self.more, strict=True))
+        if self.style.format != "csv":
+            extras = with_entries(extras)
+        if block.stamps_ns is not None:
+            extras["stamp_ns"] = STAMP_NS
+        extras |= {name: Verbatim(leaf_mark(at)) for at, name in enumerate(block.extras)}
         if self.kind == POSE:
-            results = list(results_of(block, self.extras, placed=self.placed))
-        else:
-            results = points_of(block, self.kind, self.extras, self.target.place)
-        first = self.first = self.first or results[0]
-        known = "" if not self.count else self.write([first], self.style)
-        text = self.write(results if not self.count else [first, *results], self.style)
-        return text[len(known) :].encode()
+            pose = Pose.of(own, name, parent)
+            return Marked(Result(pose if self.placed else pose._replace(position=None), extras), columns, len(numbers))
+        named: dict[str, Any] = {} if parent is None else {"frame": parent}
+        if self.target.place is None:
+            return Marked(named | spelled(self.kind, own) | extras, columns, len(numbers))
+        from frametool.grammar.place import point_entry
+
+        return Marked(point_entry(EARTH_FRAMES[0], own, self.target.place) | extras, columns, len(numbers))
 
 
-class Alike(NamedTuple):
-    """The text of rows that are alike, with marks; which number each mark stands for; what is before the first row."""
-
-    parts: Sequence[tuple[str, Syntax]]
-    columns: Mapping[str, int]
-    head: bytes = b""
-
-
-def _refuse_infinite(values: Floats) -> None:
+def refuse_infinite(values: Floats) -> None:
+    """Raise ValueInvalid for numbers that are not finite."""
     if not np.isfinite(values).all():
         raise ValueInvalid("a result is too large for a double")
 

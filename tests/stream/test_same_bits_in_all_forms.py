@@ -15,7 +15,7 @@ from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
 from frametool.stream.row_layout import NOWHERE
 from frametool.stream.row_poses import block_of
-from frametool.stream.writers import TextWriter
+from frametool.stream.writers import RowsWriter
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -79,7 +79,7 @@ def test_any_form_becomes_any_other_with_the_same_bits(moved: Callable[[str, str
 
 @pytest.mark.parametrize("form", ["csv", "json"])
 def test_blocks_whose_rows_all_name_one_frame_each_name_their_own(form: str) -> None:
-    writer = TextWriter(Style(form, (notation("quaternion"),)))
+    writer = RowsWriter(Style(form, (notation("quaternion"),)))
     texts = [writer.of_block(block_of([Result(Pose.of(NOWHERE, None, frame))] * 2)).decode() for frame in ("map", "odom")]
     assert ["map" in text for text in texts] == [True, False]
     assert ["odom" in text for text in texts] == [False, True]
