@@ -8,7 +8,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
 
 from frametool import sizes
-from frametool.errors import FrametoolError, ValueInvalid, listing
+from frametool.errors import FrametoolError
 from frametool.formats.rows.csv import cells_of, row
 from frametool.grammar.result import write_poses
 from frametool.stream.faults import STOP, Outcome
@@ -114,77 +114,58 @@ class Documents(ResultWriter):
         return found if begun else found[len(self.parting) :]
 
 
-class CsvRows(ResultWriter):
-    """Write results as one table, block after block; its columns are those of the first."""
+def csv_rows(block: BlockResults, columns: dict[str, None], style: Style) -> bytes:
+    """Return the rows of a block in a table, and add its columns to those that the table has."""
+    rows: list[tuple[int, dict[str, Any], RecordBatch | PoseBatch | None]] = [
+        (place, cells_of(value, style), None) for place, value in block.values
+    ]
+    for batch in block.batches:
+        first, value = int(batch.places[0]), batch.marked.value
+        rows.append((first, cells_of(value, style), batch))
+    rows.sort(key=itemgetter(0))
+    for _, cells, _ in rows:
+        columns |= dict.fromkeys(cells)
+    lines, groups = list[tuple[int, bytes]](), []
+    for place, cells, alike in rows:
+        if alike is None:
+            lines.append((place, row([cells.get(name, "") for name in columns], style).encode()))
+        else:
+            from frametool.stream.text_rows import in_table
 
-    def __init__(self, style: Style) -> None:
-        """Begin without columns."""
-        self.style = style
-        self.columns: dict[str, None] = {}
-
-    def header(self) -> bytes:
-        """Return the line that names the columns."""
-        return row(self.columns, self.style).encode()
-
-    def of_block(self, block: BlockResults) -> bytes:
-        """Return the text of a block; raises ValueInvalid for columns that the first one does not have."""
-        begun = [*self.columns]
-        text = self.rows(block)
-        if begun and (others := [*self.columns][len(begun) :]):
-            raise ValueInvalid(f"{listing(others)}: the first rows have no such columns; write json or yaml")
-        return text if begun else self.header() + text
-
-    def rows(self, block: BlockResults) -> bytes:
-        """Return the rows of a block, and add its columns."""
-        rows: list[tuple[int, dict[str, Any], RecordBatch | PoseBatch | None]] = [
-            (place, cells_of(value, self.style), None) for place, value in block.values
-        ]
-        for batch in block.batches:
-            first = int(batch.places[0])
-            rows.append((first, cells_of(batch.marked.value, self.style), batch))
-        rows.sort(key=itemgetter(0))
-        for _, cells, _ in rows:
-            self.columns |= dict.fromkeys(cells)
-        lines, groups = list[tuple[int, bytes]](), []
-        for place, cells, alike in rows:
-            if alike is None:
-                lines.append((place, row([cells.get(name, "") for name in self.columns], self.style).encode()))
-            else:
-                from frametool.stream.text_rows import in_table
-
-                groups.append((alike.places, alike.text(in_table(cells, self.columns, self.style), self.style)))
-        return text_of(lines, groups)
+            groups.append((alike.places, alike.text(in_table(cells, columns, style), style)))
+    return text_of(lines, groups)
 
 
-class CsvTable(CsvRows):
+class CsvTable(ResultWriter):
     """Put results together as one table, which is written at the end, when its columns are known."""
 
     def __init__(self, style: Style) -> None:
         """Begin without columns."""
         from tempfile import SpooledTemporaryFile
 
-        super().__init__(style)
+        self.style = style
+        self.columns: dict[str, None] = {}
         self.waiting = SpooledTemporaryFile(sizes.TABLE)  # noqa: SIM115 - closed with the table
         self.sizes: list[tuple[int, int]] = []  # of each block the columns that it has, and its bytes
-
-    def of_block(self, block: BlockResults) -> bytes:
-        """Add the rows of a block; nothing is written yet."""
-        text = self.rows(block)
-        self.waiting.write(text)
-        self.sizes.append((len(self.columns), len(text)))
-        return b""
 
     def end(self) -> Iterator[bytes]:
         """Yield the table of all blocks."""
         with self.waiting:
             if not self.columns:
                 return
-            yield self.header()
+            yield row(self.columns, self.style).encode()
             self.waiting.seek(0)
             for count, size in self.sizes:
                 text = self.waiting.read(size)
                 missing = len(self.columns) - max(count, 1)  # a row without cells is a line all the same
                 yield LINE.sub(rb"\1" + b"," * missing + b"\n", text) if missing else text
+
+    def of_block(self, block: BlockResults) -> bytes:
+        """Add the rows of a block; nothing is written yet."""
+        text = csv_rows(block, self.columns, self.style)
+        self.waiting.write(text)
+        self.sizes.append((len(self.columns), len(text)))
+        return b""
 
 
 class CollectedResults(ResultWriter):

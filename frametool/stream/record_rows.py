@@ -148,18 +148,15 @@ class RecordRows:
             times, late = _stamps(cut, at, each, data)
             stamps.append(times)
             left |= {*late}
-        good = np.array([row not in left for row in run.rows.tolist()], np.bool_)
-        rows = run.rows[good]
+        rows = run.rows[np.array([row not in left for row in run.rows.tolist()], np.bool_)]
         own = Cut(template, cut.starts[rows], cut.ends[rows])
-        batches: list[RecordBatch] = []
-        first = 0
+        batches, first = list[RecordBatch](), 0
         for at, (each, times) in enumerate(zip(marked, stamps, strict=True) if len(rows) else ()):
-            last = first + each.size
             becomes = [named.names for pair in names_of(own, at, text) if (named := template.named(at, pair))]
             parents, names = ([pair[role] for pair in becomes] for role in (0, 1))
-            results, stamps_ns = run.results[rows, first:last], None if times is None else times[rows]
-            batches.append(RecordBatch(each, own, data, own.starts[:, 0] + at, results, parents, names, stamps_ns))
-            first = last
+            numbers, stamps_ns = run.results[rows, first : first + each.size], None if times is None else times[rows]
+            batches.append(RecordBatch(each, own, data, own.starts[:, 0] + at, numbers, parents, names, stamps_ns))
+            first += each.size
         return batches, left.intersection(run.rows.tolist())
 
     def _planned(self, template: Template) -> tuple[Plan, list[Marked]]:
@@ -213,17 +210,15 @@ def marked(template: Template, at: int, request: Request, style: Style, target: 
         own, carried = 7 if shape.kind in (POSE, ROTATION) else len(NUMBERS[: shape.own_size]), sum(shape.covariance)
     else:  # of numbers alone, what was the row's own counts for nothing
         own, carried = 3 if operation.result_kind(shape.kind) in (POINT, VECTOR) else 7, 0
-    size = own + len(operation.extras(shape)) + carried
-    parts = (*NUMBERS[:own], *(MORE_NUMBERS + at for at in range(size - own)))
-    parent, name = entry.parent and PARENT, entry.name and NAME
+    parts = (*NUMBERS[:own], *(MORE_NUMBERS + at for at in range(len(operation.extras(shape)) + carried)))
     stamp = None if record.stamp_ns is None else STAMP_NS
-    shown = entry._replace(parent=parent, name=name, record=record._replace(stamp_ns=stamp))
-    probe = Answer(shown, parts)
+    shown = entry._replace(parent=entry.parent and PARENT, name=entry.name and NAME)
+    answers = [Answer(shown._replace(record=record._replace(stamp_ns=stamp)), parts)]
     own_style = style if style.format in SPELLED else style.changed(format="csv")
     try:
         root = Node(0, len(text), parse_nodes(text))
         unit = unit_of(record, root.at(record.path[:1]).value)
-        (value,) = values_of_unit(root.at(unit), unit, [probe], request, own_style)
+        (value,) = values_of_unit(root.at(unit), unit, answers, request, own_style)
     except (FrametoolError, ValueError):
         return None
     written = target.written(parts, floats)
@@ -231,11 +226,10 @@ def marked(template: Template, at: int, request: Request, style: Style, target: 
     found = _with_stamp(Marked(value, numbers, len(written)), is_spelled=style.format in SPELLED)
     if found is None or style.format not in SPELLED:
         return found
-    value = found.value
     if style.format == "csv":
-        value = cells_of(value, style)
-    elif isinstance(value, Result):
-        value = value.mapping(style)
+        value = cells_of(found.value, style)
+    else:
+        value = found.value.mapping(style) if isinstance(found.value, Result) else found.value
     return found if all(repr(each) in numbers for each in _floats(value)) else None
 
 

@@ -36,7 +36,7 @@ from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.result import Result, with_entries
 from frametool.stream.layout import Const, In, Out
-from frametool.stream.record_results import BlockResults, CsvRows, Documents
+from frametool.stream.record_results import BlockResults, Documents, csv_rows
 from frametool.stream.row_layout import POSE, SIX, Target
 from frametool.stream.row_poses import (
     block_of,
@@ -259,7 +259,8 @@ class RowsWriter:
         self.style, self.kind, self.extras, self.placed = style, kind, tuple(extras), placed or kind != POSE
         self.target = target_in(style, kind, placed=placed)
         self.more = [MORE_NUMBERS + at for at in range(len(self.extras))]
-        self.rows = CsvRows(style) if style.format == "csv" else Documents(style)
+        self.documents = None if style.format == "csv" else Documents(style)
+        self.columns: dict[str, None] = {}  # of a table: those of the first rows
         self.empty: RowPoses | None = None  # a block without rows says what columns there are
 
     def of_block(self, block: RowPoses) -> bytes:
@@ -274,11 +275,18 @@ class RowsWriter:
         batches = [self._batch(kept(block, alike) if len(singles) else block, alike)] if len(alike) else []
         some = kept(block, singles) if len(alike) else block
         values = values_of(some, self.kind, self.extras, self.target, placed=self.placed) if len(singles) else ()
-        return self.rows.of_block(BlockResults(batches, [*zip(singles.tolist(), values, strict=True)]))
+        results = BlockResults(batches, [*zip(singles.tolist(), values, strict=True)])
+        if self.documents is not None:
+            return self.documents.of_block(results)
+        before = len(self.columns)
+        text = csv_rows(results, self.columns, self.style)
+        if before and (others := [*self.columns][before:]):
+            raise ValueInvalid(f"{listing(others)}: the first rows have no such columns; write json or yaml")
+        return text if before else row(self.columns, self.style).encode() + text
 
     def end(self) -> Iterator[bytes]:
         """Yield the names of the columns if there were no rows."""
-        if isinstance(self.rows, CsvRows) and not self.rows.columns and self.empty is not None:
+        if self.documents is None and not self.columns and self.empty is not None:
             yield row(cells_of(self._marked(self.empty).value, self.style), self.style).encode()
 
     def _alone(self, block: RowPoses) -> Flags:
