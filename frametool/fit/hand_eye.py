@@ -120,7 +120,7 @@ def solve_hand_eye(
         raise _unfitting(rms)
     _require_two_axes(turns, s_r, holder, names[2])
     covariance = lsq.inverse(model.hessian)
-    warnings = _warnings(turns, count, holder, others.prod() <= BETTER**2 * medians.prod())
+    warnings = _warnings(turns, count, holder, bool(others.prod() <= BETTER**2 * medians.prod()))
     warnings += _scale_warnings(samples.at(found.kept), model.x)
     for warning in warnings:
         warn(warning)
