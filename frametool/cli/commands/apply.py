@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from contextlib import ExitStack
-from functools import cache, partial
+from functools import cache
 from itertools import chain, groupby
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -221,10 +221,8 @@ def apply_command(inputs: Inputs) -> int:
     task = streaming.PoseTask(inputs, "points", "trajectory")
     output, plan = task.output, task.plan
     clouds = clouds_of(task)
-    if inputs.pose is None:
-        way, rest = way_by_tree(inputs, numbers=bool(task.place))
-    else:
-        way, rest = _way_by_pose(inputs, task), inputs.arguments
+    way = Way(task) if inputs.pose is not None else TreeWay(inputs, numbers=bool(task.place))
+    rest = way.rest
     is_stream = rest in ((), ("-",))
     if clouds is not None:
         is_more = way.uncertain or not is_stream or plan is not None
@@ -249,7 +247,7 @@ def apply_command(inputs: Inputs) -> int:
         if task.place:
             inputs.ask("from_rep")
         output.values(values_of(list(sources_of(rest, kind, task.place)), request, output))
-    way.tell()
+    way.finish()
     return status
 
 
@@ -260,7 +258,7 @@ def _derived(task: PoseTask, plan: DerivationStyle, way: Way, record: str | Sour
 
     asked, timeless = task.request(operation=Operation(moves=True)), task.inputs.at is not None
     with inline_misuse():
-        made = derive_record(plan, way.explained(), pose_source(record, asked), kind=kind, degrees=asked.degrees,
+        made = derive_record(plan, way.explained(task), pose_source(record, asked), kind=kind, degrees=asked.degrees,
                              normalize=task.normalize, counters=way.counters, timeless=timeless)  # fmt: skip
     return task.write(made)
 
@@ -273,126 +271,128 @@ def _kind(inputs: Inputs) -> str | None:
     return kinds[0] if len(kinds) == 1 else None
 
 
-class Way(NamedTuple):
-    """Where records go, and the transform that takes them there from the frame they are expressed in.
+class Way:
+    """Where records go and what takes them there: one pose; where it names its frames, records must be in that one.
 
     target: the frame they are then expressed in, if it has a name
-    from_frame: the transform from a frame (None: the one SOURCE), at a time or the latest
-    at_times: columns of such transforms, nan where there is no data; None where the time does not matter
-    moves: returns True if the transform from a frame depends on the time
-    explained: the same for derivations
+    source: the frame that they come from, if it has a name; by a tree None where each names its own
+    uncertain: whether the covariance of what moves records counts, which then comes behind the seven components
     has_source: whether all come from one frame
     counters: whether no frame has a number for its name
-    uncertain: whether the covariance of what moves records counts, which then comes behind the seven components
-    tell: says at the end what was taken for granted of it
-    tree: that of the frames, if any
+    rest: the arguments that are records
     """
 
-    target: str | None
-    from_frame: Callable[[str | None, int | None], Components]
-    at_times: Callable[[str | None, Any], Components] | None
-    moves: Callable[[str | None], bool]
-    explained: Callable[[], ByTree | WrittenPose]
-    has_source: bool
-    counters: bool = True
-    uncertain: bool = False
-    tell: Callable[[], None] = lambda: None
     tree: Frames | None = None
+    has_source = counters = True
+
+    def __init__(self, task: PoseTask) -> None:
+        """Read the pose of --transform."""
+        from frametool.stream.request import COMBINED
+
+        inputs = task.inputs
+        self.uncertain, self.rest = bool(inputs.covariance), inputs.arguments
+        asked = task.request(operation=COMBINED._replace(similar=True, multiples=inputs.scale))
+        self.read = pose_source(inputs.pose, asked)
+        pose = one_pose(self.read, asked)
+        refuse(self.uncertain and pose.covariance is None, "--covariance: POSE has neither sigma nor covariance")
+        if pose.covariance is not None and not self.uncertain:
+            warn(f"{self.read.name}: its covariance is not used (--covariance)")
+        self.target, self.source = pose.parent, pose.name
+        self.pose = pose if self.uncertain else pose._replace(covariance=None)
 
     @property
     def into(self) -> str:
         """Return in which frame records are then expressed, for messages."""
         return f" in {self.target}" if self.target else ""
 
+    def from_frame(self, own: str | None, own_ns: int | None = None) -> Components:  # noqa: ARG002 - of a tree
+        """Return what moves records from a frame, at a time or the latest."""
+        _settled(own, self.source)
+        return self.pose.placed
+
+    def explained(self, task: PoseTask) -> ByTree | WrittenPose:
+        """Return the same for derivations."""
+        return task.written(self.read, warned=True)
+
+    def finish(self) -> None:
+        """Say what was taken for granted."""
+        warn_if_wide([self.pose.covariance or ()] * self.uncertain)
+
     def request(self, frame_column: str | None, time_column: str | None) -> Request:
         """Return how records move: from one frame or each from its own, all alike or each at its own time."""
         from frametool.stream.request import Operation, Request
-        from frametool.stream.stamp_source import Timed
 
-        has_source, width = self.has_source and frame_column is None, UNCERTAIN if self.uncertain else EXACT
-        timed = self.at_times and Timed(time_column or "", self.at_times, self.from_frame, self.moves, width)
-        frames = () if has_source else (frame_column or "",)
-
-        def edge_of(own: str | None) -> Components:
-            return self.from_frame(own, None)
-
-        left = edge_of(None) if has_source and not time_column else None
+        has_source = self.has_source and frame_column is None
+        left = self.from_frame(None) if has_source and not time_column else None
         return Request(
-            Operation(left=left, moves=True, uncertain=self.uncertain), frames=frames,
-            pose_from_frame=edge_of, timed=timed, frame_is_counter=self.counters,
-            rename=lambda _parent, name: (self.target, name),
+            Operation(left=left, moves=True, uncertain=self.uncertain),
+            frames=() if has_source else (frame_column or "",), pose_from_frame=self.from_frame,
+            frame_is_counter=self.counters, rename=lambda _parent, name: (self.target, name),
         )  # fmt: skip
 
 
-def way_by_tree(inputs: Inputs, *, numbers: bool) -> tuple[Way, tuple[str, ...]]:
-    """Take tree, target and, if one is named, source from the arguments; the rest are records.
+class TreeWay(Way):
+    """Move by the look-ups of a tree."""
 
-    numbers: what looks like one is no frame's name
-    """
-    arguments, chosen, uncertain = inputs.arguments, inputs.at, bool(inputs.covariance)
-    refuse(len(arguments) < 2, "name TREE and TARGET, or give --transform")
-    is_named = len(arguments) > 2 and not is_record(arguments[2]) and not (numbers and begins_number(arguments[2]))
-    named = arguments[2:3] if is_named else ()
-    rest = arguments[2 + len(named) :]
-    tree = load_tree(arguments[0], inputs.more, options.rules(inputs), streams=rest in ((), ("-",)))
-    lookups = lookups_in(tree, carried=uncertain)
-    target, *sources = (frame_name(each, tree) for each in (arguments[1], *named))
-    source = next(iter(sources), None)
+    tree: Frames
 
-    if not {target, source or target} <= set(tree.frames):
-        tree.lookup(target, source or target)  # raises, and names the nearest frames
+    def __init__(self, inputs: Inputs, *, numbers: bool) -> None:
+        """Take tree, target and, if one is named, source from the arguments.
 
-    plain: dict[str, str] = {}  # so that a leading / is reported once
+        numbers: what looks like one is no frame's name
+        """
+        arguments, self.at, self.uncertain = inputs.arguments, inputs.at, bool(inputs.covariance)
+        refuse(len(arguments) < 2, "name TREE and TARGET, or give --transform")
+        is_named = len(arguments) > 2 and not is_record(arguments[2]) and not (numbers and begins_number(arguments[2]))
+        named = arguments[2:3] if is_named else ()
+        self.rest = arguments[2 + len(named) :]
+        streams = self.rest in ((), ("-",))
+        self.tree = tree = load_tree(arguments[0], inputs.more, options.rules(inputs), streams=streams)
+        self.lookups = lookups_in(tree, carried=self.uncertain)
+        self.target: str = frame_name(arguments[1], tree)
+        self.source = next((frame_name(each, tree) for each in named), None)
+        if not {self.target, self.source or self.target} <= set(tree.frames):
+            tree.lookup(self.target, self.source or self.target)  # raises, and names the nearest frames
+        self.has_source, self.in_time = bool(named), self.at is None
+        self.counters = not any(frame.isdecimal() for frame in tree.frames)
+        self._called: dict[str, str] = {}  # so that a leading / is reported once
 
-    def start(own: str | None) -> str:
-        if own and own not in plain:
-            plain[own] = frame_name(own, tree)
-        if (settled := _settled(own and plain[own], source)) is None:
+    def start(self, own: str | None) -> str:
+        """Return the frame that records come from: SOURCE, or the one that they name."""
+        if own and own not in self._called:
+            self._called[own] = frame_name(own, self.tree)
+        if (settled := _settled(own and self._called[own], self.source)) is None:
             raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
         return settled
 
-    def from_frame(own: str | None, own_ns: int | None) -> Components:
-        return lookups.one(target, start(own), own_ns if chosen is None else options.at_ns(chosen))
+    def from_frame(self, own: str | None, own_ns: int | None = None) -> Components:
+        """Return what moves records from a frame, at the one time of all, at theirs, or the latest."""
+        return self.lookups.one(self.target, self.start(own), own_ns if self.in_time else options.at_ns(self.at))
 
-    def at_times(own: str | None, times_ns: Any) -> Components:
-        return lookups.many(target, start(own), times_ns)
+    def at_times(self, own: str | None, times_ns: Any) -> Components:
+        """Return columns of the same; nan where there is no data."""
+        return self.lookups.many(self.target, self.start(own), times_ns)
 
-    def moves(own: str | None) -> bool:
-        return tree.latest(target, start(own)) is not None
+    def request(self, frame_column: str | None, time_column: str | None) -> Request:
+        """Return how records move, unless all move at one time each at its own."""
+        from frametool.stream.stamp_source import Timed
 
-    counters = not any(frame.isdecimal() for frame in tree.frames)
-    in_time = at_times if chosen is None else None
+        def moves(own: str | None) -> bool:
+            return self.tree.latest(self.target, self.start(own)) is not None
 
-    def explained() -> ByTree:
+        width = UNCERTAIN if self.uncertain else EXACT
+        timed = Timed(time_column or "", self.at_times, self.from_frame, moves, width) if self.in_time else None
+        return super().request(frame_column, time_column)._replace(timed=timed)
+
+    def explained(self, task: PoseTask) -> ByTree:  # noqa: ARG002 - of a pose
+        """Return the look-up for derivations."""
         from frametool.stream.written import ByTree
 
-        return ByTree(tree, target, source, options.at_ns(chosen))
+        return ByTree(self.tree, self.target, self.source, options.at_ns(self.at))
 
-    has_source, tell = source is not None, partial(report_granted, lookups)
-    return Way(target, from_frame, in_time, moves, explained, has_source, counters, uncertain, tell, tree), rest
-
-
-def _way_by_pose(inputs: Inputs, task: PoseTask) -> Way:
-    """Move everything by one pose; where it names its frames, records must be expressed in that one."""
-    from frametool.stream.request import COMBINED
-
-    uncertain = inputs.covariance
-    asked = task.request(operation=COMBINED._replace(similar=True, multiples=inputs.scale))
-    source = pose_source(inputs.pose, asked)
-    pose = one_pose(source, asked)
-
-    refuse(uncertain and pose.covariance is None, "--covariance: POSE has neither sigma nor covariance")
-    moved_by = (pose if uncertain else pose._replace(covariance=None)).placed
-    if pose.covariance is not None and not uncertain:
-        warn(f"{source.name}: its covariance is not used (--covariance)")
-
-    def from_frame(own: str | None, _own_ns: int | None = None) -> Components:
-        _settled(own, pose.name)
-        return moved_by
-
-    tell = partial(warn_if_wide, [pose.covariance or ()] * uncertain)
-    explained = partial(task.written, source, warned=True)
-    return Way(pose.parent, from_frame, None, bool, explained, has_source=True, uncertain=uncertain, tell=tell)
+    def finish(self) -> None:
+        """Say what look-ups have taken for granted."""
+        report_granted(self.lookups)
 
 
 def _settled(own: str | None, source: str | None) -> str | None:

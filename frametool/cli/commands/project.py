@@ -128,7 +128,7 @@ class CameraTask(Stream):
         super().__init__(inputs, output)
         if self.messages() is None and self.path and is_bag(self.path):  # of a bag, --topic is what is streamed
             raise click.UsageError(f"write the clouds of {self.path} as files first: apply -o '{{stamp_ns}}.pcd'")
-        self.way: apply.Way | None = None
+        self.way: apply.TreeWay | None = None
         self.rest: tuple[str, ...] = inputs.arguments
         _, colon, name = (inputs.camera or "").rpartition(":")
         self.camera_name = name if colon and not is_inline(inputs.camera) else ""
@@ -137,7 +137,8 @@ class CameraTask(Stream):
             if len(self.rest) < len(names) or begins_number(self.rest[0]):
                 raise click.UsageError(f"name {', '.join(before)} and CAMERA, or give --camera FILE[:NAME]")
             self.camera_name = self.rest[len(before)]
-            self.way, self.rest = apply.way_by_tree(inputs, numbers=True)
+            self.way = apply.TreeWay(inputs, numbers=True)
+            self.rest = self.way.rest
         self.is_stream = self.rest in ((), ("-",))
         self.camera = self._camera()
 
@@ -237,7 +238,9 @@ def unproject_command(inputs: Inputs) -> int:
         far = ("range" if columns[2] == "range" else "depth"), None
     height = inputs.height if inputs.ground else None
     if into is None and inputs.ground:
-        task.way = _through(task, inputs.ground)
+        if task.way is None:
+            raise click.UsageError("--ground needs TREE, TARGET and CAMERA: the tree says where the ground is")
+        task.way = GroundWay(task.way, inputs.ground, task.camera_name)
     seen = PointsOfPixels(task.camera, inputs.first_pixel, columns, far=far, height=height, into=into)
     request = task.request(None, seen, seen.shown((task.way and task.way.target) or ""))
     if request.timed is not None and height is not None:
@@ -245,26 +248,26 @@ def unproject_command(inputs: Inputs) -> int:
     return task.answer(request._replace(poses=0, frames=()), records, seen)
 
 
-def _through(task: CameraTask, named: str) -> apply.Way:
-    """Return the way with two poses: of the ground in TARGET, of the camera over the ground, at one time."""
-    way = task.way
-    if way is None or way.tree is None or way.target is None:
-        raise click.UsageError("--ground needs TREE, TARGET and CAMERA: the tree says where the ground is")
-    tree, chosen, target, camera = way.tree, task.inputs.at, way.target, frame_name(task.camera_name, way.tree)
-    ground = frame_name(named, tree)
-    pairs = ((target, ground), (ground, camera))
+class GroundWay(apply.TreeWay):
+    """Move by two poses: of the ground in TARGET, of the camera over the ground, at one time."""
 
-    def from_frame(_own: str | None, own_ns: int | None) -> Components:
-        stamp_ns = own_ns if chosen is None else options.at_ns(chosen)
+    def __init__(self, way: apply.TreeWay, ground: str, camera: str) -> None:
+        """Take the tree and the times of a way."""
+        vars(self).update(vars(way))
+        ground = frame_name(ground, self.tree)
+        self.pairs = ((self.target, ground), (ground, frame_name(camera, self.tree)))
+
+    def from_frame(self, _own: str | None, own_ns: int | None = None) -> Components:
+        """Return both at a time, or at the latest that both have."""
+        stamp_ns, tree = own_ns if self.in_time else options.at_ns(self.at), self.tree
         if stamp_ns is None:
-            stamp_ns = min((each for pair in pairs if (each := tree.latest(*pair)) is not None), default=None)
-        return tuple(part for pair in pairs for part in tree.lookup(*pair, stamp_ns).components)
+            stamp_ns = min((each for pair in self.pairs if (each := tree.latest(*pair)) is not None), default=None)
+        return tuple(part for pair in self.pairs for part in tree.lookup(*pair, stamp_ns).components)
 
-    def at_times(_own: str | None, times_ns: Any) -> Components:
-        first, second = (tree.lookup_many(*pair, times_ns, missing="nan").components for pair in pairs)
+    def at_times(self, _own: str | None, times_ns: Any) -> Components:
+        """Return columns of both; nan where one has no data."""
+        first, second = (self.tree.lookup_many(*pair, times_ns, missing="nan").components for pair in self.pairs)
         return *first[:6], first[6] + 0.0 * second[6], *second
-
-    return way._replace(from_frame=from_frame, at_times=None if chosen is not None else at_times)
 
 
 def _records(arguments: Sequence[str]) -> Iterator[Source]:
