@@ -7,6 +7,7 @@ import sys
 import warnings
 from contextlib import chdir, contextmanager
 from io import BufferedReader, BytesIO, TextIOWrapper
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Lock
 from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
@@ -130,13 +131,9 @@ def _folder_of(files: Mapping[str, bytes] | None) -> Iterator[dict[str, bytes]]:
         raise ValueError(f"files: {outside[0]!r} is not the name of a file in the folder of the command")
     with TemporaryDirectory() as folder, chdir(folder):
         for name, content in files.items():
-            os.makedirs(os.path.dirname(name) or ".", exist_ok=True)
-            with open(name, "wb") as new:
-                new.write(content)
+            Path(name).parent.mkdir(parents=True, exist_ok=True)
+            Path(name).write_bytes(content)
         yield written
-        for base, _, names in os.walk("."):
-            for path in (os.path.relpath(os.path.join(base, name)) for name in names):
-                with open(path, "rb") as stream:
-                    content = stream.read()
-                if files.get(name := path.replace(os.sep, "/")) != content:
-                    written[name] = content
+        for path in filter(Path.is_file, Path().rglob("*")):
+            if files.get(name := path.as_posix()) != (content := path.read_bytes()):
+                written[name] = content

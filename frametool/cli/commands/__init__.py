@@ -39,7 +39,7 @@ COMMANDS = {
     "check": ("frametool.cli.commands.check", "mistakes in trees and recordings"),
     "diff": ("frametool.cli.commands.check", "what differs between two trees, calibrations or recordings"),
     "static": ("frametool.cli.commands.static", "static_transform_publisher arguments, written and read"),
-    "fk": ("frametool.cli.commands.fk", "where TIP of a robot is seen from BASE, for joint values"),
+    "fk": ("frametool.cli.commands.lookup", "where TIP of a robot is seen from BASE, for joint values"),
     "solve": ("frametool.cli.commands.solve", "transforms estimated from measurements: trees, cameras, matched points"),
     "apply": ("frametool.cli.commands.apply", "points, vectors and poses moved into another frame"),
     "project": ("frametool.cli.commands.project", "points into the picture of a camera: pixels, depths, overlays"),

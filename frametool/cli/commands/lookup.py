@@ -1,4 +1,4 @@
-"""Where one frame is seen from another: `lookup`, at a time, many or those of rows; `echo`, as a recording goes by."""
+"""Where one frame is seen from another: `lookup`, as a recording goes by `echo`, for rows of joint values `fk`."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from frametool.cli import options
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, together
 from frametool.cli.output import QUATERNION, Output
 from frametool.cli.sink import say_error
-from frametool.cli.streaming import EXPLAIN, PoseTask, stream_options
-from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, report_granted
+from frametool.cli.streaming import EXPLAIN, PoseTask, Stream, stream_options
+from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, opened, report_granted, state
 from frametool.errors import FrametoolError, NoDataAt, UnknownFrame, warn
 from frametool.formats.table import holds_arrays
 from frametool.geometry.rigid import EXACT, UNCERTAIN
@@ -268,3 +268,46 @@ def _results(replayed: Iterator[Replayed], target: str, source: str, skipped: Sk
             yield pose_algebra.result_at(found.components, target, source, at_ns)
     if skipped.errors and not skipped.found:
         raise skipped.errors[0]
+
+
+@command_named("fk", own=("input_path", "joints"))
+@argument("tree", FILE, metavar="URDF")
+@argument("base", FRAME, metavar="BASE")
+@argument("tip", FRAME, metavar="TIP")
+@stream_options
+@options.reading_options
+@options.pose_result_options("poses")
+def fk_command(inputs: Inputs) -> int:
+    """Add the pose of TIP in BASE to rows of joint values.
+
+    \b
+      frametool fk arm.urdf arm_base tool -i joints.csv
+      frametool fk arm.urdf tool right_finger -i joints.csv --prefix finger_
+      printf 't,gripper_mm\\n0,12.5\\n' | frametool fk arm.urdf tool left_finger
+
+    Rows are a table with a column for each joint, JSON lines or YAML documents with a key for each, or JointState
+    messages as `ros2 topic echo` prints them. Columns have the names of joints: radians and metres, or elbow_deg, elbow
+    [deg], finger_mm. Other columns are unchanged. A joint of the chain without a column needs --joint or --joints; a
+    mimic joint follows its leader. For a single posture use `frametool lookup arm.urdf arm_base tool -j elbow=30deg`.
+    """
+    stream = Stream(inputs, Output(inputs, "poses"))
+    if (joints := inputs.peek("joints")) and not stream.path and not stream.has_input():
+        words = " ".join((inputs.tree, inputs.base, inputs.tip, *(f"-j {each}" for each in joints)))
+        raise click.UsageError(f"no rows of joint values: give -i FILE; for one posture, frametool lookup {words}")
+    from frametool.formats.robots.urdf import robot_of
+    from frametool.stream.joint_rows import JointRows, names_in
+    from frametool.stream.request import Operation, Request
+
+    (file,) = opened((inputs.tree,), streams=True)
+    robot, posture = robot_of(file)
+    rows = JointRows(robot, posture, frame_name(inputs.base, robot), frame_name(inputs.tip, robot))
+    with stream.opened() as source:
+        begin = source.peek()
+        fmt = stream.chosen_format() or stream.detected(begin)
+        refuse(holds_arrays(fmt), f"rows of joints are a table of text, records or messages, not {fmt}")
+        names = names_in(begin, fmt, stream.name, "a key for each joint, or JointState messages", header=inputs.header)
+        rows.bind(names, stream.name, fixed=frozenset(file.answers.joints))
+        file.tally.assumed = ""  # rows say where each joint on the way is
+        state([file])
+        operation = Operation(moves=True, formula=rows)
+        return stream.run(Request(operation, poses=0, degrees=inputs.deg, normalize=inputs.normalize))

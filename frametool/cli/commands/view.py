@@ -101,7 +101,12 @@ def view_command(inputs: Inputs) -> None:
     sliders = chosen == "html" and not overlay and not inputs.no_sliders
     inputs.refuse_idle()
     content = _content(scene, chosen, tree, eye, before, str(target), sliders=sliders)
-    path = _page_file() if inputs.opens and output is None else output
+    path = output
+    if inputs.opens and path is None:
+        from tempfile import NamedTemporaryFile
+
+        with NamedTemporaryFile(prefix="frametool_", suffix=".html", delete=False) as page:
+            path = page.name
     with writing(path, force=inputs.force or output is None) as write:
         write(content)
     if inputs.opens and path:
@@ -167,12 +172,3 @@ def _solids(tree: str) -> list[Solid]:
     if meshes := sum(each.kind == "mesh" for each in solids):
         say(f"note: {meshes} mesh{'es' * (meshes > 1)} drawn as boxes; mesh files are not read")
     return solids
-
-
-def _page_file() -> str:
-    """Name a file of one's own for a page that is only looked at."""
-    from tempfile import mkstemp
-
-    handle, path = mkstemp(prefix="frametool_", suffix=".html")
-    os.close(handle)
-    return path
