@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
 
     from frametool.cli.command import Adds
-    from frametool.formats.load import Rules
     from frametool.geometry.representations import Notation
 
 STREAMED = ("records", "rows", "arrays")
@@ -390,13 +389,6 @@ def window_of(passed: Inputs) -> tuple[int, int] | None:
     from frametool.frames.stamps import FURTHEST_NS
 
     return -FURTHEST_NS if start is None else start, FURTHEST_NS if stop is None else stop
-
-
-def rules(passed: Inputs) -> Rules:
-    """Collect what the options say about how frames are taken."""
-    from frametool.formats.load import Rules
-
-    return Rules(moving=bool(passed.moving), keep_ns=passed.cache, normalize=bool(passed.normalize))
 
 
 def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int]:

@@ -40,16 +40,16 @@ SaidAnswers = asking(Answers, ANSWERED)
 OF_FILES = (*Answers._fields, "named_frames", "from_rep", "input_formats", "topics", "quiet", "verbose")
 
 
-def load_tree(
-    argument: str, more: Sequence[str] = (), rules: Rules | None = None, *, streams: bool = False,
-    drawings: bool = False,
-) -> Frames:  # fmt: skip
+def load_tree(argument: str, more: Sequence[str] = (), *, streams: bool = False, drawings: bool = False) -> Frames:
     """Read the tree of an argument and merge further files into it; say what files of other formats were taken for.
 
     streams: `--in` is about what is streamed wherever that can be
     drawings: a file without poses is taken too, if it is alone
     """
-    arguments, alone = (argument, *more), drawings and not more
+    from frametool.formats.load import Rules  # not every command that may read trees does
+
+    arguments, alone, passed = (argument, *more), drawings and not more, inputs()
+    rules = Rules(bool(passed.moving), passed.cache, bool(passed.normalize))
     how = f"{rules!r} {streams} {alone}"
     return _read_once(arguments, how, lambda: _loaded(opened(arguments, streams=streams, drawings=alone), rules))
 
@@ -82,10 +82,10 @@ def load_sides(
 
 
 def _loaded(
-    files: Sequence[FrameFile], rules: Rules | None, places: dict[str, EdgePlace] | None = None
+    files: Sequence[FrameFile], rules: Rules, places: dict[str, EdgePlace] | None = None
 ) -> Frames:
     """Merge files that are open, and say what they were taken for."""
-    from frametool.formats.load import load_sources  # not every command that may read trees does
+    from frametool.formats.load import load_sources
 
     tree = load_sources(files, rules, places)
     if tree.moves:

@@ -347,7 +347,7 @@ class TreeWay(Way):
         named = arguments[2:3] if is_named else ()
         self.rest = arguments[2 + len(named) :]
         streams = self.rest in ((), ("-",))
-        self.tree = tree = load_tree(arguments[0], inputs.more, options.rules(inputs), streams=streams)
+        self.tree = tree = load_tree(arguments[0], inputs.more, streams=streams)
         self.lookups = lookups_in(tree, carried=self.uncertain)
         self.target: str = frame_name(arguments[1], tree)
         self.source = next((frame_name(each, tree) for each in named), None)

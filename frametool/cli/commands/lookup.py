@@ -114,7 +114,7 @@ def lookup_command(inputs: Inputs) -> int:
     covariance = inputs.covariance
     if covariance:
         _check_covariance(output, by_row=by_row)
-    tree = load_tree(inputs.tree, inputs.more, options.rules(inputs), streams=by_row)
+    tree = load_tree(inputs.tree, inputs.more, streams=by_row)
     lookups, at = lookups_in(tree, carried=covariance), options.at_ns(inputs.at)
     if by_row:
         status = _by_row(task, lookups, target, source)
@@ -241,7 +241,7 @@ def echo_command(inputs: Inputs) -> int:
     out.check_target(target)
     if out.style.place is not None and out.style.format == "text":
         raise click.UsageError(f"--to {out.style.place.name}: tf2_echo's blocks have x, y, z; -f yaml, json or csv")
-    frames = load_tree(inputs.tree, inputs.more, options.rules(inputs))
+    frames = load_tree(inputs.tree, inputs.more)
     target, source = frame_name(target, frames), frame_name(source, frames)
     out.take_axes_in(frames, source)
     if frames.covariances:

@@ -12,7 +12,7 @@ from frametool.cli.output import copied_as, folder_of
 from frametool.cli.sink import say_error, writing
 from frametool.cli.trees import FRAME, load_tree, tree_file, without_slash
 from frametool.errors import BadAnswer, FileProblem, FormatError, ValueInvalid, listing, printable, shown, warn
-from frametool.formats.load import FrameFile, Rules
+from frametool.formats.load import FrameFile
 from frametool.formats.table import FORMATS, is_folder, is_recording, writers
 from frametool.frames.stamps import parse_time
 from frametool.grammar.edges import Diagnostics
@@ -81,7 +81,7 @@ def record_command(inputs: Inputs) -> int:
     fmt = _format_of(path)
     copy, place = copied_as(fmt, path, inputs.output, inputs.format_name)
     _refuse_input(place, (path, *map(tree_file, more)))
-    tally, edges = Diagnostics(), load_tree(more[0], more[1:], Rules(normalize=normalize)) if more else None
+    tally, edges = Diagnostics(), load_tree(more[0], more[1:]) if more else None
     if edges is not None and (resting := [name for *_, names in edges.robots for name in names]):
         raise BadAnswer(f"joints without a value would be static: {listing(resting)}; --joint NAME=VALUE gives it")
     if edges is not None and edges.covariances:

@@ -60,9 +60,7 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
 
 def _fixed_tree(inputs: Inputs, measured: Collection[str]) -> Frames:
     """Return the edges of --fix trees."""
-    from frametool.formats.load import Rules
-
-    tree = load_tree(inputs.fix[0], inputs.fix[1:], Rules(normalize=inputs.normalize))
+    tree = load_tree(inputs.fix[0], inputs.fix[1:])
     if moving := next((track.child for track in tree.tracks() if not track.is_static), None):
         raise ValueInvalid(f"{tree.name}: {shown(moving)} moves; fixed frames must be static (tree --at TIME)")
     if not {*tree.frames} & {*measured}:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option
-from frametool.cli.options import at_ns, color_option, read_time, rules, tree_result_options
+from frametool.cli.options import at_ns, color_option, read_time, tree_result_options
 from frametool.cli.output import Output
 from frametool.cli.trees import load_tree
 
@@ -34,6 +34,6 @@ def tree_command(inputs: Inputs) -> None:
     place, drawn = output.style.place, output.style.format in ("yaml", "json", "text", "dot", "mermaid")
     if place is not None and (not drawn or place.origin is not None):
         raise click.UsageError(f"--to {place.name}: trees say places by lla or utm, in yaml, json, text and drawings")
-    frames = load_tree(inputs.tree, inputs.more, rules(inputs), drawings=True)
+    frames = load_tree(inputs.tree, inputs.more, drawings=True)
     stamp = at_ns(inputs.at)
     output.tree(frames if stamp is None else frames.tree_at(stamp), inputs.color)

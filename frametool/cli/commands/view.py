@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse
-from frametool.cli.options import at_ns, color_option, moving_options, read_time, rules
+from frametool.cli.options import at_ns, color_option, moving_options, read_time
 from frametool.cli.sink import refuse_existing, say, writing
 from frametool.cli.trees import FRAME, frame_name, load_tree, opened, tree_file
 from frametool.errors import FormatError, listing, shown
@@ -78,7 +78,7 @@ def view_command(inputs: Inputs) -> None:
     overlay, eye = inputs.overlay, inputs.peek("eye") if chosen == "glb" else inputs.eye  # a glb is seen from anywhere
     refuse(overlay and (source or not target), "--overlay takes two trees: frametool view AFTER BEFORE --overlay")
     refuse(inputs.path_only and not (target and source), "--path draws the way between TARGET and SOURCE; name both")
-    frames = load_tree(tree, inputs.more, rules(inputs))
+    frames = load_tree(tree, inputs.more)
     from frametool.view.scene import FrameScene
 
     ends = {} if overlay else {"target": target, "source": source}
