@@ -239,9 +239,9 @@ def for_each(formats: Sequence[str], files: int) -> list[str]:
 # --- results -------------------------------------------------------------------------------------------------------
 
 PRECISION = _of_results("--precision N|full", "decimals  [default: full; a terminal shows 9 digits]", _digits)
-_PLACE = together(
+place_options = together(
     _of_results("-o --output FILE", "write to this file, atomically"),
-    _of_results("--force", "let --output overwrite a file", requires=("output", "report")),
+    _of_results("--force", "let --output overwrite a file", requires=("output", "report", "plot", "view")),
 )
 MESSAGES = ("pose", "tf", "path", "point", "fix")
 
@@ -271,7 +271,7 @@ def result_options(*what: str) -> Adds:
     recording = [_RECORDING] * (not set(formats).isdisjoint(writers("recording")))
     kind = FormatName(("text", *formats), "written here")
     chosen = option("-f --format FORMAT", "of the result (frametool formats)", kind, name="format_name")
-    return together(chosen, _PLACE, PRECISION, *recording)
+    return together(chosen, place_options, PRECISION, *recording)
 
 
 def list_options(*more: str) -> Adds:
@@ -280,7 +280,7 @@ def list_options(*more: str) -> Adds:
     more: formats besides text and those of reports
     """
     formats = "text", *writers("report"), *more
-    return together(option("-f --format", "of the result  [default: text]", formats, name="format_name"), _PLACE)
+    return together(option("-f --format", "of the result  [default: text]", formats, name="format_name"), place_options)
 
 
 rotation_options = together(

@@ -22,7 +22,7 @@ from frametool.errors import ValueInvalid, first_of, listing, printable, shown, 
 from frametool.formats import table
 from frametool.formats.table import FORMATS, by_name, is_folder, writers
 from frametool.geometry.representations import EARTH_FRAMES, Notation, notation
-from frametool.grammar.result import RecordingStyle, Result, Style, is_locked, sample_results
+from frametool.grammar.result import RecordingStyle, Result, Style, sample_results
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from frametool.cli.sink import Write
     from frametool.errors import FrametoolError
     from frametool.frames.lookups import Frames
-    from frametool.grammar.pose import Pose
     from frametool.stream.record_results import BlockResults, ResultWriter
     from frametool.stream.record_values import Value
     from frametool.stream.request import Operation
@@ -278,11 +277,6 @@ class Output:
         text, self.marks = write_tree(tree, self.style), TREE_MARKS
         self.style.screen = self.path is None and (color == "always" or (color == "auto" and self.style.screen))
         self.text(text)
-
-    def report_lock(self, poses: Sequence[Pose]) -> None:
-        """Report that the Euler angles of a single result are not unique."""
-        if len(poses) == 1 and any(is_locked(poses[0], each) for each in self.style.notations):
-            say("note: gimbal lock: the angles are not unique; the third was set to 0")
 
     def _points(self, found: list[dict[str, Any]]) -> None:
         """Write points; for a person one a line, but what has more than three numbers as a mapping."""

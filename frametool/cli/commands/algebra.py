@@ -18,8 +18,6 @@ from frametool.stream.faults import MOST
 from frametool.text.numbers import parse_fractions, parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from frametool.grammar.readers import Vector
 
 
@@ -263,20 +261,15 @@ def between_command(inputs: Inputs) -> None:
     from frametool.grammar.pose_algebra import turn_between
 
     output = Output(inputs, "poses")
-    start, end = _directions(inputs.vectors)
-    result = turn_between(start, end)
-    if result.extras["angle_deg"] > 180.0 - OPPOSITE:
-        say("note: the directions are opposite: half a turn about any axis at right angles to them; one was chosen")
-    output.values([result])
-
-
-def _directions(texts: Sequence[str]) -> tuple[Vector, Vector]:
-    """Read two vectors: six bare numbers, or each by itself."""
+    texts = inputs.vectors
     if len(texts) == 6:
         texts = ",".join(texts[:3]), ",".join(texts[3:])
     found = [vector for text in texts for vector in _vectors(text)]
     refuse(len(found) != 2, f"two vectors are wanted, V1 and V2, of three numbers each; found {len(found)}")
-    return found[0], found[1]
+    result = turn_between(*found)
+    if result.extras["angle_deg"] > 180.0 - OPPOSITE:
+        say("note: the directions are opposite: half a turn about any axis at right angles to them; one was chosen")
+    output.values([result])
 
 
 def _vectors(text: str) -> list[Vector]:

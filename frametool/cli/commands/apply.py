@@ -315,7 +315,7 @@ class Way:
         return task.written(self.read, warned=True)
 
     def finish(self) -> None:
-        """Say what was taken for granted."""
+        """Report what was taken for granted."""
         warn_if_wide([self.pose.covariance or ()] * self.uncertain)
 
     def request(self, frame_column: str | None, time_column: str | None) -> Request:
@@ -391,7 +391,7 @@ class TreeWay(Way):
         return ByTree(self.tree, self.target, self.source, options.at_ns(self.at))
 
     def finish(self) -> None:
-        """Say what look-ups have taken for granted."""
+        """Report what look-ups have taken for granted."""
         report_granted(self.lookups)
 
 

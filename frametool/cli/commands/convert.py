@@ -17,7 +17,7 @@ from frametool.errors import ValueInvalid
 from frametool.geometry import floats
 from frametool.geometry.representations import REPRESENTATIONS, Notation, notation
 from frametool.grammar.pose import Pose
-from frametool.grammar.result import Result, Style, mapping_of_numbers
+from frametool.grammar.result import Result, Style, is_locked, mapping_of_numbers
 from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:
@@ -116,7 +116,8 @@ def convert_command(inputs: Inputs) -> int:
         change = _named_change(axes, world, operation) if values else None
         return task.derive("convert", task.written(sources[0], warned=True), own=found[0], change=change)
     output.values(results)
-    output.report_lock(found)
+    if len(found) == 1 and any(is_locked(found[0], each) for each in output.style.notations):
+        say("note: gimbal lock: the angles are not unique; the third was set to 0")
     return 0
 
 

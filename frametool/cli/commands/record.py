@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option
-from frametool.cli.options import pose_options, reading_options, verbose_option
+from frametool.cli.options import place_options, pose_options, reading_options, verbose_option
 from frametool.cli.output import copied_as, folder_of
 from frametool.cli.sink import say_error, writing
 from frametool.cli.trees import FRAME, load_tree, tree_file, without_slash
@@ -37,9 +37,9 @@ def _between(text: str) -> tuple[int, int]:
     return start, stop
 
 
-@command_named("record", own=("topics",), epilog=EXIT_CODES)
+@command_named("record", own=("topics", "output"), epilog=EXIT_CODES)
 @argument("tree", FILE, metavar="RECORDING")
-@option("-o --output FILE", "write to this file or folder, atomically")
+@place_options
 @option("--with FILE", "add the missing edges of this tree; may be repeated", name="more", multiple=True)
 @option("--replace", "let --with replace edges that have other values", requires=("more",))
 @option("--into FRAME", "transform the messages of each --topic into this frame", FRAME)
@@ -48,7 +48,6 @@ def _between(text: str) -> tuple[int, int]:
 @option("--on-error", "for a message that cannot be transformed", ON_ERROR[:2], default=STOP)
 @option("--between START,STOP", "drop messages before and after", _between)
 @option("-f --format", "format of the copy  [default: by --output]", writers("recording"), name="format_name")
-@option("--force", "let --output overwrite a file", requires=("output",), under="Result")
 @reading_options
 @verbose_option
 @pose_options

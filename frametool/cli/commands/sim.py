@@ -14,7 +14,7 @@ import click
 
 from frametool.cli.command import EXIT_CODES, Command, Inputs, argument, misuse, option, refuse, say_if_typed, together
 from frametool.cli.commands import Group
-from frametool.cli.options import PRECISION, file_with, suffix_of
+from frametool.cli.options import PRECISION, file_with, place_options, suffix_of
 from frametool.cli.output import Output
 from frametool.cli.poses import inline_misuse, source_of
 from frametool.cli.signals import clean_up
@@ -81,10 +81,8 @@ output_options = together(  # what is shown of a run
     option("-f --format", "format of the records  [default: text on a terminal, yaml otherwise]", FORMS,
            name="format_name"),
     PRECISION,
-    option("-o --output FILE", "write to this file instead of stdout, atomically", under="Result"),
+    place_options,
     option("--plot FILE", "draw the result into a .svg, .html or .png", file_with(".svg", ".html", ".png")),
-    option("--force", "let --output and --plot overwrite files", requires=("output", "plot", "view"),
-           under="Result"),
 )  # fmt: skip
 
 
@@ -153,7 +151,8 @@ class SimOutput:
     def _watchers(self, scene: Scene, stack: ExitStack) -> Iterator[Watch]:
         """Open what the steps go to; the stack closes it."""
         if self.realtime or self.live:
-            yield real_time()
+            start = monotonic()  # simulated time does not run ahead of the clock
+            yield lambda step: sleep(max(0.0, step.t_ns / BILLION - (monotonic() - start)))
         if self.live:
             from frametool.view.turtles import Screen
 
@@ -167,12 +166,6 @@ class SimOutput:
             write = stack.enter_context(writing(self.output, force=self.force))
             # each record at once, so that a reader at the other end of a pipe sees it
             yield lambda step: [write(text) for text in writer.write(step)]
-
-
-def real_time() -> Watch:
-    """Return what keeps simulated time from running ahead of the clock, which starts now."""
-    start = monotonic()
-    return lambda step: sleep(max(0.0, step.t_ns / BILLION - (monotonic() - start)))
 
 
 def log_events() -> Watch:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse
-from frametool.cli.options import at_ns, color_option, moving_options, read_time
+from frametool.cli.options import at_ns, color_option, moving_options, place_options, read_time
 from frametool.cli.sink import refuse_existing, say, writing
 from frametool.cli.trees import FRAME, frame_name, load_tree, opened, tree_file
 from frametool.errors import FormatError, listing, shown
@@ -35,7 +35,7 @@ def _eye(text: str) -> Eye:
     return parse_eye(text)
 
 
-@command_named("view")
+@command_named("view", own=("output",))
 @argument("tree", FILE)
 @argument("target", FRAME, required=False)
 @argument("source", FRAME, required=False)
@@ -47,8 +47,7 @@ def _eye(text: str) -> Eye:
 @option("--from EYE", "slanted, front, side, top, or AZ,EL in degrees", _eye, name="eye", default="slanted")
 @moving_options
 @option("-f --format", "format of the picture  [default: by the suffix of --output, else text]", FORMS, name="fmt")
-@option("-o --output FILE", "write to this file instead of stdout, atomically")
-@option("--force", "let --output overwrite a file", requires=("output",), under="Result")
+@place_options
 @option("--overlay", "compare TREE with a second tree, TARGET: what has moved?")
 @option("--no-sliders", "leave out the sliders for the joints of a robot", name="no_sliders")
 @option("--open", "show the page in the browser", name="opens")
