@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import accumulate, chain, count
+from itertools import accumulate, chain, count, starmap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -11,7 +11,7 @@ from frametool.stream.evaluate import Plan
 from frametool.stream.faults import NULL, SKIP, Fault
 from frametool.stream.layout import In, Renamed
 from frametool.stream.record import KEYS_REMEDY
-from frametool.stream.record_text import RecordText, attempt, column_in
+from frametool.stream.record_text import column_in
 from frametool.stream.rows import Block
 from frametool.stream.splice import quoted_name
 from frametool.stream.splitter import DOCUMENTS, LINES, Part
@@ -21,15 +21,17 @@ from frametool.text.cells import without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterable, Sequence
     from typing import TypeAlias
 
+    from frametool.stream.record_text import RecordText
     from frametool.stream.request import Request
     from frametool.stream.splitter import Splitter
     from frametool.stream.template import Names
     from frametool.text.spans import Bytes, Ints
 
     Places: TypeAlias = Sequence[tuple[int, int]]
+    Hit: TypeAlias = tuple[Template, Places]
 
 MOST_TEMPLATES = 256  # kept in mind
 MOST_TRIED = 8  # of them tried on whole blocks
@@ -53,128 +55,83 @@ class Cut(NamedTuple):
         return Part(int(self.starts[row, -1]), int(self.starts[row, 0]), int(self.starts[row, -2]), ends[-2])
 
 
-class FoundRecords:
-    """The records of a block that templates find: many at once, and one by one."""
-
-    def __init__(self) -> None:
-        """Begin without any."""
-        self.cuts: list[Cut] = []
-        self._singles: dict[Template, list[Places]] = {}
-
-    def add(self, part: Part, template: Template, places: Places) -> None:
-        """Add a record that was found alone, and where its stretches are."""
-        spans = (*places, (part.end, part.after), (part.begin, part.start))
-        self._singles.setdefault(template, []).append(spans)
-
-    def by_template(self) -> list[Cut]:
-        """Return all records, those of each template as they follow each other in the text."""
-        found: dict[Template, list[Cut]] = {}
-        for cut in chain(self.cuts, (_as_cut(*each) for each in self._singles.items())):
-            found.setdefault(cut.template, []).append(cut)
-        joined = []
-        for template, each in found.items():
-            starts, ends = (np.concatenate(parts) for parts in zip(*(cut[1:] for cut in each), strict=True))
-            order = np.argsort(starts[:, 0], kind="stable") if len(each) > 1 else slice(None)
-            joined.append(Cut(template, starts[order], ends[order]))
-        return joined
-
-
 class RecordCutter:
-    """Cut one block of records after the other; keeps the templates it has met.
+    """Finds the records of blocks that are written alike; keeps the templates it has met.
 
-    closed: whether an array ended in the last block
+    read: reads a record, or says what is wrong with it
     """
 
-    def __init__(self, splitter: Splitter, fmt: str, request: Request, source: str) -> None:
+    def __init__(self, splitter: Splitter, read: Callable[[bytes, Part], RecordText | Fault]) -> None:
         """Start without templates."""
-        self.splitter = splitter
-        self.fmt = fmt
-        self.request = request
-        self.source = source
+        self.splitter, self.read = splitter, read
         self.templates: list[Template] = []
-        self.closed = False
 
-    def cut(self, text: bytes) -> tuple[FoundRecords, list[tuple[int, int]]]:
+    def cut(self, text: bytes) -> tuple[list[Cut], list[tuple[int, int]]]:
         """Return the records of a block that templates find, and what is left between them."""
-        self.closed = False
-        found = FoundRecords()
+        cuts: list[Cut] = []
         rest = [(0, len(text))]
-        if self.splitter.layout in (LINES, DOCUMENTS) and is_text(text):
-            rest = self._cut(text, rest, self.templates[-MOST_TRIED:][::-1], found.cuts)
-            rest = self._learn_and_cut(text, rest, found.cuts)
-            found.cuts, strays = _without_strays(found.cuts, text)
-            rest = sorted(rest + strays)
-        return found, rest
-
-    def _learn_and_cut(self, text: bytes, rest: list[tuple[int, int]], cuts: list[Cut]) -> list[tuple[int, int]]:
-        """Learn templates from the first records that are left, a few, and cut by them too."""
+        if self.splitter.layout not in (LINES, DOCUMENTS) or not is_text(text):
+            return cuts, rest
+        for template in self.templates[-MOST_TRIED:][::-1]:
+            rest = _cut_by(template, text, rest, cuts)
         for _ in range(MOST_TRIED):
-            if len(rest) != 1 or rest[0][1] - rest[0][0] < WORTH_CUTTING:
-                return rest
-            start, end = rest[0]
-            looked = text[start : min(end, start + MOST_LOOKED)]
-            parts = self.splitter.parts(looked).parts[:1]
-            if not parts or parts[0].problem:
-                return rest
-            record = looked[parts[0].start : parts[0].end]
-            if self.match(record, 0, len(record)) is None:
-                known = self.read(looked, parts[0])
-                if isinstance(known, Fault) or known.is_long or not known.entries:
-                    return rest
-                self.learn(known)
-            rest = self._cut(text, rest, self.templates[-1:], cuts)
-        return rest
+            start, end = rest[0] if len(rest) == 1 else (0, 0)
+            if end - start < WORTH_CUTTING or not self._learn_first(text[start : min(end, start + MOST_LOOKED)]):
+                break
+            rest = _cut_by(self.templates[-1], text, rest, cuts)
+        cuts, strays = _without_strays(cuts, text)
+        return cuts, sorted(rest + strays)
 
-    def _cut(
-        self, text: bytes, rest: list[tuple[int, int]], templates: Sequence[Template], cuts: list[Cut]
-    ) -> list[tuple[int, int]]:
-        """Cut what is left of a block by templates; return what is then left."""
-        for template in templates:
-            left = []
-            for start, end in rest:
-                cut, gaps = _cut_chunk(template, text[start:end], start)
-                if cut is not None:
-                    cuts.append(cut)
-                left += gaps
-            rest = left
-        return rest
+    def _learn_first(self, text: bytes) -> bool:
+        """Return True if there is a template for the first record of a text, which is learned from it if need be."""
+        part = next(iter(self.splitter.parts(text).parts), None)
+        if part is None or part.problem:
+            return False
+        if self.match(text, part) is None:
+            known = self.read(text, part)
+            if isinstance(known, Fault) or known.is_long or not known.entries:
+                return False
+            self.learned(known, text, part)
+        return True
 
-    def singly(self, text: bytes, start: int, end: int) -> Iterator[tuple[Part, tuple[Template, Places] | None]]:
-        """Yield the records of what is left one by one, each with the template that finds it alone, if one does."""
-        parts, self.closed = self.splitter.parts(text[start:end])
-        for begin, first, last, after, problem, final in parts:
-            part = Part(begin + start, first + start, last + start, after + start, problem, final)
-            yield part, None if part.problem else self.match(text, part.start, part.end)
-
-    def learned(self, known: RecordText | Fault, text: bytes, part: Part) -> tuple[Template, Places] | None:
-        """Learn from a record; return the template, and where its stretches are in it."""
-        if isinstance(known, Fault) or not known.entries:
-            return None
-        template = self.learn(known)
-        if not known.is_long:
-            return self.match(text, part.start, part.end)
-        return template, [(begin + part.start, end + part.start) for begin, end in template.places()]
-
-    def match(self, text: bytes, begin: int, stop: int) -> tuple[Template, Places] | None:
-        """Find the template that a record follows."""
-        if not is_text(text[begin:stop]):
+    def match(self, text: bytes, part: Part) -> Hit | None:
+        """Find the template that a record follows, and where its stretches are."""
+        if part.problem or not is_text(text[part.start : part.end]):
             return None
         for template in reversed(self.templates):
-            found = template.pattern.fullmatch(text, begin, stop)
+            found = template.pattern.fullmatch(text, part.start, part.end)
             if found is not None and template.fits_in(text, found.regs[1:]):
                 return template, found.regs[1:]
         return None
 
-    def read(self, text: bytes, part: Part, line: int = 0) -> RecordText | Fault:
-        """Read a record, or say what is wrong with it; line: where it begins, counted from 0."""
-        return attempt(text, part, self.fmt, self.request, self.source, line)
-
-    def learn(self, known: RecordText) -> Template:
-        """Make a template of a record; keep it in mind unless it is long, not too many."""
+    def learned(self, known: RecordText, text: bytes, part: Part) -> Hit | None:
+        """Learn from a record; a template is kept in mind unless it is long, not too many."""
+        if not known.entries:
+            return None
         template = Template(known)
-        if not known.is_long:
-            self.templates = [*self.templates[-MOST_TEMPLATES + 1 :], template]
-        return template
+        if known.is_long:
+            return template, [(begin + part.start, end + part.start) for begin, end in template.places()]
+        self.templates = [*self.templates[-MOST_TEMPLATES + 1 :], template]
+        return self.match(text, part)
+
+
+def by_template(cuts: Iterable[Cut], singles: Iterable[tuple[Part, Hit]]) -> list[Cut]:
+    """Return all records of a block, those of each template as they follow each other in the text.
+
+    singles: those that were found alone
+    """
+    alone: dict[Template, list[Places]] = {}
+    for part, (template, places) in singles:
+        alone.setdefault(template, []).append((*places, (part.end, part.after), (part.begin, part.start)))
+    found: dict[Template, list[Cut]] = {}
+    for cut in chain(cuts, starmap(_as_cut, alone.items())):
+        found.setdefault(cut.template, []).append(cut)
+    joined = []
+    for template, each in found.items():
+        starts, ends = (np.concatenate(parts) for parts in zip(*(cut[1:] for cut in each), strict=True))
+        order = np.argsort(starts[:, 0], kind="stable") if len(each) > 1 else slice(None)
+        joined.append(Cut(template, starts[order], ends[order]))
+    return joined
 
 
 def block_of(cut: Cut, data: Bytes, text: bytes, request: Request) -> Block:
@@ -232,12 +189,11 @@ def _texts(text: bytes, starts: Ints, ends: Ints) -> list[str | None]:
 
 def _renamed(template: Template, piece: Renamed, frames: Sequence[Sequence[Names]], rows: int) -> Spans:
     """Return the names of frames as results have them."""
-    at, role, node = template.renamed(piece)
+    at, role, node = template.renamed[piece.at]
     texts = {}
     for each in {*frames[at]}:
-        named = template.named(at, each)
-        name = None if named is None else named.names[role]
-        texts[each] = quoted_name(node, name or "", json=template.json).encode()
+        named = template.named(at, each) or (None, None)
+        texts[each] = quoted_name(node, named[role] or "", json=template.json).encode()
     stops = dict(zip(texts, accumulate(map(len, texts.values())), strict=True))
     ends = np.array([stops[each] for each in frames[at]], np.int64) + MARGIN
     starts = ends - np.array([len(texts[each]) for each in frames[at]], np.int64)
@@ -246,22 +202,27 @@ def _renamed(template: Template, piece: Renamed, frames: Sequence[Sequence[Names
 
 def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
     """Return what is done to the records of one template."""
-    after = len(template.stretches)
+    after, entries = len(template.stretches), template.entries
     renamed = count(after + 2)
     pieces = [In(next(renamed)) if isinstance(each, Renamed) else each for each in template.pieces]
     on_error = SKIP if request.on_error == NULL else request.on_error  # rows without one are written elsewhere
-    extra = template.extra if request.extra_column is not None else None
+    stamp = next((entry.stamp for entry in entries if entry.stamp), ())
+    key = str(stamp[0][-1]) if stamp else ""
+    timed = request.timed
+    if timed is not None and not timed.name and request.operation.formula is not None:
+        timed = timed._replace(name=key if len(stamp) == 1 else "")  # what was found says by its own name what it is
+    extra = None if request.extra_column is None else key
     return Plan(
-        template.shapes,
-        tuple(entry.target for entry in template.entries),
-        request._replace(on_error=on_error, timed=template.timed(request), extra_column=extra, offset_ns=0),
-        template.names,
+        tuple(entry.record.shape for entry in entries),
+        tuple(entry.target for entry in entries),
+        request._replace(on_error=on_error, timed=timed, extra_column=extra, offset_ns=0),
+        tuple(".".join(map(str, (path or ())[1:])) for entry in entries for path in entry.record.numbers),
         (In(after + 1), *pieces, In(after)),
         b"null",
-        edge_of=request.pose_from_frame if any(entry.edge is not None for entry in template.entries) else None,
+        edge_of=request.pose_from_frame if any(entry.edge is not None for entry in entries) else None,
         yaml=yaml,
         remedies=tuple(
-            KEYS_REMEDY if record.flat else f"write {record.rotation}_deg" for record, *_ in template.entries
+            KEYS_REMEDY if record.flat else f"write {record.rotation}_deg" for record, *_ in entries
         ),
     )
 
@@ -277,23 +238,22 @@ def is_text(block: bytes) -> bool:
     return True
 
 
-def _cut_chunk(template: Template, chunk: bytes, offset: int) -> tuple[Cut | None, list[tuple[int, int]]]:
-    """Cut a chunk of lines by one expression; give the records, and the gaps between them."""
-    stretches = len(template.stretches) + 1
-    pieces = template.block_pattern.split(chunk)
-    count = len(pieces) // (stretches + 1)
-    if not count:
-        return None, [(offset, offset + len(chunk))]
-    ends = np.cumsum(np.fromiter(map(len, pieces), np.int64, len(pieces))) + offset
-    starts = np.empty_like(ends)
-    starts[0], starts[1:] = offset, ends[:-1]
-    between = np.arange(0, len(pieces), stretches + 1)
-    gaps = [(int(starts[at]), int(ends[at])) for at in between[starts[between] < ends[between]]]
-    rows = slice(0, count * (stretches + 1))
-    shape = (count, stretches + 1)
-    begins, stops = starts[rows].reshape(shape)[:, 1:], ends[rows].reshape(shape)[:, 1:]
-    first = begins[:, :1]  # nothing is before a record
-    return Cut(template, np.concatenate([begins, first], axis=1), np.concatenate([stops, first], axis=1)), gaps
+def _cut_by(template: Template, text: bytes, rest: list[tuple[int, int]], cuts: list[Cut]) -> list[tuple[int, int]]:
+    """Cut what is left of a block by one expression, and add the records to `cuts`; return what is then left."""
+    left = []
+    width = len(template.stretches) + 2  # with what follows a record, and what parts it from the one before
+    for start, end in rest:
+        pieces = template.block_pattern.split(text[start:end])
+        count = len(pieces) // width
+        ends = np.cumsum(np.fromiter(map(len, pieces), np.int64, len(pieces))) + start
+        starts = np.concatenate([[start], ends[:-1]])
+        between = np.arange(0, len(pieces), width)
+        left += [(int(starts[at]), int(ends[at])) for at in between[starts[between] < ends[between]]]
+        if count:
+            begins, stops = (each[: count * width].reshape(count, width)[:, 1:] for each in (starts, ends))
+            first = begins[:, :1]  # nothing is before a record
+            cuts.append(Cut(template, *(np.concatenate([each, first], axis=1) for each in (begins, stops))))
+    return left
 
 
 def _without_strays(cuts: Sequence[Cut], text: bytes) -> tuple[list[Cut], list[tuple[int, int]]]:
@@ -304,7 +264,7 @@ def _without_strays(cuts: Sequence[Cut], text: bytes) -> tuple[list[Cut], list[t
         fits = np.ones(len(cut.starts), np.bool_)
         for at in range(len(cut.template.entries)):
             names = names_of(cut, at, text)
-            wrong = {each for each in {*names} if not cut.template.fits(at, each)}
+            wrong = {each for each in {*names} if cut.template.named(at, each) is None}
             if wrong:
                 fits &= np.resize(np.array([each not in wrong for each in names]), len(fits))
         gone = ~fits
@@ -337,7 +297,7 @@ def _numbers(template: Template, data: Bytes, starts: Ints, ends: Ints) -> Spans
     if template.regular:
         columns = list(template.numbers)
         return Spans(data, np.ascontiguousarray(starts[:, columns]), np.ascontiguousarray(ends[:, columns]))
-    texts = [repr(value).encode() for value in template.values]
+    texts = [repr(value).encode() for record, *_ in template.entries for value in record.values]
     own = framed(b" ".join(texts))
     lengths = np.array([len(text) for text in texts], np.int64)
     first = np.cumsum(lengths + 1) - lengths - 1 + MARGIN

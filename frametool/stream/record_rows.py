@@ -152,7 +152,7 @@ class RecordRows:
         own = Cut(template, cut.starts[rows], cut.ends[rows])
         batches, first = list[RecordBatch](), 0
         for at, (each, times) in enumerate(zip(marked, stamps, strict=True) if len(rows) else ()):
-            becomes = [named.names for pair in names_of(own, at, text) if (named := template.named(at, pair))]
+            becomes = [named for pair in names_of(own, at, text) if (named := template.named(at, pair))]
             parents, names = ([pair[role] for pair in becomes] for role in (0, 1))
             numbers, stamps_ns = run.results[rows, first : first + each.size], None if times is None else times[rows]
             batches.append(RecordBatch(each, own, data, own.starts[:, 0] + at, numbers, parents, names, stamps_ns))

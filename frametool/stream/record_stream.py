@@ -9,7 +9,7 @@ import re
 from contextlib import suppress
 from functools import cached_property
 from io import BufferedReader
-from itertools import chain, count, repeat
+from itertools import chain, count
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components
     from frametool.grammar.result import Style
     from frametool.stream.evaluate import Plan, Run, State
-    from frametool.stream.record_cuts import Cut, FoundRecords, Places, RecordCutter
+    from frametool.stream.record_cuts import Cut, Hit, RecordCutter
     from frametool.stream.record_rows import RecordBatch, RecordRows
     from frametool.stream.record_text import Answer
     from frametool.stream.request import Request
@@ -41,10 +41,7 @@ if TYPE_CHECKING:
     from frametool.text.lines import ByteStream
     from frametool.text.spans import Bytes
 
-    Hit = tuple[Template, Places]
-
 _LEADING_COMMA = re.compile(rb"\A((?:\xef\xbb\xbf)?\s*\[?\s*),\s*")
-NO_FAULT = Fault(0, "", "")
 MOST_EXACT = 100  # bad records of one template in a block whose place is looked for
 
 
@@ -136,11 +133,13 @@ def _as_array(outcomes: Iterable[Outcome], on_error: str) -> Iterator[Outcome]:
 class Found:
     """What one block holds: what becomes of records alone and faults, by place, rows of many, warnings, counts.
 
+    singles: where there are many, the records that follow a template
     kept: how many records have a result, or null in the place of one
     """
 
     def __init__(self) -> None:
         """Create an empty one."""
+        self.singles: list[tuple[Part, Hit]] | None = None
         self.items: list[tuple[int, Any]] = []
         self.faults: list[tuple[int, Fault]] = []
         self.runs: list[Run] = []
@@ -166,8 +165,7 @@ class RecordBlocks:
     def few(self, text: bytes) -> Outcome:
         """Return the outcome of records that are taken one by one."""
         found = Found()
-        parts, closed = self.splitter.parts(text)
-        self._take(text, 0, len(text), zip(parts, repeat(None)), found)
+        closed = self._take(text, 0, len(text), found)
         return self._outcome(text, [], found, closed=closed)
 
     @cached_property
@@ -176,53 +174,52 @@ class RecordBlocks:
         from frametool.stream.evaluate import State
         from frametool.stream.record_cuts import RecordCutter
 
-        return RecordCutter(self.splitter, self.fmt, self.request, self.source), State()
+        return RecordCutter(self.splitter, self._read), State()
 
     def many(self, text: bytes) -> Outcome:
         """Return the outcome of a block."""
-        from frametool.stream.record_cuts import in_order
+        from frametool.stream.record_cuts import by_template, in_order
 
         if self.is_singly or not (sizes.LEARNED or self.request.in_order):
             return self.few(text)
-        cutter, _ = self.bulk
-        found = Found()
-        records, rest = cutter.cut(text)
+        found, closed = Found(), False
+        found.singles = []
+        cuts, rest = self.bulk[0].cut(text)
         for start, end in rest:
-            self._take(text, start, end, cutter.singly(text, start, end), found, records)
-        cuts = records.by_template()
-        return self._outcome(text, in_order(cuts) if self.request.in_order else cuts, found, closed=cutter.closed)
+            closed = self._take(text, start, end, found)
+        cuts = by_template(cuts, found.singles)
+        return self._outcome(text, in_order(cuts) if self.request.in_order else cuts, found, closed=closed)
 
-    def _take(
-        self, text: bytes, start: int, end: int, parts: Iterable[tuple[Part, Hit | None]], found: Found,
-        records: FoundRecords | None = None,
-    ) -> None:  # fmt: skip
-        """Take records one by one, learning new templates if there are many; what is between them passes."""
-        at, line, counted = start, 0, 0
-        for part, known in parts:
+    def _read(self, text: bytes, part: Part, line: int = 0) -> RecordText | Fault:
+        """Read a record, or say what is wrong with it; line: where it begins, counted from 0."""
+        return attempt(text, part, self.fmt, self.request, self.source, line)
+
+    def _take(self, text: bytes, start: int, end: int, found: Found) -> bool:
+        """Take records one by one; what is between them passes.  Return whether an array ends there."""
+        parts, closed = self.splitter.parts(text[start:end])
+        at, singles = start, found.singles
+        for part, line in _with_lines(text, (each.behind(start) for each in parts) if start else parts):
             if part.begin > at and self.keeps_text:
                 found.items.append((at, text[at : part.begin]))
             at = part.after
-            line, counted = line + text.count(b"\n", counted, part.start), part.start
-            if records is not None and (hit := known or self._learned(text, part, line, found)) is not None:
-                records.add(part, *hit)
-            elif records is None:
-                self._alone(text, part, attempt(text, part, self.fmt, self.request, self.source, line), line, found)
+            made = (singles is not None and self.bulk[0].match(text, part)) or self._read(text, part, line)
+            if singles is not None and isinstance(made, RecordText):
+                made = self._learned(made, text, part) or made
+            if isinstance(made, (RecordText, Fault)):
+                self._alone(text, part, made, line, found)
+            elif singles is not None:
+                singles.append((part, made))
             if found.faults and self.request.on_error == STOP:
-                return
+                return closed
         if at < end and self.keeps_text:
             found.items.append((at, text[at:end]))
+        return closed
 
-    def _learned(self, text: bytes, part: Part, line: int, found: Found) -> Hit | None:
+    def _learned(self, made: RecordText, text: bytes, part: Part) -> Hit | None:
         """Return a template that is learned from a record; None for one that is taken alone."""
-        cutter, _ = self.bulk
-        made, hit = cutter.read(text, part, line), None
-        if not isinstance(made, Fault):
-            is_alike = self.left and not made.is_long and len(made.entries) <= self.most_entries
-            self.left -= bool(is_alike)
-            hit = cutter.learned(made, text, part) if is_alike or self.request.in_order else None
-        if hit is None:
-            self._alone(text, part, made, line, found)
-        return hit
+        is_alike = self.left and not made.is_long and len(made.entries) <= self.most_entries
+        self.left -= bool(is_alike)
+        return self.bulk[0].learned(made, text, part) if is_alike or self.request.in_order else None
 
     def _alone(
         self, text: bytes, part: Part, made: RecordText | Fault, line: int, found: Found,
@@ -282,14 +279,11 @@ class RecordBlocks:
             found.kept += len(run.rows) - len(left)
             found.mended += len({*run.mended} - left)
             found.runs.append(run)
-            line = counted = 0
-            for at, row in enumerate(alone):
-                part, reason = cut.part(row), run.reasons.get(row)
-                line, counted = line + text.count(b"\n", counted, part.start), part.start
-                made: RecordText | Fault = Fault.of(run.block.line_of(row), *reason) if reason else NO_FAULT
-                if reason is None or at < MOST_EXACT:
-                    read = attempt(text, part, self.fmt, self.request, self.source, line)
-                    made = read if reason is None or isinstance(read, Fault) else made
+            for at, (part, line) in enumerate(_with_lines(text, map(cut.part, alone))):
+                reason = run.reasons.get(row := alone[at])
+                made = self._read(text, part, line) if reason is None or at < MOST_EXACT else None
+                if made is None or (reason is not None and not isinstance(made, Fault)):
+                    made = Fault.of(run.block.line_of(row), *(reason or ("", "")))
                 self._alone(text, part, made, line, found, run.parts_of(row) if self.request.in_order else None)
             found.notes += run.notes
             own = [*cut.template.notes, *cut.template.of_places]
@@ -341,6 +335,14 @@ def _says(value: Any) -> bool:
     """Return True if there is more than null in a value."""
     inner = value.values() if type(value) is dict else value if type(value) is list else None
     return value is not None if inner is None else any(map(_says, inner))
+
+
+def _with_lines(text: bytes, parts: Iterable[Part]) -> Iterator[tuple[Part, int]]:
+    """Yield records that follow each other, each with its line, counted from 0."""
+    line = counted = 0
+    for part in parts:
+        line, counted = line + text.count(b"\n", counted, part.start), part.start
+        yield part, line
 
 
 def _put(text: bytes, part: Part, row: bytes) -> tuple[int, bytes]:

@@ -49,6 +49,12 @@ class Part(NamedTuple):
     problem: str = ""
     final: bool = False
 
+    def behind(self, start: int) -> Part:
+        """Return where a record is in a text that has so much before the one it was found in."""
+        return self._replace(
+            begin=self.begin + start, start=self.start + start, end=self.end + start, after=self.after + start
+        )
+
 
 class Parts(NamedTuple):
     """The records of a block; `closed` where an array ends in it."""

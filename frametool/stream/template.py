@@ -10,7 +10,7 @@ import re
 from functools import cached_property
 from itertools import accumulate, chain, count
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from frametool.documents.json import JSON_NUMBER
 from frametool.errors import FrametoolError
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from frametool.stream.record import Record
     from frametool.stream.record_text import RecordText
     from frametool.stream.request import Request
-    from frametool.stream.row_layout import Shape
-    from frametool.stream.stamp_source import Timed
 
     Names: TypeAlias = tuple[str | None, str | None]
     Span: TypeAlias = tuple[int, int]
@@ -43,10 +41,11 @@ JSON_TEXT = r'"[^"\\\x00-\x1f]*(?:\\(?:["\\/bfnrt]|u[0-9a-fA-F]{4})[^"\\\x00-\x1
 # what may stand for a scalar that passes, by its quotes: never anything that could be read as more than one scalar
 YAML_PLAIN = r"(?:-(?! )|[A-Za-z0-9_./+])(?:[\w./+-]| (?=[\w./+(-])|:(?=[\w/]))*"
 FREE = {
-    (True, True): JSON_TEXT,
-    (True, False): rf"(?:{JSON_NUMBER}|true|false|null)",
-    (False, True): r'"[^"\\\x00-\x1f]*"',
-    (False, False): YAML_PLAIN,
+    (True, '"'): JSON_TEXT,
+    (True, ""): rf"(?:{JSON_NUMBER}|true|false|null)",
+    (False, '"'): r'"[^"\\\x00-\x1f]*"',
+    (False, "'"): r"'[^'\x00-\x1f]*'",
+    (False, ""): YAML_PLAIN,
 }
 FRAME = {
     (True, '"'): r'[^"\\\x00-\x1f]+',
@@ -54,7 +53,6 @@ FRAME = {
     (False, "'"): r"[^'\x00-\x1f]+",
     (False, ""): rf"(?!(?:null|Null|NULL)\b){YAML_PLAIN}",
 }
-SINGLE_QUOTED = r"'[^'\x00-\x1f]*'"
 STAMP = r"(?:0|[1-9]\d{0,8}|[1-3]\d{9})(?![.\deE])", r"(?:0|[1-9]\d{0,8})(?![.\deE])"  # seconds, nanoseconds
 NOT_UNKNOWN = r"(?!-1(?:\.0*)?(?:[eE][-+]?0+)?(?![.\deE]))"  # as a covariance begins of which nothing is known
 # scalars under these keys decide what a record is, wherever in it they are ..
@@ -69,13 +67,6 @@ RESULT_KEYS = DESCRIPTIVE - {"frame"}  # a number under these belongs to a resul
 MOST_NAMES = 1 << 16  # of frames, kept in mind
 
 
-class NamedFrames(NamedTuple):
-    """The frames of a result, and all else that their names decide about its text."""
-
-    names: Names
-    decides: tuple[Any, ...]
-
-
 class Template:
     """The text of records, and what holds for all that are written alike.
 
@@ -83,86 +74,55 @@ class Template:
     numbers: the stretches that hold our numbers, in order; regular: whether all of them are written plainly
     stamps: the stretches of each entry's stamp
     frames: the stretches of the names of each entry's frames, parent and name; None where they are the same in all
-    pieces: what the result is made of
+    pieces: what the result is made of; renamed: whose name it is that stood somewhere: of which entry, whether its
+        parent or its name, and the scalar that it was
     notes: what is worth telling about all of them
     of_places: those of them that hold for all
     leaves: of what is written anew, the scalars that differ: the stretch of each, and where it was learned
     """
 
     def __init__(self, known: RecordText) -> None:
-        """Cut the text where numbers, stamps and edits are."""
-        self.known = known
+        """Cut the text where numbers, stamps, names and edits are."""
         self.text = text = known.text
         self.entries = tuple(known.entries)
-        self.json, self.is_long = known.json, known.is_long
+        self.json, self.line = known.json, known.line
         self.notes = list(known.row_notes())
         self.of_places = [each for each in known.notes_at(0, known.source.first_column) if each.about in OF_PLACES]
-        self._root = known.root
-        self._request = known.request
-        cuts, patterns = self._cuts()
-        self.stretches, pieces = cut(len(text), sorted(cuts), known.edits)
-        self._frames_at: dict[int, tuple[int, int, Node]] = {}
-        for number, nodes in enumerate(self._frame_nodes):
+        self._root, self._request = known.root, known.request
+        self._named: dict[tuple[int, Names], Names | None] = {}
+        number = re.compile(JSON_NUMBER if self.json else YAML_NUMBER)
+        self._patterns: dict[Span, str] = {}  # of what may be there
+        numbers: list[Span] = []
+        paths = [(record, path) for record, *_ in self.entries for path in record.numbers]
+        for record, path in paths:
+            if path is not None:
+                numbers.append(_text_of(known.root.at(path)))
+                self._patterns[numbers[-1]] = NOT_UNKNOWN * (path in record.known) + number.pattern
+        self.regular = len(numbers) == len(paths) and all(number.fullmatch(text, *span) for span in numbers)
+        self._patterns = self._patterns if self.regular else {}
+        stamps = [[known.root.at(path) for path in entry.stamp] for entry in self.entries]
+        cuts = {*numbers, *((node.start, node.end) for node in chain(*stamps))}
+        frames = [_frames_of(known.root, entry.record, known.request, json=self.json) for entry in self.entries]
+        self._patterns |= {_text_of(node): FRAME[self.json, node.quote] for node in chain(*frames) if node is not None}
+        leaves: dict[Span, Node] = {}
+        if known.request.canonical and self.regular:
+            own = [known.root.at(path) for _, path in paths if path is not None]
+            leaves = {_text_of(node): node for node in (*own, *chain(*frames)) if node is not None}
+            leaves |= self._cut_leaves(cuts | self._patterns.keys())
+        self.stretches, pieces = cut(len(text), sorted(cuts | self._patterns.keys()), known.edits)
+        at = dict(zip(self.stretches, count(), strict=False))
+        self.numbers = tuple(at[span] for span in numbers)
+        self.stamps = tuple(tuple(at[node.start, node.end] for node in each) for each in stamps)
+        self.frames = [[None if node is None else at[_text_of(node)] for node in nodes] for nodes in frames]
+        self.leaves = sorted(((at[span], node) for span, node in leaves.items()), key=itemgetter(0))
+        self.renamed: dict[int, tuple[int, int, Node]] = {}
+        for entry, nodes in enumerate(frames):
             for role, node in enumerate(nodes):
                 if node is not None:
-                    self._frames_at.setdefault(node.start, (number, role, node))
+                    self.renamed.setdefault(node.start, (entry, role, node))
         self.pieces = [
-            Const(each.text) if isinstance(each, Renamed) and each.at not in self._frames_at else each
-            for each in pieces
+            Const(each.text) if isinstance(each, Renamed) and each.at not in self.renamed else each for each in pieces
         ]
-        at = dict(zip(self.stretches, count(), strict=False))
-        self._patterns = {at[span]: pattern for span, pattern in patterns.items()}
-        self.numbers = tuple(map(at.__getitem__, self._numbers))
-        self.stamps = tuple(tuple(map(at.__getitem__, spans)) for spans in self._stamps)
-        self.frames = [[None if node is None else at[_text_of(node)] for node in nodes] for nodes in self._frame_nodes]
-        self.leaves = sorted(((at[span], node) for span, node in self._leaf_nodes), key=itemgetter(0))
-        self._named: dict[tuple[int, Names], NamedFrames | None] = {}
-        self.line = text.count("\n", 0, min(self._numbers, default=(0, 0))[0])
-
-    def _cuts(self) -> tuple[set[Span], dict[Span, str]]:
-        """Return where numbers, stamps, names and what else is read are, and what else may be there."""
-        text, root = self.text, self._root
-        number = JSON_NUMBER if self.json else YAML_NUMBER
-        is_number = re.compile(number).fullmatch
-        self.regular = True
-        self._numbers: list[Span] = []
-        self._stamps: list[list[Span]] = []
-        self._frame_nodes: list[tuple[Node | None, Node | None]] = []
-        patterns: dict[Span, str] = {}
-        values: list[float] = []
-        for entry in self.entries:
-            record = entry.record
-            values += record.values
-            for path in record.numbers:
-                span = None if path is None else _text_of(root.at(path))
-                self.regular = self.regular and span is not None and is_number(text, *span) is not None
-                if span is not None:
-                    self._numbers.append(span)
-                    patterns[span] = NOT_UNKNOWN * (path in record.known) + number
-            stamp = [root.at(path) for path in entry.stamp]
-            self._stamps.append([(node.start, node.end) for node in stamp])
-            nodes = _frames_of(root, record, self._request, json=self.json)
-            self._frame_nodes.append(nodes)
-        self.values = tuple(values)
-        cuts = {*self._numbers, *chain(*self._stamps)}
-        patterns = patterns if self.regular else {}
-        for node in chain(*self._frame_nodes):
-            if node is not None:
-                patterns[_text_of(node)] = FRAME[self.json, node.quote]
-        cuts.update(patterns)
-        self._leaf_nodes = []
-        if self._request.canonical and self.regular:
-            own = [root.at(path) for entry in self.entries for path in entry.record.numbers if path is not None]
-            own += [node for node in chain(*self._frame_nodes) if node is not None]
-            known = {_text_of(node): node for node in own}
-            self._leaf_nodes = [*known.items(), *self._cut_leaves(cuts, patterns)]
-        cuts.update(patterns)
-        return cuts, patterns
-
-    @property
-    def shapes(self) -> tuple[Shape, ...]:
-        """Return what the numbers mean."""
-        return tuple(entry.record.shape for entry in self.entries)
 
     @cached_property
     def pattern(self) -> re.Pattern[bytes]:
@@ -176,44 +136,27 @@ class Template:
             return re.compile(rb"(?m:^)" + self.expression + rb"([ \t]*,?[ \t]*\r?\n)")
         return re.compile(rb"(?:\A|(?<=\n---\n)|(?<=\n---\r\n))" + self.expression + rb"(---[ \t]*\r?\n)")
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Name the numbers by the keys that lead to them."""
-        return tuple(
-            ".".join(map(str, path[1:])) if path else "" for entry in self.entries for path in entry.record.numbers
-        )
-
-    @property
-    def extra(self) -> str:
-        """Return the last key that leads to what is read with the numbers."""
-        return next((str(entry.stamp[0][-1]) for entry in self.entries if entry.stamp), "")
-
-    def timed(self, request: Request) -> Timed | None:
-        """Return where stamps are; a key that nobody named but was found says by its own name what they are."""
-        found = next((entry.stamp[0][-1] for entry in self.entries if len(entry.stamp) == 1), "")
-        if request.timed is None or request.timed.name or request.operation.formula is None:
-            return request.timed
-        return request.timed._replace(name=str(found))
-
     def places(self) -> list[tuple[int, int]]:
         """Return where each stretch is in the record that was learned, in bytes."""
         sizes = [len(self.text[start:end].encode()) for start, end in self.stretches]
         ends = list(accumulate(sizes))
         return list(zip([0, *ends[:-1]], ends, strict=True))
 
-    def named(self, at: int, names: Names) -> NamedFrames | None:
-        """Return the frames of the result of an entry that names these frames; None where that is to be read anew."""
+    def named(self, at: int, names: Names) -> Names | None:
+        """Return the frames of the result of an entry that names these; None where the text around them is another."""
         if (at, names) not in self._named:
             if len(self._named) > MOST_NAMES:
                 self._named.clear()
-            self._named[at, names] = self._find_named(at, names)
+            record = self.entries[at].record
+            found, own = self._renamed(at, names), self._renamed(at, (record.parent.text, record.name.text))
+            self._named[at, names] = found[0] if found and own and found[1:] == own[1:] else None
         return self._named[at, names]
 
-    def _find_named(self, at: int, names: Names) -> NamedFrames | None:
+    def _renamed(self, at: int, names: Names) -> tuple[Names, Any, Any, bool] | None:
+        """Return the frames of such a result, and all else that they decide about its text."""
         entry, request, timed = self.entries[at], self._request, self._request.timed
-        record = entry.record
-        asked = request.for_kind(record.shape.kind)
-        if any(path[-1] == "frame" and request.counts(names[0] or "") for path in record.parent.paths):
+        asked = request.for_kind(entry.record.shape.kind)
+        if any(path[-1] == "frame" and request.counts(names[0] or "") for path in entry.record.parent.paths):
             return None
         try:
             new = names if asked.rename is None else asked.rename(*names)
@@ -222,18 +165,11 @@ class Template:
             is_timed = timed is not None and not timed.name and timed.moves(names[0])
         except FrametoolError:
             return None
-        free = [node is not None for node in self._frame_nodes[at]]
-        known = (
-            (name == old, name == other, not name) if is_free else (name,)
-            for name, old, other, is_free in zip(new, names, names[::-1], free, strict=True)
+        parent, name = (
+            name if index is None else (name == old, name == other, not name)
+            for name, old, other, index in zip(new, names, names[::-1], self.frames[at], strict=True)
         )
-        return NamedFrames(new, (is_timed, *known))
-
-    def fits(self, at: int, names: Names) -> bool:
-        """Return True if the text around these frames is that of the ones that were learned."""
-        record = self.entries[at].record
-        named, own = self.named(at, names), self.named(at, (record.parent.text, record.name.text))
-        return named is not None and own is not None and named.decides == own.decides
+        return new, parent, name, is_timed
 
     def fits_in(self, text: bytes, places: Sequence[tuple[int, int]]) -> bool:
         """Return True if the frames that a record names fit; places: where its stretches are."""
@@ -243,13 +179,9 @@ class Template:
                 old if index is None else text[slice(*places[index])].decode()
                 for old, index in zip(known, found, strict=True)
             )
-            if not self.fits(at, (parent, name)):
+            if self.named(at, (parent, name)) is None:
                 return False
         return True
-
-    def renamed(self, piece: Renamed) -> tuple[int, int, Node]:
-        """Return whose name a piece is: of which entry, whether its parent or its name, and where that was read."""
-        return self._frames_at[piece.at]
 
     @cached_property
     def expression(self) -> bytes:
@@ -257,32 +189,29 @@ class Template:
         free = iter(() if self._request.canonical else self._free_leaves())
         leaf = next(free, None)
         groups = []
-        for index, (start, end) in enumerate(self.stretches):
-            if index in self._patterns:
-                groups.append(f"({self._patterns[index]})")
+        for start, end in self.stretches:
+            if (start, end) in self._patterns:
+                groups.append(f"({self._patterns[start, end]})")
                 continue
             parts, at = [], start
             while leaf is not None and leaf[0].end <= end:
                 node, pattern = leaf
-                if node.start >= at and re.fullmatch(pattern, self.text[node.start : node.end], re.ASCII):
+                if node.start >= at:
                     parts += [re.escape(self.text[at : node.start]), pattern]
                     at = node.end
                 leaf = next(free, None)
             groups.append("".join(["(", *parts, re.escape(self.text[at:end]), ")"]))
         return "".join(groups).encode()
 
-    def _cut_leaves(self, cuts: Collection[Span], patterns: dict[Span, str]) -> list[tuple[Span, Node]]:
+    def _cut_leaves(self, cuts: Collection[Span]) -> dict[Span, Node]:
         """Return the scalars that decide nothing, without their quotes, and add what may be there."""
-        found: list[tuple[Span, Node]] = []
+        found: dict[Span, Node] = {}
         for node, pattern in self._free_leaves():
             span, quotes = (node.start, node.end), len(node.quote or "")
-            if not re.fullmatch(pattern, self.text[node.start : node.end], re.ASCII):
-                continue
             if span not in cuts:  # else it is a stamp, which is read as it is written
                 span, pattern = (node.start + quotes, node.end - quotes), pattern[quotes : len(pattern) - quotes]  # noqa: PLW2901
             if span[0] < span[1]:
-                found.append((span, node))
-                patterns[span] = pattern
+                found[span], self._patterns[span] = node, pattern
         return found
 
     def stretch_of(self, path: Path) -> int:
@@ -294,42 +223,38 @@ class Template:
         """Yield the scalars that decide nothing, in order, each with the expression of what it may be."""
         around: set[Path] = set()
         fixed: set[Path | None] = set()
-        has_poses = False
-        for entry in self.entries:
-            record, depths = entry.record, range(len(entry.record.path) + 1)
+        for record, *_ in self.entries:
+            depths = range(len(record.path) + 1)
             around.update(record.path[:depth] for depth in depths)
             around.update((*record.path[:depth], "header") for depth in depths)
-            if record.shape.kind == POSE:
-                has_poses = True
-                around.add((*record.path, "scale"))
+            around.update([(*record.path, "scale")] * (record.shape.kind == POSE))
             fixed.update(record.numbers, record.unknown)
+        has_poses = any(record.shape.kind == POSE for record, *_ in self.entries)
         words = _WORDS if has_poses else _WORDS - {"scale"}  # of points that is data
-        placed = {(*entry.record.path, key) for entry in self.entries for key in entry.record.placed}
-        number = re.compile(JSON_NUMBER if self.json else YAML_NUMBER)
+        placed = {(*record.path, key) for record, *_ in self.entries for key in record.placed}
+        number = JSON_NUMBER if self.json else YAML_NUMBER
         operation = self._request.operation
         passes = operation.keeps_frames and operation.formula is None and self._request.gathered is None
-        stamps = {path: STAMP[at % 2] for entry in self.entries for at, path in enumerate(entry.record.stamps)}
+        stamps = {path: STAMP[at % 2] for record, *_ in self.entries for at, path in enumerate(record.stamps)}
         for path, leaf in _leaves(self._root, ()):
             depth = next((depth for depth in range(len(path), 0, -1) if type(path[depth - 1]) is str), 0)
-            key = str(path[depth - 1]) if depth else ""
+            key, is_own = str(path[depth - 1]) if depth else "", depth == len(path)
+            is_free = key in RESULT_KEYS if is_own else key == COVARIANCE and passes
+            pattern = FREE.get((self.json, leaf.quote), FREE[self.json, ""])
             if key == "frame" and self._request.counts(leaf.value):
-                yield leaf, f"{leaf.quote}[0-9]++{leaf.quote}"
+                pattern = f"{leaf.quote}[0-9]++{leaf.quote}"
             elif path in stamps:
-                yield leaf, f"{leaf.quote}{stamps[path]}{leaf.quote}"
+                pattern = f"{leaf.quote}{stamps[path]}{leaf.quote}"
             elif "sigma" in path or may_be_uncertain(key) or any(path[: len(each)] == each for each in placed):
                 continue  # they say a covariance or a place, and are no numbers of ours
-            elif passes and key == COVARIANCE and depth < len(path) and path not in fixed and number.fullmatch(
-                leaf.value
-            ):
-                yield leaf, f"{leaf.quote}{number.pattern}{leaf.quote}"
-            elif key in LISTED_WORDS and depth == len(path):
-                yield leaf, SINGLE_QUOTED if leaf.quote == "'" else FREE[self.json, leaf.quote == '"']
-            elif key in RESULT_KEYS and depth == len(path) and path not in fixed and number.fullmatch(leaf.value):
-                yield leaf, f"{leaf.quote}{number.pattern}{leaf.quote}"
+            elif is_free and path not in fixed and re.fullmatch(number, leaf.value):
+                pattern = f"{leaf.quote}{number}{leaf.quote}"
+            elif is_own and key in LISTED_WORDS:
+                pass
             elif path in fixed or key in DECISIVE or (path[: depth - 1] in around and _stem(key) in words):
                 continue
-            else:
-                yield leaf, SINGLE_QUOTED if leaf.quote == "'" else FREE[self.json, leaf.quote == '"']
+            if re.fullmatch(pattern, self.text[leaf.start : leaf.end], re.ASCII):
+                yield leaf, pattern
 
 
 def _stem(key: str) -> str:
