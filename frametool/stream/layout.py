@@ -47,8 +47,13 @@ class Item(Word):
         before, behind, other, fmt = self.words
         if number != number:  # noqa: PLR0124 - nan
             return other.encode()
-        text = format(number, fmt)
-        return f"{before}{text if '.' in text else text.replace('e', self.quote.decode())}{behind}".encode()
+        return f"{before}{number_text(number, fmt, self.quote.decode())}{behind}".encode()
+
+
+def number_text(number: float, fmt: str, exponent: str) -> str:
+    """Write a number in a format of Python's; exponent: what 1e-05 has for its e, in YAML `.0e`."""
+    text = format(number, fmt)
+    return text if "." in text else text.replace("e", exponent)
 
 
 class Instead(NamedTuple):

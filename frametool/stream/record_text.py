@@ -17,11 +17,11 @@ from frametool.geometry import floats
 from frametool.grammar.names import STAMP_KEYS, in_nanoseconds
 from frametool.grammar.readers import Misfit, Reading, within
 from frametool.stream.faults import ZONES, Fault, RowNote
-from frametool.stream.layout import Const, IfLocked, In, Out, Renamed, Word
+from frametool.stream.layout import Const, IfLocked, In, Out, Renamed, Word, number_text
 from frametool.stream.record import find_records, lost_name, value_at
 from frametool.stream.row_layout import FLAT, LEAVES_PLANE, checked_rotation
-from frametool.stream.splice import Splicer, null_edits, target_of
-from frametool.stream.stamp_source import key_path, read_header_stamp, read_stamp, stamp_keys
+from frametool.stream.splice import Splicer, numbers_in, target_of
+from frametool.stream.stamp_source import key_path, read_header_stamp, read_stamp, replaced, stamp_keys
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -195,20 +195,6 @@ def written(each: Answer) -> list[float]:
     return numbers
 
 
-def number_writer(precision: int | None, *, yaml: bool) -> Callable[[float], str]:
-    """Return what writes a number as the bulk of a stream does."""
-    if precision is not None:
-        return lambda value: f"{value:z.{precision}f}"
-    if not yaml:
-        return repr
-
-    def write(value: float) -> str:
-        text = repr(value)
-        return text if "e" not in text or "." in text else text.replace("e", ".0e")
-
-    return write
-
-
 class RecordText:
     """The records of a text, and what is asked of each.
 
@@ -267,19 +253,20 @@ class RecordText:
             raise Outside("beyond --start or --stop")
         return found
 
-    def edits_for(self, entries: Sequence[Entry], request: Request) -> list[Edit]:
+    def spliced(self) -> list[Edit]:
         """Return what changes in the text; a name that several records share changes once."""
         edits: list[Edit] = []
         first = 0
-        for entry in entries:
-            edits += Splicer(self.text, self.root, entry, request, json=self.json, first=first).run()
-            first += request.result_size(entry.record.shape, entry.target)
+        for entry in self.entries:
+            edits += Splicer(self.root, entry, self.request, json=self.json, first=first).run()
+            first += self.request.result_size(entry.record.shape, entry.target)
         return list(dict.fromkeys(edits))
 
     def rendered(self, answers: Sequence[Answer]) -> bytes:
         """Return the text with results in the place of numbers, some of them as words; b"" where nothing is in it."""
         numbers = [number for each in answers for number in written(each)]
-        write = number_writer(self.request.precision, yaml=not self.json)
+        precision, exponent = self.request.precision, "e" if self.json else ".0e"
+        fmt = "" if precision is None else f"z.{precision}f"
         locked = any(each.entry.target.locked(each.parts) for each in answers)
         stretches, pieces = cut(len(self.text), (), self.edits)
         shown = []
@@ -287,7 +274,7 @@ class RecordText:
             if isinstance(piece, In):
                 shown.append(self.text[slice(*stretches[piece.part])])
             elif isinstance(piece, Out):
-                shown.append(write(numbers[piece.first]))
+                shown.append(number_text(numbers[piece.first], fmt, exponent))
             elif isinstance(piece, Word):
                 shown.append(piece.text(numbers[piece.number]).decode())
             elif isinstance(piece, (Const, Renamed)) or (locked and isinstance(piece, IfLocked)):
@@ -368,12 +355,10 @@ def nulled(text: str, *, json: bool) -> str | None:
     """Return the text of a record with null in the place of our numbers; None if it has none that can be found."""
     try:
         json_documents(Source("", text)) if json else parse_documents(text, "")
-        edits = null_edits(Node(0, len(text), parse_nodes(text)))
+        edits = [(node.start, node.end, "null") for root in parse_nodes(text) for node in numbers_in(root)]
     except FormatError:
         return None
-    segments, pieces = cut(len(text), (), edits)
-    shown = (text[slice(*segments[each.part])] if isinstance(each, In) else "null" for each in pieces)
-    return "".join(shown) if edits else None
+    return replaced(text, edits) if edits else None
 
 
 def null_of(record: bytes, *, json: bool) -> bytes:
@@ -403,7 +388,7 @@ def attempt(text: bytes, part: Part, fmt: str, request: Request, name: str, line
         source = source._replace(text=decoded)
         found = RecordText(source, request, json=fmt == "json")
         if not request.canonical:
-            found.edits = found.edits_for(found.entries, request)
+            found.edits = found.spliced()
     except Aliased as error:
         return fault_at(source, error.in_text(source.text))
     except FormatError as error:
