@@ -83,13 +83,13 @@ def with_covariances(
         found = within(below, _entries, holder[key], sizes)
         paths, numbers = tuple((*above, *below, *at) for at, _ in found), [number for _, number in found]
         if numbers[0] == UNKNOWN and operation.moves:
-            record = record._replace(unknown=(*record.unknown, paths[0]))
+            record = record._replace(begins=(*record.begins, paths[0]))
             continue
         within(below, check, numbers)
         record = record._replace(
             shape=record.shape._replace(covariance=(*record.shape.covariance, len(numbers))),
             numbers=record.numbers + paths, values=(*record.values, *numbers), covariances=(*record.covariances, key),
-            known=(*record.known, paths[0]),
+            begins=(*record.begins, paths[0]),
         )  # fmt: skip
     return record
 

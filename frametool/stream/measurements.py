@@ -26,8 +26,8 @@ from frametool.grammar.names import NAME_KEYS, STAMP_KEYS
 from frametool.grammar.pose import COVARIANCE_KEYS, Pose, inverted, read_angle_unit
 from frametool.grammar.readers import Misfit, Reading, kind, tell, within
 from frametool.stream.faults import BadRows
-from frametool.stream.record import INNER, KNOWN, find_records, value_at
-from frametool.stream.record_values import pose_of, stamp_of
+from frametool.stream.record import INNER, KNOWN, find_records, pose_of, value_at
+from frametool.stream.record_values import stamp_of
 from frametool.stream.request import COMBINED, Operation, Request
 from frametool.stream.row_layout import POSE
 

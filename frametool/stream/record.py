@@ -9,11 +9,13 @@ Arguments, files, streams and messages are read by this one definition; keys tha
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import chain, islice
 from math import nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import MOST_COMPARED, ValueInvalid, alternatives, did_you_mean, first_of, shown
+from frametool.geometry import floats
 from frametool.geometry.representations import ROTATIONS, notation
 from frametool.grammar.names import (
     EARTH_FRAMES,
@@ -34,27 +36,17 @@ from frametool.grammar.pose import (
     SCALE,
     Pose,
     as_meant,
+    inverted,
     is_position,
     is_rotation,
     length_reader,
     read_angle_unit,
     read_components,
-    read_position,
     read_rotation,
     shape_of,
     unknown_keys,
 )
-from frametool.grammar.readers import (
-    AXES_KEY,
-    INDICES,
-    Misfit,
-    NotARotation,
-    Reading,
-    kind,
-    places_in,
-    read_numbers,
-    within,
-)
+from frametool.grammar.readers import AXES_KEY, Misfit, NotARotation, Reading, kind, places_in, read_numbers, within
 from frametool.stream.row_layout import ACCEL, PARTS, POINT, POSE, TURN, VECTOR, Shape, checked_rotation, doubt
 from frametool.stream.stamp_source import key_path
 from frametool.text.numbers import parse_number, read_number_or_angle
@@ -102,8 +94,7 @@ class Record(NamedTuple):
     rotation: the key of the rotation; others: further keys that say the same rotation or position
     flat: keys that hold one number of the rotation each; `rotation` is then the first of them
     covariances: the keys of those whose numbers come last, or of a scale
-    known: where each of them begins, which -1 would make one of those
-    unknown: where a covariance begins that is invalid, and decides that
+    begins: where each covariance of messages begins; those that begin with -1 are unknown, and none of these numbers
     stamps: the paths of seconds and nanoseconds in its header, then in those around it; stamp_ns: the time of the first
     placed: the keys that say a position on the Earth and the rotation there, where its numbers are not theirs
     """
@@ -120,8 +111,7 @@ class Record(NamedTuple):
     name: Name = Name()
     parent: Name = Name()
     covariances: tuple[str, ...] = ()
-    known: tuple[Path, ...] = ()
-    unknown: tuple[Path, ...] = ()
+    begins: tuple[Path, ...] = ()
     stamps: tuple[Path, ...] = ()
     stamp_ns: int | None = None
     placed: tuple[str, ...] = ()
@@ -160,8 +150,10 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
             raise _nothing_in(document)
     except Misfit as misfit:
         raise misfit.below(*path) from None
-    if request.operation.of == "pair":
-        raise Misfit("a record holds one pose; name A or B, or compare it with the one before by --consecutive", path)
+    if request.poses > 1:
+        remedy = "name A or B, or compare it with the one before by --consecutive"
+        remedy = remedy if request.operation.of else "two in a row are for tables"
+        raise Misfit(f"a record holds one pose; {remedy}", path)
     for place in found:
         yield _record(document, place, request, reading, path)
 
@@ -382,20 +374,16 @@ def _only_asked(value: dict[str, Any], path: Path, request: Request) -> Record:
     """
     from frametool.ros import messages
 
+    record, header = Record(path, Shape("", None)), value.get("header")
     if messages.is_joint_state(value):
-        members = tuple(key for key in messages.STATE_LISTS if key in value)
-        header, parent = value.get("header"), Name()
-        record = Record(path, Shape("", None), members=members)
+        record = record._replace(members=tuple(key for key in messages.STATE_LISTS if key in value))
         if type(header) is dict:
-            parent = _named(header, ("frame_id",), (*path, "header"), parent, request)
-            record = _with_stamp(record, header, ("header", "stamp"), path)
-        return record._replace(parent=parent)
-    if there := next((key for key in value if key in (*POSITION_KEYS, *ROTATION_KEYS)), None):
+            record = record._replace(parent=_named(header, ("frame_id",), (*path, "header"), Name(), request))
+    elif there := next((key for key in value if key in (*POSITION_KEYS, *ROTATION_KEYS)), None):
         raise Misfit(f"key {shown(there)} is there already, where the result would stand", (there,), key=True)
-    record = Record(path, Shape("", None))
-    if request.operation.shown is None or type(value.get("header")) is not dict:
+    elif request.operation.shown is None:
         return record
-    return _with_stamp(record, value["header"], ("header", "stamp"), path)
+    return _with_stamp(record, header, ("header", "stamp"), path) if type(header) is dict else record
 
 
 def _for_formula(record: Record, value: dict[str, Any], formula: Formula) -> Record:
@@ -407,11 +395,15 @@ def _for_formula(record: Record, value: dict[str, Any], formula: Formula) -> Rec
     return record
 
 
+def outermost(path: Path) -> Path:
+    """Return the path of the outermost value that holds a record alone: an item of a list, or the whole document."""
+    return path[: max((at for at, step in enumerate(path, 1) if type(step) is int), default=0)]
+
+
 def _refuse_repeated(record: Record, document: Any, path: Path, request: Request) -> None:
-    """Stop where a key that an expression adds is there already."""
-    lists = [at for at, step in enumerate(path) if type(step) is int]
-    holder = value_at(document, path[: lists[-1] + 1] if lists else ())
-    for name in request.extras(record.shape):
+    """Stop where a key that an expression adds is there already, unless it gives way."""
+    said, holder = request.operation.shown, value_at(document, outermost(path))
+    for name in (*request.extras(record.shape), *(said.members if said and not said.replaces else ())):
         if request.prefix + name in holder:
             raise Misfit(f"key {shown(request.prefix + name)} is there already; take another name, or --prefix", path)
 
@@ -467,8 +459,7 @@ def _bare_list(value: list[Any], path: Path, reading: Reading, request: Request)
         return _with_rotation(value, "matrix", Record(path, Shape(POSE, None)), (), reading, request)
     if len(value) != 3 or not request.operation.moves:
         raise _bare_numbers(value)
-    numbers = tuple((*path, *each) for each in INDICES[:3])
-    return Record(path, Shape(_kind("", (), request)), numbers, read_position(value, 1.0))
+    return Record(path, Shape(_kind("", (), request)), *_three(value, path, 1.0))
 
 
 def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Request) -> Record:
@@ -488,7 +479,9 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     rotations = _rotations(value)
     flat = _flat_pose(value, rotations)
     if flat and flat.position and flat.position.kind:
-        return _six_members(value, flat.position, path, request)
+        if not request.operation.moves:
+            raise Misfit(f"a {flat.position.kind} cannot be taken for a pose; apply moves it")
+        return _with_members(Record(path, Shape(flat.position.kind, None)), value, flat.position)
     turned, there = rotations or (flat and flat.rotation), positions or (flat and flat.position)
     # the grammar of poses allows that several say the same thing twice
     if len(positions) > 1 and not (turned and POSITION_KEYS.keys() >= {*positions}):
@@ -507,7 +500,7 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
         record = _with_members(record, value, flat.position)
     reading.degrees = read_angle_unit(value["angles"]) if "angles" in value else request.degrees
     if flat and flat.rotation:
-        record = _with_flat_rotation(record, value, flat, reading, request)
+        record = _with_flat_rotation(record, value, flat, flat.rotation, reading, request)
     elif rotations:
         row = ROTATION_KEYS.get(rotations[0])
         if not (request.operation.multiples and row and row.representation.whole):
@@ -521,15 +514,6 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     is_ecef = flat and flat.position and flat.position.prefix.lower().endswith("ecef_")
     place = request.given_place or ("ecef" if is_ecef else "")
     return _given_on_earth(record, request._replace(given_place=place)) if place else record
-
-
-def _six_members(value: dict[str, Any], columns: Columns, path: Path, request: Request) -> Record:
-    """Read a twist or a wrench whose numbers are members of the record itself."""
-    if not request.operation.moves:
-        raise Misfit(f"a {columns.kind} cannot be taken for a pose; apply moves it")
-    values = tuple(_number(value, name, None) for name in columns.names)
-    paths = tuple((*path, name) for name in columns.names)
-    return Record(path, Shape(columns.kind, None), paths, values, members=columns.names)
 
 
 def _given_on_earth(record: Record, request: Request) -> Record:
@@ -560,27 +544,38 @@ def _pose_at_place(rest: dict[str, Any], path: Path, reading: Reading, request: 
     if not (rotations or positions or _flat_pose(bare, rotations)):
         return Pose(covariance=covariance), []
     record = _mapping(bare, path, reading, request._replace(kind=POSE))
-    shape = record.shape
-    placed_at = shape.position(record.values) if shape.whole or shape.unit is not None else None
-    turned = None
+    keys = [*rotations, *positions, *record.members, *record.flat, *(["angles"] if "angles" in bare else ())]
+    return pose_of(record, request)._replace(covariance=covariance), keys
+
+
+def pose_of(record: Record, request: Request) -> Pose:
+    """Return a record as a named pose; position or rotation is None where it has none."""
+    shape, values = record.shape, record.values
+    position = shape.position(values) if shape.whole or shape.unit is not None else None
+    check = partial(checked_rotation, shape, normalize=request.normalize)
+    if shape.multiple:
+        from frametool.stream.extra_numbers import of_multiple
+
+        whole = of_multiple(shape, values[: shape.own_size], lambda own: check(own)[0], floats)
+        pose = Pose.of(whole[: 7 + (whole[7] != 1.0)], record.name.text, record.parent.text)
+        return pose if position is not None else pose._replace(position=None)
+    rotation = None
     if shape.notation is not None:
-        turned, _ = checked_rotation(shape, record.values, normalize=request.normalize)
-    position: Any = placed_at
-    keys = [*rotations, *positions, *record.members, *record.flat, *(key for key in ("angles",) if key in bare)]
-    return Pose(position, turned, covariance=covariance), keys
+        x, y, z, w = shape.turned(values, check(values)[0])
+        rotation = x, y, z, w
+    covariance = values[shape.own_size :][:36] if 36 in shape.covariance else None
+    scale = values[-1] if 1 in shape.covariance else 1.0
+    pose = Pose(position, rotation, record.name.text, record.parent.text, None, covariance, scale)
+    return inverted(pose) if shape.inverse else pose
 
 
 def _two_vectors(value: dict[str, Any], name: str, path: Path, request: Request) -> Record:
     """Read a twist or a wrench."""
     if request.kind not in ("", name) or not request.operation.moves:
         raise NotARotation(f"a {name} cannot be taken for a {request.kind or POSE}")
-    numbers = [number for part in PARTS[name] for number in within((part,), read_numbers, value[part], XYZ)]
-    paths = tuple(
-        (*path, part, *(step if type(value[part]) is list else (axis,)))
-        for part in PARTS[name]
-        for step, axis in zip(INDICES[:3], XYZ, strict=True)
-    )
-    return Record(path, Shape(name, None), paths, tuple(numbers))
+    halves = [within((part,), _three, value[part], (*path, part)) for part in PARTS[name]]
+    paths, numbers = (first + second for first, second in zip(*halves, strict=True))
+    return Record(path, Shape(name, None), paths, numbers)
 
 
 def _refuse_typos(value: dict[str, Any], *, rotations: bool, position: bool) -> None:
@@ -662,29 +657,24 @@ def _with_members(record: Record, value: dict[str, Any], columns: Columns) -> Re
 
 
 def _with_flat_rotation(
-    record: Record, value: dict[str, Any], flat: PoseColumns, reading: Reading, request: Request
+    record: Record, value: dict[str, Any], flat: PoseColumns, rotation: Columns, reading: Reading, request: Request
 ) -> Record:
     """Add a rotation whose numbers are members of the record itself."""
     from frametool.stream.header import Columns, row_shape
 
-    if flat.rotation is None or request.poses != 1:
-        raise Misfit("a record holds one pose; two in a row are for tables")
-    names = flat.rotation.names
+    names = rotation.names
     if record.key:
         flat = flat._replace(position=Columns((), (), unit=record.shape.unit))
-    reading_here = request._replace(degrees=reading.degrees, kind=POSE)
-    shape = row_shape(flat, reading_here)
-    numbers, own = [], 0 if shape.whole else len(record.values)
-    for at, name in enumerate(names):
-        numbers.append(_number(value, name, shape.in_degrees(own + at)))
+    shape = row_shape(flat, request._replace(degrees=reading.degrees, kind=POSE))
+    paths, values = ((), ()) if shape.whole else (record.numbers, record.values)
+    numbers = [_number(value, name, shape.in_degrees(at)) for at, name in enumerate(names, len(values))]
     if shape.notation is not None:
         numbers = as_meant(shape.notation, numbers, [value[name] for name in names], reading)
-    values = (*(() if shape.whole else record.values), *numbers)
-    _check(shape, values, names, reading)
-    paths = (*(() if shape.whole else record.numbers), *((*record.path, name) for name in names))
+    _check(shape, (*values, *numbers), names, reading)
     return record._replace(
-        shape=shape, numbers=paths, values=values, rotation=next(key for key in value if key in names), flat=names
-    )
+        shape=shape, numbers=(*paths, *((*record.path, name) for name in names)), values=(*values, *numbers),
+        rotation=next(key for key in value if key in names), flat=names,
+    )  # fmt: skip
 
 
 def _number(
@@ -738,12 +728,22 @@ def _stays_point(value: dict[str, Any], key: str, request: Request) -> bool:
 
 def _with_position(record: Record, value: Any, metre: float, *, partial: bool) -> Record:
     """Add the position: a list, or a map in which, if it may be partial, what is missing is 0."""
-    below = (*record.path, record.key)
     parts = round(1.0 / metre, 6)
-    x, y, z = within((record.key,), read_numbers, value, XYZ, partial=partial, each=length_reader(parts))
-    steps = places_in(value) if type(value) is list else tuple((name,) for name in XYZ)
-    paths = tuple((*below, *step) if type(value) is list or step[0] in value else None for step in steps)
-    return record._replace(shape=record.shape._replace(unit=parts), numbers=paths, values=(x, y, z))
+    paths, numbers = within((record.key,), _three, value, (*record.path, record.key), parts, partial=partial)
+    return record._replace(shape=record.shape._replace(unit=parts), numbers=paths, values=numbers)
+
+
+def _three(
+    value: Any, below: Path, parts: float = 0.0, *, partial: bool = False
+) -> tuple[tuple[Path | None, ...], tuple[float, ...]]:
+    """Read a list, or x, y and z, with the paths of the numbers; if it may be partial, what is missing is 0.
+
+    parts: how many of a length's make a metre, 0 for what is no length
+    """
+    numbers = read_numbers(value, XYZ, partial=partial, each=length_reader(parts))
+    if type(value) is list:
+        return tuple((*below, *step) for step in places_in(value)), numbers
+    return tuple((*below, axis) if axis in value else None for axis in XYZ), numbers
 
 
 def _with_rotation(value: Any, key: str, record: Record, below: Path, reading: Reading, request: Request) -> Record:
@@ -753,23 +753,23 @@ def _with_rotation(value: Any, key: str, record: Record, below: Path, reading: R
     whole = joined is not None and len(texts) == len(joined.columns)
     if whole and record.shape.unit is not None:
         raise Misfit("a 4x4 matrix is the whole pose; remove xyz, or write the 3x3 rotation", below)
-    if request.poses != 1:
-        raise Misfit("a record holds one pose; two in a row are for tables")
     values, degrees = read_components(notation, texts, places, Reading(reading.source, degrees=reading.degrees))
-    paths = tuple(_path_if_there(value, (*record.path, *below), place) for place in places[: len(texts)])
-    if degrees != (reading.degrees if notation.degrees is None else notation.degrees):
-        paths = (None,) * len(paths)  # the numbers say another unit than their key: the member is written anew
+    paths: tuple[Path | None, ...] = (None,) * len(texts)
+    if degrees == (reading.degrees if notation.degrees is None else notation.degrees):
+        above = (*record.path, *below)
+        paths = tuple((*above, *each) if _is_there(value, each) else None for each in places[: len(texts)])
+    # else the numbers say another unit than their key: the member is written anew
     multiple = request.operation.multiples and joined is not None
     shape = record.shape._replace(kind=POSE, notation=notation, degrees=degrees, whole=whole, multiple=multiple)
     return record._replace(shape=shape, numbers=record.numbers + paths, values=(*record.values, *values), rotation=key)
 
 
-def _path_if_there(value: Any, path: Path, place: Path) -> Path | None:
+def _is_there(value: Any, path: Path) -> bool:
     try:
-        value_at(value, place)
+        value_at(value, path)
     except (KeyError, IndexError, TypeError):
-        return None
-    return (*path, *place)
+        return False
+    return True
 
 
 def _with_names(

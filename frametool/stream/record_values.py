@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
-from functools import partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -16,16 +15,14 @@ from frametool.documents.json import JSON_NUMBER
 from frametool.documents.source import Source, Verbatim
 from frametool.errors import FormatError, Misused, ValueInvalid, shown, warn
 from frametool.formats.table import is_recording
-from frametool.geometry import floats
 from frametool.grammar.names import in_nanoseconds, stamp_column
-from frametool.grammar.pose import SCALE, Pose, inverted
+from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.readers import Misfit, NotARotation, Reading, tell
 from frametool.grammar.result import Result, with_entries
-from frametool.stream.record import STALE, value_at
+from frametool.stream.record import STALE, pose_of, value_at
 from frametool.stream.record_text import Answer, Outside, RecordText, wide_turn, written
 from frametool.stream.request import Request
-from frametool.stream.row_layout import AS_READ, PARTS, POSE, ROTATION, VECTOR, checked_rotation
-from frametool.stream.splice import refuse_member
+from frametool.stream.row_layout import AS_READ, PARTS, POSE, ROTATION, VECTOR
 from frametool.stream.stamp_source import read_stamp
 
 if TYPE_CHECKING:
@@ -76,32 +73,6 @@ def stamp_of(documents: dict[int, Any], record: Record, source: Source) -> int |
         return _read_stamp(key, own[key]) if key else record.stamp_ns
     except ValueInvalid as error:
         raise Misfit(str(error), (*record.path, key)).placed(source) from None
-
-
-def pose_of(record: Record, request: Request) -> Pose:
-    """Return a record as a named pose; position or rotation is None where it has none."""
-    shape = record.shape
-    rotation = None
-    if shape.multiple:
-        from frametool.stream.extra_numbers import of_multiple
-
-        own = record.values[: shape.own_size]
-        check = partial(checked_rotation, shape, normalize=request.normalize)
-        whole = of_multiple(shape, own, lambda own: check(own)[0], floats)
-        pose = Pose.of(whole[: 7 + (whole[7] != 1.0)], record.name.text, record.parent.text)
-        return pose if shape.whole or shape.unit is not None else pose._replace(position=None)
-    if shape.notation is not None:
-        rotation, _ = checked_rotation(shape, record.values, normalize=request.normalize)
-        x, y, z, w = shape.turned(record.values, rotation)
-        rotation = x, y, z, w
-    position = shape.position(record.values) if shape.whole or shape.unit is not None else None
-    pose = Pose(position, rotation, record.name.text, record.parent.text)
-    extra = record.values[shape.own_size :]
-    if 36 in shape.covariance:
-        pose = pose._replace(covariance=extra[:36])
-    if 1 in shape.covariance:
-        pose = pose._replace(scale=extra[-1])
-    return inverted(pose) if shape.inverse else pose
 
 
 def read_text(source: Source, request: Request) -> RecordText:
@@ -185,8 +156,6 @@ def _formula_result(node: Node, unit: Path, made: Answer, request: Request, fmt:
         numbers = tuple(extras.values())
         members = operation.shown.values(request.prefix, numbers)
         extras = operation.shown.cells(names, numbers) if fmt == "csv" else members
-        for key in () if operation.shown.replaces else extras:
-            refuse_member(key, node.value)
     if operation.only_adds:
         return with_stamp_ns(plain(node), fmt) | extras if type(node.value) is dict else extras
     rest = with_stamp_ns(_rest(node, unit, entry.record), fmt)

@@ -27,8 +27,8 @@ from frametool.grammar.result import Result
 from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows
 from frametool.stream.header import listed
-from frametool.stream.record import find_records, value_at
-from frametool.stream.record_values import pose_of, read_text
+from frametool.stream.record import find_records, pose_of, value_at
+from frametool.stream.record_values import read_text
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_layout import IDENTITY, POSE
 from frametool.stream.row_poses import RowPoses, block_of, plain_cells

@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.documents.source import Verbatim
 from frametool.documents.yaml_writer import dump as yaml
 from frametool.documents.yaml_writer import flow, quoted
-from frametool.errors import ValueInvalid, shown
 from frametool.geometry.representations import ROTATIONS
 from frametool.grammar.names import EARTH_FRAMES, PLACE_KEYS
 from frametool.grammar.pose import LISTED_WORDS, ROTATION_KEYS, Pose
 from frametool.grammar.readers import AXES_KEY
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream.layout import Const, IfLocked, Item, Out, Renamed, Word
-from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ
+from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ, outermost
 from frametool.stream.row_layout import POINT, POSE, SIX, TURNED, VECTOR, count_of
 
 if TYPE_CHECKING:
@@ -74,11 +73,7 @@ class Splicer:
         self.record, self.target = record, _ = entry.record, entry.target
         self.request = request.for_kind(record.shape.kind)
         self.kind = request.operation.result_kind(record.shape.kind)
-        path = record.path
-        if request.operation.only_adds:
-            lists = [at for at, step in enumerate(path) if type(step) is int]
-            path = path[: lists[-1] + 1]  # the outermost that holds this record alone
-        self.node = root.at(path)
+        self.node = root.at(outermost(record.path) if request.operation.only_adds else record.path)
         self.members: dict[str, tuple[Node, Node]] = self.node.value if type(self.node.value) is dict else {}
         self.flow = json or self.node.flow or not self.members
         self.edits: list[Edit] = []
@@ -229,7 +224,6 @@ class Splicer:
             if said and said.replaces and key in self.members:
                 self._replace(key, member)
             else:
-                refuse_member(key, self.node.value)
                 members.append(member)
         return members
 
@@ -365,12 +359,6 @@ def quoted_name(node: Node, name: str, *, json: bool) -> str:
     from frametool.documents.json import dump
 
     return dump(name)
-
-
-def refuse_member(key: str, members: Any) -> None:
-    """Raise ValueInvalid where a key that is added is there already."""
-    if type(members) is not dict or key in members:
-        raise ValueInvalid(f"key {shown(key)} is there already; name the new ones with --prefix")
 
 
 def _with_numbers(text: str, first: int) -> Iterator[Piece]:

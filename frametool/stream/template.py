@@ -97,7 +97,7 @@ class Template:
         for record, path in paths:
             if path is not None:
                 numbers.append(_text_of(known.root.at(path)))
-                self._patterns[numbers[-1]] = NOT_UNKNOWN * (path in record.known) + number.pattern
+                self._patterns[numbers[-1]] = NOT_UNKNOWN * (path in record.begins) + number.pattern
         self.regular = len(numbers) == len(paths) and all(number.fullmatch(text, *span) for span in numbers)
         self._patterns = self._patterns if self.regular else {}
         stamps = [[known.root.at(path) for path in entry.stamp] for entry in self.entries]
@@ -228,7 +228,7 @@ class Template:
             around.update(record.path[:depth] for depth in depths)
             around.update((*record.path[:depth], "header") for depth in depths)
             around.update([(*record.path, "scale")] * (record.shape.kind == POSE))
-            fixed.update(record.numbers, record.unknown)
+            fixed.update(record.numbers, record.begins)
         has_poses = any(record.shape.kind == POSE for record, *_ in self.entries)
         words = _WORDS if has_poses else _WORDS - {"scale"}  # of points that is data
         placed = {(*record.path, key) for record, *_ in self.entries for key in record.placed}

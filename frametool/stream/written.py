@@ -10,7 +10,8 @@ from frametool.explain.operations import WrittenPose
 from frametool.geometry import floats
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
-from frametool.stream.record_values import pose_of, read_text
+from frametool.stream.record import pose_of
+from frametool.stream.record_values import read_text
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_layout import POINT, POSE, VECTOR
 
