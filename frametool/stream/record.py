@@ -846,12 +846,3 @@ def value_at(value: Any, path: Path) -> Any:
     for step in path:
         value = value[step]
     return value
-
-
-def lost_name(record: Record, request: Request) -> str:
-    """Name a frame that the record names and its result cannot, because the operation does not know the other one."""
-    request = request.for_kind(record.shape.kind)
-    if request.rename is None:
-        return ""
-    before = record.parent.text or record.name.text or ""
-    return before if request.rename(record.parent.text, record.name.text) == (None, None) else ""

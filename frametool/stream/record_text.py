@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import islice
 from math import isfinite, isinf
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,17 +14,17 @@ from frametool.documents.json import strict_json
 from frametool.documents.source import Source, check_text, decode
 from frametool.errors import Finding, FormatError, FrametoolError, ValueInvalid
 from frametool.geometry import floats
-from frametool.grammar.names import STAMP_KEYS, in_nanoseconds
+from frametool.grammar.names import in_nanoseconds
 from frametool.grammar.readers import Misfit, Reading, within
 from frametool.stream.faults import ZONES, Fault, RowNote
 from frametool.stream.layout import Const, IfLocked, In, Out, Renamed, Word, number_text
-from frametool.stream.record import find_records, lost_name, value_at
+from frametool.stream.record import find_records, value_at
 from frametool.stream.row_layout import FLAT, LEAVES_PLANE, checked_rotation
 from frametool.stream.splice import Splicer, numbers_in, target_of
 from frametool.stream.stamp_source import key_path, read_header_stamp, read_stamp, replaced, stamp_keys
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.geometry.types import Components, Rigid
     from frametool.grammar.readers import Path
@@ -55,7 +55,6 @@ class Entry(NamedTuple):
     edge: the pose that moves it; None if absent, or where its own time decides
     stamp: the paths of that time, or of what else comes with it: one, or seconds and nanoseconds
     parent, name: the frames of its result
-    lost: a frame that the record names and the result cannot
     """
 
     record: Record
@@ -64,7 +63,18 @@ class Entry(NamedTuple):
     stamp: tuple[Path, ...] = ()
     parent: str | None = None
     name: str | None = None
-    lost: str = ""
+
+    @property
+    def lost(self) -> str:
+        """Name a frame that the record names and the result cannot."""
+        is_named = self.parent is not None or self.name is not None
+        return "" if is_named else self.record.parent.text or self.record.name.text or ""
+
+    def stamp_ns(self, texts: Sequence[str]) -> int:
+        """Read the texts of the record's own time."""
+        if len(texts) > 1:
+            return read_header_stamp(*texts)
+        return read_stamp(texts[0], in_ns=in_nanoseconds(str(self.stamp[0][-1])))
 
 
 class Answer(NamedTuple):
@@ -104,51 +114,41 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
     """Find the pose that moves a record, or the stamp at which it is looked up; check the frames it names."""
     stamp: tuple[Path, ...] = ()
     edge = None
-    timed = request.timed
+    timed, operation = request.timed, request.operation
     if timed is not None and timed.name:
-        stamp = (_extra(key_path, document, record, timed.name),)
+        stamp = _scalar(document, record, timed.name)
     elif timed is not None and record.stamps and timed.moves(record.parent.text):
         stamp = record.stamps[:2]
-    elif timed is not None and request.operation.formula is not None and not request.operation.shown:
-        stamp = (_extra(stamp_keys, document, record),)
+    elif timed is not None and operation.formula is not None and not operation.shown:
+        stamp = _scalar(document, record)
     elif request.extra_column is not None:
-        stamp = _extra_path(document, record, request.extra_column)
+        stamp = (not request.extra_column and record.stamps[:2]) or _scalar(document, record, request.extra_column)
     elif request.pose_from_frame is not None:
         edge = request.pose_from_frame(record.parent.text)
     request = request.for_kind(record.shape.kind)
     parent, name = record.parent.text, record.name.text
     if request.rename is not None:
         parent, name = request.rename(parent, name)
-    return Entry(record, target_of(record, request), edge, stamp, parent, name, lost_name(record, request))
+    return Entry(record, target_of(record, request), edge, stamp, parent, name)
 
 
-def _extra_path(document: Document, record: Record, name: str) -> tuple[Path, ...]:
-    """Find what comes with a record under a key; "" is the stamp of its header, or else under a usual key."""
-    if name:
-        return (_extra(key_path, document, record, name),)
-    try:
-        return record.stamps[:2] or (_extra(stamp_keys, document, record),)
-    except Misfit:
-        usual = ", ".join(STAMP_KEYS)
-        raise Misfit(f"no stamp: neither a header nor {usual}; give --time-column", record.path) from None
+def _scalar(document: Document, record: Record, name: str = "") -> tuple[Path]:
+    """Find a scalar of a record or of what is around it, by a name or that of a stamp; raises Misfit."""
+    find = partial(key_path, name=name) if name else stamp_keys
+    return ((document.index, *within((document.index,), find, document.value, record.path[1:])),)
 
 
-def _extra(find: Callable[..., Path], document: Document, record: Record, *name: str) -> Path:
-    """Find a scalar around a record; raises Misfit."""
-    return (document.index, *within((document.index,), find, document.value, record.path[1:], *name))
-
-
-def answer(entry: Entry, values: Sequence[float], stamp: Sequence[str], request: Request) -> Answer:
+def answer(entry: Entry, stamp: Sequence[str], request: Request) -> Answer:
     """Return what becomes of a record.
 
-    values: its numbers; stamp: the texts of its own time
+    stamp: the texts of its own time
     Raises ValueInvalid for what is no rotation, FrametoolError where there is no pose at its time.
     """
     operation, shape, timed = request.operation, entry.record.shape, request.timed
     edge, at_ns = entry.edge, None
     if stamp and (timed is not None or request.window):
         try:
-            at_ns = _stamp_ns(entry, stamp)
+            at_ns = entry.stamp_ns(stamp)
             if timed is not None and (operation.formula is None or operation.shown):
                 edge = timed.pose(entry.record.parent.text, at_ns)
         except FrametoolError as error:
@@ -157,7 +157,7 @@ def answer(entry: Entry, values: Sequence[float], stamp: Sequence[str], request:
     if request.window and at_ns is not None and not request.window[0] <= at_ns <= request.window[1]:
         raise Outside("beyond --start or --stop")
     parts = operation.result(
-        shape, tuple(values), edge, floats,
+        shape, entry.record.values, edge, floats,
         rotation=lambda own: checked_rotation(shape, own, normalize=request.normalize)[0],
         compared=lambda pose: [pose], seconds=float, times_ns=at_ns,
     )  # fmt: skip
@@ -173,12 +173,6 @@ def wide_turn(made: Answer, operation: Operation) -> Finding | None:
 
     message = doubt(made.parts[-SIX_BY_SIX:])
     return Finding(WIDE_RULE, message, path=record.path) if message else None
-
-
-def _stamp_ns(entry: Entry, texts: Sequence[str]) -> int:
-    if len(texts) > 1:
-        return read_header_stamp(*texts)
-    return read_stamp(texts[0], in_ns=in_nanoseconds(str(entry.stamp[0][-1])))
 
 
 def written(each: Answer) -> list[float]:
@@ -236,7 +230,7 @@ class RecordText:
     def answer(self, entry: Entry) -> Answer:
         """Return what becomes of a record."""
         texts = [str(value_at(self.values, path)) for path in entry.stamp] if entry.stamp else ()
-        return answer(entry, entry.record.values, texts, self.request)
+        return answer(entry, texts, self.request)
 
     def answers(self, parts: Sequence[Components] | None = None) -> list[Answer]:
         """Return what becomes of the records but for those whose time is not wanted; raises Outside if none is.

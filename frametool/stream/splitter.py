@@ -8,6 +8,7 @@ lines, ends what can be read where it goes wrong.
 from __future__ import annotations
 
 import re
+from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.text.lines import whole_lines
@@ -180,17 +181,12 @@ def _value(text: str, at: int) -> tuple[int, str | None]:
         return place, None if is_cut else f"not JSON: {message[:1].lower()}{message[1:]}"
 
 
+@cache
 def _decoder() -> Callable[[str, int], tuple[object, int]]:
     """Return the decoder; numbers stay text, so that none is too long."""
-    global _decode  # noqa: PLW0603 - made once, when JSON is first met
-    if _decode is None:
-        from json import JSONDecoder
+    from json import JSONDecoder
 
-        _decode = JSONDecoder(parse_int=str, parse_float=str, parse_constant=str).raw_decode
-    return _decode
-
-
-_decode: Callable[[str, int], tuple[object, int]] | None = None
+    return JSONDecoder(parse_int=str, parse_float=str, parse_constant=str).raw_decode
 
 
 def _scanned(data: bytes, at: int, *, array: bool, final: bool, first: bool = True) -> Parts:

@@ -187,7 +187,8 @@ def stamp_keys(document: Any, holder: Path) -> Path:
             return key_path(document, holder, name)
         except Misfit:
             continue
-    raise Misfit(f"@ row: no stamp is found ({', '.join(STAMP_KEYS)}); name its key with --time-column", holder)
+    usual = ", ".join(STAMP_KEYS)
+    raise Misfit(f"no stamp: neither a header nor {usual}; name its key with --time-column", holder)
 
 
 def _below(value: Any, keys: Sequence[str | int]) -> tuple[Any] | None:

@@ -126,7 +126,7 @@ class Moving:
 
     def by(self, edge: Rigid) -> Sequence[float]:
         """Return the numbers behind an edge."""
-        made = answer(Entry(self.record, target_of(self.record, self.request), edge), self.record.values, (), self.request)
+        made = answer(Entry(self.record, target_of(self.record, self.request), edge), (), self.request)
         assert made is not None
         return made.parts
 
