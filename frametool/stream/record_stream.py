@@ -24,7 +24,7 @@ from frametool.stream.record_results import BlockResults
 from frametool.stream.record_text import ROUNDED, Outside, RecordText, attempt, column_in, fault_at, null_of, nulled
 from frametool.stream.record_values import plain, values_of_text
 from frametool.stream.splitter import ARRAY, NO_END, Splitter
-from frametool.text.lines import Pieces, read_blocks
+from frametool.text.lines import Pieces, read_blocks, readiness
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterable, Iterator, Sequence
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from frametool.text.spans import Bytes
 
 _LEADING_COMMA = re.compile(rb"\A((?:\xef\xbb\xbf)?\s*\[?\s*),\s*")
+LONG_MS = 20  # how long the second block of a stream may take whose first is short
 MOST_EXACT = 100  # bad records of one template in a block whose place is looked for
 
 
@@ -61,25 +62,22 @@ def _outcomes(stream: ByteStream, work: RecordBlocks) -> Generator[Outcome]:
     if first is None:
         return
     second: bytes | None = b""
-    if len(first) < sizes.SMALL and _has_ended(stream):
+    failed: FormatError | None = None
+    if len(first) < sizes.SMALL and readiness(stream, unknown=True)(LONG_MS):
         try:
             second = next(blocks, None)
         except FormatError as error:  # comes behind the results of what is whole
-            blocks = _raising(error)
+            failed = error
     are_few = second is None and not work.request.in_order and len(work.splitter.parts(first).parts) <= sizes.FEW
     is_open: bool | None = True
     for block in chain([first, second] if second else [first], blocks):
         outcome = work.few(block) if are_few else work.many(block)
         is_open = is_open and outcome.is_open
         yield outcome
+    if failed is not None:
+        raise failed
     if is_open:
         yield Outcome(b"", (Fault(-1 if work.ended else 0, "", NO_END),), is_open=True)
-
-
-def _raising(error: FormatError) -> Iterator[bytes]:
-    """Yield nothing and raise an error."""
-    raise error
-    yield b""
 
 
 def at_other_times(stream: ByteStream, fmt: str, offset_ns: int) -> BufferedReader:
@@ -96,18 +94,6 @@ def at_other_times(stream: ByteStream, fmt: str, offset_ns: int) -> BufferedRead
             yield stamp_source.replaced(block, edits)
 
     return BufferedReader(Pieces(filter(None, pieces())))
-
-
-def _has_ended(stream: ByteStream) -> bool:
-    """Return True if a stream has nothing more to come, or will have within a moment."""
-    import select
-
-    try:
-        poll = select.poll()
-        poll.register(stream.fileno(), select.POLLIN | select.POLLHUP)
-    except (AttributeError, OSError, ValueError):
-        return True
-    return bool(poll.poll(20))
 
 
 def _as_array(outcomes: Iterable[Outcome], on_error: str) -> Iterator[Outcome]:

@@ -46,7 +46,7 @@ def read_blocks(
     Raises FormatError if one is longer.
     """
     size, longest = sizes.BLOCK, longest or sizes.RECORD
-    ready = _readiness(stream)
+    ready = readiness(stream)
     begun: list[bytes] = []  # the beginning of a record
     pieces: list[bytes] = []  # what follows it
     held, line = 0, 1
@@ -88,15 +88,15 @@ def _read_piece(stream: ByteStream, size: int, ready: Callable[[int], bool]) -> 
     return b"".join(pieces)
 
 
-def _readiness(stream: ByteStream) -> Callable[[int], bool]:
-    """Return a function that returns True if more arrives within this many milliseconds; False if unknown."""
+def readiness(stream: ByteStream, *, unknown: bool = False) -> Callable[[int], bool]:
+    """Return a function that returns True if more, or the end, arrives within this many milliseconds; or `unknown`."""
     import select
 
     try:
         poll = select.poll()
         poll.register(stream.fileno(), select.POLLIN)
     except (AttributeError, OSError, ValueError):
-        return lambda _patience: False
+        return lambda _patience: unknown
     return lambda patience: bool(poll.poll(patience))
 
 

@@ -107,7 +107,7 @@ def test_a_typed_line_comes_out_while_the_stream_stays_open() -> None:
 
 
 def test_pieces_that_have_arrived_are_read_into_one_block(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("frametool.text.lines._readiness", lambda _stream: lambda _patience: True)
+    monkeypatch.setattr("frametool.text.lines.readiness", lambda _stream: lambda _patience: True)
     text = b"0123456\n" * 100_000
     blocks = list(read_blocks(Trickle(text, 1 << 16)))
     assert b"".join(blocks) == text
