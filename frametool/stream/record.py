@@ -150,10 +150,8 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
             raise _nothing_in(document)
     except Misfit as misfit:
         raise misfit.below(*path) from None
-    if request.poses > 1:
-        remedy = "name A or B, or compare it with the one before by --consecutive"
-        remedy = remedy if request.operation.of else "two in a row are for tables"
-        raise Misfit(f"a record holds one pose; {remedy}", path)
+    if request.operation.of == "pair":
+        raise Misfit("a record holds one pose; name A or B, or compare it with the one before by --consecutive", path)
     for place in found:
         yield _record(document, place, request, reading, path)
 

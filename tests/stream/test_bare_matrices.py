@@ -54,3 +54,9 @@ def test_a_bare_matrix_that_is_rounded_is_reported(run: Run, matrix: str, comman
     assert run(command, matrix).err == f"frametool: warning: argument:1:3: {off}\n"
     assert run(command, stdin=f"{matrix}\n").err == f"frametool: warning: stdin:1:3: {off}\n"
     assert run(command, matrix, "--normalize").status == 0
+
+
+def test_a_matrix_in_blocks_of_yaml_becomes_a_mapping_too(run: Run) -> None:
+    blocks = "- - 0\n  - -1\n  - 0\n- - 1\n  - 0\n  - 0\n- - 0\n  - 0\n  - 1\n"
+    done = run("convert", "--in", "yaml", "--to", "rpy_deg", stdin=blocks)
+    assert (done.status, done.out) == (0, "{rpy_deg: {roll: 0.0, pitch: 0.0, yaw: 90.0}}\n"), done.err
