@@ -38,7 +38,7 @@ class Overload(NamedTuple):
 
     rule: `pose.ab pose.bc -> pose.ac`, a kind or a word of FITS for each argument with letters for its frames, target
         first, or for the unit of a number; equal letters must be the same frame or unit; `..` repeats the only argument
-    check: returns the reason why floats have no result, "" if they have one
+    check: returns the reason why floats have no result, if there is one, or raises it
     """
 
     rule: str
@@ -240,11 +240,6 @@ def _no_direction(*numbers: float) -> str:
     return "" if is_known else "vector 0 0 0 has no direction; the angle to it is not defined"
 
 
-def _no_twist(*numbers: float) -> str:
-    rigid.check_twist(*numbers)  # raises ValueInvalid
-    return ""
-
-
 def _within(name: str, least: float, most: float, words: str) -> Check:
     return lambda value: "" if least <= value <= most else f"{name}() takes {words}, found {value:g}"
 
@@ -301,12 +296,16 @@ REMEDIES = {
 }
 
 
+def _result(overloads: Sequence[Overload], sign: str, terms: Sequence[Term]) -> Term | None:
+    """Return the result of the first meaning that suits the arguments."""
+    return next((found for each in overloads if (found := each.result(sign, terms)) is not None), None)
+
+
 def operated(sign: str, *terms: Term) -> Term:
     """Return the result of an operator; raises CalcError."""
     refusal, overloads = OPERATORS[sign]
-    for each in overloads:
-        if (found := each.result(sign, terms)) is not None:
-            return found
+    if (found := _result(overloads, sign, terms)) is not None:
+        return found
     remedy = next((text for kind, text in REMEDIES.items() if kind in [term.type.kind for term in terms]), "")
     raise CalcError(f"cannot {refusal.format(*(term.type.named for term in terms))}{remedy}")
 
@@ -335,7 +334,7 @@ FUNCTIONS: dict[str, tuple[str, Sequence[Overload]]] = {
         Overload("pose.ab -> pose.ab", lambda *pose: (*(0.0 * part for part in pose[:3]), *pose[3:7]))]),
     "rpy": ("a pose", [Overload("pose.ab -> angles.a", _roll_pitch_yaw)]),
     "log": ("a pose", [Overload("pose.ab -> twist.a", _of_unit(rigid.log))]),
-    "exp": ("six numbers [vx, vy, vz, wx, wy, wz]", [Overload("twist.a -> pose.a", rigid.exp, _no_twist)]),
+    "exp": ("six numbers [vx, vy, vz, wx, wy, wz]", [Overload("twist.a -> pose.a", rigid.exp, rigid.check_twist)]),
     "dist": ("two poses or two points", [
         Overload("pose.ab pose.ac -> length", lambda *both: rigid.distance(*both)[:1]),
         Overload("point.a point.a -> length", lambda ax, ay, az, bx, by, bz, xp: (
@@ -378,9 +377,8 @@ FUNCTIONS: dict[str, tuple[str, Sequence[Overload]]] = {
 def called(name: str, terms: Sequence[Term]) -> Term:
     """Return the result of a function; raises CalcError."""
     takes, overloads = FUNCTIONS[name]
-    for each in overloads:
-        if (found := each.result(name, terms)) is not None:
-            return found
+    if (found := _result(overloads, name, terms)) is not None:
+        return found
     what = first_of([term.type.named for term in terms], 3) or "nothing"
     raise CalcError(f"{name}() takes {takes}, found {what}")
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components, Namespace
 
     Kernel = Callable[..., Components]
-    Check = Callable[..., str]
+    Check = Callable[..., str | None]
 
 POSE, POINT, VECTOR, NUMBER = "pose", "point", "vector", "number"
 TWIST, ANGLES, LIST, TREE = "twist", "angles", "list", "tree"
@@ -100,7 +100,7 @@ def made(type_: Type, kernel: Kernel, *operands: Term, check: Check | None = Non
     """Return the result of a kernel for the numbers of all operands: at once if they are known, else for each row.
 
     kernel: takes the numbers, then the namespace with their functions
-    check: returns the reason why floats have no result, "" if they have one
+    check: returns the reason why floats have no result, if there is one, or raises it
     """
 
     def computed(row: RowValues | None) -> Components:

@@ -39,11 +39,6 @@ TIE = 1e-9  # of u: an improvement below this does not count
 O = Transform(axes_change("flu", "optical"), (0.0, 0.0, 0.0))  # body_from_optical, in the notation of papers
 
 
-def _translation_of_inverse(m: Measurement) -> Transform:
-    rotation = m.transform.rotation
-    return Transform(rotation, -rotation.apply(m.components[:3]))
-
-
 def _yaw_first(m: Measurement) -> Transform | None:
     if m.written is None or m.written[0] != "rpy":
         return None
@@ -54,7 +49,7 @@ def _yaw_first(m: Measurement) -> Transform | None:
 BLUNDERS: dict[str, Callable[[Measurement], Transform | None]] = {
     "inverted": lambda m: m.transform.inverse(),
     "rotation inverted": lambda m: m.turned(*m.transform.rotation.inverse().components),
-    "translation of the inverse": _translation_of_inverse,
+    "translation of the inverse": lambda m: m.turned(*m.transform.rotation.inverse().components).inverse(),
     "wxyz taken for xyzw": lambda m: m.turned(*m.components[4:], m.components[3]),
     "xyzw taken for wxyz": lambda m: m.turned(m.components[6], *m.components[3:6]),
     "millimetres": lambda m: m.shifted(1e-3), "metres taken for millimetres": lambda m: m.shifted(1e3),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from itertools import tee
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import locate_many, parse_documents
@@ -141,11 +140,7 @@ def check(
     others: other files are allowed; a file without any sign of frames only gets the finding that it has none
     """
     findings: list[Finding] = []
-    everything = _of_one_earth(_statements(files, findings, normalize=normalize, others=others))
-    if tree is not None:
-        everything, again = tee(everything)
-        _stand(tree, again)
-    findings += lint(everything)
+    findings += lint(_of_one_earth(_statements(files, findings, normalize=normalize, others=others)), tree)
     order = {file.name: index for index, file in enumerate(files)}
     return sorted(findings, key=lambda each: (order.get(each.source, 0), each.line, each.column))
 
@@ -158,17 +153,6 @@ def _of_one_earth(everything: Iterable[Statement]) -> Iterator[Statement]:
         parent, child = (earth if name in EARTH_FRAMES else name for name in each[:2])
         if parent != child or each.parent == each.child or any(each.components[:6]):
             yield each if (parent, child) == each[:2] else each._replace(parent=parent, child=child)
-
-
-def _stand(tree: FrameTree, everything: Iterator[Statement]) -> None:
-    """Add the static edges to a tree; invalid ones are omitted, as other rules report them."""
-    said: dict[str, list[Statement]] = {}
-    for each in everything:
-        said.setdefault(each.child, []).append(each)
-    for statements in said.values():
-        if len({each.stamp_ns for each in statements}) < 2 or len({each[:3] for each in statements}) < 2:
-            with suppress(BadTopology):
-                tree.add_components(*statements[0][:3])
 
 
 def _statements(
@@ -205,6 +189,11 @@ class Child:
         self.clashes: list[Statement] = []
         self.backward: list[Statement] = []
 
+    @property
+    def is_static(self) -> bool:
+        """Return True for a frame at one time, or with one pose at all times."""
+        return len(self.stamps) + (self.static is not None) < 2 or not (self.changes or self.other_pose)
+
     def add(self, seen: Statement, number: int) -> None:
         """Add one more."""
         if seen.stamp_ns is None:
@@ -225,8 +214,8 @@ class Child:
         self.log.add(seen.parent, seen.components, seen.stamp_ns, seen.line)
 
 
-def lint(everything: Iterable[Statement]) -> Iterator[Finding]:
-    """Apply the rules to all edges of all files together."""
+def lint(everything: Iterable[Statement], tree: FrameTree | None = None) -> Iterator[Finding]:
+    """Apply the rules to all edges of all files together; tree: receives the static edges that fit into one."""
     children: dict[str, Child] = {}
     for number, seen in enumerate(everything):
         if seen.parent == seen.child:
@@ -240,6 +229,9 @@ def lint(everything: Iterable[Statement]) -> Iterator[Finding]:
             yield seen.finding("w-first", message)
         child.add(seen, number)
     for child in children.values():
+        if tree is not None and child.is_static:
+            with suppress(BadTopology):  # which a rule reports
+                tree.add_components(*child.first[:3])
         yield from _child(child)
     yield from _cycles(children)
     yield from _roots(children)
