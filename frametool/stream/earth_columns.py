@@ -356,12 +356,13 @@ def settle(
     is_formula = operation.formula is not None
     stays = not (is_formula or operation.moves)
     says_itself = stays and (on_earth or not {*PARENT_COLUMNS}.isdisjoint(names))
-    if says_itself or request.place is None or (not is_formula and request.frames):
+    if says_itself or (not is_formula and (request.place is None or request.frames)):
         return request, shapes  # a look-up looks at each row, an expression at its own frames
     rename = (request.for_kind(shapes[0].kind) if shapes else request).rename
     frame = None if stays or rename is None else rename(ECEF if on_earth and is_formula else None, None)[0]
     try:
-        check_in_ecef(frame, request.place)
+        if request.place is not None:
+            check_in_ecef(frame, request.place)
     except ValueInvalid as error:
         raise FormatError(str(error), source=source, line=1) from None
     return request, shapes
