@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
     from numpy.typing import NDArray
-    from rosbags.interfaces import Nodetype
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
@@ -310,64 +309,57 @@ def _repeated(text: bytes, count: int) -> Spans:
     return Spans(framed(text), np.tile(starts + MARGIN, (count, 1)), np.tile(ends + MARGIN, (count, 1)))
 
 
-class MessageNumbers:
-    """The numbers in one message: their places and types, and the parts that other messages must share with it."""
+def numbers_in(types: MessageTypes, kind: str, data: bytes) -> tuple[list[tuple[int, str]], list[slice]]:
+    """Return the places and types of the numbers in a message, and the parts that other messages must share with it.
 
-    def __init__(self, types: MessageTypes, kind: str, data: bytes) -> None:
-        """Read a message; raises ValueError if one of its parts has no fixed place."""
-        from rosbags.interfaces import Nodetype
+    Raises ValueError or KeyError if one of its parts has no fixed place.
+    """
+    from rosbags.interfaces import Nodetype
 
-        self.fields, self.data = types.store.fielddefs, data
-        self.begin = self.at = 0 if types.ros1 else 4
-        self.aligned = not types.ros1
-        self.numbers: list[tuple[int, str]] = []
-        self.shared = [slice(self.begin)]
-        self._value(Nodetype.NAME, kind)
-        if self.at != len(data) or not self.numbers or (self.aligned and data[:2] != CDR_LE):
-            raise ValueError
-
-    def _value(self, node: Nodetype, what: Any) -> None:
-        from rosbags.interfaces import Nodetype  # the extra is named where it is missing
-
+    begin = at = 0 if types.ros1 else 4
+    left: list[Any] = [(Nodetype.NAME, kind)]
+    numbers, shared = list[tuple[int, str]](), [slice(begin)]
+    while left:
+        node, what = left.pop()
         if node == Nodetype.NAME:
-            for _, inner in self.fields[what][1]:
-                self._value(*inner)
-        elif node == Nodetype.ARRAY:
-            for _ in range(min(what[1], MOST_NUMBERS)):
-                self._value(*what[0])
-        elif node == Nodetype.SEQUENCE or what[0] == "string":
-            begin = self._place(4)
-            count = int.from_bytes(self.data[begin : self.at], "little")
-            self.at += count if node == Nodetype.BASE else 0
-            self.shared.append(slice(begin, self.at))
-            for _ in range(min(count, MOST_NUMBERS) if node == Nodetype.SEQUENCE else 0):
-                self._value(*what[0])
+            left += (each for _, each in reversed(types.store.fielddefs[what][1]))
+            continue
+        if node == Nodetype.ARRAY:
+            left += [what[0]] * min(what[1], MOST_NUMBERS)
+            continue
+        has_count = node == Nodetype.SEQUENCE or what[0] == "string"
+        code = "<u4" if has_count else CODES[what[0]]
+        size = int(code[-1])
+        place = at if types.ros1 else at + (begin - at) % size
+        at = place + size
+        if not has_count:
+            numbers.append((place, code))
+        elif node == Nodetype.SEQUENCE:
+            left += [what[0]] * min(int.from_bytes(data[place:at], "little"), MOST_NUMBERS)
         else:
-            code = CODES.get(what[0])
-            if code is None or len(self.numbers) > MOST_NUMBERS:
-                raise ValueError
-            self.numbers.append((self._place(int(code[-1])), code))
-
-    def _place(self, size: int) -> int:
-        """Skip the next part of this many bytes; return its position."""
-        self.at += size + (-(self.at - self.begin) % size if self.aligned else 0)
-        return self.at - size
+            at += int.from_bytes(data[place:at], "little")
+        shared += [slice(place, at)] * has_count
+        if len(numbers) > MOST_NUMBERS:
+            raise ValueError
+    if at != len(data) or not numbers or not (types.ros1 or data[:2] == CDR_LE):
+        raise ValueError
+    return numbers, shared
 
 
 def layout_of(types: MessageTypes, channel: Channel, data: bytes) -> BinaryLayout | None:
     """Return the layout of messages like this one; None unless it gives the same line as the full reader."""
     try:
         line = text_of(types, channel, data)
-        fields = MessageNumbers(types, channel.type, data)
-    except ValueError:
+        found, shared = numbers_in(types, channel.type, data)
+    except (ValueError, KeyError):
         return None
-    places, codes = zip(*fields.numbers, strict=True)
+    places, codes = zip(*found, strict=True)
     names = [f"f{at}" for at in range(len(codes))]
     numbers = np.dtype({"names": names, "formats": codes, "offsets": places, "itemsize": len(data)})
     texts = STRING_OR_NUMBER.sub(lambda found: found[1] or HOLE, line).split(HOLE)
     if len(texts) != len(codes) + 1:
         return None
-    made = BinaryLayout(numbers, fields.shared, texts, data)
+    made = BinaryLayout(numbers, shared, texts, data)
     values, alike = made.values([data])
     return made if alike.all() and made.lines(values) == line else None
 

@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from frametool.stream.faults import BadRows
 
     Advance = Callable[[int, int], None]  # takes the number of messages and bytes that were read
-    Change = Callable[[bytes], bytes | None]  # of a message; None drops it
 
 MOVES = ", ".join(sorted(name.rpartition("/")[2] for name in MOVED_TYPES))
 OTHER_TRANSFORMS = "FrameTransform"  # of Foxglove, and lists of them
@@ -76,7 +75,6 @@ class RecordRun:
     """One copy of a recording: `look` reads it, `pieces` are the bytes of the copy, `summary` says what was done.
 
     Messages are bytes, and everything that is not changed is preserved.  No messages are kept in memory.
-    change: returns the new messages of a channel
     counts: of messages by channel; span: the first and the last log time
     inside: how many are in the window; outside: how many outside of it are copied; first_ns: the first time of these
     undefined: types that the recording does not define, and whether ROS 2 Humble does
@@ -85,7 +83,6 @@ class RecordRun:
     def __init__(self, recording: RecordingReader, request: RecordRequest) -> None:
         """Begin with a recording that is not read yet."""
         self.reader, self.request, self.path = recording, request, recording.path
-        self.change: dict[Channel, Change] = {}
         self.counts: Counter[Channel] = Counter()
         self.span: tuple[int, int] | None = None
         self.inside = self.outside = 0
@@ -107,7 +104,7 @@ class RecordRun:
         Raises FormatError for a recording that is not whole and a topic that cannot be moved, BadTopology for edges
         that do not fit, LookupFailed for a frame that is not there and a window without messages.
         """
-        request, types = self.request, self.reader.types
+        request = self.request
         self._read_all(advance)
         self._check_topics()
         if request.window and not self.inside:
@@ -120,11 +117,9 @@ class RecordRun:
             for root in self.plan.apart:
                 near = did_you_mean(root, self.edges.frames)
                 warn(f"{self.path}: frame {shown(root)} is in none of its transforms{near}")
-        if self.plan.replaced:
-            self.change |= {each: self._replacing(each) for each in self.used}
         if request.into:
-            self.mover = mover = MessageMover(self._frames(), request.into, types, normalize=request.normalize)
-            self.change |= {each: self._moving(each, mover) for each in self.named}
+            types = self.reader.types
+            self.mover = MessageMover(self._frames(), request.into, types, normalize=request.normalize)
 
     def _read_all(self, advance: Advance) -> None:
         """Read everything; raises FormatError if the recording is not complete."""
@@ -181,41 +176,40 @@ class RecordRun:
         source = TransformsOfCopy(self.reader, used, self.transform_topics, more)
         return load_sources([source], Rules(normalize=self.request.normalize))
 
-    def _replacing(self, channel: Channel) -> Change:
-        """Return a function that puts the new values into messages of transforms."""
+    def _changed(self, channel: Channel, data: bytes) -> bytes | None:
+        """Return a message as it is in the copy; None for one that is left out."""
+        if self.plan.replaced and channel in self.used:
+            return self._replaced(channel, data)
+        if self.mover and channel in self.named:
+            return self._moved(self.mover, channel, data)
+        return data
+
+    def _replaced(self, channel: Channel, data: bytes) -> bytes:
+        """Return a message of transforms with the new values of edges."""
         edges, types = {edge.child: edge for edge in self.plan.replaced}, self.reader.types
-        names = [child.encode() for child in edges]
+        if not any(name.encode() in data for name in edges):
+            return data
+        message = types.read(channel, data)
+        if not replaced(message, edges, self.edges.names.bare):
+            return data
+        self.rewritten += 1
+        return types.write(channel, message)
 
-        def change(data: bytes) -> bytes:
-            if not any(name in data for name in names):
-                return data
-            message = types.read(channel, data)
-            if not replaced(message, edges, self.edges.names.bare):
-                return data
-            self.rewritten += 1
-            return types.write(channel, message)
-
-        return change
-
-    def _moving(self, channel: Channel, mover: MessageMover) -> Change:
-        """Return a function that moves the messages of a channel; one that cannot be moved is an error, or left out."""
-
-        def change(data: bytes) -> bytes | None:
-            number = self.moved[channel.topic] = self.moved.get(channel.topic, 0) + 1
-            try:
-                new = mover.moved(channel, data)
-            except (LookupFailed, ValueInvalid) as error:
-                stamp = "" if mover.header is None else f", stamp {format_stamp(mover.header.stamp_ns)}"
-                reason = f"on {channel.topic}{stamp}: {error}"
-                if self.request.bad.on_error == STOP:
-                    error.args = (f"{self.path}: message {number}: {reason}",)
-                    raise
-                self.request.bad.take([Fault(number, "", reason)])
-                return None
-            self.unmoved += new is data
-            return new
-
-        return change
+    def _moved(self, mover: MessageMover, channel: Channel, data: bytes) -> bytes | None:
+        """Return a message in the other frame; one that cannot be moved is an error, or left out."""
+        number = self.moved[channel.topic] = self.moved.get(channel.topic, 0) + 1
+        try:
+            new = mover.moved(channel, data)
+        except (LookupFailed, ValueInvalid) as error:
+            stamp = "" if mover.header is None else f", stamp {format_stamp(mover.header.stamp_ns)}"
+            reason = f"on {channel.topic}{stamp}: {error}"
+            if self.request.bad.on_error == STOP:
+                error.args = (f"{self.path}: message {number}: {reason}",)
+                raise
+            self.request.bad.take([Fault(number, "", reason)])
+            return None
+        self.unmoved += new is data
+        return new
 
     def _messages(self, advance: Advance) -> Iterator[Recorded]:
         """Yield all messages."""
@@ -258,8 +252,7 @@ class RecordRun:
         """Yield the messages of the copy."""
         for message in self._messages(advance):
             if self._is_inside(message.log_ns) or message.channel.is_static:
-                change = self.change.get(message.channel)
-                copied = message.data if change is None else change(message.data)
+                copied = self._changed(message.channel, message.data)
                 if copied is not None:
                     yield message._replace(data=copied)
 
