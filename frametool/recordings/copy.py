@@ -7,7 +7,7 @@ frame and is unchanged.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -75,22 +75,17 @@ class RecordedEdges:
         """Create an empty set; `name` is that of the recording, for messages."""
         self.name, self.names = name, Names()
         self.known: dict[str, RecordedEdge] = {}
+        self.frames: dict[str, str] = {}  # all of them, each with a topic
 
     def add(self, topic: str, transform: RawTransform) -> None:
         """Add a transform."""
-        edge = self.known.setdefault(self.names.bare(transform.child), RecordedEdge(transform.numbers))
-        edge.parents[self.names.bare(transform.parent)] = edge.topics[topic] = None
+        child, parent = self.names.bare(transform.child), self.names.bare(transform.parent)
+        edge = self.known.setdefault(child, RecordedEdge(transform.numbers))
+        edge.parents[parent] = edge.topics[topic] = None
+        for frame in (parent, child):
+            self.frames.setdefault(frame, topic)
         if not edge.varies and transform.numbers != edge.numbers:
             edge.varies = not is_same(transform.numbers, edge.numbers)
-
-    @cached_property
-    def frames(self) -> dict[str, str]:
-        """Return all frames, each with a topic, once all transforms were added."""
-        found: dict[str, str] = {}
-        for child, edge in self.known.items():
-            for frame in (*edge.parents, child):
-                found.setdefault(frame, next(iter(edge.topics)))
-        return found
 
     def plan(self, tree: Frames, *, replace: bool) -> EdgePlan:
         """Group the edges of a tree: missing in the recording, present with the same values, or with others.

@@ -274,8 +274,7 @@ class Bag1File:
         self.reader: Any = opened.enter_context(Unindexed(path))
         self.channels = {}
         for each in self.reader.connections:
-            known = {name: getattr(each.ext, name) for name in ("callerid", "latching")}
-            about = {name: str(said) for name, said in known.items() if said is not None}
+            about = {name: str(said) for name, said in each.ext._asdict().items() if said is not None}
             schema = each.msgtype, "ros1msg", each.msgdef.data.encode()
             self.channels[each.id] = Channel(each.topic, each.msgtype, "ros1", schema, about, each.digest)
         self.stated = sum((Counter(each.connection_counts) for each in self.reader.chunk_infos), Counter[int]())
@@ -301,9 +300,7 @@ class Bag1File:
         while records.tell() < len(chunk):
             header = Header.read(records)
             data = read_bytes(records, read_uint32(records))
-            if header.get_uint8("op") == RecordType.CONNECTION:
-                continue
-            if (number := header.get_uint32("conn")) in numbers:
+            if header.get_uint8("op") != RecordType.CONNECTION and (number := header.get_uint32("conn")) in numbers:
                 log_ns = header.get_time("time")
                 found.append(Recorded(self.channels[number], log_ns, data, log_ns))
 
@@ -360,14 +357,13 @@ class MessageTypes:
             if each.type == kind and fmt in ("ros1msg", "ros2msg"):
                 digests |= {each.digest} - {""}
                 found |= get_types_from_msg(definition.decode(), kind)
-        known = self.store
         self._register(found)
         try:
-            known.generate_msgdef(kind)
+            self.store.generate_msgdef(kind)
         except Exception:  # noqa: BLE001 - of a type that is not there, or has parts that are not
             self._register(typestore(ros1=self.ros1).fielddefs)
         for digest in digests:
-            made = known.generate_msgdef(kind)[1] if self.ros1 else known.hash_rihs01(kind)
+            made = self.store.generate_msgdef(kind)[1] if self.ros1 else self.store.hash_rihs01(kind)
             if made != digest:
                 raise TypeError(f"hash of {kind} is {made}, not {digest}")
 
@@ -379,7 +375,7 @@ class MessageTypes:
 class RecordingReader:
     """An open recording.
 
-    channels: equal ones of several files are merged; foreign: those whose messages are not ROS's
+    all: its channels, equal ones of several files merged; channels: those whose messages are encoded as ROS does
     metadata: of a folder, every value as text
     """
 
@@ -406,7 +402,6 @@ class RecordingReader:
         encoding = "ros1" if self.is_ros1 else CDR
         self.all = [*known.values()]
         self.channels = [each for each in self.all if each.encoding == encoding]
-        self.foreign = [each for each in self.all if each.encoding != encoding]
         self.types = MessageTypes(self.channels, ros1=self.is_ros1)
 
     def _kind(self, file: Path) -> Any:
@@ -428,12 +423,10 @@ class RecordingReader:
             known = None if file.stated is None else sum(file.stated.get(number, 0) for number in numbers)
             self._check(wanted, count, known, file.total if wanted is None else None)  # a channel may be lost
             total += count
-        if wanted is None:
-            self._check(wanted, total, self.metadata.get("message_count"))
-            return
-        named = {(each.topic, each.type) for each in wanted}
+        named = {(each.topic, each.type) for each in wanted or ()}
         counts = [int(each["count"]) for each in self._topics if (each["name"], each["type"]) in named]
-        self._check(wanted, total, sum(counts) if counts else None)
+        stated = sum(counts) if counts else None
+        self._check(wanted, total, self.metadata.get("message_count") if wanted is None else stated)
 
     def _check(self, wanted: Collection[Channel] | None, count: int, *stated: Any) -> None:
         """Raise FormatError unless all stated messages were found."""

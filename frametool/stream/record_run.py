@@ -160,8 +160,8 @@ class RecordRun:
             raise Misused(f"--into moves the messages of topics that are named; {remedy}", source=self.path)
 
     def _refuse_others(self) -> None:
-        """Raise FormatError for transforms that cannot be read here, as protobuf's, and for topics that are foreign."""
-        for each in self.reader.foreign:
+        """Raise FormatError for transforms that cannot be read here, as protobuf's or ROS 1's in MCAP."""
+        for each in (one for one in self.reader.all if one not in self.reader.channels):
             if each.type.replace(".", "/").rpartition("/")[2].startswith(OTHER_TRANSFORMS):
                 raise FormatError(f"{each.topic} holds {each.type}: no transforms of recordings", source=self.path)
             if each.encoding == "ros1":
