@@ -286,19 +286,17 @@ def _transforms(value: Any, path: Path, options: Options) -> Iterator[tuple[dict
         for index, item in enumerate(value):
             yield from _transforms(item, (*path, index), options)
         return
-    tally = options.tally
-    mapping = as_mapping(value, "a message with transforms")
-    enveloped = messages.is_envelope(mapping)
-    inner = mapping["msg"] if enveloped else mapping
+    mapping, others = as_mapping(value, "a message with transforms"), options.tally.others
+    inner, below = (mapping["msg"], (*path, "msg")) if messages.is_envelope(mapping) else (mapping, path)
     topic = messages.topic_of(mapping)
     options.topics.seen.add(topic)
-    if is_pose(inner) and (not enveloped or options.topics.chooses(topic)):
-        yield inner, (*path, "msg") if enveloped else path
+    if is_pose(inner) and (inner is mapping or options.topics.chooses(topic)):
+        yield inner, below
     elif not is_pose(inner) and messages.is_message(inner):
         yield from messages.messages(mapping, path)
     elif "op" in mapping:
         topic = str(mapping.get("topic") or f"op {mapping['op']}")
-        tally.others[topic] = tally.others.get(topic, 0) + 1
+        others[topic] = others.get(topic, 0) + 1
     else:
         keys = first_of(list(mapping), 8, quote=shown)
         raise Misfit(f"expected a message with transforms, found the keys {keys}", path)
@@ -306,12 +304,11 @@ def _transforms(value: Any, path: Path, options: Options) -> Iterator[tuple[dict
 
 def _header_lines(message: TextMessage, count: int) -> list[int]:
     """Return the lines on which the transforms of a message begin."""
-    if message.source.text.count("\n") > 1:
-        text = message.source.text
-        offsets = [match.start() for match in _HEADER.finditer(text)]
-        if len(offsets) == count:
-            return [message.line + text.count("\n", 0, offset) for offset in offsets]
-    return [message.line] * count
+    text = message.source.text
+    offsets = [match.start() for match in _HEADER.finditer(text)] if text.count("\n") > 1 else []
+    if len(offsets) != count:
+        return [message.line] * count
+    return [message.line + text.count("\n", 0, offset) for offset in offsets]
 
 
 # --- the fast path for plain transforms ---
