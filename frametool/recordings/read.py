@@ -316,9 +316,6 @@ def typestore(*, ros1: bool) -> Any:
     return store
 
 
-TIMES = {"builtin_interfaces/msg/Time": "uint32", "builtin_interfaces/msg/Duration": "int32"}  # wiki.ros.org/msg
-
-
 class MessageTypes:
     """The types of some channels: those defined in the recording, or the usual ones if it defines none."""
 
@@ -329,9 +326,9 @@ class MessageTypes:
 
         self.channels, self.ros1 = channels, ros1
         self.store: Any = get_typestore(Stores.EMPTY)
-        for name, code in TIMES.items() if ros1 else ():  # the library has int32 for both
-            fields: Any = [("sec", (Nodetype.BASE, (code, 0))), ("nanosec", (Nodetype.BASE, ("uint32", 0)))]
-            self.store.fielddefs[name] = ([], fields)
+        if ros1:  # whose seconds have no sign (wiki.ros.org/msg); the library has int32
+            parts: Any = [(name, (Nodetype.BASE, ("uint32", 0))) for name in ("sec", "nanosec")]
+            self.store.fielddefs["builtin_interfaces/msg/Time"] = [], parts
 
     def read(self, channel: Channel, data: bytes) -> Any:
         """Return a message; raises ValueInvalid for invalid bytes."""
