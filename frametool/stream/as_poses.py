@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     BlockWriter: TypeAlias = "TextWriter | RowsWriter | ArrayWriter | RecordingWriter"
 
 QUATERNION = notation("quaternion")
+NO_ROTATION = "no rotation among the columns {}: poses are wanted"
 AS_VALUES = Style("json")  # of results that are not written
 
 
@@ -152,8 +153,7 @@ class FormatConverter:
         is_bare = shape.kind == POSE and shape.notation is None and bool(self.request.poses)
         has_none = is_bare and not target.notations
         if (is_bare and self.request.keeps_position and not has_none) or (has_none and not self.has_points):
-            message = f"no rotation among the columns {rows.columns}: poses are wanted"
-            raise FormatError(message, source=self.source, line=line)
+            raise FormatError(NO_ROTATION.format(rows.columns), source=self.source, line=line)
         self.shape = shape._replace(kind=POINT) if has_none else shape
 
     # --- rows of tables, and of columns of numbers ---
@@ -289,7 +289,10 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
     line = count = 0
     for block, outcome in converter.steps(cast("ByteStream", file.stream)):
         if not line:
+            if converter.shape.kind != POSE:  # positions on the Earth
+                raise FormatError(NO_ROTATION.format(converter.rows.columns), source=file.name, line=1)
             _check(converter.rows, fmt, file, options)
+            fmt = fmt if converter.shape.place is None else fmt._replace(frames=(EARTH_FRAMES[0], *fmt.frames[1:]))
             line = 1
         for fault in outcome.faults:
             options.report(BadRow(fault._replace(line=line + fault.line), fault.reason, source=file.name))

@@ -21,6 +21,7 @@ from mpmath import mpf
 import frametool
 from frametool import earth
 from frametool.geometry import quaternion
+from frametool.stream.as_poses import NO_ROTATION
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -622,3 +623,12 @@ def test_what_has_no_effect_is_an_error(run: Callable[..., Any]) -> None:
         assert told in done.err
     done = run("convert", "--from", "utm", "--zone", "32N", "--to", "lla", stdin=f"x,y,z\n{grid}")
     assert done.out == run("convert", "--from", "utm", "--zone", "32N", "--to", "lla", stdin=f"easting,northing,alt\n{grid}").out
+
+
+def test_positions_on_the_earth_are_no_frames_and_poses_there_are_of_ecef(run: Callable[..., Any]) -> None:
+    rows = "stamp,lat,lon,alt{}\n0,48,11,520{}\n"
+    for command in ("tree", "view"):
+        done = run(command, "fixes.csv", files={"fixes.csv": rows.format("", "")})
+        assert (done.status, done.err) == (1, f"frametool: fixes.csv:1: {NO_ROTATION.format('stamp, lat, lon, alt')}\n")
+    done = run("tree", "fixes.csv", files={"fixes.csv": rows.format(",heading_deg,axes", ",30,enu")})
+    assert (done.status, done.err) == (0, "frametool: fixes.csv: 1 pose of body in ecef (--frames)\n")
