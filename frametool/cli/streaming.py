@@ -456,12 +456,11 @@ class PoseTask(Stream):
 
     def __init__(self, inputs: Inputs, *what: str) -> None:
         """Look at what the options say; `what` are the results that the command writes."""
-        self._format: str = inputs.explain or ""
-        self.derives = bool(self._format)
         self.normalize: bool = inputs.normalize
         super().__init__(inputs, Output(inputs, *what or ("poses",)))
         self.window = options.window_of(inputs)
-        self.plan = self._plan() if self.derives else None
+        self.plan = self._plan() if inputs.explain else None
+        self.derives = self.plan is not None
 
     def request(self, **rest: Any) -> Request:
         """Return what is done with rows and records: they are read as the options say."""
@@ -541,7 +540,7 @@ class PoseTask(Stream):
 
     def write(self, explanation: Explanation) -> int:
         """Write a derivation where the result would go."""
-        self.output.text(explanation.render(self._format))
+        self.output.text(explanation.render(self.inputs.explain))
         return 0
 
 

@@ -12,7 +12,7 @@ from frametool.cli import options
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, refuse_two_readers
 from frametool.cli.commands.compare import trajectory
 from frametool.cli.output import Output
-from frametool.cli.sink import refuse_existing, say_error, tell, writing
+from frametool.cli.sink import refuse_existing, say_error, tell
 from frametool.cli.trees import answers, load_tree, opened, state
 from frametool.errors import ValueInvalid, alternatives, first_of, shown, warn
 from frametool.geometry.rigid import IDENTITY
@@ -252,8 +252,9 @@ def solve_command(inputs: Inputs) -> None:
 
     if said := (write_left_out if inputs.quiet else write_solution)(found):
         tell(said.rstrip("\n"))
-    if report:
-        _write_report(found, report, force=force)
+    if report:  # one document, or a table of the rows
+        into = Output(inputs.but(output=report, format_name=None, notations=(), precision=None), "report")
+        into.report(found.numbers["measurements"] if into.chosen == "csv" else [found.numbers])
     _write(output, found, on_hand=not (hand_eye and inputs.eye_to_hand))
     if count := len(found.left_out):
         warn(f"{count} outlier{'s' * (count > 1)} rejected; --no-robust uses all rows")
@@ -281,18 +282,3 @@ def _write(output: Output, found: Solution, *, on_hand: bool) -> None:
             else:
                 tree.add(each.parent, str(each.name), each.transform, each.covariance)
         output.tree(tree)
-
-
-def _write_report(found: Solution, path: str, *, force: bool) -> None:
-    """Write the numbers of the fit as one document, or those of its rows as a table."""
-    if options.suffix_of(path) == ".csv":
-        from frametool.formats.rows.csv import write_points
-        from frametool.grammar.result import Style
-
-        text = write_points(found.numbers["measurements"], Style("csv"))
-    else:
-        from frametool.documents.json import dump
-
-        text = f"{dump(found.numbers)}\n"
-    with writing(path, force=force) as write:
-        write(text)
