@@ -7,12 +7,16 @@ returns the pose of its turtle. The law maps the position of the target, relativ
 from __future__ import annotations
 
 import math
+import os
 import re
+import sys
 from collections import deque
+from contextlib import contextmanager
+from functools import partial
 from itertools import chain, count, cycle
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import ValueInvalid, shown
+from frametool.errors import Misused, ValueInvalid, shown
 from frametool.frames.stamps import BILLION
 from frametool.geometry.transform import Transform
 from frametool.sim.turtle import PI, SIZE, TICK_NS, TurtlePose, Twist, wrapped
@@ -310,3 +314,23 @@ def typed_commands(reads: Iterable[bytes], *, headings: bool) -> Iterator[tuple[
         command = heading if len(key) == 1 else KEYS.get(ARROWS.get(key[2:], ""))  # an arrow has three bytes
         if command is not None:
             yield 0, command
+
+
+INSTEAD = "pipe key names into frametool sim follow --leader -"
+
+
+@contextmanager
+def keyboard(mailbox: Mailbox, *, headings: bool) -> Iterator[None]:
+    """Read single keys from the terminal into a mailbox; the terminal is as before afterwards.  Raises Misused."""
+    try:
+        import termios
+        import tty
+    except ImportError:
+        raise Misused(f"single keys are read on Linux and macOS alone; {INSTEAD}") from None
+    before = termios.tcgetattr(sys.stdin)
+    tty.setcbreak(sys.stdin)
+    try:
+        mailbox.fill_from(typed_commands(iter(partial(os.read, sys.stdin.fileno(), 64), b""), headings=headings))
+        yield
+    finally:
+        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)

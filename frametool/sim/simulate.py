@@ -20,7 +20,7 @@ from frametool.sim.scene import Follow
 from frametool.sim.turtle import TICK_NS, ServiceRefused, TurtlePose, TurtleState, World
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from frametool.geometry.transform import Transform
     from frametool.sim.drivers import MakeLeader
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from frametool.sim.turtle import Pen, Twist, WallHit
 
     Process = Iterator[int]  # yields the nanoseconds at which it is to be resumed; ends when it has finished
+    Watch = Callable[["SimulationStep"], object]
 
 WORLD = "world"
 CACHE_NS = 10 * BILLION  # tf's own default
@@ -315,3 +316,18 @@ def goal(leader: TurtleState, follow: Follow, now_ns: int) -> TurtleState:
 
 def _seconds(t_ns: int) -> str:
     return f"{t_ns / BILLION:.3f}".rstrip("0").rstrip(".") + " s"
+
+
+def event_log(say: Callable[[str], None]) -> Watch:
+    """Return what reports what turtlesim and the followers log; a wall once for each contact."""
+    at_wall: set[str] = set()
+
+    def watch(step: SimulationStep) -> None:
+        new = (str(hit) for hit in step.walls if hit.turtle not in at_wall)
+        for line in (*step.log, *new):
+            say(f"{step.t_ns / BILLION:.3f} s: {line}")
+        if step.is_tick:
+            at_wall.clear()
+            at_wall.update(hit.turtle for hit in step.walls)
+
+    return watch

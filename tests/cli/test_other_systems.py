@@ -18,9 +18,8 @@ from shell import ENVIRONMENT, ROOT
 
 from frametool import cli
 from frametool.cli.commands import COMMANDS as NAMES
-from frametool.cli.commands.sim import keyboard
 from frametool.formats import table
-from frametool.sim.drivers import Mailbox
+from frametool.sim.drivers import Mailbox, keyboard
 
 if TYPE_CHECKING:
     from collections.abc import Callable

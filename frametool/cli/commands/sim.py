@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import sys
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from functools import partial
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
@@ -26,7 +26,7 @@ from frametool.frames.stamps import BILLION
 from frametool.sim import drivers
 from frametool.sim.readers import lines_as_they_come, parse_spawn, read_commands, read_script
 from frametool.sim.scene import Scene, duration_ns, read_scene, tutorial
-from frametool.sim.simulate import RunSummary, SimulationStep, simulate
+from frametool.sim.simulate import RunSummary, event_log, simulate
 from frametool.sim.step_writer import EMITS, FORMS, StepWriter
 from frametool.sim.turtle import VARIANTS
 from frametool.text.numbers import parse_number
@@ -35,8 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from frametool.sim.drivers import MakeLeader
-
-    Watch = Callable[[SimulationStep], object]
+    from frametool.sim.simulate import Watch
 
 
 _of_turtles = partial(option, under="Turtles")
@@ -159,28 +158,13 @@ class SimOutput:
             clean_up()  # the terminal's cursor
             yield stack.enter_context(Screen(scene, to_stderr=not sys.stdout.isatty())).watch
         else:
-            yield log_events()
+            yield event_log(say)
         if self.output is not None or not (self.live and sys.stdout.isatty()):
             several = self.leaders or self.emit == "poses" or len(scene.followers) > 1
             writer = StepWriter(self.emit, self.style, leaders=self.leaders, labelled=several)
             write = stack.enter_context(writing(self.output, force=self.force))
             # each record at once, so that a reader at the other end of a pipe sees it
             yield lambda step: [write(text) for text in writer.write(step)]
-
-
-def log_events() -> Watch:
-    """Return what prints on stderr what turtlesim and the followers log; a wall once for each contact."""
-    at_wall: set[str] = set()
-
-    def watch(step: SimulationStep) -> None:
-        new = (str(hit) for hit in step.walls if hit.turtle not in at_wall)
-        for line in (*step.log, *new):
-            say(f"{step.t_ns / BILLION:.3f} s: {line}")
-        if step.is_tick:
-            at_wall.clear()
-            at_wall.update(hit.turtle for hit in step.walls)
-
-    return watch
 
 
 def leader_of(inputs: Inputs) -> MakeLeader:
@@ -211,7 +195,6 @@ def _from_stdin(*, paced: bool) -> MakeLeader:
     return mailbox
 
 
-INSTEAD = "pipe key names into frametool sim follow --leader -"
 SUBCOMMANDS = {
     "follow": (__name__, "a leader, and one or more turtles that follow"),
     "run": (__name__, "a whole scene from one file"),
@@ -336,27 +319,9 @@ def teleop(inputs: Inputs) -> None:
     Each key moves for a second: 2 m/s ahead or back, 2 rad/s to the left or right. With --turtlesim ros2 the keys
     g t r e d c v b around f turn to a heading. When stdout is no terminal, every command goes there.
     """
-    refuse(sys.stdin is None or not sys.stdin.isatty(), f"standard input is no terminal; {INSTEAD}")
+    refuse(sys.stdin is None or not sys.stdin.isatty(), f"standard input is no terminal; {drivers.INSTEAD}")
     mailbox = drivers.Mailbox()
     output, scene = SimOutput(inputs.but(live=True), leaders=True), scene_of(inputs, mailbox)
-    with keyboard(mailbox, headings=scene.variant == "ros2"):
+    clean_up()  # the terminal's keys
+    with drivers.keyboard(mailbox, headings=scene.variant == "ros2"):
         output.run(scene)
-
-
-@contextmanager
-def keyboard(mailbox: drivers.Mailbox, *, headings: bool) -> Iterator[None]:
-    """Read single keys from the terminal into a mailbox; the terminal is as before afterwards."""
-    try:
-        import termios
-        import tty
-    except ImportError:
-        raise click.UsageError(f"single keys are read on Linux and macOS alone; {INSTEAD}") from None
-    clean_up()
-    before = termios.tcgetattr(sys.stdin)
-    tty.setcbreak(sys.stdin)
-    try:
-        typed = iter(partial(os.read, sys.stdin.fileno(), 64), b"")
-        mailbox.fill_from(drivers.typed_commands(typed, headings=headings))
-        yield
-    finally:
-        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
