@@ -20,7 +20,6 @@ from frametool.cli.options import FULL
 from frametool.cli.sink import in_colour, is_special, say, writing
 from frametool.errors import ValueInvalid, first_of, listing, printable, shown, warn
 from frametool.formats import table
-from frametool.formats.table import FORMATS, by_name, is_folder, writers
 from frametool.geometry.representations import EARTH_FRAMES, Notation, notation
 from frametool.grammar.result import RecordingStyle, Result, Style, sample_results
 
@@ -49,12 +48,12 @@ def recorded(chosen: Inputs, fmt: str, output: str | None) -> RecordingStyle:
 def _place(fmt: str, output: str | None) -> str:
     """Return where a recording is written; raises UsageError where it cannot be."""
     if output is None or output == "-":
-        raise UsageError(f"{fmt} is no text; give -o {'FOLDER' if is_folder(fmt) else 'FILE'}")
-    if is_folder(fmt) and output.endswith(FORMATS[fmt].suffixes):
+        raise UsageError(f"{fmt} is no text; give -o {'FOLDER' if table.is_folder(fmt) else 'FILE'}")
+    if table.is_folder(fmt) and output.endswith(table.FORMATS[fmt].suffixes):
         raise UsageError(f"-o {output}: a ROS 2 bag is written as a folder of MCAP; give -f {fmt} -o FOLDER")
-    named = None if is_folder(fmt) else by_name(output, writers("recording"))
+    named = None if table.is_folder(fmt) else table.by_name(output, table.writers("recording"))
     if named not in (None, fmt):
-        raise UsageError(f"-o {output} is the name of {named}, -f says {fmt}; give -o NEW{FORMATS[fmt].suffixes[0]}")
+        raise UsageError(f"-o {output} names {named}, -f says {fmt}; give -o NEW{table.FORMATS[fmt].suffixes[0]}")
     return output
 
 
@@ -70,7 +69,7 @@ def copied_as(fmt: str, path: str, output: str | None, named: str | None) -> tup
     named: the format, where the name of the output does not say it
     """
     folder = "bag2" if os.path.isdir(path) and output and not os.path.splitext(output)[1] else None
-    copy = named or by_name(output, writers("recording")) or folder
+    copy = named or table.by_name(output, table.writers("recording")) or folder
     if copy is None:
         unknown = f"-o {output} names no format; " if output else ""
         raise UsageError(f"{unknown}give {'-o NEW.bag' if fmt == 'bag1' else '-o NEW.mcap or -f bag2 -o FOLDER'}")
@@ -322,7 +321,7 @@ class Output:
 
     def opened(self) -> AbstractContextManager[Write]:
         """Open the place where results go."""
-        return writing(self.path, force=self.force, folder=is_folder(self.style.format))
+        return writing(self.path, force=self.force, folder=table.is_folder(self.style.format))
 
     def report_suffix(self, fmt: str = "") -> None:
         """Report the format of a file whose suffix names none, where none was chosen.

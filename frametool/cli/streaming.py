@@ -269,9 +269,7 @@ class Stream:
 
         return detect(begin, *options.STREAMED, name=self.path or "", otherwise="columns" if is_table else "")
 
-    def _outcomes(
-        self, stream: Any, fmt: str, request: Request
-    ) -> tuple[Generator[Outcome], str, Diagnostics | None]:
+    def _outcomes(self, stream: Any, fmt: str, request: Request) -> tuple[Generator[Outcome], str, Diagnostics | None]:
         """Choose how rows become results: as columns of numbers, as poses in another format, or in place.
 
         Also: the format in which they are, and what was assumed of that of the input.

@@ -54,9 +54,7 @@ def load_tree(argument: str, more: Sequence[str] = (), *, streams: bool = False,
     return _read_once(arguments, how, lambda: _loaded(opened(arguments, streams=streams, drawings=alone), rules))
 
 
-def load_sides(
-    a: Sequence[str], b: Sequence[str], *, normalize: bool
-) -> list[tuple[Frames, dict[str, EdgePlace]]]:
+def load_sides(a: Sequence[str], b: Sequence[str], *, normalize: bool) -> list[tuple[Frames, dict[str, EdgePlace]]]:
     """Read two trees that will be compared, each of several files, as `load_tree` does; with each frame's place."""
     from frametool.formats.load import Rules
 
@@ -64,9 +62,7 @@ def load_sides(
     count = len(a) + len(b)
     every: list[FrameFile] = []
 
-    def side(
-        arguments: Sequence[str], behind: int, earth: str
-    ) -> tuple[Frames, dict[str, EdgePlace]]:
+    def side(arguments: Sequence[str], behind: int, earth: str) -> tuple[Frames, dict[str, EdgePlace]]:
         where: dict[str, EdgePlace] = {}
         every.extend(files := opened(arguments, behind=behind, of=count))
         return _loaded(files, Rules(normalize=normalize, earth=earth), where), where
@@ -81,9 +77,7 @@ def load_sides(
     return sides
 
 
-def _loaded(
-    files: Sequence[FrameFile], rules: Rules, places: dict[str, EdgePlace] | None = None
-) -> Frames:
+def _loaded(files: Sequence[FrameFile], rules: Rules, places: dict[str, EdgePlace] | None = None) -> Frames:
     """Merge files that are open, and say what they were taken for."""
     from frametool.formats.load import load_sources
 

@@ -18,7 +18,6 @@ from frametool.errors import FormatError, listing, shown
 from frametool.frames.stamps import format_stamp
 
 if TYPE_CHECKING:
-
     from frametool.formats.robots.model import Solid
     from frametool.view.scene import FrameScene
 
