@@ -1,29 +1,29 @@
-"""Frames drawn once: a static picture for files and notebooks, and one of braille characters for a terminal."""
+"""Static pictures for files and notebooks: of frames, and of runs of turtles with charts of distance and commands."""
 
 from __future__ import annotations
 
 import math
 from base64 import b64encode
-from itertools import groupby, pairwise
-from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.sax.saxutils import escape
 
-from frametool.errors import cells, printable
+from frametool.frames.buffer import TransformBuffer
 from frametool.frames.lookups import Frames
-from frametool.frames.stamps import format_stamp
-from frametool.view.pictures import Picture, dot, line, shade_of, words, write_svg
-from frametool.view.scene import SLANTED, FrameScene, Labels, Projection, Size, nice, text_width, words_of
+from frametool.frames.stamps import BILLION
+from frametool.sim.turtle import SIZE as WORLD
+from frametool.view.pictures import ChartLine, Picture, box, dot, line, shade_of, stacked, words, write_svg
+from frametool.view.scene import EYES, SLANTED, FrameScene, Labels, Projection, Size, nice, text_width
+from frametool.view.terminal import BACKGROUND, ON_WHITE, colours_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from frametool.geometry.types import Rigid
+    from frametool.sim.scene import Scene
+    from frametool.sim.simulate import SimulationStep
+    from frametool.sim.turtle import Pen, TurtleState
     from frametool.view.pictures import Point, SvgElement
-    from frametool.view.scene import Flat, Label
-
-    Run = tuple[str, str]  # text and its style
-    Spot = tuple[int, int]  # line and column
+    from frametool.view.scene import Label
 
 PIECES, LAST_SHADE = 24, 0.85  # of a trail, from dark when it begins to a green that white paper still shows
 WIDTH, HEIGHT = 1000.0, 700.0
@@ -116,6 +116,115 @@ def _scale(flat: Projection, step: float) -> Iterator[SvgElement]:
     yield words(right, HEIGHT - 46.0, f"in {flat.scene.fixed[:40]}, grid {step:g} m", "soft", "end", 11.0)
 
 
+SHORT = 0.05  # metres: two pixels
+
+
+class Stroke(NamedTuple):
+    """A line drawn with one pen; points in metres, y up."""
+
+    turtle: str
+    pen: Pen
+    points: list[Point]
+
+
+class Drawing:
+    """Collect what a plot shows of a run; turtles that do not move take no memory."""
+
+    def __init__(self, scene: Scene) -> None:
+        """Create an empty drawing."""
+        self.strokes: list[Stroke] = []
+        self.turtles: dict[str, TurtleState] = {}
+        # of each follower, for each control step: seconds, metres, m/s, rad/s
+        self.curves: dict[str, list[tuple[float, ...]]] = {name: [] for name in scene.followers}
+        self._current: dict[str, Stroke] = {}
+        self._clears = 0
+
+    def watch(self, step: SimulationStep) -> None:
+        """Add a step to the drawing."""
+        if step.is_tick:
+            if step.clears != self._clears:
+                self._clears = step.clears
+                self.strokes.clear()
+                self._current.clear()
+            self.turtles = step.states
+            for name in step.states:
+                self._draw(name, step)
+        for command in step.commands:
+            ahead, turning, _ = command.twist
+            self.curves[command.turtle].append((step.t_ns / BILLION, command.distance or 0.0, ahead, turning))
+
+    def _draw(self, name: str, step: SimulationStep) -> None:
+        """Extend a turtle's stroke, or begin one with a new pen."""
+        x, y, _ = step.states[name]
+        pen = step.pens[name]
+        stroke = self._current.get(name)
+        if stroke is None or stroke.pen != pen:
+            begin = [stroke.points[-1]] if stroke is not None else []
+            stroke = self._current[name] = Stroke(name, pen, begin)
+            if not pen.off:
+                self.strokes.append(stroke)
+        if not stroke.points or math.dist(stroke.points[-1], (x, y)) > SHORT:
+            stroke.points.append((x, y))
+
+
+WINDOW, METRE = 500.0, 45.0  # pixels, as turtlesim's
+MARGIN = 30.0
+LEFT = WINDOW + 110.0  # where the curves begin
+PANEL_WIDTH, PANEL_GAP = 420.0, 50.0
+SIDE = WINDOW + 2.0 * MARGIN
+PANELS = ("distance (m)", "linear.x (m/s)", "angular.z (rad/s)")  # as the numbers of curves after the times
+# circles of a turtle: pixels ahead and to the left, radius: feet, head, shell
+BODY = (*((x, y, 4.0) for x in (-9.0, 9.0) for y in (-11.0, 11.0)), (17.0, 0.0, 5.0), (0.0, 0.0, 13.0))
+
+
+def run_picture(drawing: Drawing) -> Picture:
+    """Draw the run; without followers there are no charts."""
+    colours = colours_of({*drawing.turtles, *drawing.curves})
+    shapes = [*_window(drawing, colours)]
+    followed = {name: rows for name, rows in drawing.curves.items() if rows}
+    panels = {
+        title: [ChartLine(name, ON_WHITE[colours[name]], [(row[0], row[at]) for row in rows])
+                for name, rows in followed.items()]
+        for at, title in enumerate(PANELS if followed else (), 1)
+    }  # fmt: skip
+    area = LEFT, MARGIN, PANEL_WIDTH, (WINDOW - 2.0 * PANEL_GAP) / len(PANELS)
+    shapes += (shape for chart in stacked(area, PANEL_GAP, "time (s)", panels) for shape in chart.drawn())
+    return Picture(LEFT + PANEL_WIDTH + MARGIN if followed else SIDE, SIDE, shapes, "turtles")
+
+
+def _window(drawing: Drawing, colours: dict[str, str]) -> Iterator[SvgElement]:
+    """Draw the world: background, trails, and the turtles at the end from above."""
+
+    def place(x: float, y: float) -> Point:
+        return MARGIN + x * METRE, MARGIN + (WORLD - y) * METRE
+
+    yield box(MARGIN, MARGIN, WINDOW, WINDOW, f"#{bytes(BACKGROUND).hex()}")
+    for stroke in drawing.strokes:
+        *colour, width, _ = stroke.pen
+        yield line([place(*point) for point in stroke.points], f"#{bytes(colour).hex()}", width, title=stroke.turtle)
+    for name, (*position, theta) in drawing.turtles.items():
+        x, y = place(*position)
+        cosine, sine = math.cos(theta), math.sin(theta)
+        for ahead, left, radius in BODY:
+            across, down = x + cosine * ahead - sine * left, y - sine * ahead - cosine * left
+            yield dot(across, down, radius + 1.0, "#333333")
+            yield dot(across, down, radius, colours[name])
+        yield words(x, y - 24.0, name, "#ffffff", "middle")
+
+
+def run_page() -> tuple[Callable[[SimulationStep], None], Callable[[], str]]:
+    """Return what collects the transforms of a run by steps, and what then makes a page of them, seen from above."""
+    from frametool.view.exports import write_page
+
+    buffer = TransformBuffer(name="run")
+
+    def watch(step: SimulationStep) -> None:
+        for stamp_ns, parent, child, transform in step.broadcasts:
+            buffer.insert(parent, child, transform, stamp_ns)
+
+    return watch, lambda: write_page(FrameScene(buffer), title="turtles", file="tf.yaml", eye=EYES["top"])
+
+
 def html_of(value: Any) -> str | None:
     """Return the HTML of a transform, rotation, tree, trajectory or comparison; None if its repr is all there is."""
     if isinstance(value, Frames) and value.frames:
@@ -140,143 +249,3 @@ def html_of(value: Any) -> str | None:
     parts = value.components
     pose = Pose.of(parts) if len(parts) > len("xyzw") else Pose(rotation=parts)
     return f"<pre>{escape(write_poses([Result(pose)], Style('text')))}</pre>"
-
-
-BRAILLE = 0x2800
-DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # by row, then column of a cell
-
-
-class Canvas:
-    """A grid of cells with eight dots and one colour each; a terminal's cell is about twice as high as wide."""
-
-    def __init__(self, lines: int, columns: int) -> None:
-        """Create an empty one."""
-        self.lines, self.columns = lines, columns
-        self.cells: dict[Spot, tuple[int, str]] = {}  # dots and colour
-
-    def mark(self, across: int, down: int, colour: str) -> None:
-        """Set a dot by column and row; the last one in a cell gives its colour."""
-        if 0 <= across < 2 * self.columns and 0 <= down < 4 * self.lines:
-            cell = down // 4, across // 2
-            dots, _ = self.cells.get(cell, (0, ""))
-            self.cells[cell] = dots | DOTS[down % 4][across % 2], colour
-
-    def runs(self, line: int, over: Mapping[Spot, Run]) -> list[Run]:
-        """Return a line as runs of one colour; over: letters that replace cells."""
-        drawn = (over.get((line, column)) or self._character((line, column)) for column in range(self.columns))
-        return [("".join(map(itemgetter(0), run)), colour) for colour, run in groupby(drawn, key=itemgetter(1))]
-
-    def _character(self, cell: Spot) -> Run:
-        dots, colour = self.cells.get(cell, (0, ""))
-        return chr(BRAILLE + dots) if dots else " ", colour
-
-
-COLOURS = ("red", "green", "blue")  # of axes
-ARROWS = "→↗↑↖←↙↓↘"
-LEAST_LINES, LEAST_COLUMNS = 4, 20
-MOST_OUTSIDE = 12  # frames that are pointed to
-
-
-def terminal_lines(scene: FrameScene, columns: int, lines: int, eye: tuple[float, float] = SLANTED) -> list[list[Run]]:
-    """Draw a scene in some columns and lines, each as runs of one style; the last line is the scale."""
-    canvas = Canvas(max(lines, LEAST_LINES) - 1, max(columns, LEAST_COLUMNS))
-    wide, high = 2.0 * canvas.columns, 4.0 * canvas.lines
-    margin = min(14.0, wide / 8.0, high / 8.0)
-    size = Size(wide, high, margin, (6.0, 14.0), cell=(2, 4), line=4.0, measure=lambda words: 2.0 * cells(words))
-    flat = Projection(scene, size, eye, most=True)
-    _draw(canvas, flat)
-    labels = Labels(flat)
-    outside = [name for name, point in flat.origins.items() if not flat.holds(point)]
-    pointed = sum(labels.place(_at_edge(labels, flat, name)) for name in outside[:MOST_OUTSIDE])
-    arrows = len(labels.placed)
-    labels.place_all()
-    letters: dict[Spot, Run] = {}
-    for number, label in enumerate(labels.placed):
-        row, column = int(label.box[1]) // 4, int(label.box[0]) // 2 + 1
-        style = "dim" if number < arrows else "bold"
-        letters |= {(row, column + at): (letter, style) for at, letter in enumerate(_letters(label.words))}
-    scale = _scale_line(flat, canvas.columns, eye, len(outside) - pointed + labels.hidden)
-    return [*(canvas.runs(row, letters) for row in range(canvas.lines)), scale]
-
-
-def terminal_text(scene: FrameScene, columns: int, lines: int, eye: tuple[float, float] = SLANTED) -> str:
-    """Return the picture without colours."""
-    drawn = terminal_lines(scene, columns, lines, eye)
-    return "".join("".join(text for text, _ in runs).rstrip() + "\n" for runs in drawn)
-
-
-def print_terminal(scene: FrameScene, eye: tuple[float, float] = SLANTED, color: str = "auto") -> None:
-    """Print a picture of the terminal's size, in colour where it has any, or as `color` says: always or never."""
-    from shutil import get_terminal_size
-
-    from rich.text import Text
-
-    from frametool.view.progress import coloured_console
-
-    columns, lines = get_terminal_size()
-    drawn = terminal_lines(scene, columns, lines - 1, eye)
-    coloured_console(color).print(Text("\n").join(Text.assemble(*runs) for runs in drawn))
-
-
-def _draw(canvas: Canvas, flat: Projection) -> None:
-    """Draw the links, the trails and the axes."""
-    for parent, name in flat.links:
-        _mark_line(canvas, flat, flat.origins[parent], flat.origins[name], "bright_black", 3)
-    for stretch in (stretch for stretches in flat.trails.values() for stretch in stretches):
-        for begin, end in pairwise(map(flat.at, stretch)):
-            _mark_line(canvas, flat, begin, end, "magenta", 2)
-    for name in flat.nearest_last():
-        for axis, tip in flat.axes(name):
-            _mark_line(canvas, flat, flat.origins[name], tip, COLOURS[axis])
-
-
-def _mark_line(canvas: Canvas, flat: Projection, begin: Flat, end: Flat, colour: str, gap: int = 1) -> None:
-    """Set every dot, or every second, third, .. of a line; a line that leaves the picture is cut."""
-    if not flat.holds(begin):
-        begin, end = end, begin
-    if not flat.holds(begin):
-        return
-    far = max(abs(end.x - begin.x), abs(end.y - begin.y))
-    most = 2.0 * flat.size.width + flat.size.height  # the rest is outside
-    count = max(1, math.ceil(min(far, most)))
-    part = min(1.0, most / max(far, 1.0)) / count
-    for number in range(0, count + 1, gap):
-        across, down = (a + (b - a) * part * number for a, b in zip(begin[:2], end[:2], strict=True))
-        canvas.mark(math.floor(across), math.floor(down), colour)
-
-
-def _at_edge(labels: Labels, flat: Projection, name: str) -> Iterator[Label]:
-    """Yield the places at an edge for a frame beyond it: its name and distance with an arrow, the nearest first."""
-    x, y, _ = flat.origins[name]
-    half_wide, half_high = flat.size.width / 2.0, flat.size.height / 2.0
-    across, down = x - half_wide, y - half_high
-    arrow = ARROWS[round(math.atan2(-down, across) / (math.pi / 4.0)) % 8]
-    away = math.dist(flat.poses[name][:3], flat.centre)
-    said = f"{words_of([name])} {away:.0f} m" if away >= 10.0 else f"{words_of([name])} {away:.2g} m"
-    text = f"{said} {arrow}" if across > 0.0 else f"{arrow} {said}"
-    part = min(half_wide / max(abs(across), 1e-9), half_high / max(abs(down), 1e-9))
-    length = flat.size.measure(text)
-    left = half_wide + across * part - (length if across > 0.0 else 0.0)
-    left = min(max(left, 0.0), flat.size.width - length)
-    middles = (at + 2 for at in range(0, int(flat.size.height), 4))
-    for middle in sorted(middles, key=lambda at: abs(at - half_high - down * part)):
-        yield from labels.at(text, length, flat.origins[name], left, middle)
-
-
-def _scale_line(flat: Projection, columns: int, eye: tuple[float, float], hidden: int) -> list[Run]:
-    """Return the scale, the direction of view, and the number of names without room."""
-    metres, stamp_ns = nice(24.0 / flat.scale), flat.scene.at_ns
-    bar = "─" * max(round(metres * flat.scale / 2.0) - 2, 0)
-    azimuth, elevation = (round(math.degrees(angle)) + 0 for angle in eye)
-    more = f", {hidden} name{'s' * (hidden > 1)} hidden" if hidden else ""
-    time = "" if stamp_ns is None else f" at {format_stamp(stamp_ns)[:-6]} s"
-    seen = f"in {printable(flat.scene.fixed)[:40]}{time}, from {azimuth}, {elevation} deg{more}"
-    text = f"├{bar}┤ {metres:g} m  {seen}  axes "[: columns - 6]
-    return [(text, ""), ("x", COLOURS[0]), (" ", ""), ("y", COLOURS[1]), (" ", ""), ("z", COLOURS[2])]
-
-
-def _letters(text: str) -> Iterator[str]:
-    """Yield the content of each cell of a text; a wide letter takes two, the second one empty."""
-    for letter in text:
-        yield letter
-        yield from [""] * (cells(letter) - 1)

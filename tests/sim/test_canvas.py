@@ -10,8 +10,8 @@ from rich.console import Console
 from frametool.sim.scene import tutorial
 from frametool.sim.simulate import simulate
 from frametool.view.pictures import ticks, write_svg
-from frametool.view.stills import Canvas
-from frametool.view.turtles import Drawing, Screen, run_picture
+from frametool.view.stills import Drawing, run_picture
+from frametool.view.terminal import Canvas, Screen
 
 
 def test_dots_of_a_cell_add_up() -> None:

@@ -19,7 +19,8 @@ from frametool.frames.lookups import FrameTree
 from frametool.geometry.transform import Transform
 from frametool.view.pictures import write_png, write_svg
 from frametool.view.scene import EYES, FrameScene, Labels, Projection, nice
-from frametool.view.stills import HEIGHT, SIZE, WIDTH, Canvas, still_picture, terminal_lines, terminal_text
+from frametool.view.stills import HEIGHT, SIZE, WIDTH, still_picture
+from frametool.view.terminal import Canvas, terminal_lines, terminal_text
 
 if TYPE_CHECKING:
     from pathlib import Path

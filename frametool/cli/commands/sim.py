@@ -137,12 +137,12 @@ class SimOutput:
         pictures: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
         if self.plot:
             from frametool.view.pictures import write_picture
-            from frametool.view.turtles import Drawing, run_picture
+            from frametool.view.stills import Drawing, run_picture
 
             run, suffix = Drawing(scene), suffix_of(self.plot)
             pictures[self.plot] = run.watch, lambda: write_picture(run_picture(run), suffix)
         if self.view:
-            from frametool.view.turtles import run_page
+            from frametool.view.stills import run_page
 
             pictures[self.view] = run_page()
         return pictures
@@ -153,7 +153,7 @@ class SimOutput:
             start = monotonic()  # simulated time does not run ahead of the clock
             yield lambda step: sleep(max(0.0, step.t_ns / BILLION - (monotonic() - start)))
         if self.live:
-            from frametool.view.turtles import Screen
+            from frametool.view.terminal import Screen
 
             clean_up()  # the terminal's cursor
             yield stack.enter_context(Screen(scene, to_stderr=not sys.stdout.isatty())).watch

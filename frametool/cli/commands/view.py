@@ -92,7 +92,7 @@ def view_command(inputs: Inputs) -> None:
     if chosen == "text" and output is None:
         color = inputs.color
         if sys.stdout.isatty():
-            from frametool.view.stills import print_terminal
+            from frametool.view.terminal import print_terminal
 
             print_terminal(scene, eye, color)
             return
@@ -142,7 +142,7 @@ def _content(
 
         return write_glb(scene)
     if fmt == "text":
-        from frametool.view.stills import terminal_text
+        from frametool.view.terminal import terminal_text
 
         return terminal_text(scene, *get_terminal_size(PIPE_SIZE), eye)
     from frametool.view.pictures import write_picture
