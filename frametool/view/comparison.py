@@ -19,7 +19,8 @@ from frametool import __version__
 from frametool.documents.json import dump
 from frametool.errors import printable
 from frametool.fit.numbers import SHORT, number_at
-from frametool.formats.rows.csv import quoted
+from frametool.formats.rows.csv import write_points
+from frametool.grammar.result import Style
 from frametool.view import pictures
 from frametool.view.pictures import Chart, ChartLine, Picture, stacked
 from frametool.view.pose_text import WIDTH
@@ -43,6 +44,9 @@ TITLES = {
     "up": "up_m", "rpe": "rpe_percent", "kitti": "kitti_percent", "scale": "scale", "paired": "paired",
 }  # fmt: skip
 RANKED = range(1, [*TITLES].index("scale"))
+LATEX = {letter: f"\\{letter}" for letter in "_%&#${}"}
+LATEX |= {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+ESCAPED = {"text": {}, "markdown": str.maketrans({"|": "&#124;"}), "latex": str.maketrans(LATEX)}
 
 
 def write_comparison(found: dict[str, Any]) -> str:
@@ -93,7 +97,7 @@ def write_explanation(found: dict[str, Any]) -> str:
     """Write the formulas of a comparison with the numbers of this run."""
     poses, fit, ate, settings = found["poses"], found["transform"], found["ate"], found["settings"]
     c, q = fit.get("scale", 1.0), fit["quaternion"]
-    parts = [ate[key]["rmse"] for key in ("along_m", "across_m", "up_m")]
+    squares = " + ".join(f"{ate[key]['rmse']:.6g}^2" for key in ("along_m", "across_m", "up_m"))
     turn, shift = ", ".join(f"{q[axis]:.9g}" for axis in "xyzw"), ", ".join(f"{part:.9g}" for part in fit["xyz"])
     lines = [
         f"pairs      n = {poses['paired']} of {poses['possible']}, t_ref = t_est + {found['offset_s']:.9g} s",
@@ -104,7 +108,7 @@ def write_explanation(found: dict[str, Any]) -> str:
         "ate        d_i = p'_i - p_ref,i;  rmse = sqrt(sum |d_i|^2 / n)",
         f"           = sqrt({ate['m']['sse']:.9g} / {poses['paired']}) = {ate['m']['rmse']:.9g} m",
         "           along, across, up: d_i in the axes of REF's path",
-        f"           {' + '.join(f'{each:.6g}^2' for each in parts)} = {ate['m']['rmse']:.6g}^2",
+        f"           {squares} = {ate['m']['rmse']:.6g}^2",
     ]
     if ate["deg"]:
         lines.append(f"           E_i = inv(ref_i) est'_i;  its angle: rmse {ate['deg']['rmse']:.9g} deg")
@@ -125,21 +129,18 @@ def write_table(found: Sequence[dict[str, Any]], fmt: str = "text") -> str:
     """Write one row per comparison: `csv`, or `text`, `markdown`, `latex` with the best value of each column marked."""
     rows = [_table_row(each) for each in found]
     if fmt == "csv":
-        lines = [TITLES.values(), *(["" if cell is None else str(cell) for cell in row] for row in rows)]
-        return "".join(f"{','.join(map(quoted, line))}\n" for line in lines)
+        return write_points([dict(zip(TITLES.values(), row, strict=True)) for row in rows], Style("csv"))
     known = ([cell for cell in column if isinstance(cell, float)] for column in zip(*rows, strict=True))
     best = [min(there) if at in RANKED and there and len(rows) > 1 else None for at, there in enumerate(known)]
     mark = {"text": "{}*", "markdown": "**{}**", "latex": r"\textbf{{{}}}"}[fmt]
     shown: list[Sequence[str]] = [[*TITLES]]
     for row in rows:
-        texts = [str(cell) if isinstance(cell, (str, int)) else fixed(cell, 3) for cell in row]
-        if fmt == "latex":
-            texts = ["".join(_LATEX.get(letter, letter) for letter in text) for text in texts]
+        texts = (str(cell) if isinstance(cell, (str, int)) else fixed(cell, 3) for cell in row)
         marks = (mark if cell is not None and cell == least else "{}" for cell, least in zip(row, best, strict=True))
-        shown.append([each.format(text) for each, text in zip(marks, texts, strict=True)])
+        shown.append([each.format(text.translate(ESCAPED[fmt])) for each, text in zip(marks, texts, strict=True)])
     if fmt == "markdown":
         shown.insert(1, ["---", *["---:"] * (len(TITLES) - 1)])
-        return "".join(f"| {' | '.join(cell.replace('|', '&#124;') for cell in line)} |\n" for line in shown)
+        return "".join(f"| {' | '.join(line)} |\n" for line in shown)
     if fmt == "latex":
         body = "".join(f"{' & '.join(line)} \\\\\n" for line in shown)
         return f"\\begin{{tabular}}{{l{'r' * (len(TITLES) - 1)}}}\n{body}\\end{{tabular}}\n"
@@ -151,9 +152,6 @@ def _table_row(found: dict[str, Any]) -> list[Any]:
     own = {"est": found["est"], "rpe": found["rpe"][-1]["percent"] if found["rpe"] else None}
     return [own[title] if title in own else number_at(found, SHORT[title]) for title in TITLES]
 
-
-_LATEX = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
-_LATEX |= {letter: "\\" + letter for letter in "_%&#${}"}
 
 WIDE, HIGH = 412.0, 112.0  # pixels of a chart
 LEFT, TOP, RIGHT, BOTTOM = 54.0, 40.0, 14.0, 42.0  # around it
@@ -329,11 +327,10 @@ def _by_length(curves: Sequence[Curve], numbers: Sequence[dict[str, Any]]) -> Pi
     for curve, each in zip(curves, numbers, strict=True):
         points = [(row["length_m"], row["percent"]) for row in (each["kitti"] or {"lengths": []})["lengths"]]
         deltas = [(float(row["delta"][:-1]), row["percent"]) for row in each["rpe"] if row["percent"] is not None]
-        lines.append(ChartLine("", curve.colour, sorted(points or deltas), dots=True))
-    lines = [each for each in lines if len(each.points) >= LEAST_LENGTHS]
-    if not lines:
-        return None
-    return _figure(HIGH, [*Chart((LEFT, TOP, WIDE, HIGH), ("length (m)", "relative error (%)"), lines).drawn()])
+        if len(points or deltas) >= LEAST_LENGTHS:
+            lines.append(ChartLine("", curve.colour, sorted(points or deltas), dots=True))
+    chart = Chart((LEFT, TOP, WIDE, HIGH), ("length (m)", "relative error (%)"), lines)
+    return _figure(HIGH, [*chart.drawn()]) if lines else None
 
 
 def _samples(curve: Curve, paths: Chart, seen: Any, errors: Chart) -> dict[str, Any]:

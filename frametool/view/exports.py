@@ -204,29 +204,29 @@ def _packed(letter: str, numbers: Iterable[float]) -> bytes:
     return struct.pack(f"<{len(found)}{letter}", *found)
 
 
-SLIDER_KEYS = ("name", "kind", "axis", "anchor", "rest", "lower", "upper")
+SLIDER_KEYS = ("name", "kind", "axis", "anchor", "rest", "lower", "upper", "mimic")
 LINK_KEYS = ("origin", "after", "inverted")
 
 
 def joint_sliders(scene: FrameScene) -> dict[str, list[dict[str, Any]]]:
     """Return the revolute and prismatic joints with a constant value, and the links that they move, for the page."""
-    joints: list[Any] = []
     sliders: list[dict[str, Any]] = []
     moved: list[dict[str, Any]] = []
+    places: dict[str, int] = {}
     for values, links, _ in scene.tree.robots:
         for link in links:
-            known = [values.get(joint.name) for joint in link.joints]
-            if not known or link.child not in scene.index or not all(isinstance(each, JointValue) for each in known):
+            known: list[Any] = [values.get(joint.name) for joint in link.joints]
+            if {*map(type, known)} != {JointValue} or link.child not in scene.index:
                 continue
-            numbers = [*range(len(joints), len(joints) + len(known))]
+            numbers = [*range(len(sliders), len(sliders) + len(known))]
             moved.append({"frame": scene.index[link.child], "joints": numbers} | _picked(link, LINK_KEYS))
-            joints += link.joints
+            places |= {joint.name: number for joint, number in zip(link.joints, numbers, strict=True)}
             sliders += ({"value": float(value.plain)} | _picked(joint, SLIDER_KEYS)
                         for joint, value in zip(link.joints, known, strict=True))  # fmt: skip
-    places = {joint.name: number for number, joint in enumerate(joints)}
-    for joint, slider in zip(joints, sliders, strict=True):
-        if joint.mimic is not None and joint.mimic.joint in places:
-            slider["mimic"] = [places[joint.mimic.joint], joint.mimic.multiplier, joint.mimic.offset]
+    for slider in sliders:
+        mimic = slider.pop("mimic")
+        if mimic is not None and mimic.joint in places:
+            slider["mimic"] = [places[mimic.joint], mimic.multiplier, mimic.offset]
     return {"joints": sliders, "links": moved}
 
 
@@ -244,15 +244,11 @@ def _drawn_solids(scene: FrameScene, solids: Sequence[Solid]) -> dict[str, Any]:
         ends[track.parent].append(track.components[:3])
     lengths = sorted(filter(None, (math.hypot(*end) for held in ends.values() for end in held)))
     least = MESH_PART * (lengths[len(lengths) // 2] if lengths else 1.0)
-    found = []
-    for each in solids:
-        if each.frame not in ends:
-            continue
-        shape = {}
-        if each.kind == "mesh":
-            extents = [(min(column), max(column)) for column in zip(*ends[each.frame], strict=True)]
+    found = [each._asdict() | {"frame": scene.index[each.frame]} for each in solids if each.frame in ends]
+    for each in found:
+        if each["kind"] == "mesh":
+            extents = [(min(column), max(column)) for column in zip(*ends[scene.names[each["frame"]]], strict=True)]
             centre = [(low + high) / 2.0 for low, high in extents]
             size = [max(high - low, least) for low, high in extents]
-            shape = {"kind": "box", "size": size, "pose": [*centre, *IDENTITY[3:]]}
-        found.append(each._asdict() | shape | {"frame": scene.index[each.frame]})
+            each |= {"kind": "box", "size": size, "pose": [*centre, *IDENTITY[3:]]}
     return {"solids": found, "meshes": sum(each.kind == "mesh" for each in solids)}

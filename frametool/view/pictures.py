@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import math
 import os
+import struct
 import warnings
 from base64 import b64decode, b64encode
 from hashlib import sha256
@@ -130,7 +131,7 @@ image {image-orientation: none}
 def write_svg(picture: Picture, more: str = "") -> str:
     """Return the picture as an SVG document; more: elements drawn below it."""
     rule = ".{name} {{fill: {colour}}} .{name}-line {{stroke: {colour}}}\n".format
-    light, dark = ("".join(rule(name=name, colour=PALETTE[name][scheme]) for name in PALETTE) for scheme in (0, 1))
+    light, dark = ("".join(rule(name=name, colour=each[scheme]) for name, each in PALETTE.items()) for scheme in (0, 1))
     style = f"<style>\n{SHARED}{light}@media (prefers-color-scheme: dark) {{\n{dark}}}\n</style>\n"
     return svg_element(picture, f'{style}<rect class="paper" width="100%" height="100%"/>\n{more}')
 
@@ -424,12 +425,12 @@ def read_shot(path: str) -> SvgElement:
     with opened(path) as file:
         data = file.read()
     if data.startswith(PNG) and len(data) > 24:
-        width, height = (int.from_bytes(data[begin : begin + 4], "big") for begin in (16, 20))
+        width, height = struct.unpack_from(">II", data, 16)
         return _image(width, height, "png", data)
     at = 2 if data.startswith(JPEG) else len(data)
     while at + 9 < len(data) and data[at] == 0xFF:
         if data[at + 1] in FRAMES:
-            height, width = (int.from_bytes(data[begin : begin + 2], "big") for begin in (at + 5, at + 7))
+            height, width = struct.unpack_from(">HH", data, at + 5)
             return _image(width, height, "jpeg", data)
         is_filled = data[at + 1] == 0xFF  # before a marker there may be more of its first byte
         at += 1 if is_filled else 2 + int.from_bytes(data[at + 2 : at + 4], "big")

@@ -62,8 +62,7 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
         rows.append([style.number(value + 0.0) for value in numbers])
     text = "".join(f"{'  '.join(cells)}  {frame}\n" for cells, frame in zip(_aligned(rows), frames, strict=True))
     if len(rows) == 1 and record.get("frame") in EARTH_FRAMES and style.place is None and "point" in record:
-        lines = list(_earth_lines(Pose(tuple(record["point"]), parent=record["frame"])))
-        text += _layout(lines, style) if lines else ""
+        text += _layout([*_earth_lines(Pose(tuple(record["point"]), parent=record["frame"]))], style)
     return text
 
 
@@ -211,7 +210,7 @@ def _layout(lines: Sequence[NumberLine], style: Style, label: int = 0) -> str:
 
     label: width of the labels, at least
     """
-    label, width = max(label, *(len(line.label) for line in lines)), get_terminal_size((WIDTH, 0)).columns
+    label, width = max([label, *(len(line.label) for line in lines)]), get_terminal_size((WIDTH, 0)).columns
     texts = _columns(lines, label, style)
     begins = [at for at, line in enumerate(lines) if at and line.label]
     if begins and max(map(len, texts)) > width:
@@ -277,7 +276,7 @@ def _block(result: Result, style: Style) -> str:
     stamp_ns, components = result.extras.get("stamp_ns"), result.pose.components
 
     def fixed(values: Sequence[float]) -> list[str]:
-        return [f"{round(value, decimals) + 0.0:.{decimals}f}" for value in values]  # no minus before a zero
+        return [f"{value:z.{decimals}f}" for value in values]
 
     lines = ["At any time: the frames stand still" if stamp_ns is None else f"At time {format_stamp(stamp_ns)}"]
     lines.append(f"- Translation: [{', '.join(fixed(components[:3]))}]")

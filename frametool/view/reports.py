@@ -85,7 +85,7 @@ def fixed(value: float | None, decimals: int) -> str:
     if value is None:
         return "-"
     is_plain = abs(value) < NOTHING or 0.5 * 10.0**-decimals <= abs(value) < LARGE
-    return f"{round(value, decimals) + 0.0:.{decimals}f}" if is_plain else f"{value:.1e}"
+    return f"{value:z.{decimals}f}" if is_plain else f"{value:.1e}"
 
 
 DEEPEST = 1000  # levels; the lines of a drawing grow with its depth
@@ -139,14 +139,14 @@ def write_report(entries: Sequence[dict[str, Any]]) -> str:
     keys = [key for key in entries[0] if key not in HIDDEN]
     shown = [key for key in keys if any(entry[key] or (entry[key] == 0 and key not in RARE) for entry in edges)]
     rows = [[HEADINGS.get(key, key) for key in shown], *([_cell(key, entry) for key in shown] for entry in edges)]
-    sentences = [*(_motion(entry) for entry in edges if entry["length_m"])]
-    sentences += (_chain(entry) for entry in entries if entry["kind"] == "chain")
-    return "".join([columns(rows, [key in ("parent", "topics") for key in shown]), *sentences])
+    sentences = [_motion(entry) for entry in edges if entry["length_m"]]
+    chains = [_chain(entry) for entry in entries if entry["kind"] == "chain"]
+    return "".join([columns(rows, [key in ("parent", "topics") for key in shown]), *sentences, *chains])
 
 
 def trouble(entries: Sequence[dict[str, Any]]) -> tuple[str, ...]:
     """Return the patterns that highlight problems in a report; each group is named by its colour."""
-    bad = [re.escape(_edge(entry)) for entry in entries if entry["jumps"] or entry["backward"]]
+    bad = (re.escape(_edge(entry)) for entry in entries if entry["jumps"] or entry["backward"])
     rows = (rf"(?m)^(?P<red>{edge} .*)$" for edge in bad)
     return *rows, r"(?m)(?P<magenta>\b[1-9]\d* gaps?)$", r"(?P<red>share no time)"
 

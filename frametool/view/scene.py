@@ -188,12 +188,10 @@ def can_be_drawn(point: Sequence[float]) -> bool:
 
 def _in_order(tree: Frames) -> list[str]:
     """Return the frames in depth-first order, by the first parents."""
-    children: dict[str | None, list[str]] = {}
-    for name in tree.frames:
-        track = tree.track(name)
-        children.setdefault(None if track is None else next(track.walk())[1], []).append(name)
-    order: list[str] = []
-    waiting = children.get(None, [])[::-1]
+    children: dict[str, list[str]] = {}
+    for track in tree.tracks():
+        children.setdefault(next(track.walk())[1], []).append(track.child)
+    order, waiting = [], [*reversed(tree.roots)]
     while waiting:
         order.append(waiting.pop())
         waiting += reversed(children.get(order[-1], []))
@@ -446,8 +444,9 @@ class Labels:
     def _cells(self, box: Box) -> Iterator[tuple[int, int]]:
         """Return the cells that a box covers; a point covers one."""
         (wide, high), (left, top, right, bottom) = self._size.cell, box
-        across = range(math.floor(left / wide), max(math.ceil(right / wide), math.floor(left / wide) + 1))
-        return product(across, range(math.floor(top / high), max(math.ceil(bottom / high), math.floor(top / high) + 1)))
+        spans = ((int(left // wide), math.ceil(right / wide)), (int(top // high), math.ceil(bottom / high)))
+        across, down = (range(begin, max(end, begin + 1)) for begin, end in spans)
+        return product(across, down)
 
 
 def text_width(words: str, size: float = 12.0) -> float:
