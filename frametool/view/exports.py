@@ -22,24 +22,25 @@ from zlib import compress
 
 from frametool import __version__
 from frametool.formats.robots.model import JointValue
+from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry.rigid import IDENTITY
 from frametool.sim.turtle import single
-from frametool.view.pictures import page_file, write_html
-from frametool.view.scene import Projection, can_be_drawn
+from frametool.view.pictures import PALETTE, page_file, write_html
+from frametool.view.scene import EYES, FrameScene, Projection, can_be_drawn
 from frametool.view.stills import SIZE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from frametool.formats.robots.model import Solid
     from frametool.frames.track import MovingTrack
     from frametool.geometry.types import Rigid
-    from frametool.view.scene import FrameScene
+    from frametool.sim.simulate import SimulationStep
 
 
 THICK = 0.02  # half the width of a bar, where its length is 1
-COLOURS = ((217, 45, 32, 255), (18, 135, 61, 255), (26, 95, 208, 255))
+COLOURS = [(*bytes.fromhex(PALETTE[axis][0][1:]), 255) for axis in "xyz"]
 SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))  # of a box, outwards
 Z_UP = (-0.7071067811865476, 0.0, 0.0, 0.7071067811865476)
 COMPONENTS = {"f": 5126, "H": 5123, "B": 5121}
@@ -202,6 +203,17 @@ def _packed(letter: str, numbers: Iterable[float]) -> bytes:
     """Return numbers of a type of the module struct as bytes, little-endian."""
     found = [*numbers]
     return struct.pack(f"<{len(found)}{letter}", *found)
+
+
+def run_page() -> tuple[Callable[[SimulationStep], None], Callable[[], str]]:
+    """Return what collects the transforms of a run by steps, and what then makes a page of them, seen from above."""
+    buffer = TransformBuffer(name="run")
+
+    def watch(step: SimulationStep) -> None:
+        for stamp_ns, parent, child, transform in step.broadcasts:
+            buffer.insert(parent, child, transform, stamp_ns)
+
+    return watch, lambda: write_page(FrameScene(buffer), title="turtles", file="tf.yaml", eye=EYES["top"])
 
 
 SLIDER_KEYS = ("name", "kind", "axis", "anchor", "rest", "lower", "upper", "mimic")

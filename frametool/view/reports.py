@@ -40,8 +40,7 @@ def columns(rows: Sequence[Sequence[str]], left: Sequence[bool]) -> str:
     """
     width = max(WIDTH, get_terminal_size((WIDTH, 0)).columns)
     widths = [max(map(cells, column)) for column in zip(*rows, strict=True)]
-    numeric = widths[1:-1] if left[-1] else widths[1:]
-    room = width - sum(2 + size for size in numeric if size)
+    room = width - sum(2 + size for size in (widths[1:-1] if left[-1] else widths[1:]) if size)
     widths[0] = max((cells(row[0]) for row in rows if cells(row[0]) <= room), default=0)
     lines = []
     for first, *others in rows:

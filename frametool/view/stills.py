@@ -7,16 +7,15 @@ from base64 import b64encode
 from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.sax.saxutils import escape
 
-from frametool.frames.buffer import TransformBuffer
 from frametool.frames.lookups import Frames
 from frametool.frames.stamps import BILLION
 from frametool.sim.turtle import SIZE as WORLD
 from frametool.view.pictures import ChartLine, Picture, box, dot, line, shade_of, stacked, words, write_svg
-from frametool.view.scene import EYES, SLANTED, FrameScene, Labels, Projection, Size, nice, text_width
+from frametool.view.scene import SLANTED, FrameScene, Labels, Projection, Size, nice, text_width
 from frametool.view.terminal import BACKGROUND, ON_WHITE, colours_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from frametool.geometry.types import Rigid
     from frametool.sim.scene import Scene
@@ -29,7 +28,6 @@ PIECES, LAST_SHADE = 24, 0.85  # of a trail, from dark when it begins to a green
 WIDTH, HEIGHT = 1000.0, 700.0
 SIZE = Size(WIDTH, HEIGHT, margin=70.0, axes=(14.0, 46.0), cell=(4, 4), line=16.0, measure=text_width)
 CORNER = 46.0  # pixels from the corner to the little axes
-AXES = ("x", "y", "z")
 
 
 def still_picture(
@@ -68,7 +66,7 @@ def still_picture(
 def _frame(flat: Projection, name: str) -> Iterator[SvgElement]:
     """Draw the axes of a frame, the nearest last."""
     x, y, _ = flat.origins[name]
-    yield from (line([(x, y), tip[:2]], AXES[axis], 2.0, title=name) for axis, tip in flat.axes(name))
+    yield from (line([(x, y), tip[:2]], "xyz"[axis], 2.0, title=name) for axis, tip in flat.axes(name))
     yield dot(x, y, 2.2, "ink", name)
 
 
@@ -83,7 +81,7 @@ def _trail(frame: str, stretches: Sequence[Sequence[Point]]) -> Iterator[SvgElem
 def _other(flat: Projection, name: str, pose: Rigid) -> Iterator[SvgElement]:
     """Draw a frame's pose in the other tree, and a line to it."""
     x, y, _ = flat.at(pose[:3])
-    for axis, tip in zip(AXES, flat.tips(pose), strict=True):
+    for axis, tip in zip("xyz", flat.tips(pose), strict=True):
         yield line([(x, y), tip[:2]], axis, 2.0, 0.4, title=name)
     yield line([flat.origins[name][:2], (x, y)], "trail", 1.5)
 
@@ -103,8 +101,8 @@ def _corner(flat: Projection) -> Iterator[SvgElement]:
     right, up, toward = flat.view
     for axis in sorted(range(3), key=lambda axis: toward[axis]):
         dx, dy = right[axis], -up[axis]
-        yield line([(x, y), (x + 28.0 * dx, y + 28.0 * dy)], AXES[axis], 2.0)
-        yield words(x + 38.0 * dx, y + 38.0 * dy, AXES[axis], AXES[axis], "middle", weight="bold")
+        yield line([(x, y), (x + 28.0 * dx, y + 28.0 * dy)], "xyz"[axis], 2.0)
+        yield words(x + 38.0 * dx, y + 38.0 * dy, "xyz"[axis], "xyz"[axis], "middle", weight="bold")
 
 
 def _scale(flat: Projection, step: float) -> Iterator[SvgElement]:
@@ -210,19 +208,6 @@ def _window(drawing: Drawing, colours: dict[str, str]) -> Iterator[SvgElement]:
             yield dot(across, down, radius + 1.0, "#333333")
             yield dot(across, down, radius, colours[name])
         yield words(x, y - 24.0, name, "#ffffff", "middle")
-
-
-def run_page() -> tuple[Callable[[SimulationStep], None], Callable[[], str]]:
-    """Return what collects the transforms of a run by steps, and what then makes a page of them, seen from above."""
-    from frametool.view.exports import write_page
-
-    buffer = TransformBuffer(name="run")
-
-    def watch(step: SimulationStep) -> None:
-        for stamp_ns, parent, child, transform in step.broadcasts:
-            buffer.insert(parent, child, transform, stamp_ns)
-
-    return watch, lambda: write_page(FrameScene(buffer), title="turtles", file="tf.yaml", eye=EYES["top"])
 
 
 def html_of(value: Any) -> str | None:

@@ -142,7 +142,7 @@ class SimOutput:
             run, suffix = Drawing(scene), suffix_of(self.plot)
             pictures[self.plot] = run.watch, lambda: write_picture(run_picture(run), suffix)
         if self.view:
-            from frametool.view.stills import run_page
+            from frametool.view.exports import run_page
 
             pictures[self.view] = run_page()
         return pictures
