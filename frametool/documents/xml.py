@@ -10,7 +10,7 @@ import re
 from typing import TYPE_CHECKING
 from xml.parsers import expat
 
-from frametool.documents.source import MOST_CHARACTERS, Source, line_of, not_text, pointer
+from frametool.documents.source import MOST_CHARACTERS, InputFile, Source, line_of, not_text, pointer
 from frametool.errors import FileProblem, FormatError, bare, shown
 from frametool.text.numbers import parse_number
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import NoReturn
 
-    from frametool.documents.source import InputFile
 
 DEEPEST_ELEMENT = 100_000
 _BLOCK = 1 << 16

@@ -9,13 +9,12 @@ from frametool.errors import ValueInvalid, shown, warn
 from frametool.frames import topology
 from frametool.frames.lookups import Frames, taken
 from frametool.frames.stamps import FURTHEST_NS, format_stamp, whole_stamp
-from frametool.frames.track import MovingTrack, StaticTransform
+from frametool.frames.track import MovingTrack, StaticTransform, Track
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
-    from frametool.frames.track import Track
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Rigid
 

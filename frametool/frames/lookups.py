@@ -18,7 +18,7 @@ from frametool.frames import topology
 from frametool.frames.path import Query, left_out, no_data
 from frametool.frames.stamps import BILLION, FURTHEST_NS, whole_stamp
 from frametool.frames.topology import Groups, edges_between, to_root
-from frametool.frames.track import StaticTransform
+from frametool.frames.track import StaticTransform, Track
 from frametool.geometry import rigid
 from frametool.geometry.rigid import IDENTITY
 from frametool.geometry.transform import Transform
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from typing import Any
 
     from frametool.errors import LookupFailed
-    from frametool.frames.track import Track
     from frametool.geometry.camera import Camera
     from frametool.geometry.types import Components, Rigid
 

@@ -10,7 +10,7 @@ from operator import attrgetter
 
 from frametool.errors import NoDataAt, TooEarly, TooLate, bare
 from frametool.frames.stamps import BILLION, format_stamp
-from frametool.frames.track import StaticTransform
+from frametool.frames.track import MovingTrack, StaticTransform, Track
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import EARTH_FRAMES
 from frametool.geometry.rigid import IDENTITY
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from typing import TypeVar
 
     from frametool.frames.edge_log import EdgeLog
-    from frametool.frames.track import MovingTrack, Track
     from frametool.geometry.types import Rigid
 
     Edge = TypeVar("Edge")

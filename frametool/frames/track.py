@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Rigid
 
     Way: TypeAlias = tuple[float, float, float, float, float, float, float, float]
-    Track: TypeAlias = "StaticTransform | MovingTrack"  # of one child frame; `is_static` distinguishes them
 
 MANY = 1 << 13  # from this many samples per call on they are packed
 FEW = 64  # late samples: up to this many are inserted one by one, which is cheaper than a sort
@@ -295,3 +294,6 @@ class MovingTrack:
             self.table = TrackTable(self)
         found: Rigid = self.table.at(times)
         return found
+
+
+Track = StaticTransform | MovingTrack  # of one child frame; `is_static` distinguishes them

@@ -6,16 +6,14 @@ from itertools import repeat
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from frametool.errors import Finding, listing, shown
-from frametool.grammar.readers import is_slashed, slash_note
+from frametool.errors import Finding, FormatError, listing, shown
+from frametool.grammar.readers import Path, is_slashed, slash_note
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-    from frametool.errors import FormatError
     from frametool.geometry.types import Components, Rigid
-    from frametool.grammar.readers import Path
 
     Report = Callable[[FormatError], None]
 

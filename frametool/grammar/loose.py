@@ -13,12 +13,11 @@ from frametool.errors import bare
 from frametool.geometry.representations import RPY
 from frametool.grammar.names import COLUMN_WORDS
 from frametool.grammar.pose import POSE_KEYS, POSITION_WORDS, ROTATION_WORDS, Pose, is_position, own_key, read_pose
-from frametool.grammar.readers import Misfit, Reading, Unclear, kind, within
+from frametool.grammar.readers import Misfit, Path, Reading, Unclear, kind, within
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from frametool.grammar.readers import Path
 
 _POSITIONS = (*POSITION_WORDS, "translation", "position", "location")
 _TURNS = (*(word for word, meant in ROTATION_WORDS.items() if not meant), "q", "quaternion")

@@ -16,13 +16,12 @@ import re
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from frametool.errors import ValueInvalid, shown
-from frametool.geometry.representations import notation
+from frametool.geometry.representations import Notation, notation
 from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.geometry.representations import Notation
 
 Rows: TypeAlias = "list[list[str]]"
 

@@ -20,14 +20,13 @@ from frametool.geometry.earth import NORTH, SOUTH, ZONES, standard_zone, utm, zo
 from frametool.geometry.place import ECEF, ENU, GRID, GRIDDED, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place, Spot
 from frametool.geometry.representations import HEADING, POSITIONS
 from frametool.grammar.names import EARTH_FRAMES, FLAT
-from frametool.grammar.readers import AXES_KEY, Misfit, Reading, kind, read_number, read_numbers, within
+from frametool.grammar.readers import AXES_KEY, Misfit, Quaternion, Reading, kind, read_number, read_numbers, within
 from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.grammar.pose import Pose
-    from frametool.grammar.readers import Quaternion
 
 AT = "at"
 # names of other tools; those after the first two count only together with these

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import Finding, Unanswered, ValueInvalid, shown, warn
+from frametool.errors import Finding, FormatError, Unanswered, ValueInvalid, shown, warn
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.documents.source import Source
-    from frametool.errors import FormatError
     from frametool.geometry.place import Earth
 
-    Path = tuple[str | int, ...]
-    Vector = tuple[float, float, float]
-    Quaternion = tuple[float, float, float, float]
 
+
+Path = tuple[str | int, ...]  # keys and indices that lead to a value
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
 
 AXES_KEY = "axes"  # a constant rotation by name instead of numbers; the axes at a position on the Earth
 NAME_KEYS = ("child_frame_id", "child_frame", "child", "name")  # the frame whose pose it is

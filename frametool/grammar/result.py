@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.geometry import euler, floats, quaternion, rigid
-from frametool.geometry.representations import EARTH_FRAMES, notation
+from frametool.geometry.representations import EARTH_FRAMES, Notation, notation
 from frametool.grammar.pose import NAMES, SCALE, Pose, notation_of
-from frametool.grammar.readers import AXES_KEY
+from frametool.grammar.readers import AXES_KEY, Quaternion
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -23,10 +23,8 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import Frames
     from frametool.frames.track import MovingTrack
     from frametool.geometry.place import Place
-    from frametool.geometry.representations import Notation
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Rigid, Three
-    from frametool.grammar.readers import Quaternion
 
 INFINITE = float("inf")
 ROUNDED_TO_ZERO = 1e-12  # below it, on a screen

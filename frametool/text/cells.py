@@ -8,14 +8,11 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from frametool.text.spans import MARGIN, Spans, framed
-
-if TYPE_CHECKING:
-    from frametool.text.spans import Bytes, Flags, Ints
+from frametool.text.spans import MARGIN, Bytes, Flags, Ints, Spans, framed
 
 _NOTHING_HIDDEN: Flags = np.empty(0, np.bool_)
 _CLOSING_QUOTE = re.compile(rb'(?:[^"]++|"")*+"')

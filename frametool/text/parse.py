@@ -11,13 +11,13 @@ from __future__ import annotations
 import math
 import re
 from decimal import Decimal
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from frametool.frames.stamps import BILLION
 from frametool.text.numbers import half_unit
-from frametool.text.spans import Spans, windows
+from frametool.text.spans import Bytes, Flags, Floats, Ints, Spans, Words, windows
 from frametool.text.write import (
     LEAST_POWER,
     TENS,
@@ -31,9 +31,6 @@ from frametool.text.write import (
     read_eight_digits,
     shortest_decimals,
 )
-
-if TYPE_CHECKING:
-    from frametool.text.spans import Bytes, Flags, Floats, Ints, Words
 
 _NUMBER = re.compile(rb"[ \t]*[+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]+)?[ \t]*")
 _MOST_WORDS = 3

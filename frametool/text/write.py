@@ -21,12 +21,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.text.spans import MARGIN, Spans, framed
+from frametool.text.spans import MARGIN, Bytes, Flags, Floats, Ints, Spans, Words, framed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.text.spans import Bytes, Flags, Floats, Ints, Words
 
 _SPLITTER = 134217729.0
 # beyond these exponents a product or its error leaves the range of normal floats

@@ -25,7 +25,7 @@ from frametool.formats.rows.csv import LineCell, split_line
 from frametool.formats.trees.tree_reader import line_error
 from frametool.geometry import euler, floats, rigid
 from frametool.geometry.rigid import IDENTITY
-from frametool.grammar.readers import kind
+from frametool.grammar.readers import Path, kind
 from frametool.text.numbers import LENGTHS, NotFinite, parse_angle, parse_length, parse_number
 
 if TYPE_CHECKING:
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.grammar.edges import Diagnostics, Edge, Options
-    from frametool.grammar.readers import Path
 
     Fail = Callable[[str], FormatError]
     # the name of a column or key as written, the value, and the error for its place

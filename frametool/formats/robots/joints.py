@@ -40,7 +40,7 @@ from frametool.formats.trees.tree_reader import read_time
 from frametool.frames.stamps import SUFFIXES, format_stamp, parse_stamp
 from frametool.geometry import floats, rigid
 from frametool.grammar.edges import Diagnostics, Edge, Options
-from frametool.grammar.readers import Misfit, as_mapping
+from frametool.grammar.readers import Misfit, Path, as_mapping
 from frametool.ros import messages
 from frametool.ros.message_stream import TextMessage, line_texts, read_messages
 from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS, parse_number
@@ -50,7 +50,6 @@ if TYPE_CHECKING:
 
     from frametool.formats.robots.model import Value
     from frametool.geometry.types import Rigid
-    from frametool.grammar.readers import Path
 
     Series = Mapping[int | None, Value]
 

@@ -20,7 +20,7 @@ from operator import and_
 from typing import Any, NamedTuple, TypeAlias
 
 from frametool.documents.document import parse_documents
-from frametool.documents.source import Source
+from frametool.documents.source import InputFile, Source
 from frametool.errors import FormatError, UnknownFrame, ValueInvalid, alternatives, listing, shown
 from frametool.formats.table import FORMATS
 from frametool.frames.topology import edges_between
@@ -31,18 +31,16 @@ from frametool.geometry.rigid import IDENTITY
 from frametool.geometry.transform import Transform
 from frametool.geometry.validation import as_numbers, scalars, single
 from frametool.grammar.pose import read_pose, rotation_of
-from frametool.grammar.readers import INDICES, Misfit, Reading, as_mapping, kind
+from frametool.grammar.readers import INDICES, Misfit, Quaternion, Reading, Vector, as_mapping, kind
 from frametool.text.numbers import parse_angle, parse_length
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
-    from frametool.documents.source import InputFile
     from frametool.documents.xml import Element
     from frametool.geometry.types import Components, Condition, Namespace, Number, Numbers, Rigid
     from frametool.grammar.edges import Options
-    from frametool.grammar.readers import Quaternion, Vector
 
     Value: TypeAlias = "JointValue | Rigid"
     Values: TypeAlias = Mapping[str, Value]

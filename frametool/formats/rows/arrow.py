@@ -19,7 +19,7 @@ import numpy as np
 
 from frametool import sizes
 from frametool.documents.json import dump
-from frametool.documents.source import Verbatim
+from frametool.documents.source import InputFile, Verbatim
 from frametool.errors import FileProblem, ValueInvalid, shown, warn
 from frametool.formats.rows import column_file
 from frametool.frames.stamps import SUFFIXES
@@ -28,7 +28,6 @@ from frametool.text.parse import nanoseconds_of
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Kind, Made, OutColumn
     from frametool.grammar.result import Style
     from frametool.text.spans import Flags, Ints

@@ -23,11 +23,11 @@ from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
 from frametool.formats.rows import column_file
 from frametool.formats.table import FORMATS
 from frametool.grammar.names import NORMALS
-from frametool.text.cells import split_blank
+from frametool.text.cells import Cells, split_blank
 from frametool.text.lines import read_blocks
 from frametool.text.numbers import explain_number
 from frametool.text.parse import parse_floats
-from frametool.text.spans import MARGIN, Spans, framed, join
+from frametool.text.spans import MARGIN, Ints, Spans, framed, join
 from frametool.text.write import fixed_spans, rounded_to_single, shortest_spans
 
 if TYPE_CHECKING:
@@ -37,8 +37,6 @@ if TYPE_CHECKING:
     from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Kind, Made, OutColumn
     from frametool.grammar.result import Style
-    from frametool.text.cells import Cells
-    from frametool.text.spans import Ints
 
 Code = TypeVar("Code")
 

@@ -21,7 +21,7 @@ from weakref import finalize
 
 import numpy as np
 
-from frametool.documents.source import Verbatim
+from frametool.documents.source import InputFile, Verbatim
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, printable, shown
 from frametool.frames.stamps import SUFFIXES, nanoseconds_each, tell_size
 from frametool.text.parse import nanoseconds_of
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from frametool.documents.source import InputFile
     from frametool.geometry.types import Components
     from frametool.grammar.result import Style
     from frametool.text.spans import Flags, Floats, Ints

@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid
 from frametool.grammar.pose import NAMES
-from frametool.grammar.result import NoResult, Result, in_columns, pose_numbers, without_frame
+from frametool.grammar.result import NoResult, Result, Style, in_columns, pose_numbers, without_frame
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from frametool.grammar.result import Style
 
 
 PLAIN = ("point", "vector", "xyz")  # whose numbers are x, y, z

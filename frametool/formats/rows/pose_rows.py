@@ -35,23 +35,20 @@ from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import format_error, lines, parse_documents
-from frametool.documents.source import read_text
+from frametool.documents.source import InputFile, read_text
 from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
 from frametool.formats.table import FORMATS, Poses
 from frametool.frames.stamps import BILLION, format_stamp, parse_stamp, whole_stamp
 from frametool.geometry import euler, floats, quaternion, rigid
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Samples
-from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
+from frametool.grammar.edges import Options, Samples
+from frametool.grammar.readers import Misfit, Path, as_mapping, kind, read_numbers, within
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from frametool.documents.source import InputFile
     from frametool.geometry.types import Components
-    from frametool.grammar.edges import Options
-    from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
 
 

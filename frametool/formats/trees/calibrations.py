@@ -47,16 +47,14 @@ from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.loose import WORDS, read_loose_pose
 from frametool.grammar.pose import read_angle_unit, read_rotation
-from frametool.grammar.readers import Misfit, Reading, Unclear, as_mapping, kind, read_numbers, within
-from frametool.grammar.result import angles_of, static_edges
+from frametool.grammar.readers import Misfit, Path, Reading, Unclear, as_mapping, kind, read_numbers, within
+from frametool.grammar.result import Style, angles_of, static_edges
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
-    from frametool.grammar.readers import Path
-    from frametool.grammar.result import Style
 
 ANGLES = (*XYZ, "roll", "pitch", "yaw")
 QUATERNION = (*XYZ, "qx", "qy", "qz", "qw")

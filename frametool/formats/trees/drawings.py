@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 from frametool.frames.edge_log import CacheEntry, cache_entries, listed_motion
 from frametool.geometry.rigid import IDENTITY
-from frametool.grammar.edges import Edge
+from frametool.grammar.edges import Edge, Options
 from frametool.grammar.result import Style, edge_label, graphviz
 
 if TYPE_CHECKING:
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.frames.lookups import Frames
-    from frametool.grammar.edges import Options
 
 _WORD = r"""("(?:[^"\\]|\\.)*+"|[A-Za-z_\d./]++)"""
 _ARROW = rf"""{_WORD}\s*->\s*(?={_WORD}\s*(\[(?:[^\]"]|"(?:[^"\\]|\\.)*+")*+\])?)"""

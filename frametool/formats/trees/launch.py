@@ -25,8 +25,8 @@ from frametool.documents.document import format_error, locate_many, parse_docume
 from frametool.documents.xml import Element, read_xml
 from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.formats.detect import Beginning
-from frametool.grammar.readers import Misfit, kind
-from frametool.grammar.result import refuse_motion
+from frametool.grammar.readers import Misfit, Path, kind
+from frametool.grammar.result import Style, refuse_motion
 from frametool.ros import publisher
 from frametool.ros.publisher import CALL
 
@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from frametool.documents.source import InputFile, Source
     from frametool.frames.lookups import Frames
     from frametool.grammar.edges import Edge, Options
-    from frametool.grammar.readers import Path
-    from frametool.grammar.result import Style
 
 PACKAGES = ("tf", "tf2_ros")
 COMPOSABLE = "tf2_ros::StaticTransformBroadcasterNode"

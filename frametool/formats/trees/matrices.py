@@ -23,14 +23,13 @@ from frametool.geometry import floats, rigid
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Answers, Edge
 from frametool.grammar.pose import AGREEMENT, rotation_of
-from frametool.grammar.readers import Misfit, Reading, Unclear, kind, read_numbers
+from frametool.grammar.readers import Misfit, Path, Quaternion, Reading, Unclear, kind, read_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.readers import Path, Quaternion
 
 # pattern of the key, target, source; <a> and <b> are names in it, {..} are named by the file or the user:
 # {me} the block of the key, {before} the camera before it, {imu} {body} the common reference frame

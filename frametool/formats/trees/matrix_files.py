@@ -45,8 +45,8 @@ from frametool.formats.trees.matrices import (
 from frametool.formats.trees.tree_reader import document_edges, dotted, named, remember
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.pose import read_spelled
-from frametool.grammar.readers import Misfit, Reading, Unclear, answerable, as_mapping, kind, within
-from frametool.grammar.result import rows_of, static_edges
+from frametool.grammar.readers import Misfit, Path, Reading, Unclear, answerable, as_mapping, kind, within
+from frametool.grammar.result import Style, rows_of, static_edges
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -54,8 +54,6 @@ if TYPE_CHECKING:
     from frametool.documents.source import InputFile
     from frametool.frames.lookups import Frames
     from frametool.grammar.edges import Answers, Edge, Options
-    from frametool.grammar.readers import Path
-    from frametool.grammar.result import Style
 
 DEEPEST = 100  # elements
 BLOCK_NAMES = {"cameras": "cam", "imu_params": "imu", "imu_parameters": "imu"}  # of okvis

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.document import locate_many, parse_documents
+from frametool.documents.document import Document, locate_many, parse_documents
 from frametool.documents.source import InputFile, Source, pointer
 from frametool.errors import Finding, FormatError, ValueInvalid, alternatives, bare, first_of, shown
 from frametool.frames.stamps import parse_stamp
@@ -31,16 +31,14 @@ from frametool.grammar.pose import (
     read_name,
     read_pose,
 )
-from frametool.grammar.readers import AXES_KEY, Misfit, Reading, Unclear, as_mapping, kind, tell, within
+from frametool.grammar.readers import AXES_KEY, Misfit, Path, Reading, Unclear, as_mapping, kind, tell, within
 from frametool.ros import messages
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 
-    from frametool.documents.document import Document
     from frametool.geometry.place import Earth
-    from frametool.grammar.readers import Path
 
     Take = Callable[[Any, Reading], Iterable[Edge]]
 
