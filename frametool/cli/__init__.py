@@ -35,8 +35,8 @@ def run(arguments: list[str]) -> int:
     from frametool.cli.commands import TROUBLE
     from frametool.cli.signals import die_of
     from frametool.cli.sink import TROUBLES, discard, say, say_warning, words_of
-    from frametool.documents.source import DEEPEST
     from frametool.errors import heard_by
+    from frametool.sizes import DEEPEST
 
     own = TROUBLE.get(arguments[0] if arguments else "")
     in_out = own or IN_OUT

@@ -12,26 +12,14 @@ import re
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
+from frametool import sizes
 from frametool.documents.json import json_events, looks_like_json, parse_json
-from frametool.documents.source import (
-    END,
-    LEAF,
-    MAP,
-    MOST_CHARACTERS,
-    UTF16,
-    Source,
-    check_text,
-    decode,
-    error_at,
-    find_marks,
-    mark_of,
-    places_of,
-)
+from frametool.documents.source import END, LEAF, LIST, MAP, UTF16, Source, check_text, decode, error_at, places_of
 from frametool.errors import FormatError
 from frametool.text.numbers import odd_characters
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
     from typing import BinaryIO
 
     from frametool.documents.source import Event, Path
@@ -97,6 +85,45 @@ def locate_many(text: str, paths: Sequence[Path], *, key: bool = False) -> list[
 def _offsets(text: str, paths: Sequence[Path], *, key: bool) -> list[int]:
     found = find_marks(events_of(text), paths) if paths else {}
     return [mark_of(path, found, key=key) for path in paths]
+
+
+def find_marks(events: Iterable[Event], paths: Sequence[Path]) -> dict[Path, tuple[int, int]]:
+    """Iterate over the events of a text and store the offsets of keys and values on the paths.
+
+    A path is (document, key or index, ...).  Returns (offset of the key, offset of the value) for each path and each
+    of its prefixes that the text has; in a list both are the value's.  The first of equal keys counts.
+    """
+    wanted = {path[:length] for path in paths for length in range(1, len(path) + 1)}
+    found: dict[Path, tuple[int, int]] = {}
+    outer: list[tuple[Path, str | int | None]] = []
+    path: Path = ()
+    step: str | int | None = 0  # the next index or key; None when a key is expected
+    key_start = 0
+    for kind, text, start, *_ in events:
+        if kind == END:
+            path, step = outer.pop()
+            continue
+        if step is None:
+            step, key_start = text, start
+            continue
+        here = (*path, step)
+        if here in wanted and here not in found:
+            found[here] = (start if type(step) is int else key_start, start)
+            if len(found) == len(wanted):
+                break
+        step = step + 1 if isinstance(step, int) else None
+        if kind != LEAF:
+            outer.append((path, step))
+            path, step = here, 0 if kind == LIST else None
+    return found
+
+
+def mark_of(path: Path, found: dict[Path, tuple[int, int]], *, key: bool) -> int:
+    """Return the offset of the key or value at a path; if it is missing, that of the nearest enclosing value."""
+    for length in range(len(path), 0, -1):
+        if path[:length] in found:
+            return found[path[:length]][not (key and length == len(path))]
+    return 0
 
 
 def format_error(
@@ -212,7 +239,7 @@ def lines(stream: BinaryIO, name: str, whole: Callable[[bytes], int] | None = No
     from frametool.text.lines import read_blocks, whole_lines
 
     line = 1
-    blocks = read_blocks(cast("ByteStream", stream), whole=whole or whole_lines, longest=MOST_CHARACTERS)
+    blocks = read_blocks(cast("ByteStream", stream), whole=whole or whole_lines, longest=sizes.MOST_CHARACTERS)
     for block in blocks:
         if block.startswith(UTF16):  # which has other line ends
             block += b"".join(blocks)  # noqa: PLW2901

@@ -9,19 +9,8 @@ from __future__ import annotations
 import re
 import sys
 
-from frametool.documents.source import (
-    DEEPEST,
-    END,
-    LEAF,
-    LIST,
-    MAP,
-    MOST_CONTAINERS,
-    Source,
-    Verbatim,
-    error_at,
-    repeated_key,
-    too_much,
-)
+from frametool import sizes
+from frametool.documents.source import END, LEAF, LIST, MAP, Source, Verbatim, error_at, repeated_key, too_much
 from frametool.errors import FormatError
 
 TYPE_CHECKING = False
@@ -71,7 +60,7 @@ def parse_json(source: Source) -> list[Any] | None:
 
 def strict_json(source: Source) -> list[Any]:
     """Return the values of a text that must be JSON; otherwise raises FormatError with the place."""
-    if source.text.count("[") + source.text.count("{") > MOST_CONTAINERS:
+    if source.text.count("[") + source.text.count("{") > sizes.MOST_CONTAINERS:
         raise error_at(source, 0, too_much(0))
     try:
         values = _deeply_decoded(source)
@@ -94,7 +83,7 @@ def strict_json(source: Source) -> list[Any]:
 def _deeply_decoded(source: Source) -> list[Any]:
     """Decode a text, with the stack that json needs for deep nesting within the limit."""
     limit = sys.getrecursionlimit()
-    sys.setrecursionlimit(limit + 4 * DEEPEST)
+    sys.setrecursionlimit(limit + 4 * sizes.DEEPEST)
     try:
         return _decoded(source.text)
     except RecursionError:
@@ -132,10 +121,10 @@ def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _settle(values: list[Any], text: str) -> bool:
-    """Convert booleans to text, level by level; return True if there are at most DEEPEST levels."""
+    """Convert booleans to text, level by level; return True if there are at most sizes.DEEPEST levels."""
     has_words = "true" in text or "false" in text
     level: list[Any] = [values]
-    for _ in range(DEEPEST + 1):
+    for _ in range(sizes.DEEPEST + 1):
         if has_words:
             for outer in level:
                 pairs = outer.items() if type(outer) is dict else enumerate(outer)
@@ -178,8 +167,8 @@ def _depths(text: str) -> Iterator[tuple[int, int]]:
 
 def _too_deep(source: Source) -> FormatError:
     """Return the error for the bracket that exceeds the depth."""
-    at = next((start for depth, start in _depths(source.text) if depth > DEEPEST), 0)
-    return error_at(source, at, too_much(DEEPEST))
+    at = next((start for depth, start in _depths(source.text) if depth > sizes.DEEPEST), 0)
+    return error_at(source, at, too_much(sizes.DEEPEST))
 
 
 def dump(value: Any, number: Callable[[float], str] = repr) -> str:

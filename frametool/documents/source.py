@@ -19,6 +19,7 @@ from functools import cached_property
 from io import BufferedReader, BytesIO, FileIO
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
+from frametool import sizes
 from frametool.errors import LONGEST_NAME, FileProblem, FormatError, cells, shown
 
 if TYPE_CHECKING:
@@ -31,31 +32,15 @@ if TYPE_CHECKING:
     # kind, text of a scalar, start, end, quote of a scalar or bracket of a container ("" for a block), column
     Event: TypeAlias = tuple[int, str, int, int, str, int]
 
-DEEPEST = 990  # levels of lists and maps; a chain of 60 frames has 120, and libyaml reads at most 1000
-# characters or bytes of one file of documents; a million frames have 100 to 600 million
-MOST_CHARACTERS = 1 << 30
-# lists and maps in one text: each needs 64 bytes or more, and 3 characters; a million messages have 6e6
-MOST_CONTAINERS = 10_000_000
-# commas and line ends in one text: each value needs 60 bytes; a million messages on lines have 4e7
-MOST_VALUES = 50_000_000
 MOST_KEPT, MOST_KEPT_BYTES = 32, 1 << 28  # values, and bytes of the files and texts they were read from
 SETTLED_NS = 50_000_000  # a file written just now may change again within one tick of its clock
 
 
-def size_problem(text: str) -> str:
-    """Return in what respect a text is too long; "" if it is not."""
-    if len(text) > MOST_CHARACTERS:
-        return f"longer than {MOST_CHARACTERS} characters, the most in one file; split it"
-    if len(text) > MOST_VALUES and text.count(",") + text.count("\n") > MOST_VALUES:
-        return f"more than {MOST_VALUES} commas and line ends, the most in one file; split it"
-    return ""
-
-
 def too_much(depth: int) -> str:
     """Return which of the two limits is exceeded at a depth."""
-    if depth >= DEEPEST:
-        return f"nested deeper than {DEEPEST} levels"
-    return f"more than {MOST_CONTAINERS} lists and maps in one file; split it"
+    if depth >= sizes.DEEPEST:
+        return f"nested deeper than {sizes.DEEPEST} levels"
+    return f"more than {sizes.MOST_CONTAINERS} lists and maps in one file; split it"
 
 
 HEAD = 1 << 16  # bytes of a file that are inspected before it is read
@@ -219,14 +204,14 @@ def read_text(path: str | PathLike[str], stream: BinaryIO | None = None) -> str:
     name = "stdin" if str(path) == "-" else str(path)
     stream = stream or opened(path)
     try:
-        data = stream.read(MOST_CHARACTERS + 1)
+        data = stream.read(sizes.MOST_CHARACTERS + 1)
     except OSError as error:
         raise FileProblem(f"{name}: {(error.strerror or str(error)).lower()}") from None
     finally:
         if name != "stdin":
             stream.close()
-    if len(data) > MOST_CHARACTERS:
-        raise FormatError(f"longer than {MOST_CHARACTERS} bytes, the most in one file; split it", source=name)
+    if len(data) > sizes.MOST_CHARACTERS:
+        raise FormatError(f"longer than {sizes.MOST_CHARACTERS} bytes, the most in one file; split it", source=name)
     return decode(data, name)
 
 
@@ -281,7 +266,11 @@ def not_text(data: bytes) -> str:
 
 def check_text(source: Source) -> None:
     """Refuse a text that is too long or has halves of surrogate pairs, which no encoding can write."""
-    if problem := size_problem(source.text):
+    if len(source.text) > sizes.MOST_CHARACTERS:
+        problem = f"longer than {sizes.MOST_CHARACTERS} characters, the most in one file; split it"
+        raise FormatError(problem, source=source.name)
+    if len(source.text) > sizes.MOST_VALUES and source.text.count(",") + source.text.count("\n") > sizes.MOST_VALUES:
+        problem = f"more than {sizes.MOST_VALUES} commas and line ends, the most in one file; split it"
         raise FormatError(problem, source=source.name)
     try:
         source.text.encode()
@@ -395,45 +384,6 @@ def paused_collector() -> Iterator[None]:
     finally:
         if enabled:
             gc.enable()
-
-
-def find_marks(events: Iterable[Event], paths: Sequence[Path]) -> dict[Path, tuple[int, int]]:
-    """Iterate over the events of a text and store the offsets of keys and values on the paths.
-
-    A path is (document, key or index, ...).  Returns (offset of the key, offset of the value) for each path and each
-    of its prefixes that the text has; in a list both are the value's.  The first of equal keys counts.
-    """
-    wanted = {path[:length] for path in paths for length in range(1, len(path) + 1)}
-    found: dict[Path, tuple[int, int]] = {}
-    outer: list[tuple[Path, str | int | None]] = []
-    path: Path = ()
-    step: str | int | None = 0  # the next index or key; None when a key is expected
-    key_start = 0
-    for kind, text, start, *_ in events:
-        if kind == END:
-            path, step = outer.pop()
-            continue
-        if step is None:
-            step, key_start = text, start
-            continue
-        here = (*path, step)
-        if here in wanted and here not in found:
-            found[here] = (start if type(step) is int else key_start, start)
-            if len(found) == len(wanted):
-                break
-        step = step + 1 if isinstance(step, int) else None
-        if kind != LEAF:
-            outer.append((path, step))
-            path, step = here, 0 if kind == LIST else None
-    return found
-
-
-def mark_of(path: Path, found: dict[Path, tuple[int, int]], *, key: bool) -> int:
-    """Return the offset of the key or value at a path; if it is missing, that of the nearest enclosing value."""
-    for length in range(len(path), 0, -1):
-        if path[:length] in found:
-            return found[path[:length]][not (key and length == len(path))]
-    return 0
 
 
 def repeated_key(source: Source, events: Iterable[Event]) -> FormatError:

@@ -10,7 +10,8 @@ import re
 from typing import TYPE_CHECKING
 from xml.parsers import expat
 
-from frametool.documents.source import MOST_CHARACTERS, InputFile, Source, line_of, not_text, pointer
+from frametool import sizes
+from frametool.documents.source import InputFile, Source, line_of, not_text, pointer
 from frametool.errors import FileProblem, FormatError, bare, shown
 from frametool.text.numbers import parse_number
 
@@ -31,11 +32,11 @@ class XmlFile:
         """Read the bytes; raises FileProblem, and FormatError if they are too many."""
         self.name = file.name
         try:
-            self.data = file.stream.read(MOST_CHARACTERS + 1)
+            self.data = file.stream.read(sizes.MOST_CHARACTERS + 1)
         except OSError as error:
             raise FileProblem(f"{self.name}: {(error.strerror or str(error)).lower()}") from None
-        if len(self.data) > MOST_CHARACTERS:
-            raise FormatError(f"longer than {MOST_CHARACTERS} bytes, the most in one file", source=self.name)
+        if len(self.data) > sizes.MOST_CHARACTERS:
+            raise FormatError(f"longer than {sizes.MOST_CHARACTERS} bytes, the most in one file", source=self.name)
 
     def at(self, line: int, column: int, message: str, *, rule: str = "") -> FormatError:
         """Return the error for a place."""

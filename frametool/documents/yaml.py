@@ -22,20 +22,7 @@ import yaml
 from yaml import AliasEvent, MappingStartEvent, ScalarEvent, SequenceStartEvent, StreamEndEvent
 
 from frametool import sizes
-from frametool.documents.source import (
-    DEEPEST,
-    END,
-    LEAF,
-    LIST,
-    MAP,
-    MOST_CONTAINERS,
-    Source,
-    error_at,
-    line_of,
-    paused_collector,
-    repeated_key,
-    too_much,
-)
+from frametool.documents.source import END, LEAF, LIST, MAP, Source, error_at, line_of, paused_collector, too_much
 from frametool.errors import FormatError
 from frametool.text.numbers import odd_characters
 
@@ -107,7 +94,7 @@ def _as_json(lines: str) -> list[Any] | None:
     """Read one plain value in brackets per line as JSON; None if a key appears twice or there are too many."""
     from json import JSONDecoder
 
-    if lines.count("{") + lines.count("[") > MOST_CONTAINERS:
+    if lines.count("{") + lines.count("[") > sizes.MOST_CONTAINERS:
         return None
     lines = f"\n{lines}\n"
     for plain, quoted in _QUOTES:
@@ -167,7 +154,7 @@ def _message(error: yaml.MarkedYAMLError, line: str, column: int) -> str:
     """Return what is wrong at a column of a line, from the parser's problem and its context."""
     problem, context = _one_line(error.problem or ""), _one_line(error.context or "")
     if "maximum nesting depth" in problem:  # of libyaml, which reads ahead
-        return too_much(DEEPEST)
+        return too_much(sizes.DEEPEST)
     has_tab = "\t" in (line[column - 1 : column], *line[: column - 1].split(" "))
     if has_tab and re.search("cannot start any token|tab character", problem):
         return "a tab cannot indent YAML; use blanks"
@@ -275,7 +262,7 @@ class _Builder:
         stack, nulls, refused_keys, item, aside, ends = self.open, _NULLS, _ODD_KEYS, _ITEM, self.aside, _ENDS
         current: Any = self.documents
         key: Any = item
-        room = MOST_CONTAINERS
+        room = sizes.MOST_CONTAINERS
         value: Value
         while True:
             event = get()
@@ -298,7 +285,7 @@ class _Builder:
                 if key is None:
                     raise self._error(event, "a key must be one text, not a list or map")
                 room -= 1
-                if len(stack) >= DEEPEST or not room:
+                if len(stack) >= sizes.DEEPEST or not room:
                     raise self._error(event, too_much(len(stack)))
             elif kind in ends:
                 current, key = stack.pop()
@@ -338,6 +325,8 @@ class _Builder:
         if event.value == "":
             raise self._error(event, "an empty key; write a name, or quotes around a blank one")
         if event.value in current:
+            from frametool.documents.source import repeated_key
+
             raise repeated_key(self.source, yaml_events(self.source.text))
         if not event.style:
             raise self._error(event, "merge keys (<<) are not supported; write the entries out")
@@ -361,7 +350,7 @@ class _Builder:
         """Copy level by level, so that no depth can exhaust the stack."""
         root: list[Value] = [value]
         level: list[Any] = [root]
-        for _ in range(DEEPEST + 1 - len(self.open)):
+        for _ in range(sizes.DEEPEST + 1 - len(self.open)):
             below = []
             for container in level:
                 self.copies -= len(container)
@@ -374,7 +363,7 @@ class _Builder:
             if not below:
                 return root[0]
             level = below
-        raise self._error(event, too_much(DEEPEST))
+        raise self._error(event, too_much(sizes.DEEPEST))
 
     def _error(self, event: Any, message: str) -> FormatError:
         """Return the error for the place where an event begins."""

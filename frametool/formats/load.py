@@ -19,33 +19,13 @@ from typing import Any, BinaryIO, NamedTuple
 
 from frametool.documents.document import format_error, locate, locate_many
 from frametool.documents.source import InputFile, Source, paused_collector
-from frametool.errors import (
-    BadAnswer,
-    BadTopology,
-    FileProblem,
-    Finding,
-    FormatError,
-    ValueInvalid,
-    alternatives,
-    shown,
-    warn,
-)
+from frametool.errors import BadAnswer, BadTopology, FileProblem, FormatError, ValueInvalid, alternatives, shown, warn
 from frametool.formats.detect import Beginning, detect, of_folder
 from frametool.formats.table import CHOICES, FORMATS, readers
 from frametool.frames import topology
 from frametool.frames.lookups import FrameTree
 from frametool.geometry.representations import EARTH_FRAMES
-from frametool.grammar.edges import (
-    Answers,
-    Diagnostics,
-    Edge,
-    EdgeColumns,
-    Options,
-    Samples,
-    Topics,
-    at_other_times,
-    stop,
-)
+from frametool.grammar.edges import Answers, Diagnostics, Edge, EdgeColumns, Options, Samples, Topics, stop
 from frametool.grammar.names import NAME_KEYS, PARENT_COLUMNS
 from frametool.grammar.readers import alike, more_like_it
 
@@ -54,6 +34,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+    from frametool.errors import Finding
     from frametool.frames.buffer import TransformBuffer
     from frametool.geometry.camera import Camera
     from frametool.geometry.types import Components, Rigid
@@ -138,6 +119,8 @@ class FrameFile(InputFile):
             options = Options(self.tally, self.topics, report, normalize, self.answers)
             found = import_module(FORMATS[self.format].reader).read(self, options)
             if offset_ns := self.answers.time_offset:
+                from frametool.grammar.edges import at_other_times
+
                 found = (at_other_times(piece, offset_ns) for piece in found)
             yield from found
         finally:

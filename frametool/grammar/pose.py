@@ -16,21 +16,8 @@ from frametool.errors import ValueInvalid, bare, did_you_mean, overheard, shown
 from frametool.geometry import floats, quaternion, uncertainty
 from frametool.geometry.representations import LIST, NAMED, NAMED_AXES, REPRESENTATIONS, ROTATIONS, ROWS, axes_name
 from frametool.geometry.representations import notation as parse_notation
-from frametool.grammar.readers import (
-    AXES_KEY,
-    INDICES,
-    NAME_KEYS,
-    PARENT_NAMES,
-    Misfit,
-    NotARotation,
-    Reading,
-    kind,
-    places_in,
-    read_number,
-    read_numbers,
-    read_texts,
-    within,
-)
+from frametool.grammar import readers
+from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, places_in, read_numbers, read_texts, within
 from frametool.text.numbers import half_unit, parse_angle, parse_length, parse_number
 
 if TYPE_CHECKING:
@@ -69,7 +56,7 @@ SPREAD = ("count", "used", "distance_rms", "distance_max", "angle_rms", "angle_r
           "std_x", "std_y", "std_z", "std_angle", "std_angle_deg")  # fmt: skip
 VELOCITY = ("linear_x", "linear_y", "linear_z", "angular_x", "angular_y", "angular_z")  # m/s, rad/s
 DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "angle_deg", *SPREAD, *VELOCITY))
-NAMES = frozenset((*NAME_KEYS, *PARENT_NAMES))
+NAMES = frozenset((*readers.NAME_KEYS, *readers.PARENT_NAMES))
 OTHER_NAMES = NAMES.difference(("name", "parent"))
 MOST_NAMED = 5  # unknown keys in one message, if they fit
 MOST_CHOICES = 10  # representations listed in an error; `help rotations` has all
@@ -77,9 +64,9 @@ MOST_CHARACTERS = 80
 SCALE = "scale"
 COVARIANCE_KEYS = frozenset(("sigma", "covariance"))
 LEFT_OUT = "covariances left out: {} has none"  # completed with the name of a command
-POSE_KEYS = frozenset(
-    (*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, *COVARIANCE_KEYS, "inverse", "angles", SCALE, AXES_KEY)
-)
+POSE_KEYS = frozenset((
+    *POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, *COVARIANCE_KEYS, "inverse", "angles", SCALE, readers.AXES_KEY,
+))  # fmt: skip
 
 
 class Pose(NamedTuple):
@@ -168,7 +155,7 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
                 position = found if position is None else _agreeing_position(position, found)
             elif key in LISTED_WORDS and not is_rotation(key, value):
                 raise Misfit(f"expected the numbers of {'a position' if key in POSITION_WORDS else 'a rotation'}")
-            elif key in ROTATION_KEYS or key == AXES_KEY:
+            elif key in ROTATION_KEYS or key == readers.AXES_KEY:
                 moved, turned = read_rotation(key, value, reading)
                 rotation = turned if rotation is None else agreeing_rotation(rotation, turned)
                 if moved is not None and position is not None:
@@ -183,7 +170,7 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
     name, parent = mapping.get("name"), mapping.get("parent")
     is_usual = name and parent and type(name) is type(parent) is str and OTHER_NAMES.isdisjoint(mapping)
     if not (is_usual or NAMES.isdisjoint(mapping)):
-        name, parent = _agreeing_name(mapping, NAME_KEYS), _agreeing_name(mapping, PARENT_NAMES)
+        name, parent = _agreeing_name(mapping, readers.NAME_KEYS), _agreeing_name(mapping, readers.PARENT_NAMES)
     pose = Pose(position, rotation, name, parent, None, uncertain)
     is_inverse = "inverse" in mapping and _read_choice("inverse", mapping["inverse"], "true", "false")
     return inverted(pose) if is_inverse else pose
@@ -235,7 +222,7 @@ def _read_choice(key: str, value: Any, yes: str, no: str) -> bool:
 def read_position(value: Any, unit: float, *, bare: bool = False) -> Vector:
     """Read [x, y, z] or {x, y, z}, in metres or in the unit, such as 0.001; bare: numbers without units only."""
     parts = round(1.0 / unit)  # dividing rounds once: 0.1 from 100
-    x, y, z = read_numbers(value, XYZ, partial=True, each=read_number if bare else length_reader(parts))
+    x, y, z = read_numbers(value, XYZ, partial=True, each=readers.read_number if bare else length_reader(parts))
     return (x, y, z) if parts == 1 else (x / parts, y / parts, z / parts)
 
 
@@ -243,7 +230,7 @@ def length_reader(parts: float) -> Callable[[Any], float]:
     """Return a reader of lengths in a unit (parts per metre); lengths in metres may carry another unit, 10cm."""
 
     def read(text: Any) -> float:
-        return parse_length(text) if type(text) is str and parts == 1.0 else read_number(text)
+        return parse_length(text) if type(text) is str and parts == 1.0 else readers.read_number(text)
 
     return read
 
@@ -298,11 +285,11 @@ def pose_of_numbers(texts: Sequence[str], default: Notation | None, reading: Rea
 
         return read_pose(matrix_pose([list(texts)], rep, stated=default is not None) or {}, reading)
     if whole and len(texts) == len(whole.columns):
-        return Pose(*read_spelled(rep, texts, INDICES, reading))
+        return Pose(*read_spelled(rep, texts, readers.INDICES, reading))
     if len(texts) not in rep.counts:
         raise ValueInvalid(f"{rep.counted}; found {len(texts)}")
     x, y, z = map(parse_length, texts[:-size] or ("0", "0", "0"))
-    rotation = rotation_of(rep, texts[-size:], INDICES, reading)
+    rotation = rotation_of(rep, texts[-size:], readers.INDICES, reading)
     return Pose((x, y, z) if len(texts) > size else None, rotation)
 
 
@@ -329,7 +316,7 @@ def is_position(key: str, value: Any) -> bool:
 def is_rotation(key: str, value: Any) -> bool:
     """Return True if a key with this value is a rotation; never raises: errors are reported when it is read."""
     if key not in LISTED_WORDS:
-        return key in ROTATION_KEYS or (key == AXES_KEY and type(value) is str)
+        return key in ROTATION_KEYS or (key == readers.AXES_KEY and type(value) is str)
     if key not in ROTATION_WORDS or type(value) not in (list, dict):
         return False
     if key in ("R", "T"):
@@ -364,7 +351,7 @@ def read_rotation(key: str, value: Any, reading: Reading) -> tuple[Vector | None
 
     Raises Misfit or ValueInvalid: wrong shape, not a number, not a rotation, or several that do not agree.
     """
-    if key == AXES_KEY:
+    if key == readers.AXES_KEY:
         return None, _read_axes(value)
     if not _is_several(key, value):
         return read_spelled(*shape_of(key, value), reading)
@@ -393,7 +380,7 @@ def shape_of(key: str, value: Any) -> Spelled:
 
     For several rotations under one key it returns the first; its numbers have no paths, so that they are not replaced.
     """
-    if key == AXES_KEY:
+    if key == readers.AXES_KEY:
         return parse_notation("quaternion"), [repr(part) for part in _read_axes(value)], [(name,) for name in "xyzw"]
     if _is_several(key, value):
         bound, texts, places = shape_of(key, value[0])
@@ -516,7 +503,7 @@ def _read_one_by_one(
 def _with_unit(text: Any, notation: Notation | None) -> tuple[float, str | None]:
     """Read a number, or an angle of a notation with its own unit; raises ValueInvalid if its key has another one."""
     if notation is None or type(text) is not str:
-        return read_number(text), None
+        return readers.read_number(text), None
     number, unit = parse_angle(text)
     own = "degrees" if "deg" in text or "°" in text else "radians"
     other = {True: "degrees", False: "radians", None: own}[notation.degrees]
@@ -590,7 +577,7 @@ def _take_rows(notation: Notation, value: Any) -> Spelled:
     if type(value) is not list:
         raise Misfit(f"expected {expected}, found {kind(value)}")
     if len(value) in counts and not any(type(each) is list for each in value):
-        return notation, value, INDICES
+        return notation, value, readers.INDICES
     size = len(value)
     if size not in counts.values() or any(type(each) is not list or len(each) != size for each in value):
         lengths = ", ".join(str(len(each)) if type(each) is list else "no list" for each in value)

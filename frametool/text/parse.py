@@ -16,21 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from frametool.frames.stamps import BILLION
+from frametool.text import write
 from frametool.text.numbers import half_unit
 from frametool.text.spans import Bytes, Flags, Floats, Ints, Spans, Words, windows
-from frametool.text.write import (
-    LEAST_POWER,
-    TENS,
-    ZEROS,
-    first_point,
-    halves,
-    not_digits,
-    power_of_ten,
-    powers_of_ten,
-    product_error,
-    read_eight_digits,
-    shortest_decimals,
-)
+from frametool.text.write import TENS, ZEROS, halves, not_digits, product_error, read_eight_digits, shortest_decimals
 
 _NUMBER = re.compile(rb"[ \t]*[+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]+)?[ \t]*")
 _MOST_WORDS = 3
@@ -107,7 +96,7 @@ def _parse_plain(data: Bytes, starts: Ints, ends: Ints) -> tuple[Floats, Flags]:
         sure &= mantissa.whole < _EXACT
         values = mantissa.whole / 1e8
     else:
-        power, rest = power_of_ten(-8 * mantissa.words)
+        power, rest = write.power_of_ten(-8 * mantissa.words)
         values = _scale(mantissa, np.array(power), np.array(rest), sure)
     values *= 1.0 - 2.0 * negative
     return values, sure
@@ -120,8 +109,8 @@ def _parse_decorated(data: Bytes, starts: Ints, ends: Ints) -> tuple[Floats, Fla
     ends, exponents, sure = _split_exponent(data, begins, ends)
     mantissa, is_number = _read_mantissa(data, begins, ends)
     sure &= is_number
-    places = exponents - 8 * mantissa.words - LEAST_POWER
-    powers, rests = powers_of_ten()
+    places = exponents - 8 * mantissa.words - write.LEAST_POWER
+    powers, rests = write.powers_of_ten()
     values = _scale(mantissa, powers.take(places, mode="clip"), rests.take(places, mode="clip"), sure)
     values *= 1.0 - 2.0 * negative
     return values, sure
@@ -169,7 +158,7 @@ def _read_mantissa(data: Bytes, starts: Ints, ends: Ints) -> tuple[_Mantissa, Fl
     """Read unsigned decimals as integers of whole words, and return which of them are certain."""
     characters = windows(data, 8)[starts].view("<u8")
     length = ends - starts
-    before = np.minimum(first_point(characters), length)
+    before = np.minimum(write.first_point(characters), length)
     characters ^= ZEROS
     characters <<= ((8 - before) << 3).astype(np.uint64)
     after = length - before - 1

@@ -11,8 +11,7 @@ import yaml
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as some
 
-from frametool.documents import json as json_documents
-from frametool.documents import source
+from frametool import sizes
 from frametool.documents import yaml as yaml_documents
 from frametool.documents.document import explain_scalar, format_error, locate, locate_many, parse_documents, parse_nodes
 from frametool.documents.json import dump
@@ -110,13 +109,12 @@ def test_the_parser_without_libyaml_reads_the_same(text: str, monkeypatch: pytes
 
 @pytest.mark.parametrize("text", ["[" + "[]," * 30 + "[]]", "[a," + "[]," * 30 + "[]]", "- []\n" * 30])
 def test_lists_and_maps_are_counted(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (json_documents, yaml_documents):
-        monkeypatch.setattr(module, "MOST_CONTAINERS", 30)
+    monkeypatch.setattr(sizes, "MOST_CONTAINERS", 30)
     assert "lists and maps in one file; split it" in refusal(text)
 
 
 def test_a_text_too_long_is_refused_before_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(source, "MOST_CHARACTERS", 100)
+    monkeypatch.setattr(sizes, "MOST_CHARACTERS", 100)
     assert refusal("a" * 101) == "f: longer than 100 characters, the most in one file; split it"
     (tmp_path / "long.yaml").write_text("a" * 101)
     with pytest.raises(FormatError, match="longer than 100 bytes"):
@@ -125,7 +123,7 @@ def test_a_text_too_long_is_refused_before_it_is_read(tmp_path: Path, monkeypatc
 
 @pytest.mark.parametrize("text", ["1," * 31, "- 1\n" * 31])
 def test_values_in_no_list_of_their_own_are_counted(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(source, "MOST_VALUES", 30)
+    monkeypatch.setattr(sizes, "MOST_VALUES", 30)
     assert refusal(text) == "f: more than 30 commas and line ends, the most in one file; split it"
 
 
@@ -135,9 +133,9 @@ def test_a_million_messages_are_within_the_limits() -> None:
     transform = {"translation": moved, "rotation": turned}
     message = {"header": {"stamp": stamp, "frame_id": "f123456"}, "child_frame_id": "f123457", "transform": transform}
     text = json.dumps(message, indent=4)
-    assert 1e6 * text.count("{") < source.MOST_CONTAINERS
-    assert 1e6 * (text.count(",") + text.count("\n") + 2) < source.MOST_VALUES
-    assert 1e6 * len(text) < source.MOST_CHARACTERS
+    assert 1e6 * text.count("{") < sizes.MOST_CONTAINERS
+    assert 1e6 * (text.count(",") + text.count("\n") + 2) < sizes.MOST_VALUES
+    assert 1e6 * len(text) < sizes.MOST_CHARACTERS
 
 
 def laughs(depth: int) -> str:

@@ -20,18 +20,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from frametool.documents.source import InputFile, Source
-from frametool.errors import (
-    BadAnswer,
-    FormatError,
-    ValueInvalid,
-    alternatives,
-    bare,
-    did_you_mean,
-    first_of,
-    listing,
-    shown,
-    warn,
-)
+from frametool.errors import BadAnswer, FormatError, ValueInvalid, alternatives, did_you_mean, listing, shown, warn
 from frametool.formats.detect import detect
 from frametool.formats.robots.model import TURNING, Joint, JointValue, Link, followed, read_value
 from frametool.formats.rows.csv import split_line
@@ -414,8 +403,7 @@ def _of_table(
     try:
         columns = find_joint_columns(names, joints)
         if not columns:
-            named = first_of(names, 20, quote=bare)
-            raise ValueInvalid(f"no column is a joint; columns: {named}; joints: {listing(joints)}")
+            raise ValueInvalid(f"no column is a joint; columns: {listing(names)}; joints: {listing(joints)}")
         without = joints.keys() - {column.joint for column in columns}
         for name in names:
             own = _with_unit(name.strip(), joints)[0]

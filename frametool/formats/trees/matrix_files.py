@@ -24,24 +24,8 @@ from frametool.documents.xml import Element, read_xml
 from frametool.documents.yaml import TAG
 from frametool.documents.yaml_writer import flow, quoted
 from frametool.errors import FormatError, ValueInvalid, bare, first_of, listing, shown, warn
-from frametool.formats.trees.matrices import (
-    FRAME_KEYS,
-    MATRIX,
-    NO_POSE,
-    TAGS,
-    Grid,
-    Meaning,
-    Stated,
-    directed,
-    edges_of,
-    grid_of,
-    made_ordinary,
-    meaning_of,
-    partner_of,
-    read_shift,
-    read_turn,
-    whole_pose,
-)
+from frametool.formats.trees import matrices
+from frametool.formats.trees.matrices import Grid, Meaning, Stated, directed
 from frametool.formats.trees.tree_reader import document_edges, dotted, named, remember
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.pose import read_spelled
@@ -74,18 +58,18 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         alone = frames[1]
 
     def take(value: Any, reading: Reading) -> list[Edge]:
-        matrices = Matrices(as_mapping(value, "matrices by name"), frames, alone, options.answers, reading)
-        left = f"{first_of(matrices.left, 3)} {'is not a pose' if len(matrices.left) == 1 else 'are not poses'}"
-        if not matrices.poses:
-            raise Misfit(f"{NO_POSES[file.format]}{f'; {left}' if matrices.left else ''}")
-        edges = edges_of(matrices.poses, reading)
-        options.tally.assumed = left if matrices.left else options.tally.assumed
+        found = Matrices(as_mapping(value, "matrices by name"), frames, alone, options.answers, reading)
+        left = f"{first_of(found.left, 3)} {'is not a pose' if len(found.left) == 1 else 'are not poses'}"
+        if not found.poses:
+            raise Misfit(f"{NO_POSES[file.format]}{f'; {left}' if found.left else ''}")
+        edges = matrices.edges_of(found.poses, reading)
+        options.tally.assumed = left if found.left else options.tally.assumed
         return edges
 
     if file.head().lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
         yield from _read_xml(file, options, take)
     else:
-        yield from document_edges(made_ordinary(file), options, take, TAGS)
+        yield from document_edges(matrices.made_ordinary(file), options, take, matrices.TAGS)
 
 
 def sensor_name(path: str) -> str:
@@ -131,8 +115,8 @@ class Matrices:
             if key in paired:
                 continue
             path = self.reading.here = (*block.path, key)
-            grid = within(path, grid_of, value)
-            if grid is not None and (pair := partner_of(key, block.entries)):
+            grid = within(path, matrices.grid_of, value)
+            if grid is not None and (pair := matrices.partner_of(key, block.entries)):
                 paired.add(pair[0])
                 yield self._pair(block, key, grid, *pair)
             elif (pose := self._single(block, key, value, grid)) is not None:
@@ -141,15 +125,15 @@ class Matrices:
     def _single(self, block: MatrixBlock, key: str, value: Any, grid: Grid | None) -> Stated | None:
         """Return the pose under one key, if it is one."""
         path = (*block.path, key)
-        meaning = meaning_of(key, self._known(block), self.frames)
+        meaning = matrices.meaning_of(key, self._known(block), self.frames)
         says = isinstance(meaning, Meaning) and meaning.said
-        whole = whole_pose(grid, twelve=says)
+        whole = matrices.whole_pose(grid, twelve=says)
         if says and whole is None and (grid is not None or type(value) is not str):
             found = grid.size if grid else kind(value)
             raise Misfit(f"{bare(key)}: expected a 4 x 4 or 3 x 4 matrix, found {found}", path)
-        if whole is None or (not says and re.fullmatch(NO_POSE, key.rpartition(".")[2])):
+        if whole is None or (not says and re.fullmatch(matrices.NO_POSE, key.rpartition(".")[2])):
             is_matrix = grid is not None and (grid.rows > 1 or type(value) is dict)
-            if is_matrix or (type(value) is dict and value.get(TAG) in TAGS):
+            if is_matrix or (type(value) is dict and value.get(TAG) in matrices.TAGS):
                 self.left.append(bare(dotted(path)))
             return None
         if isinstance(meaning, Unclear):
@@ -158,7 +142,7 @@ class Matrices:
             meaning = self._named(block, path) or self._directed(block, key, path, meaning)
         if "" in (meaning.target, meaning.source):
             raise Misfit(f"{bare(key)}: there is no camera before {bare(block.name)}", path, key=True)
-        position, rotation = within(path, read_spelled, MATRIX, whole.texts, whole.places, self.reading)
+        position, rotation = within(path, read_spelled, matrices.MATRIX, whole.texts, whole.places, self.reading)
         return Stated(*meaning[:3], (*(position or IDENTITY[:3]), *rotation), path, chained=key == "T_cn_cnm1")
 
     def _known(self, block: MatrixBlock) -> dict[str, str]:
@@ -180,13 +164,13 @@ class Matrices:
 
         Raises Misfit if one of the two is missing, and Unclear if nothing states the direction.
         """
-        for target, source in FRAME_KEYS:
+        for target, source in matrices.FRAME_KEYS:
             if target in block.entries and source in block.entries:
                 parent, child = (within(block.path, named, block.entries, key) for key in (target, source))
                 what = f"{target} and {source} beside {path[-1]}"
                 is_said = source != "source_frame"
                 return Meaning(parent, child, child) if is_said else directed(what, path, parent, child, self.answers)
-        for key, other in [*FRAME_KEYS, *(each[::-1] for each in FRAME_KEYS)]:
+        for key, other in [*matrices.FRAME_KEYS, *(each[::-1] for each in matrices.FRAME_KEYS)]:
             if key in block.entries:
                 raise Misfit(f"{key} without {other}, so nothing says what the matrix is between", (*block.path, key))
         return None
@@ -203,7 +187,7 @@ class Matrices:
     def _pair(self, block: MatrixBlock, key: str, turn: Grid, translation: str, target: str, source: str) -> Stated:
         """Read a rotation and its translation."""
         path, place = (*block.path, key), (*block.path, translation)
-        shift = within(place, grid_of, block.entries[translation])
+        shift = within(place, matrices.grid_of, block.entries[translation])
         if shift is None:
             raise Misfit(f"{translation}: expected 3 numbers, found {kind(block.entries[translation])}", place)
         meaning = self._named(block, path)
@@ -216,8 +200,8 @@ class Matrices:
         elif meaning is None:
             parent, child = self.answers.names(self.base or "body", block.name or key)
             meaning = directed(f"{key} and {translation}", path, parent, child, self.answers)
-        rotation = within(path, read_turn, turn, self.reading)
-        return Stated(*meaning[:3], (*within(place, read_shift, shift), *rotation), path)
+        rotation = within(path, matrices.read_turn, turn, self.reading)
+        return Stated(*meaning[:3], (*within(place, matrices.read_shift, shift), *rotation), path)
 
 
 def _renamed(blocks: list[MatrixBlock], chosen: tuple[str, ...]) -> list[MatrixBlock]:
@@ -302,7 +286,7 @@ def _stored(tree: Frames, style: Style) -> str:
     text = "%YAML:1.0\n---\n"
     for parent, child, pose in static_edges(tree, style.format):
         key = f"{parent}_T_{child}"
-        if not re.fullmatch(_KEY, key) or meaning_of(key, _NO_NAMES) != Meaning(parent, child, child):
+        if not re.fullmatch(_KEY, key) or matrices.meaning_of(key, _NO_NAMES) != Meaning(parent, child, child):
             raise ValueInvalid(
                 f"{style.format} cannot name the pose of {shown(child)} in {shown(parent)}: names there have letters, "
                 f"digits and _, begin with a letter and do not hold _T_"

@@ -22,15 +22,7 @@ from frametool.frames.stamps import parse_stamp
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Diagnostics, Edge, Options
 from frametool.grammar.names import EARTH_FRAMES, may_be_on_earth
-from frametool.grammar.pose import (
-    COVARIANCE_KEYS,
-    NAMES,
-    POSE_KEYS,
-    Pose,
-    read_angle_unit,
-    read_name,
-    read_pose,
-)
+from frametool.grammar.pose import COVARIANCE_KEYS, NAMES, POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
 from frametool.grammar.readers import AXES_KEY, Misfit, Path, Reading, Unclear, as_mapping, kind, tell, within
 from frametool.ros import messages
 from frametool.text.numbers import parse_number
