@@ -145,8 +145,7 @@ class TransformBuffer(Frames):
         if child not in self._frames:
             return
         line = [parent]
-        at_ns = None if static else stamp_ns
-        while (track := self._tracks.get(line[-1])) is not None and _holds(track, at_ns):
+        while (track := self._tracks.get(line[-1])) is not None and _holds(track, None if static else stamp_ns):
             line.append(track.parent)
             if line[-1] == child:
                 raise topology.cycle([*line, parent])

@@ -119,8 +119,7 @@ def carried_many(frames: Frames, target: str, source: str, at_ns: Any, poses: Ri
     there = np.flatnonzero(~np.isnan(poses[6]))
     order = there[np.argsort(times[there], kind="stable")]
     found = np.full((times.size, 36), np.nan)
-    cuts = np.searchsorted(times[order], frames.changes())
-    for rows in np.split(order, cuts):
+    for rows in np.split(order, np.searchsorted(times[order], frames.changes())):
         for start, stop in arrays.blocks(rows.size):
             at = times[rows[start:stop]]
             entries = frames.covariance_along(target, source, int(at[0]), methodcaller("at_many", at))

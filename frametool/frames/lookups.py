@@ -368,8 +368,7 @@ class Frames:
         self.require(target, source)
         target, source = self.resolve_name(target), self.resolve_name(source)
         try:
-            parent_of = partial(self.parent, at_ns=at_ns) if self._varies else self.parent
-            return edges_between(target, source, parent_of)
+            return edges_between(target, source, partial(self.parent, at_ns=at_ns) if self._varies else self.parent)
         except NotConnected as error:
             raise self._unconnected(error, target, source, at_ns) from None
         except BadTopology as error:

@@ -13,7 +13,6 @@ from frametool.frames.stamps import BILLION, format_stamp
 from frametool.frames.track import MovingTrack, StaticTransform, Track
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import EARTH_FRAMES
-from frametool.geometry.rigid import IDENTITY
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -57,7 +56,7 @@ def _product(edges: Sequence[Edge], sample: Callable[[Edge], Rigid | None]) -> R
         if here is None:
             return None
         product = here if product is None else rigid.compose(*product, *here)
-    return IDENTITY if product is None else product
+    return rigid.IDENTITY if product is None else product
 
 
 class Query:

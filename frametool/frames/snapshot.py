@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import BadTopology, LookupFailed
 from frametool.geometry import rigid
-from frametool.geometry.rigid import IDENTITY
 
 if TYPE_CHECKING:
     from frametool.frames.lookups import Frames
@@ -73,7 +72,7 @@ class Snapshot:
 
         For the latest time, moving frames are looked up one by one: each at the time common to the edges of its path.
         """
-        found: dict[str, Rigid] = {start: IDENTITY}
+        found: dict[str, Rigid] = {start: rigid.IDENTITY}
         if self.at_ns is None and self.tree.moves:
             for frame in self.tree.frames:
                 with suppress(LookupFailed, BadTopology):

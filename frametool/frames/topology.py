@@ -146,6 +146,5 @@ def static_and_moving(child: str, details: str = " is both static and moving") -
 def cycle(frames: list[str]) -> BadTopology:
     """Return the error for a cycle, parents to the left: `a <- b <- a`; shortened in the middle if it is long."""
     if len(frames) > MOST_SHOWN + 1:
-        left_out = f"({len(frames) - MOST_SHOWN} more)"
-        frames = [*frames[: MOST_SHOWN // 2], left_out, *frames[-MOST_SHOWN // 2 :]]
+        frames = [*frames[: MOST_SHOWN // 2], f"({len(frames) - MOST_SHOWN} more)", *frames[-MOST_SHOWN // 2 :]]
     return BadTopology(f"frames form a cycle: {' <- '.join(map(bare, reversed(frames)))}", rule="cycle")

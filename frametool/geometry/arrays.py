@@ -161,8 +161,7 @@ def reduced_exactly(x: Array) -> Two[Array]:
 
 def run(kernel: Kernel, count: int, parts: Components, *args: object) -> Components:
     """Apply a kernel to components, some or all of them arrays; return `count` component arrays."""
-    shape = batch_shape(parts)
-    out = np.empty((count, *shape))
+    out = np.empty((count, *batch_shape(parts)))
     walk(kernel, parts, out.reshape(count, -1), *args)
     return tuple(out)
 

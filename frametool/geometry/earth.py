@@ -62,8 +62,7 @@ def lla(x: N, y: N, z: N, xp: Functions[N]) -> Three[N]:
     NaN within 100 km of the centre, where the latitude is not unique.
     Source: Fukushima 2006, Halley's method on the sine and cosine of the reduced latitude; three steps suffice.
     """
-    squared = x * x + y * y
-    axial = xp.sqrt(squared)
+    axial = xp.sqrt(x * x + y * y)
     run, rise = xp.maximum(axial / A, 1e-18), (EC / A) * z
     sine, cosine = rise, EC * run
     for step in range(STEPS):

@@ -20,8 +20,7 @@ def _plan(name: str) -> tuple[int, int, int, float, bool, bool]:
     """Return the axes i, j, k (outermost first), their parity, and whether symmetric and static."""
     static = name[0] == "s"
     i, j, last = ("xyz".index(letter) for letter in (name[:0:-1] if static else name[1:]))
-    k = 3 - i - j
-    return i, j, k, 1.0 if (j - i) % 3 == 1 else -1.0, last == i, static
+    return i, j, 3 - i - j, 1.0 if (j - i) % 3 == 1 else -1.0, last == i, static
 
 
 AXES = {

@@ -99,8 +99,7 @@ class Place(NamedTuple):
                 raise ValueInvalid(f"--to {name} needs --origin: {{lat: .., lon: ..}}, or first for the first position")
             fields = POSITIONS[name].names
             axes = ECEF if name == ECEF else name if name in LOCAL else earth_.axes or kernels(name).axes
-            origin = earth_.origin if name in LOCAL else None
-            made.append(cls(name, fields, axes, earth_.zone, origin))
+            made.append(cls(name, fields, axes, earth_.zone, earth_.origin if name in LOCAL else None))
         return made[0]._replace(more=tuple(made[1:]))
 
     @classmethod

@@ -189,8 +189,7 @@ class Rotation(Batched):
         For opposite directions the axis is orthogonal to the start and to the coordinate axis farthest from it.
         """
         parts = (*validation.columns(start, 3, "start"), *validation.columns(end, 3, "end"))
-        made = validation.checked(quaternion.between, 4, parts, "start, end", quaternion.check_directions)
-        return cls.of(*made)
+        return cls.of(*validation.checked(quaternion.between, 4, parts, "start, end", quaternion.check_directions))
 
     @classmethod
     def from_columns(cls, spec: str, inputs: Components, name: str, *, normalize: bool = False) -> Rotation:

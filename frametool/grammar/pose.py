@@ -65,7 +65,8 @@ SCALE = "scale"
 COVARIANCE_KEYS = frozenset(("sigma", "covariance"))
 LEFT_OUT = "covariances left out: {} has none"  # completed with the name of a command
 POSE_KEYS = frozenset((
-    *POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, *COVARIANCE_KEYS, "inverse", "angles", SCALE, readers.AXES_KEY,
+    *POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, *COVARIANCE_KEYS,
+    "inverse", "angles", SCALE, readers.AXES_KEY,
 ))  # fmt: skip
 
 
@@ -289,8 +290,7 @@ def pose_of_numbers(texts: Sequence[str], default: Notation | None, reading: Rea
     if len(texts) not in rep.counts:
         raise ValueInvalid(f"{rep.counted}; found {len(texts)}")
     x, y, z = map(parse_length, texts[:-size] or ("0", "0", "0"))
-    rotation = rotation_of(rep, texts[-size:], readers.INDICES, reading)
-    return Pose((x, y, z) if len(texts) > size else None, rotation)
+    return Pose((x, y, z) if len(texts) > size else None, rotation_of(rep, texts[-size:], readers.INDICES, reading))
 
 
 def notation_of(texts: Sequence[str], default: Notation | None) -> Notation:

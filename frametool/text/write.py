@@ -118,8 +118,7 @@ def first_point(characters: Words) -> Ints:
 @cache
 def _four_digits() -> tuple[Words, Words]:
     """Return tables of the characters 0000 .. 9999 in the lower and in the upper half of a word."""
-    characters = b"".join(b"%04d" % number for number in range(10000))
-    low = np.frombuffer(characters, "<u4").astype(np.uint64)
+    low = np.frombuffer(b"".join(b"%04d" % number for number in range(10000)), "<u4").astype(np.uint64)
     return low, low << np.uint64(32)
 
 
@@ -277,8 +276,7 @@ class Fields:
     def write_whole(self, whole: Ints) -> None:
         """Write the digits of integers below GREATEST_WHOLE before the point, and the point."""
         upper = whole // 10**7 if whole.max(initial=0) >= 10**7 else None
-        lower = whole if upper is None else whole - upper * 10**7
-        words = eight_digits(lower)
+        words = eight_digits(whole if upper is None else whole - upper * 10**7)
         words >>= np.uint64(8)
         words |= _POINT_CHARACTER
         self.words[:, 1] = words
@@ -395,8 +393,7 @@ def _plain_parts(size: Floats, decimals: Decimals) -> _Parts:
     digits, places = decimals.digits, decimals.places
     fraction = digits - whole * TENS.take(places, mode="clip")
     fraction *= TENS.take(_MOST_DIGITS - places, mode="clip")
-    zeros = np.maximum(places - _MOST_DIGITS, 0)
-    return _Parts(whole, fraction, zeros)
+    return _Parts(whole, fraction, np.maximum(places - _MOST_DIGITS, 0))
 
 
 def _power_parts(parts: _Parts, decimals: Decimals, powered: Ints) -> Ints:

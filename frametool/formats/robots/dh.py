@@ -24,7 +24,6 @@ from frametool.formats.robots.model import Joint, Link
 from frametool.formats.rows.csv import LineCell, split_line
 from frametool.formats.trees.tree_reader import line_error
 from frametool.geometry import euler, floats, rigid
-from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.readers import Path, kind
 from frametool.text.numbers import LENGTHS, NotFinite, parse_angle, parse_length, parse_number
 
@@ -304,7 +303,7 @@ def _link(row: DhRow, parent: str, child: str, options: Options) -> Link:
     alpha = euler.to_quaternion(row.alpha.number, 0.0, 0.0, "sxyz", floats, degrees=row.alpha.degrees)
     along_z, along_x = (0.0, 0.0, row.d.number, *theta), (row.a, 0.0, 0.0, *alpha)
     modified = options.answers.dh == "modified"
-    origin = rigid.compose(*along_x, *along_z) if modified else IDENTITY
-    after = IDENTITY if modified else rigid.compose(*along_z, *along_x)
+    origin = rigid.compose(*along_x, *along_z) if modified else rigid.IDENTITY
+    after = rigid.IDENTITY if modified else rigid.compose(*along_z, *along_x)
     joints = () if row.kind == "fixed" else (Joint(row.name, row.kind, AXIS, line=row.line),)
     return Link(parent, child, origin, joints, row.line, after, fixed="" if joints else row.name)

@@ -371,8 +371,7 @@ def _of_value(value: Any, path: Path, message: TextMessage, joints: Mapping[str,
                 return
             stamp_ns = messages.header_stamp(mapping.get("header"))
             for joint, position, place in messages.positions(mapping):
-                refuse = partial(_refused, message, (*path, *place))
-                yield JointSample(joint, position, stamp_ns, refuse)
+                yield JointSample(joint, position, stamp_ns, partial(_refused, message, (*path, *place)))
         except Misfit as misfit:
             raise misfit.below(*path) from None
 

@@ -25,9 +25,6 @@ from frametool.errors import FormatError, alternatives, shown
 from frametool.formats.robots.joints import JointSample, JointState
 from frametool.formats.robots.model import SHAPES, SIZES, Joint, JointValue, Link, Solid
 from frametool.geometry import floats, matrix, quaternion, rigid
-from frametool.geometry.floats import DEGREE, half_sincos, half_sincos_deg
-from frametool.geometry.quaternion import cross, unit_vector
-from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Diagnostics, Edge, Options, Topics
 
 if TYPE_CHECKING:
@@ -137,7 +134,7 @@ class MjcfModel:
 
     def _walk(self, section: Element) -> None:
         """Read the contents of a world in the order of the file; with a stack, because bodies may be deep."""
-        pending = [(child, _Inside(WORLD, "", IDENTITY)) for child in reversed(section.children)]
+        pending = [(child, _Inside(WORLD, "", rigid.IDENTITY)) for child in reversed(section.children)]
         while pending:
             node, around = pending.pop()
             if (inside := self._take(node, around)) is not None:
@@ -152,7 +149,7 @@ class MjcfModel:
             return inside._replace(around=self._class(node, inside.around), frame=pose)
         elif node.tag == "body":
             name = self._place(node, inside, self.pose(own_attributes(node)))
-            return _Inside(name, self._class(node, inside.around), IDENTITY)
+            return _Inside(name, self._class(node, inside.around), rigid.IDENTITY)
         elif node.tag in JOINTS:
             self._join(node, inside)
         elif node.tag in ("site", "camera"):
@@ -188,7 +185,7 @@ class MjcfModel:
         if known is not None or name == WORLD:
             first = f"; first in line {known.line}" if known else ", which is the name of the root"
             raise node.error(f"{node.tag} {shown(name)} twice{first}", "name")
-        pose = pose if inside.frame == IDENTITY else rigid.compose(*inside.frame, *pose)
+        pose = pose if inside.frame == rigid.IDENTITY else rigid.compose(*inside.frame, *pose)
         self.links[name] = Link(inside.body, name, pose, line=node.line)
         return name
 
@@ -213,9 +210,9 @@ class MjcfModel:
             raise node.error(message)
         joint = Joint(name, TYPES[kind], rest_pose=link.origin, line=node.line)  # free: its pose in the world
         if kind != "free":
-            joint = self._hinged(joint._replace(rest_pose=IDENTITY), attributes, inside.frame)
+            joint = self._hinged(joint._replace(rest_pose=rigid.IDENTITY), attributes, inside.frame)
         self.joints[name] = joint
-        origin = IDENTITY if kind == "free" else link.origin
+        origin = rigid.IDENTITY if kind == "free" else link.origin
         self.links[link.child] = link._replace(origin=origin, joints=(*link.joints, joint))
 
     def _hinged(self, joint: Joint, attributes: Attributes, frame: Rigid) -> Joint:
@@ -224,7 +221,7 @@ class MjcfModel:
         if joint.kind == "ball":
             return joint._replace(anchor=anchor)
         axis = quaternion.rotate(*frame[3:], *direction(attributes, "axis", numbers_of(attributes, "axis", "0 0 1")))
-        unit = DEGREE if joint.kind == "revolute" and self.degrees else 1.0
+        unit = floats.DEGREE if joint.kind == "revolute" and self.degrees else 1.0
         rest = unit * numbers_of(attributes, "ref", "0")[0]
         limited = word(attributes, "limited", "auto", "true", "false")
         lower = upper = None
@@ -238,7 +235,7 @@ class MjcfModel:
         present = [name for name in ORIENTATIONS if name in attributes]
         if len(present) > 1:
             raise attributes[present[1]].error(f"{' and '.join(present)} in one element; keep one", present[1])
-        return x, y, z, *(self._orientation(present[0], attributes) if present else IDENTITY[3:])
+        return x, y, z, *(self._orientation(present[0], attributes) if present else rigid.IDENTITY[3:])
 
     def pose_of_site(self, attributes: Attributes) -> Rigid:
         """Read the pose of a site, which may be defined by two ends: its z axis points to the first end."""
@@ -271,7 +268,7 @@ class MjcfModel:
                 x = direction(attributes, kind, numbers[:3])
                 along = sum(a * b for a, b in zip(x, numbers[3:], strict=True))
                 y = direction(attributes, kind, [b - along * a for a, b in zip(x, numbers[3:], strict=True)])
-                z = cross(*x, *y)
+                z = quaternion.cross(*x, *y)
                 return matrix.to_quaternion(x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2], floats)
         return _turning_z(*direction(attributes, kind, numbers))
 
@@ -279,7 +276,7 @@ class MjcfModel:
         """Multiply the rotations about the axes of eulerseq: a moving axis on the right, a fixed one on the left."""
         turned = (0.0, 0.0, 0.0, 1.0)
         for letter, angle in zip(self.eulerseq, angles, strict=True):
-            sine, cosine = half_sincos_deg(angle, floats) if self.degrees else half_sincos(angle, floats)
+            sine, cosine = floats.half_sincos_deg(angle, floats) if self.degrees else floats.half_sincos(angle, floats)
             x, y, z = (sine if axis == letter.lower() else 0.0 for axis in "xyz")
             turn = x, y, z, cosine
             turned = quaternion.compose(*turned, *turn) if letter.islower() else quaternion.compose(*turn, *turned)
@@ -319,7 +316,7 @@ def direction(attributes: Attributes, name: str, vector: Sequence[float]) -> Vec
     x, y, z = vector
     if quaternion.magnitude(x, y, z, floats) < LEAST:
         raise attributes[name].error(f"{name}: {x:g} {y:g} {z:g} has no direction", name)
-    return unit_vector(x, y, z, floats)
+    return quaternion.unit_vector(x, y, z, floats)
 
 
 def _turning_z(x: float, y: float, z: float) -> Quaternion:
@@ -357,8 +354,7 @@ def read_joints(file: InputFile, state: str) -> Iterator[JointSample]:
         return key.error(problem, "qpos")
 
     for joint, size in zip(joints, sizes, strict=True):
-        value = _value(joint, list(islice(numbers, size)), refuse)
-        yield JointSample(joint.name, value, None, refuse)
+        yield JointSample(joint.name, _value(joint, list(islice(numbers, size)), refuse), None, refuse)
 
 
 class _Geoms(MjcfModel):

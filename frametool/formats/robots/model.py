@@ -25,9 +25,7 @@ from frametool.errors import FormatError, UnknownFrame, ValueInvalid, alternativ
 from frametool.formats.table import FORMATS
 from frametool.frames.topology import edges_between
 from frametool.geometry import floats, quaternion, rigid
-from frametool.geometry.floats import DEGREE, RADIAN
 from frametool.geometry.representations import notation
-from frametool.geometry.rigid import IDENTITY
 from frametool.geometry.transform import Transform
 from frametool.geometry.validation import as_numbers, scalars, single
 from frametool.grammar.pose import read_pose, rotation_of
@@ -88,7 +86,7 @@ class Joint(NamedTuple):
     upper: float | None = None
     mimic: Mimic | None = None
     rest: float = 0.0
-    rest_pose: Rigid = IDENTITY
+    rest_pose: Rigid = rigid.IDENTITY
     anchor: Vector = (0.0, 0.0, 0.0)
     line: int = 0
 
@@ -117,7 +115,7 @@ class JointValue(NamedTuple):
     @property
     def plain(self) -> Number:
         """Return the value in radians or metres."""
-        return self.number * DEGREE if self.degrees else self.number
+        return self.number * floats.DEGREE if self.degrees else self.number
 
 
 def motion(joint: Joint, value: Value, xp: Namespace = floats) -> Rigid:
@@ -125,7 +123,7 @@ def motion(joint: Joint, value: Value, xp: Namespace = floats) -> Rigid:
     if isinstance(value, JointValue):
         number, degrees = value
         if joint.rest:
-            number = number - (joint.rest * RADIAN if degrees else joint.rest)
+            number = number - (joint.rest * floats.RADIAN if degrees else joint.rest)
         if joint.kind == "prismatic":
             return rigid.slid(*joint.axis, number)
         value = rigid.turned(*joint.axis, number, xp, degrees=degrees)
@@ -140,8 +138,8 @@ def motion(joint: Joint, value: Value, xp: Namespace = floats) -> Rigid:
 def _is_at_rest(joint: Joint, value: Value) -> Condition:
     """Return True, or an array, where a joint does not move anything."""
     if not isinstance(value, JointValue):
-        return value == IDENTITY
-    at_rest: Condition = value.number == (joint.rest * RADIAN if value.degrees else joint.rest)
+        return value == rigid.IDENTITY
+    at_rest: Condition = value.number == (joint.rest * floats.RADIAN if value.degrees else joint.rest)
     return at_rest
 
 
@@ -157,10 +155,10 @@ class Link(NamedTuple):
 
     parent: str | None
     child: str
-    origin: Rigid = IDENTITY
+    origin: Rigid = rigid.IDENTITY
     joints: tuple[Joint, ...] = ()
     line: int = 0
-    after: Rigid = IDENTITY
+    after: Rigid = rigid.IDENTITY
     rest: Rigid | None = None
     inverted: bool = False
     fixed: str = ""
@@ -173,8 +171,7 @@ class Link(NamedTuple):
         at_rest: Condition = reduce(and_, map(_is_at_rest, self.joints, values))
         if at_rest is True:
             return rest
-        motions = map(motion, self.joints, values, repeat(xp))
-        moved = _product(self.origin, *motions, self.after)
+        moved = _product(self.origin, *map(motion, self.joints, values, repeat(xp)), self.after)
         if self.inverted:
             moved = rigid.inverse(*moved)
         if not xp.some(at_rest):
@@ -184,10 +181,10 @@ class Link(NamedTuple):
 
 def _product(*poses: Rigid) -> Rigid:
     """Compose poses, the outermost first; the identity changes no bits."""
-    product = IDENTITY
+    product = rigid.IDENTITY
     for each in poses:
-        if each is not IDENTITY:
-            product = each if product is IDENTITY else rigid.go_on(product, each)
+        if each is not rigid.IDENTITY:
+            product = each if product is rigid.IDENTITY else rigid.go_on(product, each)
     return product
 
 
@@ -197,7 +194,7 @@ def followed(joint: Joint, leader: Value) -> Value:
         return joint.start
     _, multiplier, offset = joint.mimic
     if leader.degrees and joint.kind in TURNING:
-        return JointValue(leader.number * multiplier + offset * RADIAN, degrees=True)
+        return JointValue(leader.number * multiplier + offset * floats.RADIAN, degrees=True)
     return JointValue(leader.plain * multiplier + offset)
 
 
@@ -268,7 +265,7 @@ class Solid(NamedTuple):
     frame: str
     kind: str
     size: tuple[float, ...]
-    pose: Rigid = IDENTITY
+    pose: Rigid = rigid.IDENTITY
 
 
 def read_solids(file: InputFile, fmt: str) -> list[Solid]:
@@ -431,7 +428,7 @@ class Chain:
         for link in links:
             pose = link.pose([self._value(joint.name, values) for joint in link.joints], xp)
             product = pose if product is None else rigid.go_on(product, pose)
-        return product or IDENTITY
+        return product or rigid.IDENTITY
 
     def _value(self, name: str, values: Values) -> Value:
         """Return the value of a joint: set, mimicked, or at rest."""

@@ -28,8 +28,6 @@ from frametool.formats.robots.model import PARTS, Joint, Link, Mimic, Solid, rea
 from frametool.frames.lookups import FrameTree
 from frametool.frames.topology import Groups
 from frametool.geometry import euler, floats, quaternion, rigid
-from frametool.geometry.quaternion import unit_vector
-from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Diagnostics, Edge, Options, Topics
 
 if TYPE_CHECKING:
@@ -48,7 +46,7 @@ def read_pose(holder: Element, options: Options) -> tuple[Rigid, str]:
     """
     pose = holder.first("pose")
     if pose is None:
-        return IDENTITY, ""
+        return rigid.IDENTITY, ""
     if pose.attribute("frame"):
         message = "<pose frame=..> of SDF 1.5 has no meaning and is left out; relative_to has one"
         options.tally.note_each(message, pose.line)
@@ -59,7 +57,7 @@ def read_pose(holder: Element, options: Options) -> tuple[Rigid, str]:
         raise pose.error("degrees with quat_xyzw; keep one", "degrees")
     relative_to = pose.attribute("relative_to")
     if not pose.text:
-        return IDENTITY, relative_to
+        return rigid.IDENTITY, relative_to
     x, y, z, roll, pitch, yaw = pose.numbers(7 if fmt == "quat_xyzw" else 6)[:6]
     if fmt == "quat_xyzw":
         rotation = read_quaternion(pose, pose.text.split()[3:], options)
@@ -92,7 +90,7 @@ class SdfFrame:
         self.scope: SdfFrame = scope or self
         self.name: str = local if scope is None or scope.kind == WORLD else f"{scope.name}::{local}"
         self.holder = holder
-        self.pose = IDENTITY
+        self.pose = rigid.IDENTITY
         self.relative_to = self.attached_to = self.scope
         self.placement: SdfFrame | None = None
 
@@ -233,7 +231,7 @@ class SdfFrames:
             return frame.pose
         if outer.relative_to is frame and outer.placement is None:
             return rigid.inverse(*outer.pose)
-        known = self.seen.setdefault(outer.name, {outer.name: IDENTITY})
+        known = self.seen.setdefault(outer.name, {outer.name: rigid.IDENTITY})
         way, top = [], frame.name
         while top not in known and (track := self.tree.track(top)):
             way.append(track)
@@ -383,7 +381,7 @@ class _SdfTree(SdfFrames):
             outer = frame.scope  # before 1.5 an axis is relative to the model, until 1.6 if it says so
         if outer is not frame:
             x, y, z = quaternion.rotate(*self.relative(frame, outer)[3:], x, y, z)
-        return unit_vector(x, y, z, floats)
+        return quaternion.unit_vector(x, y, z, floats)
 
     def _limit(self, limit: Element | None, which: str) -> float | None:
         """Read one limit; None for no limit, which SDF writes as 1e16 or inf."""
@@ -444,7 +442,7 @@ class _SdfTree(SdfFrames):
             return Link(outer.name, frame.name, origin, joint.motions, line, after, rest, inverted)
         outer = self._outer(frame)
         model = frame.below(self.top)[-1]
-        stays = outer is self.top and model.kind == "model" and relative(outer, model) == IDENTITY
+        stays = outer is self.top and model.kind == "model" and relative(outer, model) == rigid.IDENTITY
         if stays and not self.in_world:
             return Link(None, frame.name, line=line)  # outside of any world, in a model without a pose in one
         return Link(outer.name, frame.name, relative(outer, frame), line=line)

@@ -76,8 +76,7 @@ def describe(file: InputFile, options: Options) -> tuple[dict[str, int], list[Li
             if element.tag == "link":
                 _take_frame(element, frames, options)
             else:
-                link = _link(element, joints, options)
-                joints[element.attributes["name"]] = link, element
+                joints[element.attributes["name"]] = _link(element, joints, options), element
         except FormatError as error:
             options.report(error)
     links = list(_connected(joints, frames, options))

@@ -431,8 +431,7 @@ def _g2o(file: InputFile, options: Options) -> Iterator[Written]:
             only_others = -1
             yield _g2o_pose(file, number, words, kinds[words[0]], ids=1 + edges)
         elif not words[0][0].isupper():
-            message = f"expected a tag as {next(iter(kinds))}, found {shown(words[0])}"
-            raise file.error(message, number)
+            raise file.error(f"expected a tag as {next(iter(kinds))}, found {shown(words[0])}", number)
         elif not re.fullmatch(NO_POSE, words[0]):
             unknown.setdefault(words[0], number)
     if unknown:

@@ -43,7 +43,6 @@ from frametool.errors import FormatError, ValueInvalid, bare, listing, shown, wa
 from frametool.formats.trees.matrices import FRAME_KEYS, Meaning, directed, meaning_of
 from frametool.formats.trees.tree_reader import XYZ, document_edges, named
 from frametool.geometry import floats, quaternion, rigid
-from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.loose import WORDS, read_loose_pose
 from frametool.grammar.pose import read_angle_unit, read_rotation
@@ -141,12 +140,11 @@ def _nuscenes(file: InputFile, options: Options, value: Any, reading: Reading) -
                 stamp = within((index,), _text, record, "timestamp")
                 if not re.fullmatch(r"(?a)\d{1,18}", stamp):
                     raise Misfit(f"expected whole microseconds, found {shown(stamp)}", (index, "timestamp"))
-                pose = _sensor_pose(record, index, reading)
-                yield Edge(world, ego, pose, int(stamp) * 1000, path=(index,))
+                yield Edge(world, ego, _sensor_pose(record, index, reading), int(stamp) * 1000, path=(index,))
             except Misfit as misfit:
                 reading.refuse(misfit)
     elif "channel" in records[0]:
-        yield Edge(None, ego, IDENTITY)
+        yield Edge(None, ego, rigid.IDENTITY)
     else:
         raise Misfit("no poses in this table of nuScenes: they are in calibrated_sensor.json and ego_pose.json")
 

@@ -28,7 +28,6 @@ from frametool.formats.detect import Beginning
 from frametool.grammar.readers import Misfit, Path, kind
 from frametool.grammar.result import Style, refuse_motion
 from frametool.ros import publisher
-from frametool.ros.publisher import CALL
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -100,10 +99,10 @@ def _is_reported(action: Action) -> bool:
     if action.kind == "executable":
         command = fields.get("cmd")
         words = command.split() if isinstance(command, str) else command if isinstance(command, list) else []
-        return isinstance(command, Misfit) or any(str(word).rsplit("/", 1)[-1] == CALL for word in words)
+        return isinstance(command, Misfit) or any(str(word).rsplit("/", 1)[-1] == publisher.CALL for word in words)
     if action.kind == "composable_node":
         return bool(fields.get("plugin") == COMPOSABLE)
-    is_call = fields.get("pkg") in PACKAGES and fields.get("exec", fields.get("type")) == CALL
+    is_call = fields.get("pkg") in PACKAGES and fields.get("exec", fields.get("type")) == publisher.CALL
     return action.kind == "include" or (action.kind == "node" and is_call)
 
 
@@ -123,7 +122,7 @@ def _arguments(action: Action) -> str | Sequence[str]:
     elif isinstance(arguments, str) and (substitution := _SUBSTITUTION.search(arguments)):
         problem = f"its arguments have {shown(substitution[0])}"
     if problem:
-        raise Misfit(f"{CALL} not read: {problem}")
+        raise Misfit(f"{publisher.CALL} not read: {problem}")
     return arguments if isinstance(arguments, str) else [str(word) for word in arguments or ()]
 
 
@@ -133,7 +132,7 @@ def _open_conditions(action: Action) -> list[str]:
     for condition in dict.fromkeys(action.conditions):
         word, _, value = condition[:-1].lower().partition('="')
         if word in ("if", "unless") and value in (_NO if word == "if" else _YES):
-            raise Misfit(f"{CALL} not read: it never starts ({condition})")
+            raise Misfit(f"{publisher.CALL} not read: it never starts ({condition})")
         if value not in (*_NO, *_YES):
             found.append(condition)
     return found
@@ -217,7 +216,7 @@ def _calls(tree: ast.Module) -> Iterator[Action]:
             if getattr(node.func, "attr", getattr(node.func, "id", "")) == "IncludeLaunchDescription":
                 named = [*node.args, *(each.value for each in node.keywords), node.func]
                 tag, fields["file"] = "include", _written(named[0])
-            if tag and (tag != "executable" or CALL in _written(node)):
+            if tag and (tag != "executable" or publisher.CALL in _written(node)):
                 yield Action(tag, fields, conditions, node.lineno, node.col_offset + 1)
         for name, held in ast.iter_fields(node):
             under = conditions

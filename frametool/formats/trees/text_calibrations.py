@@ -34,7 +34,6 @@ from frametool.formats.trees.matrices import MATRIX, Stated, edges_of
 from frametool.formats.trees.tree_reader import line_error
 from frametool.geometry import quaternion, rigid
 from frametool.geometry.representations import notation
-from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.pose import read_spelled, rotation_of
 from frametool.grammar.readers import INDICES, Misfit, Reading, read_numbers
@@ -145,7 +144,7 @@ class Calibration:
     def _pose(self, name: str, shift: str) -> Rigid:
         """Return the pose of twelve numbers, or of a rotation and its translation, if any; warnings are recorded."""
         line, numbers, texts = self.fields[name]
-        x, y, z = self.fields[shift].numbers if shift else numbers[3::4] if len(numbers) == 12 else IDENTITY[:3]
+        x, y, z = self.fields[shift].numbers if shift else numbers[3::4] if len(numbers) == 12 else rigid.IDENTITY[:3]
         turn = [text for at, text in enumerate(texts) if len(texts) == 9 or at % 4 < 3]
         reading = Reading(self.file.source, normalize=self.options.normalize)
         try:
@@ -187,7 +186,7 @@ class Calibration:
                 if not focal > 0.0:
                     raise line_error(self.file, field.line, 1, f"P{index}: the focal length {focal:g} is not positive")
             centre = 0.0 - (px - cx * pz) / fx, 0.0 - (py - cy * pz) / fy, 0.0 - pz
-            yield f"cam0{rect}", f"cam{index}{rect}", (*centre, *IDENTITY[3:]), field.line
+            yield f"cam0{rect}", f"cam{index}{rect}", (*centre, *rigid.IDENTITY[3:]), field.line
 
 
 # --- Kalibr ---
@@ -222,8 +221,7 @@ def _read_kalibr(file: InputFile, options: Options) -> Iterator[Edge]:
             raise file.error(f"{label}: {error}", lines[label]) from None
         if target != source:  # as the first IMU relative to itself
             child = max(target, source, key=lambda name: (name[:3] == "cam", name[:3], len(name), name))
-            both = target[:3] == source[:3] == "cam"
-            stated.append(Stated(target, source, child, pose, (label,), chained=both))
+            stated.append(Stated(target, source, child, pose, (label,), chained=target[:3] == source[:3] == "cam"))
     if not stated:
         raise file.error("no pose in it: it would be under baseline T_1_0 or T_ci")
     try:
