@@ -209,12 +209,8 @@ class TreeBuilder:
         self._stamps: dict[str, int] = {}  # child -> its only stamp, while it has no other
         self._moves: set[str] = set()
         self._late: set[str] = set()  # children with a warning that their samples go back in time
-        self.axes: dict[str, str] = {}  # frame -> the axes of its camera
         self.covariances: dict[str, Components] = {}  # child -> the covariance of its edge
-        self.drawn: dict[str, str] = {}  # child -> the label of its edge in a drawing
-        self.cameras: dict[str, Camera] = {}  # of frametool trees, by their frames
-        self.with_cameras: list[FrameFile] = []  # files of other formats that may hold cameras, read on demand
-        self.robots: list[Any] = []  # as in `Diagnostics`
+        self.files: list[FrameFile] = []  # those that were read
 
     @property
     def places(self) -> dict[str, EdgePlace]:
@@ -345,12 +341,14 @@ class TreeBuilder:
             self._warn_replaced(static)
             tree = self._static_tree(made)
             made = made if made.moves else tree
-        made.camera_axes |= self.axes
         made.covariances |= self.covariances
-        made.drawn |= self.drawn
-        made.cameras, made.robots = self.cameras, self.robots
-        if self.with_cameras:
-            made.read_cameras = partial(_read_cameras, made, self.with_cameras)
+        made.cameras = {frame: camera for file in self.files for frame, camera in file.cameras.items()}
+        made.robots = [file.tally.robot for file in self.files if file.tally.robot is not None]
+        for file in self.files:
+            made.camera_axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}
+            made.drawn |= file.tally.drawn
+        if held := [file for file in self.files if FORMATS[file.format].cameras]:  # read on demand
+            made.read_cameras = partial(_read_cameras, made, held)
         return made
 
     def _moving(self) -> TransformBuffer:
@@ -526,10 +524,4 @@ def _add(builder: TreeBuilder, file: FrameFile) -> None:
                 builder.add_edge(edge, EdgePlace(file, edge))
     if piece is None:
         raise file.error("no frames in it")
-    builder.axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}
-    builder.drawn |= file.tally.drawn
-    builder.cameras |= file.cameras
-    if file.tally.robot is not None:
-        builder.robots.append(file.tally.robot)
-    if FORMATS[file.format].cameras:
-        builder.with_cameras.append(file)
+    builder.files.append(file)

@@ -1,4 +1,4 @@
-"""The rules of a tree: one parent per frame, one pose in it, no cycle; and the errors for edges that break them.
+"""The rules of a tree: one parent per frame, one pose in it, no cycle; the errors for edges that break them; snapshots.
 
 Each error is a BadTopology without a place: a tree raises it, a loader adds where both edges are, `check` lists it.
 """
@@ -6,16 +6,20 @@ Each error is a BadTopology without a place: a tree raises it, a loader adds whe
 from __future__ import annotations
 
 from collections.abc import Hashable
+from contextlib import suppress
+from functools import cached_property
 from math import isfinite
 from typing import Generic, TypeVar
 
-from frametool.errors import BadTopology, NotConnected, ValueInvalid, bare, shown
+from frametool.errors import BadTopology, LookupFailed, NotConnected, ValueInvalid, bare, shown
+from frametool.geometry import rigid
 from frametool.geometry.representations import EARTH_FRAMES
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Container, Sequence
 
+    from frametool.frames.lookups import Frames
     from frametool.geometry.types import Components, Rigid
 
 MOST_SHOWN = 16  # frames of a cycle
@@ -148,3 +152,79 @@ def cycle(frames: list[str]) -> BadTopology:
     if len(frames) > MOST_SHOWN + 1:
         frames = [*frames[: MOST_SHOWN // 2], f"({len(frames) - MOST_SHOWN} more)", *frames[-MOST_SHOWN // 2 :]]
     return BadTopology(f"frames form a cycle: {' <- '.join(map(bare, reversed(frames)))}", rule="cycle")
+
+
+class Snapshot:
+    """The edges of a tree at one time, or each at its own latest time.
+
+    edges: child -> its parent and its pose there, parent_from_child
+    without_data: the moving frames that have no data at that time
+    """
+
+    def __init__(self, tree: Frames, at_ns: int | None = None) -> None:
+        """Collect the edges of a tree; `at_ns` None is the latest of each."""
+        self.tree = tree
+        self.at_ns = at_ns
+        self.edges: dict[str, tuple[str, Rigid]] = {}
+        self.without_data: set[str] = set()
+        for track in tree.tracks():
+            pose = track.components if at_ns is None else track.at(at_ns)
+            parent = track.parent if at_ns is None else track.parent_at(at_ns)
+            if pose is None or parent is None:
+                self.without_data.add(track.child)
+            else:
+                self.edges[track.child] = parent, pose
+
+    def parent(self, frame: str) -> str | None:
+        """Return a frame's parent; None for a root, and if there are no data."""
+        return self.edges[frame][0] if frame in self.edges else None
+
+    @cached_property
+    def roots(self) -> dict[str, str]:
+        """Return the root above each frame, itself for a root; frames with the same root are connected."""
+        roots: dict[str, str] = {}
+        for frame in self.tree.frames:
+            line: dict[str, None] = {}
+            above: str | None = frame
+            while above is not None and above not in roots and above not in line:
+                line[above] = None
+                above = self.parent(above)
+            root = next(reversed(line)) if line and above is None else frame if above in line else roots[above or frame]
+            roots.update(dict.fromkeys(line, root))
+        return roots
+
+    @cached_property
+    def _children(self) -> dict[str, list[str]]:
+        children: dict[str, list[str]] = {}
+        for child, (parent, _) in self.edges.items():
+            children.setdefault(parent, []).append(child)
+        return children
+
+    def below(self, start: str) -> list[str]:
+        """Return a frame and all its descendants, the nearest first."""
+        found = [start]
+        for frame in found:  # it grows during the loop
+            found += (child for child in self._children.get(frame, ()) if child != start)
+        return found
+
+    def seen_from(self, start: str) -> dict[str, Rigid]:
+        """Return the pose in `start` of every frame connected to it.
+
+        For the latest time, moving frames are looked up one by one: each at the time common to the edges of its path.
+        """
+        found: dict[str, Rigid] = {start: rigid.IDENTITY}
+        if self.at_ns is None and self.tree.moves:
+            for frame in self.tree.frames:
+                with suppress(LookupFailed, BadTopology):
+                    found[frame] = self.tree.lookup_components(start, frame)
+            return found
+        pending = [start]
+        for frame in pending:  # it grows during the loop
+            steps = {child: self.edges[child][1] for child in self._children.get(frame, ())}
+            if frame in self.edges:
+                parent, pose = self.edges[frame]
+                steps = {parent: rigid.inverse(*pose)} | steps
+            for other in [each for each in steps if each not in found]:
+                found[other] = rigid.compose(*found[frame], *steps[other])
+                pending.append(other)
+        return found

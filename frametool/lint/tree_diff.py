@@ -10,8 +10,8 @@ from math import degrees
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import FrametoolError, ValueInvalid, listing, shown
-from frametool.frames.snapshot import Snapshot
 from frametool.frames.stamps import format_stamp
+from frametool.frames.topology import Snapshot
 from frametool.geometry import floats, rigid
 from frametool.geometry.rotation import NEAR
 from frametool.geometry.transform import NEAR_BY

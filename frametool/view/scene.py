@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, printable, shown
 from frametool.frames.buffer import TransformBuffer
-from frametool.frames.snapshot import Snapshot
+from frametool.frames.topology import Snapshot
 from frametool.geometry import earth as wgs84
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.place import ECEF as EARTH
