@@ -342,12 +342,14 @@ class TreeBuilder:
             tree = self._static_tree(made)
             made = made if made.moves else tree
         made.covariances |= self.covariances
-        made.cameras = {frame: camera for file in self.files for frame, camera in file.cameras.items()}
-        made.robots = [file.tally.robot for file in self.files if file.tally.robot is not None]
+        held: list[FrameFile] = []  # files of other formats that may hold cameras, read on demand
         for file in self.files:
             made.camera_axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}
             made.drawn |= file.tally.drawn
-        if held := [file for file in self.files if FORMATS[file.format].cameras]:  # read on demand
+            made.cameras = {**made.cameras, **file.cameras}
+            made.robots = [*made.robots, *([] if file.tally.robot is None else [file.tally.robot])]
+            held += [file] * FORMATS[file.format].cameras
+        if held:
             made.read_cameras = partial(_read_cameras, made, held)
         return made
 
