@@ -415,7 +415,7 @@ def plain_columns(text: str, line: int, tally: Diagnostics, *, normalize: bool =
     found = {gap: layout.gap.fullmatch(gap) for gap in {*gaps}}
     if begin != opened[0] or not all(found.values()) or not layout.closing.fullmatch(end):
         return None
-    parents, children = ([tally.names[name] for name in parts[at::EACH]] for at in (3, 4))
+    parents, children = ([*map(tally.names.__getitem__, parts[at::EACH])] for at in (3, 4))
     stamps = [*map(int, parts[1::EACH])], [*map(int, parts[2::EACH])]
     rows = zip(*(map(float, parts[at::EACH]) for at in range(5, EACH)), strict=True)
     steps = {gap: gap.count("\n") + layout.lines for gap in found}
@@ -437,8 +437,7 @@ def edge_columns(
     names: of parents and of children; stamps: seconds and nanoseconds; rows: components as they were read
     """
     seconds, nanoseconds = stamps
-    is_refused = any(stamp_problem(pick(seconds), pick(nanoseconds), STAMPS[0]) for pick in (min, max))
-    if is_refused or not all(map(all, names)):
+    if stamp_problem(max(seconds), max(nanoseconds), STAMPS[0]) or not all(map(all, names)):  # none is below its range
         return None
     rough = len(tally.rough)
     try:
