@@ -52,6 +52,7 @@ from frametool.grammar.place import (
 from frametool.grammar.place import FIELDS as PLACE_FIELDS
 from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose
 from frametool.grammar.readers import AXES_KEY, Misfit, NotARotation, Reading, within
+from frametool.stream.extra_numbers import of_position
 from frametool.stream.faults import ZONES, RowNote
 from frametool.stream.header import Columns, Header, PoseColumns, find_positions, find_rotations, listed, places_named
 from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape, place_of
@@ -474,8 +475,7 @@ def _extra(pose: Pose, reading: Reading, request: Request, *, is_point: bool) ->
     if request.gathered is not None or request.operation.formula is not None or request.place is not None:
         reading.note(LEFT_OUT.format("a result at a place" if request.place else "this"), rule="left-out")
         return ()
-    entries = tuple(pose.covariance)
-    return tuple(entries[6 * i + j] for i in range(3) for j in range(3)) if is_point else entries
+    return of_position(tuple(pose.covariance)) if is_point else tuple(pose.covariance)
 
 
 def _of_fix(value: dict[str, Any], mapping: dict[str, Any], reading: Reading, request: Request) -> tuple[float, ...]:

@@ -6,6 +6,7 @@ Loaded where one of them is there.
 from __future__ import annotations
 
 import re
+from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
@@ -57,7 +58,8 @@ def with_covariances(
     operation, shape, path = request.operation, record.shape, place.path
     there = [key for key in place.covariances if key in holder]
     is_own = shape.kind in PLACED and around == path
-    flat = _flat(holder, shape) if is_own and SIGMA not in holder and not there else ()
+    flat = [*holder] if is_own and SIGMA not in holder and not there else []
+    flat = [flat[at] for at in find_columns(flat, 36 if shape.kind == POSE else POINT_ENTRIES)[0]]
     has_sigma = is_own and (SIGMA in holder or bool(flat))
     said = (*there, *(flat or [SIGMA] * has_sigma))
     is_left_out = operation.formula is not None and around == path and not operation.only_adds
@@ -104,40 +106,48 @@ def is_unknown(value: Any, sizes: Sequence[int]) -> bool:
     return _entries(value, sizes)[0][1] == UNKNOWN
 
 
-def _flat(own: dict[str, Any], shape: Shape) -> tuple[str, ...]:
-    """Return the keys that say a covariance or sigmas as columns do: `c11` .. `c66`, `sigma_x` .."""
-    names = [*own]
-    return tuple(names[place] for place in find_columns(names, 36 if shape.kind == POSE else 9)[0])
-
-
-def _of_flat(own: dict[str, Any], flat: Sequence[str], reading: Reading) -> Components:
-    """Read the covariance that such keys say."""
+def _of_flat(own: dict[str, Any], reading: Reading, *, flat: Sequence[str], size: int) -> Components:
+    """Read the covariance that keys say as columns do: `c11` .. `c66`, or `sigma_x` .."""
     numbers = [within((key,), read_number, own[key]) for key in flat]
-    _, sigma = find_columns(flat, 36 if len(flat) != POINT_ENTRIES else POINT_ENTRIES)
+    _, sigma = find_columns(flat, size)
     if not sigma:
         within((flat[0],), check, numbers)
         return tuple(numbers)
     if negative := next((key for key, number in zip(flat, numbers, strict=True) if number < 0.0), ""):
         raise NotARotation(f"sigma is negative: {own[negative]}", (negative,))
-    found = [0.0] * 6
-    for axis, (at, unit) in enumerate(sigma):
-        bare = "deg" if reading.degrees and axis > 2 else ""
-        found[axis] = 0.0 if at < 0 else in_unit(numbers[at], unit or bare)
-    return of_sigmas(found)
+    return _of_sources(numbers, _with_unit(sigma, degrees=reading.degrees), size)
+
+
+def _with_unit(sigma: Sequence[tuple[int, str]], *, degrees: bool) -> tuple[tuple[int, str], ...]:
+    """Return the sources of six sigmas with the unit of bare angles."""
+    return tuple((at, unit or "deg" * (degrees and axis > 2)) for axis, (at, unit) in enumerate(sigma))
+
+
+def _of_sources(numbers: Sequence[Any], sigma: Sequence[tuple[int, str]], size: int) -> Components:
+    """Return the covariance of sigmas, each from one of some numbers in its unit, or 0."""
+    zero = numbers[0] - numbers[0]
+    entries = of_sigmas([zero if at < 0 else in_unit(numbers[at], unit) for at, unit in sigma])
+    return entries if size == len(entries) else of_position(entries)
+
+
+def of_position(entries: Components) -> Components:
+    """Return the covariance of a position out of that of a pose."""
+    return tuple(entries[6 * i + j] for i in range(3) for j in range(3))
 
 
 def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Reading, flat: Sequence[str]) -> Record:
     """Add the covariance that sigmas say; none of its entries is in the text, and the result names them anew."""
-    size = 36 if record.shape.kind == POSE else 9
+    size = 36 if record.shape.kind == POSE else POINT_ENTRIES
     degrees = reading.degrees
     reading.degrees = read_angle_unit(own["angles"]) if "angles" in own else degrees
     try:
-        entries = within(path, _of_flat, own, flat, reading) if flat else within(path, read_covariance, own, reading)
+        read = partial(_of_flat, flat=flat, size=size) if flat else read_covariance
+        entries = within(path, read, own, reading=reading)
     finally:
         reading.degrees = degrees
     if size < len(entries) and any(entries[18:]):
         raise Misfit("a point does not turn; its sigma has xyz alone", (*path, SIGMA))
-    entries = entries if size == len(entries) else tuple(entries[6 * i + j] for i in range(3) for j in range(3))
+    entries = entries if size == len(entries) else of_position(entries)
     return record._replace(
         shape=record.shape._replace(covariance=(size,), rewritten=True), numbers=(*record.numbers, *[None] * size),
         values=(*record.values, *entries), others=(*record.others, *(flat or (SIGMA,))),
@@ -188,8 +198,7 @@ def covariance_columns(
     if len(shapes) != 1:
         message = "a covariance beside several poses in a row: whose it is nobody can tell"
         raise FormatError(message, source=source, line=1)
-    if request.degrees:
-        sigma = tuple((at, unit or "deg" * (axis > 2)) for axis, (at, unit) in enumerate(sigma))
+    sigma = _with_unit(sigma, degrees=request.degrees)
     return places, (shape._replace(covariance=(len(places),), rewritten=True, sigma=sigma),)
 
 
@@ -266,9 +275,7 @@ def in_full(shape: Shape, own: Components, extra: Components) -> tuple[Shape, Co
     size, place = shape.covariance[0], shape.place
     entries = extra[:size]
     if shape.sigma:
-        zero = entries[0] - entries[0]
-        entries = of_sigmas([zero if at < 0 else in_unit(entries[at], unit) for at, unit in shape.sigma])
-        entries = entries if shape.kind == POSE else tuple(entries[6 * i + j] for i in range(3) for j in range(3))
+        entries = _of_sources(entries, shape.sigma, 36 if shape.kind == POSE else POINT_ENTRIES)
     if place is not None:
         turn = place._replace(level=False).turned(own[: place.size], IDENTITY)
         entries = uncertainty.rotate_covariance(entries, *turn)

@@ -383,19 +383,13 @@ def _half_position(header: Header, rotation: Columns) -> Columns | None:
 
 def _paired(positions: Sequence[Columns], rotations: Sequence[Columns]) -> list[PoseColumns]:
     """Put each rotation with the position that shares most of its affixes."""
-    if not rotations or not positions:
-        return [PoseColumns(each, None) for each in positions] + [PoseColumns(None, each) for each in rotations]
-    poses = []
-    left = list(positions)
+    poses, left = [], list(positions)
     for rotation in rotations:
-        near = max(left, key=partial(_kinship, rotation), default=None)
-        if rotation.whole or near is None:
-            poses.append(PoseColumns(None, rotation))
-            continue
-        left.remove(near)
+        near = max(left, key=partial(_kinship, rotation), default=None) if not rotation.whole else None
+        left = [each for each in left if each is not near]
         poses.append(PoseColumns(near, rotation))
     poses += [PoseColumns(each, None) for each in left]
-    return sorted(poses, key=lambda pose: min(each.places[0] for each in pose if each is not None))
+    return sorted(poses, key=lambda pose: pose.places[0])
 
 
 def _kinship(rotation: Columns, position: Columns) -> tuple[bool, int]:
