@@ -78,7 +78,11 @@ class ColumnRows(PlannedRows):
                 raise Misused(f"column {table.name(place)} holds no numbers", source=source)
         self.faults: list[Fault] = []
         self.notes: list[RowNote] = []
-        self.narrow = {} if request.all_numbers else self._narrow()  # all of them are written as doubles
+        self.narrow: dict[int, Kind] = {}  # numbers that are rounded to fewer digits than they are computed with
+        for column in self.layout.columns if not request.all_numbers else ():  # all of them are written as doubles
+            if isinstance(column, New) and not column.words:
+                kind = self._kind_of(column)
+                self.narrow |= {column.number: kind} if kind.itemsize < DOUBLE.itemsize else {}
 
     def out_columns(self, *, named: bool = False) -> list[OutColumn]:
         """Return the columns of the output; what is read as float32 is written so, what is new is a double.
@@ -91,45 +95,43 @@ class ColumnRows(PlannedRows):
         found = []
         for at, column in enumerate(self.layout.columns, 1):
             place = column.place if isinstance(column, (Kept, Named)) else None
+            kind = self.file.kinds[column.place] if isinstance(column, Kept) else None
+            if isinstance(column, New) and not column.words:
+                kind = self._kind_of(column)
             if names or isinstance(column, Fixed):
                 name = names[place] if names and place is not None else column.name  # type: ignore[union-attr]
             elif isinstance(column, New) and column.number < len(usual):
                 name = usual[column.number]
             else:
                 name = ours.get(-1 if place is None else place, f"column_{at}")
-            kind = self.file.kinds[column.place] if isinstance(column, Kept) else None
-            if isinstance(column, New) and not column.words:
-                kind = self._kind_of(column)
             found.append(OutColumn(name * bool(names or named), kind, place if isinstance(column, Kept) else None))
         return found
 
     def _kind_of(self, column: New) -> Kind:
         """Return the type of a result's numbers: that of the column it replaces; raises Misused for integers."""
-        names = self.table.names
+        names, kinds = self.table.names, self.file.kinds
         kind: Kind | None = DOUBLE
-        if names is None and getattr(self.file.kinds[0], "kind", "") in FLOATS:  # an array of one type
-            kind = self.file.kinds[0]
+        if names is None and getattr(kinds[0], "kind", "") in FLOATS:  # an array of one type
+            kind = kinds[0]
         elif names and column.name in names:
-            kind = self.file.kinds[names.index(column.name)]
+            kind = kinds[names.index(column.name)]
         if kind is None or kind.kind not in FLOATS:
             whole = f"column {column.name} holds {kind}, where the result would be rounded"
             raise Misused(f"{whole}; --keep puts it beside, -f csv writes text", source=self.source)
         return kind
 
-    def _narrow(self) -> dict[int, Kind]:
-        """Return which numbers of the result are rounded to fewer digits than they are computed with."""
-        news = [column for column in self.layout.columns if isinstance(column, New) and not column.words]
-        kinds = {column.number: self._kind_of(column) for column in news}
-        return {number: kind for number, kind in kinds.items() if kind.itemsize < DOUBLE.itemsize}
-
     def of_batch(self, batch: Batch) -> RowResults:
         """Return the results of a batch, and leave what is wrong with other rows in `faults`."""
         values, absent, bad = self._read(batch)
+        every = self.request.operation.formula is not None or self.request.gathered is not None
+        shapes = zip(absent, self.plan.shapes, strict=False)
+        empty = [flags for flags, shape in shapes if shape.notation or every]
+        gone = np.flatnonzero(np.logical_or.reduce(empty)) if np.any(empty) else None  # 0 is a point, but no rotation
         frames, names, strays = self.naming.of_rows(batch.size, lambda place: coded_texts(batch.texts(place)))
         stamps, late = self._stamps(batch)
         block = Block(
             values, (), np.arange(batch.size), int, names=names, stamps=stamps, bad={**late, **strays, **bad},
-            gone=self._without_pose(absent), frames=[frames],
+            gone=gone, frames=[frames],
         )  # fmt: skip
         run = self.ran(block)
         for number, kind in self.narrow.items():
@@ -182,12 +184,6 @@ class ColumnRows(PlannedRows):
             columns[first : first + shape.size, flags] = 0.0 if self.request.operation.formula is None else np.nan
             first += shape.size
         return columns.T, absent, bad
-
-    def _without_pose(self, absent: Flags) -> Ints | None:
-        """Return which rows cannot be computed: 0 is a point, but no rotation."""
-        computes = self.request.operation.formula is None and self.request.gathered is None
-        rows = [flags for flags, shape in zip(absent, self.plan.shapes, strict=False) if shape.notation or not computes]
-        return np.flatnonzero(np.logical_or.reduce(rows)) if np.any(rows) else None
 
     def _stamps(self, batch: Batch) -> tuple[list[Any], dict[int, tuple[str, str]]]:
         """Read the stamps, weights or labels of rows, and which of them have none."""

@@ -41,12 +41,7 @@ class Timed(NamedTuple):
     @classmethod
     def of_rows(cls, name: str) -> Timed:
         """Return where the stamps of rows stand for an expression, which knows by itself what they are for."""
-        return cls(name, _by_expression, _by_expression, lambda _: True)
-
-    @property
-    def in_ns(self) -> int:
-        """Return how many nanoseconds a whole number is, by the name of the stamps; 0 for seconds."""
-        return in_nanoseconds(self.name)
+        return cls(name, lambda *_: (), lambda *_: (), lambda _: True)
 
     @property
     def column(self) -> str:
@@ -57,11 +52,6 @@ class Timed(NamedTuple):
         """Return the pose at one time, to the bit as `many` does; raises FrametoolError if absent."""
         found = tuple(float(column[0]) for column in self.many(frame, [stamp_ns]))
         return found if found[0] == found[0] else self.one(frame, stamp_ns)
-
-
-def _by_expression(_frame: str | None, _at: Any) -> Any:
-    """Move nothing: what an expression looks up it looks up itself."""
-    raise ValueInvalid("an expression does its own look-ups")
 
 
 def read_header_stamp(seconds: str, nanoseconds: str) -> int:

@@ -97,7 +97,9 @@ def plan_table(
     asked_at = range(shapes[0].own_size, shapes[0].size) if request.operation.shown else ()  # empty cells are not
     words, marked = readers_of(shapes[0]) if on_earth else ({}, dict.fromkeys(asked_at, number_or_none))
     named = ({frames[0]: PARENT} if frames and request.poses else {}) | ({} if name is None else {name: NAME})
-    poses = [_written(pose) for pose in poses] if on_earth else poses
+    if on_earth and (position := poses[0].position):  # what is read and stays as it is
+        position = position._replace(places=position.places[: len(position.places) - position.staying])
+        poses = [poses[0]._replace(position=position)]
     written = _columns(table, poses, shapes, targets, request, named, extra)
     if table.header:
         refuse_repeated(written, names)
@@ -233,14 +235,6 @@ def _without_position(pose: PoseColumns, request: Request, table: Table, source:
     is_whole = len(request.notations) == 1 and request.notations[0].representation.whole is not None
     stays = not (is_whole or pose.rotation.whole or leaves_plane)
     return PoseColumns(None, pose.rotation) if stays else pose
-
-
-def _written(pose: PoseColumns) -> PoseColumns:
-    """Leave out the columns that are read and stay as they are."""
-    position = pose.position
-    if position is None or not position.staying:
-        return pose
-    return pose._replace(position=position._replace(places=position.places[: -position.staying]))
 
 
 def _frame_columns(table: Table, request: Request, source: str, *, on_earth: bool) -> tuple[int, ...]:
