@@ -113,35 +113,30 @@ class Shape(NamedTuple):
 
     @property
     def _there(self) -> list[int]:
-        """Return which numbers of position and rotation have a column."""
-        return [place for place in range(self._full) if place not in self.absent]
+        """Return which number of the rotation each number of a row is; below 0 of the position."""
+        return [place - count_of(self.unit) for place in range(self._full) if place not in self.absent]
 
     @property
     def position_size(self) -> int:
         """Count the numbers of the position in a row."""
-        return 0 if self.whole else sum(place < count_of(self.unit) for place in self._there)
+        return 0 if self.whole else sum(index < 0 for index in self._there)
 
     @property
     def rotation_at(self) -> tuple[int, ...]:
         """Return where in a row the rotation's numbers are."""
-        if self.joined:
-            return tuple(self.joined.split(range(self.own_size))[1])
-        return tuple(range(self.position_size, self.own_size))
+        every = range(self.own_size)
+        return tuple(self.joined.split(every)[1] if self.joined else every[self.position_size :])
 
     def number_at(self, index: int) -> int:
         """Return where in a row a number of the rotation is that has a column."""
-        if self.joined:
-            return self.rotation_at[index]
-        return self._there.index(index + count_of(self.unit))
+        return self.rotation_at[index] if self.joined else self._there.index(index)
 
     def in_degrees(self, place: int) -> bool | None:
         """Return True if a row's number is an angle in degrees; None if it is no angle."""
-        if place >= self.own_size:
+        angles = () if self.whole or self.notation is None else self.notation.representation.angles
+        if place >= self.own_size or self._there[place] not in angles:
             return None
-        index = self._there[place] - count_of(self.unit)
-        if self.whole or self.notation is None or index not in self.notation.representation.angles:
-            return None
-        return self.degrees and index not in self.radians_at
+        return self.degrees and self._there[place] not in self.radians_at
 
     def in_metres(self, place: int) -> bool:
         """Return True if a row's number is a length in metres, of a point, a vector or a position."""

@@ -162,14 +162,13 @@ def as_trajectory(table: Table, fmt: str, request: Request, source: str) -> Tabl
 
 def _euroc(names: Sequence[str], known: Sequence[str], source: str) -> PoseColumns:
     """Find EuRoC's columns by the words their names begin with."""
-    bare = [name.split("[")[0].strip() for name in names]
-    wanted = [name.split("[")[0].strip() for name in known[1:8]]
+    bare, wanted = ([name.split("[")[0].strip() for name in each] for each in (names, known[1:8]))
     if missing := [name for name in wanted if name not in bare]:
         raise FormatError(f"no column {', '.join(missing)}", source=source, line=1)
-    places = [bare.index(name) for name in wanted]
-    position = Columns(tuple(places[:3]), tuple(names[at] for at in places[:3]), unit=1.0)
-    turn = tuple(names[at] for at in places[3:])
-    return PoseColumns(position, Columns(tuple(places[3:]), turn, notation=notation("wxyz"), degrees=(None,) * 4))
+    places = tuple(map(bare.index, wanted))
+    called = tuple(names[at] for at in places)
+    rotation = Columns(places[3:], called[3:], notation=notation("wxyz"), degrees=(None,) * 4)
+    return PoseColumns(Columns(places[:3], called[:3], unit=1.0), rotation)
 
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
