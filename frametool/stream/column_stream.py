@@ -6,22 +6,16 @@ The points of a message are such a file too: moved by one pose, and written as a
 from __future__ import annotations
 
 from importlib import import_module
+from io import BytesIO
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from frametool.documents.source import InputFile
 from frametool.errors import FormatError, Misused, listing, warn
 from frametool.formats.rows import pcd
-from frametool.formats.rows.column_file import (
-    FLOATS,
-    ColumnFile,
-    Made,
-    OutColumn,
-    StructuredBatch,
-    not_finite,
-    rows_of_batch,
-)
+from frametool.formats.rows.column_file import FLOATS, ColumnFile, Made, OutColumn, RecordFile, not_finite
 from frametool.formats.table import FORMATS
 from frametool.grammar.names import NORMALS, in_nanoseconds
 from frametool.stream.array_writer import ColumnsWriter
@@ -326,25 +320,10 @@ def made_of(columns: Sequence[OutColumn], rows: ColumnRows, results: RowResults)
     return made
 
 
-class MessageColumns(ColumnFile):
+class MessageColumns(RecordFile):
     """The points of a message as a file of columns."""
 
     vectors = NORMALS
-    gaps = True
-
-    def __init__(self, cloud: PointCloud) -> None:
-        """Take the cloud."""
-        self.cloud = cloud
-        self.names: tuple[str, ...] | None = cloud.names
-        self.width = len(cloud.names)
-        self.kinds = [cloud.rows.dtype[place] for place in range(self.width)]
-
-    def batches(self) -> Iterator[StructuredBatch]:
-        """Yield the points."""
-        rows = self.cloud.rows
-        step = rows_of_batch(rows.dtype.itemsize)
-        for first in range(0, len(rows), step):
-            yield StructuredBatch(rows[first : first + step])
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
         """Refuse: messages are written in other formats."""
@@ -358,4 +337,6 @@ def moved_cloud(cloud: PointCloud, pose: Rigid, style: Style, source: str) -> It
     create = lambda columns, _count, style: module.create(columns, len(cloud.rows), style, **kept)  # noqa: E731
     into = SimpleNamespace(**{**vars(module), "create": create})
     request = Request(Operation(left=pose, moves=True))
-    yield from run_columns(MessageColumns(cloud), request, style, source=source, into=into)
+    stored = InputFile(source, BytesIO(cloud.rows.tobytes()))
+    file = MessageColumns(stored, cloud.names, cloud.rows.dtype, len(cloud.rows))
+    yield from run_columns(file, request, style, source=source, into=into)
