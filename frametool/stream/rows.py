@@ -15,7 +15,7 @@ from frametool.errors import ValueInvalid
 from frametool.stream.layout import Const, IfLocked, In, Instead, Out, Word
 from frametool.text.cells import without_quotes
 from frametool.text.spans import MARGIN, Spans, framed, join
-from frametool.text.write import fixed_spans, shortest_spans
+from frametool.text.write import fixed_spans, replaced, shortest_spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -159,19 +159,12 @@ def number_spans(
 
 def _with_points(spans: Spans, values: Floats, separators: bytes) -> Spans:
     """Write 1e-05 as 1.0e-05."""
-    size = abs(values)
+    size, shape = abs(values), values.shape
     far = np.flatnonzero(((size < 1e-4) & (size > 0.0)) | (size >= 1e16))
-    if not far.size:
-        return spans
-    texts = [
-        repr(value) if "." in repr(value) else repr(value).replace("e", ".0e") for value in values.ravel()[far].tolist()
-    ]
-    after = [chr(separators[place % len(separators)]) for place in far.tolist()]
-    _, (added,) = texts_as_rows([(0, f"{text}{end}".encode()) for text, end in zip(texts, after, strict=True)])
-    starts, ends = spans.starts.copy(), spans.ends.copy()
-    starts.reshape(-1)[far] = added.starts + len(spans.data)
-    ends.reshape(-1)[far] = added.ends + len(spans.data)
-    return Spans(np.concatenate([spans.data, added.data]), starts, ends)
+    texts = [text if "." in text else text.replace("e", ".0e") for text in map(repr, values.ravel()[far].tolist())]
+    ended = [text + chr(separators[place % len(separators)]) for text, place in zip(texts, far.tolist(), strict=True)]
+    data, starts, ends = replaced(Spans(spans.data, spans.starts.ravel(), spans.ends.ravel()), far, ended)
+    return Spans(data, starts.reshape(shape), ends.reshape(shape))
 
 
 def separators(pieces: Iterable[Piece]) -> bytes:
