@@ -64,11 +64,9 @@ class Naming:
 
         column: returns the texts of a column
         """
-        if self.places == (None, None) and size and self.layout.frames:
-            texts = [each.each() for each in map(column, self.layout.frames)]
-            return ["\0".join(names) for names in zip(*texts, strict=True)], BlockNames(), {}
         if self.places == (None, None) or not size:
-            return [self.earth], BlockNames(), {}
+            texts = [column(place).each() for place in self.layout.frames] if size else []
+            return [*map("\0".join, zip(*texts, strict=True))] or [self.earth], BlockNames(), {}
         none = Coded([""], np.zeros(size, np.int64))
         parents, names = (none if place is None else column(place) for place in self.places)
         count = len(names.texts)
@@ -326,11 +324,8 @@ def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming, requ
         for begin, end, kind, until in layout.stretches
     ]
     times = [place for place in (layout.time, layout.below) if place is not None]
-    stamps = []
-    if times:
-        columns = [without_quotes(cells.column(place)) for place in times]
-        found, late = read_extra(columns, request, table.name(times[0]))
-        stamps, bad = [found], {**late, **bad}
+    columns = [without_quotes(cells.column(place)) for place in times]
+    stamps, late = read_extra(columns, request, table.name(times[0]) if times else "")
     unchanged, broken = [], []
     lines_before = _line_counter(cells)
     if len(cells.rows) < len(cells.counts):
@@ -343,7 +338,7 @@ def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming, requ
                 reason = f"expected {table.width} cells{named}, found {int(cells.counts[line])}"
                 broken.append((line, Fault(lines_before(line), "", reason, skipped=True)))
     lines = lambda row: lines_before(int(cells.rows[row]))  # noqa: E731
-    return Block(numbers, parts, cells.rows, lines, unchanged, broken, names, stamps, bad, frames=[frames])
+    return Block(numbers, parts, cells.rows, lines, unchanged, broken, names, [stamps], late | bad, frames=[frames])
 
 
 def at_other_times(table: Table, layout: Layout, text: bytes, offset_ns: int) -> bytes:
