@@ -325,7 +325,7 @@ def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming, requ
     ]
     times = [place for place in (layout.time, layout.below) if place is not None]
     columns = [without_quotes(cells.column(place)) for place in times]
-    stamps, late = read_extra(columns, request, table.name(times[0]) if times else "")
+    stamps, late = read_extra(columns, request, table.name(times[0])) if times else (None, {})
     unchanged, broken = [], []
     lines_before = _line_counter(cells)
     if len(cells.rows) < len(cells.counts):
