@@ -192,6 +192,11 @@ def of_sigmas(sigmas: Sequence[Any]) -> Components:
     return tuple(sigmas[i] * sigmas[i] if i == j else zero for i in range(6) for j in range(6))
 
 
+def of_position(entries: Components) -> Components:
+    """Return the covariance of a position out of that of a pose."""
+    return tuple(entries[6 * i + j] for i in range(3) for j in range(3))
+
+
 def check(entries: Sequence[float]) -> None:
     """Raise NotARotation unless these 36 or 9 numbers are a covariance: known, symmetric, not negative."""
     try:

@@ -22,6 +22,7 @@ from frametool.grammar.covariance import (
     entries_of,
     find_columns,
     in_unit,
+    of_position,
     of_sigmas,
     read_covariance,
     read_scale,
@@ -128,11 +129,6 @@ def _of_sources(numbers: Sequence[Any], sigma: Sequence[tuple[int, str]], size: 
     zero = numbers[0] - numbers[0]
     entries = of_sigmas([zero if at < 0 else in_unit(numbers[at], unit) for at, unit in sigma])
     return entries if size == len(entries) else of_position(entries)
-
-
-def of_position(entries: Components) -> Components:
-    """Return the covariance of a position out of that of a pose."""
-    return tuple(entries[6 * i + j] for i in range(3) for j in range(3))
 
 
 def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Reading, flat: Sequence[str]) -> Record:
