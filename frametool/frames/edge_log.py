@@ -107,8 +107,7 @@ class EdgeLog:
         pauses = [self._stamps[at] - self._stamps[before] for before, at in pairwise(order)]
         stamps, lines = ([column[at] for at in order[1:]] for column in (self._stamps, self._lines))
         metres, radians = far.tolist()
-        returns = np.append(False, back.any(0)).tolist()
-        return [*map(SampleStep, stamps, lines, metres, radians, pauses, returns)]
+        return [*map(SampleStep, stamps, lines, metres, radians, pauses, np.append(False, back.any(0)).tolist())]
 
     @property
     def moves(self) -> bool:

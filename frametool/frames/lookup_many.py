@@ -160,6 +160,5 @@ class TrackTable:
         if (high - low) * SHARED > times.size:
             at = np.searchsorted(self.stamps, times, "right") - 1
             return self.stamps.take(at), self.columns.take(at, axis=1)
-        begins = np.searchsorted(times, self.stamps[low + 1 : high])
-        counts = np.diff(begins, prepend=0, append=times.size)
+        counts = np.diff(np.searchsorted(times, self.stamps[low + 1 : high]), prepend=0, append=times.size)
         return self.stamps[low:high].repeat(counts), self.columns[:, low:high].repeat(counts, axis=1)

@@ -204,8 +204,7 @@ class Frames:
         """
         self.require(target, source, fixed)
         fixed_from_source = self.lookup_components(fixed, source, source_at_ns)
-        target_from_fixed = self.lookup_components(target, fixed, target_at_ns)
-        return Transform.of(*rigid.compose(*target_from_fixed, *fixed_from_source))
+        return Transform.of(*rigid.compose(*self.lookup_components(target, fixed, target_at_ns), *fixed_from_source))
 
     def covariance(self, target: str, source: str, at_ns: int | None = None) -> list[float]:
         """Return the covariance of target_from_source: 36 numbers, row-major, to first order; edges are independent.

@@ -148,8 +148,7 @@ class Rotation(Batched):
             raise ValueInvalid("quaternion does not say its order; give xyzw=[..] or wxyz=[..]")
         if name == "matrix":
             return cls.from_matrix(numbers, normalize=normalize)
-        columns = validation.columns(numbers, len(rep.columns), name)
-        return cls.from_columns(name, columns, name, normalize=normalize)
+        return cls.from_columns(name, validation.columns(numbers, len(rep.columns), name), name, normalize=normalize)
 
     @classmethod
     def from_rotvec(cls, rotvec_xyz: Numbers) -> Rotation:

@@ -56,8 +56,7 @@ class Transform(Batched):
         import numpy as np
 
         generator = np.random.default_rng(seed)
-        rotation = Rotation.random(n, seed=generator)
-        return cls(rotation, radius * generator.normal(size=(3,) if n is None else (n, 3)))
+        return cls(Rotation.random(n, seed=generator), radius * generator.normal(size=(3,) if n is None else (n, 3)))
 
     @classmethod
     def from_parts(cls, xyz: Numbers = (0.0, 0.0, 0.0), *, normalize: bool = False, **rotation: Any) -> Transform:

@@ -260,8 +260,7 @@ def sample_results(tree: Frames) -> Iterator[Result]:
     """Yield every sample as a separate result, frame by frame; those of moving frames have their stamp."""
     for track in tree.tracks():
         for stamp_ns, parent, components in track.walk():
-            extras = {} if stamp_ns is None else {"stamp_ns": stamp_ns}
-            yield Result(Pose.of(components, track.child, parent), extras)
+            yield Result(Pose.of(components, track.child, parent), {} if stamp_ns is None else {"stamp_ns": stamp_ns})
 
 
 def edge_results(tree: Frames) -> Iterator[Result]:

@@ -218,8 +218,7 @@ class JointState:
                 lower, upper = joint.lower - SLACK, joint.upper + SLACK
                 if beyond := [value for value in values if not lower <= value <= upper]:
                     limits = f"{joint.lower:g} .. {joint.upper:g} {'rad' if joint.kind in TURNING else 'm'}"
-                    message = f"joint {shown(name)} is beyond its limits {limits}, {beyond[0]:g}"
-                    tally.note(message, joint.line, "limit")
+                    tally.note(f"joint {shown(name)} is beyond its limits {limits}, {beyond[0]:g}", joint.line, "limit")
             steps = zip(series, values, values[1:], strict=False) if joint.kind == "revolute" else ()
             for wide in [at for at, one, two in steps if abs(two - one) >= HALF_TURN][:1]:
                 far = f"joint {shown(name)} turns by half a turn or more in the step from {format_stamp(wide or 0)}"
@@ -428,8 +427,7 @@ def _of_table(
                 stamp_ns = parse_stamp(cells[stamp[0]] + stamp[1])
             for place, joint, degrees, per_metre in columns:
                 at = names[place]
-                value = JointValue(parse_number(cells[place]) / per_metre, degrees)
-                yield JointSample(joint, value, stamp_ns, refuse)
+                yield JointSample(joint, JointValue(parse_number(cells[place]) / per_metre, degrees), stamp_ns, refuse)
         except ValueInvalid as error:
             raise refuse(f"{at}: {error}") from None
 

@@ -166,8 +166,7 @@ class MjcfModel:
     def _mark(self, node: Element, inside: _Inside) -> None:
         """Read a site or camera."""
         attributes = self.attributes(node, inside.around)
-        pose = self.pose_of_site(attributes) if node.tag == "site" else self.pose(attributes)
-        name = self._place(node, inside, pose)
+        name = self._place(node, inside, self.pose_of_site(attributes) if node.tag == "site" else self.pose(attributes))
         if node.tag == "camera":
             self.options.tally.axes[name] = self.options.answers.camera_axes or "opengl"
         if "mode" in attributes and (mode := attributes["mode"].attribute("mode")) != "fixed":

@@ -212,8 +212,7 @@ class TextBatch(column_file.Batch):
         self.bytes_read = len(cells.data) - 2 * MARGIN
 
     def _problem(self, row: int, place: int, reason: str) -> FormatError:
-        message = f"{self.table.cloud.names[place]}: {reason}"
-        return self.table.problem(message, self.line + int(self.cells.rows[row]))
+        return self.table.problem(f"{self.table.cloud.names[place]}: {reason}", self.line + int(self.cells.rows[row]))
 
     def numbers(self, place: int) -> column_file.ColumnNumbers:
         """Return a column as floats; raises FormatError for a cell that is not a number."""

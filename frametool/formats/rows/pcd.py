@@ -284,8 +284,7 @@ class PcdFile(CloudFile):
         if head.data == "binary":
             column_file.check_declared(file, self.count, self.record.itemsize, self.what, last=True)
         elif head.data == "ascii":
-            every = sum(field.values for field in head.fields)
-            self.text = TextRows(self, cells, every, head.text.count(b"\n") + 1)
+            self.text = TextRows(self, cells, sum(field.values for field in head.fields), head.text.count(b"\n") + 1)
 
     def moved_by(self, pose: Components | None) -> None:
         """Transform VIEWPOINT by the pose that transforms all points; None: there is no such pose."""
@@ -322,8 +321,7 @@ class PcdFile(CloudFile):
             fields = tuple(field for field in fields if field.name != PADDING)
             plain = sum(field.size * field.values for field in fields)
             if size != points * plain:
-                said = f"the header says {points} points of {plain} bytes, the packed data says {size} bytes"
-                raise file.error(said)
+                raise file.error(f"the header says {points} points of {plain} bytes, the packed data says {size} bytes")
         packed = column_file.read_exactly(file, packed_size, "the packed points")
         if file.stream.read(1):
             raise file.error("more bytes follow the packed points")

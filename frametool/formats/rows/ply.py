@@ -164,8 +164,7 @@ class PlyFile(clouds.CloudFile):
             self.before = self._lines(sum(each.instances for each in before))
             if not self.width:
                 raise file.error(f"the {self.count} vertices have no properties")
-            line = (self.head + self.before).count(b"\n") + 1
-            self.text = clouds.TextRows(self, range(self.width), self.width, line)
+            self.text = clouds.TextRows(self, range(self.width), self.width, (self.head + self.before).count(b"\n") + 1)
 
     def _lines(self, count: int) -> bytes:
         """Read the lines of the elements before the vertices."""

@@ -296,8 +296,7 @@ def blocks(file: InputFile, options: Options, *, named: bool = True) -> Iterator
         good, poses = _checked(some, spec, file, options)
         times = [stamps.at(count + at) if stamps else _counted(some[at], file) for at in range(len(some))]
         count += len(some)
-        found = tuple(part[good] for part in poses)
-        yield PoseBlock(found, np.array(times, np.int64)[good], [some[at] for at in good])
+        yield PoseBlock(tuple(part[good] for part in poses), np.array(times, np.int64)[good], [some[at] for at in good])
     if stamps:
         stamps.finish(count, file.name)
     describe(options, spec, count, named=named)
