@@ -49,11 +49,12 @@ def _place(fmt: str, output: str | None) -> str:
     """Return where a recording is written; raises UsageError where it cannot be."""
     if output is None or output == "-":
         raise UsageError(f"{fmt} is no text; give -o {'FOLDER' if table.is_folder(fmt) else 'FILE'}")
-    if table.is_folder(fmt) and output.endswith(table.FORMATS[fmt].suffixes):
+    suffixes = table.FORMATS[fmt].suffixes
+    if table.is_folder(fmt) and output.endswith(suffixes):
         raise UsageError(f"-o {output}: a ROS 2 bag is written as a folder of MCAP; give -f {fmt} -o FOLDER")
     named = None if table.is_folder(fmt) else table.by_name(output, table.writers("recording"))
     if named not in (None, fmt):
-        raise UsageError(f"-o {output} names {named}, -f says {fmt}; give -o NEW{table.FORMATS[fmt].suffixes[0]}")
+        raise UsageError(f"-o {output} is the name of {named}, -f says {fmt}; give -o NEW{suffixes[0]}")
     return output
 
 
