@@ -95,11 +95,6 @@ def lookups_in(tree: Frames, *, carried: bool) -> Lookups:
     return Lookups(tree, carried=carried)
 
 
-def report_granted(lookups: Lookups) -> None:
-    """Report what look-ups have taken for granted."""
-    inputs().note(lookups.granted())
-
-
 def refuse_idle(files: Sequence[FrameFile]) -> None:
     """Refuse --topic where the files that were read name none."""
     if inputs().topics and not any(file.topics.counts or file.topics.seen for file in files):

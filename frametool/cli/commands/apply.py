@@ -14,7 +14,7 @@ from frametool.cli import options, streaming
 from frametool.cli.command import Inputs, argument, command_named, option, refuse, together
 from frametool.cli.poses import inline_misuse, is_inline, is_pasted, one_pose, pose_source, values_of
 from frametool.cli.sink import say_warning, writing
-from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, report_granted
+from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in
 from frametool.documents.source import InputFile, Source
 from frametool.errors import FormatError, FrametoolError, FrametoolWarning, ValueInvalid, heard_by, shown, warn
 from frametool.formats.table import FORMATS, holds_arrays, writers
@@ -341,7 +341,8 @@ class TreeWay(Way):
 
         numbers: what looks like one is no frame's name
         """
-        arguments, self.at, self.uncertain = inputs.arguments, inputs.at, bool(inputs.covariance)
+        self.inputs, self.at, self.uncertain = inputs, inputs.at, bool(inputs.covariance)
+        arguments = inputs.arguments
         refuse(len(arguments) < 2, "name TREE and TARGET, or give --transform")
         is_named = len(arguments) > 2 and not is_record(arguments[2]) and not (numbers and begins_number(arguments[2]))
         named = arguments[2:3] if is_named else ()
@@ -392,7 +393,7 @@ class TreeWay(Way):
 
     def finish(self) -> None:
         """Report what look-ups have taken for granted."""
-        report_granted(self.lookups)
+        self.inputs.note(self.lookups.granted())
 
 
 def _settled(own: str | None, source: str | None) -> str | None:

@@ -13,7 +13,7 @@ from frametool.cli.command import FILE, Inputs, argument, command_named, option,
 from frametool.cli.output import QUATERNION, Output
 from frametool.cli.sink import say_error
 from frametool.cli.streaming import EXPLAIN, PoseTask, Stream, stream_options
-from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, opened, report_granted, state
+from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, opened, state
 from frametool.errors import FrametoolError, NoDataAt, UnknownFrame, warn
 from frametool.formats.table import holds_arrays
 from frametool.geometry.rigid import EXACT, UNCERTAIN
@@ -118,7 +118,7 @@ def lookup_command(inputs: Inputs) -> int:
     lookups, at = lookups_in(tree, carried=covariance), options.at_ns(inputs.at)
     if by_row:
         status = _by_row(task, lookups, target, source)
-        report_granted(lookups)
+        inputs.note(lookups.granted())
         return status
     target, source = frame_name(target, tree), frame_name(source, tree)
     source_at, fixed = options.at_ns(inputs.source_at), inputs.fixed and frame_name(inputs.fixed, tree)
@@ -134,7 +134,7 @@ def lookup_command(inputs: Inputs) -> int:
         output.values([looked_up_across(tree, target, at, source, source_at, fixed)])
     else:
         output.values([lookups.result(target, source, at)])
-    report_granted(lookups)
+    inputs.note(lookups.granted())
     return status
 
 

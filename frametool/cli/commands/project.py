@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
+import os
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -23,9 +23,7 @@ from frametool.text.numbers import parse_length, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
-    from contextlib import AbstractContextManager
 
-    from frametool.cli.sink import Write
     from frametool.geometry.camera import Camera
     from frametool.geometry.types import Components
     from frametool.stream.pixels import Seen
@@ -89,7 +87,8 @@ def project_command(inputs: Inputs) -> int:
     from frametool.stream.pixels import PixelsOfPoints
 
     overlay, image, path = None, inputs.image, inputs.output
-    output = Output(inputs, "points", otherwise="yaml") if image is None else Undrawn(inputs.but(output=None), "points")
+    own = inputs if image is None else inputs.but(output=os.devnull)  # the rows of an overlay are not written
+    output = Output(own, "points", otherwise="yaml")
     task = CameraTask(inputs, output, "TREE CAMERA")
     if image is not None:
         from frametool.formats.cameras import resized
@@ -110,14 +109,6 @@ def project_command(inputs: Inputs) -> int:
             write(overlay.drawn())
         say(overlay.summary())
     return status
-
-
-class Undrawn(Output):
-    """The rows of an overlay, which are not written."""
-
-    def opened(self) -> AbstractContextManager[Write]:
-        """Open no place."""
-        return nullcontext(lambda _: None)
 
 
 class CameraTask(Stream):
