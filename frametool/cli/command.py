@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     Record = TypeVar("Record")
     Adds = Callable[[Any], Any]
+    Lists = Callable[[click.HelpFormatter, bool], None]
     Offers = Callable[[click.Context, str], Mapping[str, str] | None]
 
 # an argument that begins like this is a number, whatever short options there are
@@ -360,14 +361,15 @@ class WithHelp(click.Command):
     """A command with -h, --help and --help-all.
 
     own: the options that it is about although they have a heading elsewhere
+    lists: writes a list before the exit codes, for --help-all with all its meanings
     """
 
-    def __init__(self, *args: Any, own: Sequence[str] = (), **kwargs: Any) -> None:
+    def __init__(self, *args: Any, own: Sequence[str] = (), lists: Lists | None = None, **kwargs: Any) -> None:
         """Add --help-all, which click does not know; of options with one name the first counts, as a command's own."""
         super().__init__(*args, **kwargs)
         names = {name: each for each in reversed(self.params) for name in each.opts}
         self.params = [*dict.fromkeys(names[each.opts[-1]] for each in self.params), HELP_ALL]
-        self.own = own
+        self.own, self.lists = own, lists
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options of this command, and a line for each group that others have too; then the commands."""
@@ -436,9 +438,12 @@ class Command(WithHelp):
         passed.refuse_idle()
         return result
 
-    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """End every help with the exit codes, those of most commands unless its epilog says others."""
         formatter.write_paragraph()
+        if self.lists:
+            self.lists(formatter, bool(ctx.meta.get(EVERYTHING)))
+            formatter.write_paragraph()
         formatter.write_text(self.epilog or EXIT_CODES)
 
 

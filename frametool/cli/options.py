@@ -191,10 +191,8 @@ _of_files, _of_times, _of_rotations, _of_results, _of_formats = (
 verbose_option = _of_files("-v --verbose", "report the detected format of each input")
 _IN = "format of the input (`frametool formats`), once per file"
 in_option = _of_files("--in FORM", _IN, FormatName(READ, "read"), name="input_formats", multiple=True)
-_CAMERA_AXES = _of_formats(
-    "--camera-axes", "axes of the cameras in a file; converts nothing  [default: those of its format]",
-    CAMERA_AXES,
-)  # fmt: skip
+_AXES = "axes of the cameras in a file; converts nothing  [default: those of its format]"
+_CAMERA_AXES = _of_formats("--camera-axes", _AXES, CAMERA_AXES)
 _STAMPS = _of_formats("--stamps FILE", "timestamps for poses without any, one per line")
 _EDGES = _of_formats("--edges", "read the edges of a g2o graph instead of its vertices")
 _TOPIC = _of_files("--topic NAME", "read only this topic; may be repeated", name="topics", multiple=True)

@@ -7,17 +7,7 @@ from functools import partial
 from math import radians
 from typing import TYPE_CHECKING
 
-from frametool.cli.command import (
-    EVERYTHING,
-    FILE,
-    Command,
-    Inputs,
-    argument,
-    command_named,
-    option,
-    refuse,
-    refuse_two_readers,
-)  # fmt: skip
+from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, refuse_two_readers
 from frametool.cli.options import at_ns, file_options, list_options, offset_option, read_time, result_options
 from frametool.cli.output import Output
 from frametool.cli.sink import folded, in_colour, say, say_error, say_first, writing
@@ -38,21 +28,16 @@ FAILED = 1
 MARKS = (r"(?m)^\S.*?: (?P<red>error): ", r"(?m)^\S.*?: (?P<magenta>warning): ")
 
 
-class CheckCommand(Command):
-    """A command whose help lists the rules."""
-
-    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Name the rules, with --help-all their levels and what they are about, then the exit codes."""
-        formatter.write_paragraph()
-        if ctx.meta.get(EVERYTHING):
-            with formatter.section("Rules"):
-                formatter.write_dl([(f"{rule} ({level})", about) for rule, (level, about) in RULES.items()])
-        else:
-            formatter.write_text(f"{len(RULES)} rules, explained by --help-all: {', '.join([*RULES][:6])} ..")
-        super().format_epilog(ctx, formatter)
+def _rules(formatter: click.HelpFormatter, everything: bool) -> None:
+    """Write the rules, with --help-all their levels and what they are about."""
+    if everything:
+        with formatter.section("Rules"):
+            formatter.write_dl([(f"{rule} ({level})", about) for rule, (level, about) in RULES.items()])
+    else:
+        formatter.write_text(f"{len(RULES)} rules, explained by --help-all: {', '.join([*RULES][:6])} ..")
 
 
-@command_named("check", cls=CheckCommand)
+@command_named("check", lists=_rules)
 @argument("files", FILE, nargs=-1, required=True)
 @option("-f --format", "format of the findings", (*WRITERS,), name="fmt", default="text")
 @option("--strict", "exit with 1 for warnings too")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli import options, poses
-from frametool.cli.command import Command, Inputs, argument, command_named, misuse, option, refuse
+from frametool.cli.command import Inputs, argument, command_named, misuse, option, refuse
 from frametool.cli.output import QUATERNION
 from frametool.cli.sink import say
 from frametool.cli.streaming import EXPLAIN, ONE_RECORD, PoseTask, one_argument, pose_stream_options
@@ -28,17 +28,12 @@ if TYPE_CHECKING:
     from frametool.stream.request import Operation
 
 
-class ConvertCommand(Command):
-    """A command whose help lists the representations."""
-
-    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List them, then the exit codes."""
-        formatter.write_paragraph()
-        formatter.write_text(f"Representations: {', '.join(row.spelling for row in REPRESENTATIONS.values())}.")
-        super().format_epilog(ctx, formatter)
+def _representations(formatter: click.HelpFormatter, _everything: bool) -> None:
+    """Write the list of representations."""
+    formatter.write_text(f"Representations: {', '.join(row.spelling for row in REPRESENTATIONS.values())}.")
 
 
-@command_named("convert", own=("from_rep", "notations"), cls=ConvertCommand)
+@command_named("convert", own=("from_rep", "notations"), lists=_representations)
 @argument("values", nargs=-1, metavar="[VALUES.. | POSE]")
 @option("--axes NAME", "the pose at the same place in these axes (help axes)", options.AXIS)
 @option("--world-axes A_from_B", "axes of the reference frame (help axes)", options.AXIS, name="world")

@@ -12,17 +12,7 @@ import click
 
 from frametool import __version__
 from frametool.cli import command as shared
-from frametool.cli.command import (
-    EXIT_CODES,
-    FILE,
-    Inputs,
-    Text,
-    argument,
-    command_named,
-    option,
-    option_groups,
-    refuse,
-)  # fmt: skip
+from frametool.cli.command import EXIT_CODES, FILE, Inputs, Text, argument, command_named, option, refuse
 from frametool.cli.commands import COMMANDS, group
 from frametool.cli.sink import refuse_existing, show, writing
 from frametool.errors import FileProblem, ValueInvalid, any_near, printable, shown
@@ -165,7 +155,7 @@ def _search(ctx: click.Context, name: str) -> str:
 
 def _texts(command: click.Command, ctx: click.Context) -> list[str]:
     """Return what a command says of itself, and of each of its own options."""
-    own = option_groups(command, ctx)["Options"]
+    own = shared.option_groups(command, ctx)["Options"]
     return [f"{command.name} {command.help}", *(f"{each.opts[-1]} {each.help}" for each in own)]
 
 
@@ -183,7 +173,7 @@ def common(ctx: click.Context) -> str:
 def described(name: str, command: click.Command, ctx: click.Context) -> dict[str, Any]:
     """Return all that there is to say of a command for a program."""
     lines = [line.strip() for line in (command.help or "").replace("\b\n", "").split("\n")]
-    groups = option_groups(command, ctx).items()
+    groups = shared.option_groups(command, ctx).items()
     return {
         "name": name,
         "about": lines[0],

@@ -17,10 +17,9 @@ from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, opened
 from frametool.errors import FrametoolError, NoDataAt, UnknownFrame, warn
 from frametool.formats.table import holds_arrays
 from frametool.geometry.rigid import EXACT, UNCERTAIN
-from frametool.grammar import pose_algebra
+from frametool.grammar import pose_algebra as algebra
 from frametool.grammar.edges import stop
 from frametool.grammar.pose import LEFT_OUT
-from frametool.grammar.pose_algebra import Lookups, looked_up_across, looked_up_many, sample_stamps, why_missing
 from frametool.stream.faults import NULL, SKIP, RowsSkipped
 
 if TYPE_CHECKING:
@@ -131,7 +130,7 @@ def lookup_command(inputs: Inputs) -> int:
     if inputs.times is not None or every:
         status = _many(task, lookups, target, source)
     elif fixed is not None:
-        output.values([looked_up_across(tree, target, at, source, source_at, fixed)])
+        output.values([algebra.looked_up_across(tree, target, at, source, source_at, fixed)])
     else:
         output.values([lookups.result(target, source, at)])
     inputs.note(lookups.granted())
@@ -148,7 +147,7 @@ def _check_covariance(output: Output, *, by_row: bool) -> None:
         raise click.UsageError(f"{fmt} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")
 
 
-def _many(task: PoseTask, lookups: Lookups, target: str, source: str) -> int:
+def _many(task: PoseTask, lookups: algebra.Lookups, target: str, source: str) -> int:
     """Print the results at --times, or at those of all samples; with --on-error skip report the others."""
     inputs, tree, window = task.inputs, lookups.tree, task.window
     times, skipped = inputs.times, Skipped(in_json=task.output.chosen == "json")
@@ -156,7 +155,7 @@ def _many(task: PoseTask, lookups: Lookups, target: str, source: str) -> int:
     if times is not None and inputs.on_error == NULL:
         raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")
     report = skipped.add if skip else stop
-    asked = sample_stamps(tree, target, source) if times is None else options.read_times(times, report)
+    asked = algebra.sample_stamps(tree, target, source) if times is None else options.read_times(times, report)
     if window is not None:
         inputs.ask("start", "stop")
         asked = [stamp for stamp in asked if window[0] <= stamp <= window[1]]
@@ -165,14 +164,14 @@ def _many(task: PoseTask, lookups: Lookups, target: str, source: str) -> int:
 
     def miss(at_ns: int) -> None:
         is_full = len(skipped.errors) == MOST_REPORTED  # to say why takes longest
-        skipped.add(None if is_full else why_missing(tree, target, source, at_ns))
+        skipped.add(None if is_full else algebra.why_missing(tree, target, source, at_ns))
 
-    found = looked_up_many(tree, target, source, asked, miss=miss if skip else None, covariance=lookups.carried)
+    found = algebra.looked_up_many(tree, target, source, asked, miss=miss if skip else None, covariance=lookups.carried)
     task.output.poses_as_they_come(skipped.counted(map(lookups.noted, found)))
     return skipped.finish()
 
 
-def _by_row(task: PoseTask, lookups: Lookups, target: str | None, source: str | None) -> int:
+def _by_row(task: PoseTask, lookups: algebra.Lookups, target: str | None, source: str | None) -> int:
     """Add the pose of SOURCE in TARGET to every row; a frame named on the command line is every row's."""
     from frametool.stream.request import Operation
     from frametool.stream.stamp_source import Timed
@@ -265,7 +264,7 @@ def _results(replayed: Iterator[Replayed], target: str, source: str, skipped: Sk
         if isinstance(found, NoDataAt):
             skipped.add(found, steps)
         else:
-            yield pose_algebra.result_at(found.components, target, source, at_ns)
+            yield algebra.result_at(found.components, target, source, at_ns)
     if skipped.errors and not skipped.found:
         raise skipped.errors[0]
 

@@ -98,7 +98,7 @@ def view_command(inputs: Inputs) -> None:
             return
     sliders = chosen == "html" and not overlay and not inputs.no_sliders
     inputs.refuse_idle()
-    content = _content(scene, chosen, tree, eye, before, str(target), sliders=sliders)
+    content = _content(inputs, scene, chosen, eye, before, sliders=sliders)
     path = output
     if inputs.opens and path is None:
         from tempfile import NamedTemporaryFile
@@ -126,15 +126,16 @@ def _format(fmt: str | None, output: str | None, *, opens: bool) -> str:
 
 
 def _content(
-    scene: FrameScene, fmt: str, tree: str, eye: Eye, before: FrameScene | None, before_tree: str, *, sliders: bool,
-) -> str | bytes:  # fmt: skip
+    inputs: Inputs, scene: FrameScene, fmt: str, eye: Eye, before: FrameScene | None, *, sliders: bool
+) -> str | bytes:
     """Return the picture in a format, and say what a still one does not show."""
-    title, other_title = (os.path.basename(each) if len(each) < 200 else "tree" for each in (tree, before_tree))
+    tree: str = inputs.tree
+    title, other = (os.path.basename(each) if len(each) < 200 else "tree" for each in (tree, str(inputs.target)))
     if fmt == "html":
         from frametool.view.exports import write_page
 
         return write_page(
-            scene, title=title, file=tree, eye=eye, other=before, other_title=other_title, sliders=sliders,
+            scene, title=title, file=tree, eye=eye, other=before, other_title=other, sliders=sliders,
             solids=_solids(tree) if scene.tree.robots and not before else (),
         )  # fmt: skip
     if fmt == "glb":
