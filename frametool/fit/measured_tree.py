@@ -293,7 +293,7 @@ class TreeSolution:
     dof: degrees of freedom of metres and of radians; rms_distance, rms_angle: of the inliers
     tree: all of that as a tree with covariances: frames in the root, or in the frame that they are fixed in
     hints: warnings about the sigmas
-    rows: the number of used measurements of each frame
+    poses: of all frames in the root; rows: the number of used measurements of each frame
     frame_checked: whether its pose in the root depends only on loops
     """
 
@@ -333,12 +333,7 @@ class TreeSolution:
             elif name == top:
                 self.tree.add_root(name)
             else:
-                self.tree.add(self.root, name, self.pose(name), self.marginal(name))
-
-    def pose(self, frame: str, parent: str | None = None) -> Transform:
-        """Return the pose of a frame in the root, or in another."""
-        pose = self.poses[self._known(frame)]
-        return pose if parent is None else self.poses[self._known(parent)].inverse() @ pose
+                self.tree.add(self.root, name, self.poses[name], self.covariance(self.root, name))
 
     def covariance(self, target: str, source: str) -> Array | None:
         """Return the covariance (6, 6) of the pose of source in target, from all loops; None if it is not known.
@@ -347,14 +342,7 @@ class TreeSolution:
         """
         return self._fit.covariance(self._at(target), self._at(source))
 
-    def marginal(self, frame: str) -> Array | None:
-        """Return the covariance (6, 6) of the pose of a frame in the root; None if it is not known."""
-        return self._fit.covariance((0, Transform.identity()), self._at(frame))
-
-    def _known(self, frame: str) -> str:
+    def _at(self, frame: str) -> tuple[int, Transform]:
         if frame not in self.poses:
             raise ValueInvalid(f"unknown frame {shown(frame)}{alternatives(frame, self.frames, 'frames')}")
-        return frame
-
-    def _at(self, frame: str) -> tuple[int, Transform]:
-        return self._number[self._known(frame)], self._poses[self.frames.index(frame)]
+        return self._number[frame], self._poses[self.frames.index(frame)]

@@ -35,7 +35,7 @@ if True:
     {solve}
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
-SOLVE = "found = solve_tree(made.measurements); [found.marginal(name) for name in found.frames]"
+SOLVE = "found = solve_tree(made.measurements); [found.covariance(found.root, name) for name in found.frames]"
 
 
 def quality(frames: int, rows: int, *, sigmas: bool) -> str:

@@ -32,7 +32,7 @@ def test_a_tree_is_solved_from_tuples_as_from_measurements() -> None:
     assert found.checked.all()
     assert found.tree.roots == (found.root,) == ("f0",)
     for name in found.frames[1:]:
-        assert found.tree.lookup("f0", name).components == same.pose(name).components
+        assert found.tree.lookup("f0", name).components == same.poses[name].components
         marginal = found.covariance("f0", name)
         assert marginal is not None
         np.testing.assert_allclose(np.reshape(found.tree.covariance("f0", name), (6, 6)), marginal, rtol=1e-9, atol=1e-15)

@@ -50,7 +50,7 @@ def test_few_loops_are_solved_and_their_noise_is_found_or_said_to_be_rough(frame
     assert found.sigma is not None
     assert all(1 / 3 < each / 1e-3 < 3 for each in found.sigma)
     assert bool(found.hints) == (frames > 3 or more == 0) or frames + more <= 2 * (frames - 1)
-    covariance = found.marginal("f2")
+    covariance = found.covariance(found.root, "f2")
     assert covariance is not None
     assert np.sqrt(np.diagonal(covariance)).min() > 1e-4
 

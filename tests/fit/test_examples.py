@@ -35,7 +35,7 @@ def test_the_tree_is_that_of_the_robot_without_the_inverted_row() -> None:
     assert np.flatnonzero(~found.checked).tolist() == [19]
     assert (len(found.frames), len(found.measurements)) == (7, 20)
     for name in found.frames[1:-1]:
-        off = found.pose(name).distance(robot.lookup("base_link", name))
+        off = found.poses[name].distance(robot.lookup("base_link", name))
         covariance = found.covariance("base_link", name)
         assert covariance is not None
         assert off[0] < 3 * np.sqrt(np.trace(covariance[:3, :3]))

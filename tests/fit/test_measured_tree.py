@@ -68,7 +68,7 @@ def relative(found: np.ndarray | None, wanted: np.ndarray) -> float:
 
 
 def off(solution: TreeSolution, truth: World) -> float:
-    return max(truth.rms(solution.pose))
+    return max(truth.rms(solution.poses.__getitem__))
 
 
 def left_out(solution: TreeSolution) -> dict[int, str | None]:
@@ -88,9 +88,9 @@ def test_golden_worlds(case: dict[str, Any]) -> None:
         assert found.sigma == pytest.approx((case["estimated"]["xyz"], case["estimated"]["rpy"]), abs=LEAST_SQUARES)
     for name, wanted in case["frames"].items():
         pose = Transform(Rotation.from_quaternion(wanted["xyzw"], normalize=True), wanted["xyz"])
-        assert found.pose(name).is_close(pose, angle=LEAST_SQUARES, distance=LEAST_SQUARES)
+        assert found.poses[name].is_close(pose, angle=LEAST_SQUARES, distance=LEAST_SQUARES)
         if wanted["covariance"] is not None:
-            assert relative(found.marginal(name), np.reshape(wanted["covariance"], (6, 6))) < OF_SIGMAS
+            assert relative(found.covariance(found.root, name), np.reshape(wanted["covariance"], (6, 6))) < OF_SIGMAS
 
 
 @pytest.mark.parametrize(("frames", "rows"), [(2, 1), (2, 4), (5, 4), (7, 20), (60, 150)])
@@ -187,16 +187,16 @@ def test_the_order_of_the_rows_does_not_matter(sigmas: bool) -> None:  # noqa: F
     other = solve_tree([truth.measurements[row] for row in order])
     assert [order[row] for row in left_out(other)] == list(truth.wrong)
     for name in found.frames:
-        assert found.pose(name).is_close(other.pose(name), angle=1e-10, distance=1e-10)
+        assert found.poses[name].is_close(other.poses[name], angle=1e-10, distance=1e-10)
 
 
 def test_another_root_moves_the_tree_as_a_whole() -> None:
     truth = world(12, 30, 5, sigmas=True)
     one, two = solve_tree(truth.measurements), solve_tree(truth.measurements, root="f4")
     for name in one.frames:
-        assert one.pose(name, "f4").is_close(two.pose(name), angle=1e-11, distance=1e-11)
+        assert one.tree.lookup("f4", name).is_close(two.poses[name], angle=1e-11, distance=1e-11)
         assert np.allclose(sure(one.covariance("f4", name)), sure(two.covariance("f4", name)), rtol=1e-7, atol=1e-16)
-        assert np.allclose(sure(one.covariance("f4", name)), sure(two.marginal(name)), rtol=1e-7, atol=1e-16)
+        assert np.allclose(sure(one.covariance("f4", name)), sure(two.covariance(two.root, name)), rtol=1e-7, atol=1e-16)
     assert np.allclose(one.u, two.u, atol=1e-8)
 
 
@@ -214,7 +214,7 @@ def test_covariances_are_those_of_many_draws() -> None:
             rows.append(each._replace(components=moved.components))
         found = solve_tree(rows, robust=False)
         for target, source in pairs:
-            pose, true = found.pose(source, target), truth.true(target, source)
+            pose, true = found.tree.lookup(target, source), truth.true(target, source)
             draws[target, source].append(np.concatenate([pose.xyz - true.xyz, (pose.rotation @ true.rotation.inverse()).as_rotvec()]))
     exact = solve_tree(truth.measurements)
     for (target, source), errors in draws.items():
@@ -226,7 +226,7 @@ def test_covariances_are_those_of_many_draws() -> None:
 def test_a_frame_is_exactly_where_it_is_in_itself() -> None:
     found = solve_tree(world(5, 9, 2).measurements)
     assert not np.any(found.covariance("f2", "f2"))
-    assert not np.any(found.marginal("f0"))
+    assert not np.any(found.covariance(found.root, "f0"))
 
 
 def test_no_robust_keeps_all() -> None:
@@ -245,7 +245,7 @@ def test_given_sigmas_that_are_too_small_are_told_and_believed() -> None:
     assert found.sigma is None
     calm = solve_tree(world(12, 40, 7, sigmas=True, noise=0.5).measurements)
     assert calm.sigma_factor == 1.0
-    assert np.allclose(sure(calm.marginal("f5")), sure(found.marginal("f5")), rtol=0.2, atol=1e-6)
+    assert np.allclose(sure(calm.covariance(calm.root, "f5")), sure(found.covariance(found.root, "f5")), rtol=0.2, atol=1e-6)
 
 
 def test_rows_without_sigmas_among_others_tell_their_own() -> None:
@@ -267,7 +267,7 @@ def test_no_loop_and_no_sigma_leaves_the_covariance_unknown() -> None:
     found = solve_tree(chain(4, sigmas=False))
     assert found.sigma is None
     assert found.dof == 0
-    assert found.marginal("f3") is None
+    assert found.covariance(found.root, "f3") is None
     assert found.covariance("f3", "f1") is None
     assert not found.checked.any()
     assert found.used.all()
@@ -275,7 +275,7 @@ def test_no_loop_and_no_sigma_leaves_the_covariance_unknown() -> None:
 
 def test_given_sigmas_need_no_loop() -> None:
     found = solve_tree(chain(2, sigmas=True))
-    assert np.allclose(sure(found.marginal("f1")), np.reshape(COVARIANCE, (6, 6)), rtol=1e-9, atol=1e-18)
+    assert np.allclose(sure(found.covariance(found.root, "f1")), np.reshape(COVARIANCE, (6, 6)), rtol=1e-9, atol=1e-18)
 
 
 def test_a_row_in_no_loop_is_unchecked_and_what_hangs_by_it() -> None:
@@ -292,9 +292,9 @@ def test_what_only_rows_of_unknown_noise_join_has_no_covariance() -> None:
     truth = world(7, 20, 4, sigmas=True)
     found = solve_tree([*truth.measurements, Measurement("f3", "tool", Transform.identity().components)])
     assert found.sigma is None
-    assert found.marginal("tool") is None
+    assert found.covariance(found.root, "tool") is None
     assert found.covariance("tool", "f3") is None
-    assert found.marginal("f3") is not None
+    assert found.covariance(found.root, "f3") is not None
 
 
 TRIANGLE = [
@@ -362,10 +362,10 @@ def test_fixed_frames_move_as_one_body_and_keep_their_entries() -> None:
     row = Measurement("f0", "h", (truth.true("f0", "f2") @ mount @ mount).components, COVARIANCE)
     found = solve_tree([*truth.measurements, row], fixed=fixed)
     assert parents(found) == {**dict.fromkeys(["f1", "f2", "f3", "f4", "f5", "f6"], "f0"), "g": "f2", "h": "g"}
-    assert found.pose("h", "f2").is_close(mount @ mount, angle=1e-14, distance=1e-14)
+    assert found.tree.lookup("f2", "h").is_close(mount @ mount, angle=1e-14, distance=1e-14)
     assert not np.any(found.covariance("g", "h"))
-    without = sure(solve_tree(truth.measurements).marginal("f2"))
-    assert (np.diag(sure(found.marginal("f2"))) < np.diag(without)).all()
+    without = sure(solve_tree(truth.measurements).covariance("f0", "f2"))
+    assert (np.diag(sure(found.covariance(found.root, "f2"))) < np.diag(without)).all()
 
 
 def test_a_fixed_root_hangs_where_it_is_fixed() -> None:
@@ -373,7 +373,7 @@ def test_a_fixed_root_hangs_where_it_is_fixed() -> None:
     found = solve_tree(truth.measurements, root="f0", fixed=fixed_tree(("base", "f0", truth.poses[1])))
     assert found.root == "f0"
     assert parents(found) == {"f0": "base", "f1": "f0", "f2": "f0", "f3": "f0"}
-    assert found.pose("base").is_close(truth.poses[1].inverse())
+    assert found.poses["base"].is_close(truth.poses[1].inverse())
 
 
 def test_a_row_within_a_body_is_tested_and_moves_nothing() -> None:
@@ -383,14 +383,14 @@ def test_a_row_within_a_body_is_tested_and_moves_nothing() -> None:
     rows = [*truth.measurements, Measurement("g", "f2", mount.components, COVARIANCE)]
     found = solve_tree(rows, fixed=fixed)
     assert left_out(found) == {20: "inverted"}
-    assert np.allclose(sure(found.marginal("f2")), sure(solve_tree(truth.measurements).marginal("f2")), rtol=1e-6, atol=1e-16)
+    assert np.allclose(sure(found.covariance(found.root, "f2")), sure(solve_tree(truth.measurements).covariance("f0", "f2")), rtol=1e-6, atol=1e-16)
 
 
 def test_all_in_one_body_leaves_nothing_to_find() -> None:
     mount = (0.3, 0.2, 0.1, 0.0, 0.0, 0.0, 1.0)
     found = solve_tree([Measurement("a", "b", mount)], fixed=fixed_tree(("a", "b", Transform.of(*mount))))
-    assert found.pose("b").components[:3] == (0.3, 0.2, 0.1)
-    assert not np.any(found.marginal("b"))
+    assert found.poses["b"].components[:3] == (0.3, 0.2, 0.1)
+    assert not np.any(found.covariance(found.root, "b"))
 
 
 # errors
@@ -430,7 +430,7 @@ def test_small_and_large_worlds_are_solved(size: float) -> None:
     rows = [each._replace(components=(*(size * part for part in each.components[:3]), *each.components[3:])) for each in truth.measurements]
     found = solve_tree(rows)
     assert found.used.all()
-    assert np.isfinite(sure(found.marginal("f5"))).all()
+    assert np.isfinite(sure(found.covariance(found.root, "f5"))).all()
 
 
 def test_many_groups_are_named_on_one_line() -> None:
@@ -460,14 +460,14 @@ def test_a_thousand_frames_come_to_an_end() -> None:
     found = solve_tree(truth.measurements)
     assert left_out(found) == dict.fromkeys(truth.wrong, "inverted")
     for name in ("f1", "f500", "f999"):
-        assert relative(found.covariance("f0", name), sure(found.marginal(name))) < 1e-9
+        assert relative(found.covariance("f0", name), sure(found.covariance(found.root, name))) < 1e-9
 
 
 SCRIPT = """
 from frametool.fit.measured_tree import solve_tree
 from worlds import world
 found = solve_tree(world(30, 70, 1).with_inverted(1).measurements)
-print([found.pose(name).components for name in found.frames], found.sigma, found.u.tolist(), found.marginal("f5").tolist())
+print([found.poses[name].components for name in found.frames], found.sigma, found.u.tolist(), found.covariance(found.root, "f5").tolist())
 """
 
 
