@@ -46,7 +46,7 @@ def quality(frames: int, rows: int, *, sigmas: bool) -> str:
         found = solve_tree(truth.measurements)
         left = np.flatnonzero(~found.used).tolist()
         named += left == list(truth.wrong) and found.fits[left[0]] == "inverted"
-        ours = truth.rms(found.pose)
+        ours = truth.rms(found.poses.__getitem__)
         ratios.append([_ratio(truth, ours, leave_out) for leave_out in ((), truth.wrong)])
     (m, rad), (good_m, good_rad) = np.median(ratios, 0)
     given = "sigmas" if sigmas else ""

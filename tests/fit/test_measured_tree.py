@@ -120,7 +120,7 @@ def test_loops_are_worth_three_times_a_spanning_tree() -> None:
     ratios = []
     for seed in range(40):
         truth = world(7, 20, seed).with_inverted(1)
-        ours, tree = truth.rms(solve_tree(truth.measurements).pose), truth.rms(truth.spanning_tree().__getitem__)
+        ours, tree = truth.rms(solve_tree(truth.measurements).poses.__getitem__), truth.rms(truth.spanning_tree().__getitem__)
         ratios.append(np.divide(tree, ours))
     assert (np.median(ratios, 0) > 2.8).all()
 
