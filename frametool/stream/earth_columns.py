@@ -432,7 +432,8 @@ def placed_record(
     check_parent(value, value)
     there, used = inner(without_place(value))
     mapping = {key: value[key] for key in (*own, AXES_KEY, "parent", "frame", "inverse") if key in value}
-    covariance = _of_fix(value, mapping, reading, request) if "header" in value else ()
+    is_fix = "header" in value and operation.formula is None
+    covariance = _of_fix(value, mapping, reading, request) if is_fix else ()
     pose = placed_by(mapping, there, reading)
     if pose.rotation is None and (operation.inverse or operation.similar) and gathered is None:
         raise Misfit(UNSAID)  # as a factor it is a pose
@@ -440,6 +441,8 @@ def placed_record(
     is_point = pose.rotation is None and request.kind != POSE and takes_points
     numbers: tuple[float, ...] = pose.components[: 7 if pose.rotation is not None else 3]
     shape = Shape(POINT if is_point else POSE, 1.0, None if pose.rotation is None else notation("quaternion"))
+    if covariance and not is_point:  # of a pose whose turn is exact
+        covariance = tuple(covariance[3 * i + j] if max(i, j) < 3 else 0.0 for i in range(6) for j in range(6))
     extra = covariance or _extra(pose, reading, request, is_point=is_point)
     if extra:
         shape = shape._replace(covariance=(len(extra),), rewritten=True)

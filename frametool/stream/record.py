@@ -525,6 +525,8 @@ def _given_on_earth(record: Record, request: Request) -> Record:
     if shape.unit != 1.0:
         raise Misfit(f"--from {request.given_place} takes metres")
     is_point = shape.notation is None and not request.kind and request.operation.keeps_frames
+    if request.gathered is not None:
+        request.gathered.frame, is_point = EARTH_FRAMES[0], False
     shape = shape._replace(unit=place, kind=POINT if is_point else shape.kind)
     return record._replace(shape=shape, parent=Name(EARTH_FRAMES[0]))
 

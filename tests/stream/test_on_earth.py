@@ -632,3 +632,24 @@ def test_positions_on_the_earth_are_no_frames_and_poses_there_are_of_ecef(run: C
         assert (done.status, done.err) == (1, f"frametool: fixes.csv:1: {NO_ROTATION.format('stamp, lat, lon, alt')}\n")
     done = run("tree", "fixes.csv", files={"fixes.csv": rows.format(",heading_deg,axes", ",30,enu")})
     assert (done.status, done.err) == (0, "frametool: fixes.csv: 1 pose of body in ecef (--frames)\n")
+
+
+FIX = (
+    '{"header": {"stamp": {"sec": 1, "nanosec": 0}, "frame_id": "gps"}, "latitude": 48.1, "longitude": 11.5, '
+    '"altitude": 520.0, "position_covariance": [1, 0, 0, 0, 1, 0, 0, 0, 1], "position_covariance_type": 2}\n'
+)
+
+
+def test_from_one_fix_to_the_next_the_covariances_of_both_add_up(run: Callable[..., Any]) -> None:
+    done = run("relative", "--consecutive", stdin=2 * FIX)
+    covariance = json.loads(done.out.splitlines()[1])["covariance"]
+    assert covariance[::7] == pytest.approx([2.0, 2.0, 2.0, 0.0, 0.0, 0.0])
+
+
+def test_an_expression_over_fixes_leaves_their_covariances(run: Callable[..., Any]) -> None:
+    assert json.loads(run("calc", "d = norm(row)", stdin=FIX).out)["d"] == pytest.approx(6366854.272197201)
+
+
+def test_the_mean_of_flat_keys_in_ecef_is_in_ecef(run: Callable[..., Any]) -> None:
+    done = run("mean", stdin='{"ecef_x": 4177000.0, "ecef_y": 855000.0, "ecef_z": 4728000.0}\n')
+    assert done.out.startswith("parent: ecef\nxyz: [4177000.0, 855000.0, 4728000.0]\n"), done.err
