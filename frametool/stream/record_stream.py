@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
-from functools import cached_property
+from functools import cached_property, partial
 from io import BufferedReader
 from itertools import chain, count
 from operator import itemgetter
@@ -143,7 +143,8 @@ class RecordBlocks:
 
     def __init__(self, fmt: str, request: Request, source: str) -> None:
         """Start without templates."""
-        self.fmt, self.request, self.source = fmt, request, source
+        self.fmt, self.request = fmt, request
+        self._read = partial(attempt, fmt=fmt, request=request, name=source)
         self.splitter = Splitter(fmt)
         self.left = sizes.LEARNED  # where no records are alike, learning is lost time
         self.ended = True  # whether the last block ended with a line
@@ -175,10 +176,6 @@ class RecordBlocks:
             closed = self._take(text, start, end, found)
         cuts = by_template(cuts, found.singles)
         return self._outcome(text, in_order(cuts) if self.request.in_order else cuts, found, closed=closed)
-
-    def _read(self, text: bytes, part: Part, line: int = 0) -> RecordText | Fault:
-        """Read a record, or say what is wrong with it; line: where it begins, counted from 0."""
-        return attempt(text, part, self.fmt, self.request, self.source, line)
 
     def _take(self, text: bytes, start: int, end: int, found: Found) -> bool:
         """Take records one by one; what is between them passes.  Return whether an array ends there."""

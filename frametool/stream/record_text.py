@@ -335,7 +335,7 @@ def cut(
         walk(start, max(edit.end, start), shown=False)
         at = max(edit.end, start)
     walk(at, length, shown=True)
-    return stretches, [piece for piece in pieces if not isinstance(piece, Out) or piece.last > piece.first]
+    return stretches, pieces
 
 
 def json_documents(source: Source) -> list[Document]:
@@ -370,7 +370,7 @@ def column_in(text: bytes, place: int) -> int:
     return len(text[text.rfind(b"\n", 0, place) + 1 : place].decode("utf-8", "replace")) + 1
 
 
-def attempt(text: bytes, part: Part, fmt: str, request: Request, name: str, line: int) -> RecordText | Fault:
+def attempt(text: bytes, part: Part, line: int = 0, *, fmt: str, request: Request, name: str) -> RecordText | Fault:
     """Read one record of a stream, or say what is wrong with it; line: where it begins, counted from 0."""
     if part.problem:
         return Fault(line, "", part.problem, final=part.final)

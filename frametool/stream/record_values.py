@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
     from frametool.stream.record import Record
-    from frametool.stream.record_text import Entry
 
     Value = Result | dict[str, Any]
 
@@ -94,20 +93,15 @@ def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
         warn(f"{source.name}: frame {shown(lost)} is left out: the frames of the result are not known")
     answers = []
     for entry in known.entries:
-        with suppress(Outside):
-            answers.append(_answer(known, entry))
+        try:
+            with suppress(Outside):
+                answers.append(known.answer(entry))
+        except ValueInvalid as error:  # what was read well has no result
+            misfit = error if isinstance(error, Misfit) else NotARotation(str(error), entry.record.path)
+            raise misfit.placed(known.source) from misfit
     if warning := next(filter(None, (wide_turn(each, request.operation) for each in answers)), None):
         tell(source, [warning])
     yield from values_of_text(known, answers, style)
-
-
-def _answer(known: RecordText, entry: Entry) -> Answer:
-    """Apply the operation to one record; raises FormatError with its place, Outside if its time is not wanted."""
-    try:
-        return known.answer(entry)
-    except ValueInvalid as error:  # what was read well has no result
-        misfit = error if isinstance(error, Misfit) else NotARotation(str(error), entry.record.path)
-        raise misfit.placed(known.source) from misfit
 
 
 def values_of_text(known: RecordText, answers: Sequence[Answer], style: Style) -> Iterator[Value]:
