@@ -105,7 +105,7 @@ class MovingTrack:
         self.varies = False
         self.stamps, self.parents = [stamp_ns], [parent]
         self.samples = [components]  # or Packed, which behaves like such a list
-        self.begin = 0  # the index of the oldest sample: those before it were dropped
+        self.begin = 0  # the index of the oldest sample: those before it were dropped, or are room for older ones
         self.late: list[tuple[int, str, Rigid]] = []
         self.segments: dict[int, Way] = {}  # by the stamp at which they begin
         self.first_ns = self.last_ns = stamp_ns
@@ -186,22 +186,36 @@ class MovingTrack:
 
     def _settle(self) -> None:
         """Insert the late samples."""
-        late, self.late = self.late, []
-        if not late:
+        if not self.late:
             return
         self._unpack()
-        if len(late) > FEW:
-            rows = sorted([*self.walk(), *late], key=itemgetter(0))
-            self.stamps, self.parents, self.samples = (list(column) for column in zip(*rows, strict=True))
+        columns: tuple[list[Any], ...] = self.stamps, self.parents, self.samples
+        if len(self.late) > FEW:
+            rows = [*self.walk(), *self.late]
+            rows.sort(key=itemgetter(0))
+            self.stamps[:], self.parents[:], self.samples[:] = zip(*rows, strict=True)
             self.begin = 0
             self.segments.clear()
-            return
-        columns: tuple[list[Any], ...] = self.stamps, self.parents, self.samples
-        for row in late:
-            at = bisect_right(self.stamps, row[0], self.begin)
-            self.segments.pop(self.stamps[at - 1], None)
+        else:
+            for row in self.late:
+                self._insert(columns, row)
+        self.late.clear()
+
+    def _insert(self, columns: tuple[list[Any], ...], row: tuple[int, str, Rigid]) -> None:
+        """Insert a late sample; before the oldest there is room, doubled when it is used up, so that this is fast."""
+        at = bisect_right(self.stamps, row[0], self.begin)
+        self.segments.pop(self.stamps[at - 1], None)
+        if at > self.begin:
             for column, part in zip(columns, row, strict=True):
                 column.insert(at, part)
+            return
+        if not self.begin:
+            self.begin = len(self.stamps)
+            for column in columns:
+                column[:0] = column[:1] * self.begin
+        self.begin -= 1
+        for column, part in zip(columns, row, strict=True):
+            column[self.begin] = part
 
     def _place(self, at_ns: int) -> int:
         """Return the index of the newest sample that is not after a time; `begin` - 1 if there is none."""

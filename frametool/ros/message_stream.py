@@ -1,7 +1,7 @@
 """Messages and transforms of a recording in text, one after another: bounded memory, any length.
 
-From the output of the echo tools, their CSV, and JSON lines of rosbridge and Foxglove; what the tools or the shell
-print in between is skipped and counted.  A message is plain values, as the document reader returns them.
+From the output of the echo tools (echo, csv1, csv2), and JSON lines (jsonl) of rosbridge and Foxglove; what the tools
+or the shell print in between is skipped and counted.  A message is plain values, as the document reader returns them.
 
     %time,field.header.seq,field.header.stamp,field.header.frame_id,field.point.x,..      rostopic echo -p
     1795206353524626016,1,1795206353524626016,turtle1,1.0,..                               stamps in ns, nothing quoted

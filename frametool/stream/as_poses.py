@@ -2,11 +2,23 @@
 
 rows or listed poses -> the operation -> blocks of poses -> the text of the other format
 
-`read` makes of the rows of a table frames that move, of which each is a pose at its time:
+`read` makes of the rows of a table frames that move, of which each is a pose at its time; csv, tsv, semicolon:
 
-stamp,x,y,z,qx,qy,qz,qw                      frames as --frames says, `world` and `body` if it does not
-stamp_ns,parent,name,x,y,yaw_deg             each row names its frames
-parent,name,x,y,z,roll,pitch,yaw             no stamps: frames that are static
+    stamp,x,y,z,qx,qy,qz,qw                  frames as --frames says, `world` and `body` if it does not
+    stamp_ns,parent,name,x,y,yaw_deg         each row names its frames
+    parent,name,x,y,z,roll,pitch,yaw         no stamps: frames that are static
+
+Without names of columns rows are those of tum, t x y z qx qy qz qw,
+
+    1305031102.1758 1.34 0.62 1.65 0.657 0.612 -0.295 -0.311
+
+of kitti, three rows of a matrix,
+
+    1.0 0.0 0.0 0.5 0.0 1.0 0.0 0.0 0.0 0.0 1.0 2.0
+
+or of euroc, nanoseconds, x y z, qw qx qy qz, and what else it has:
+
+    1403636580838555648,4.688319,-1.786938,0.783338,0.534108,-0.153029,-0.827383,-0.082152
 """
 
 from __future__ import annotations

@@ -260,10 +260,19 @@ def _described(entry: dict[str, Any], more: str = "") -> str:
 
 
 def example_of(name: str) -> list[str]:
-    """Return the indented lines in the docstring of the format's reader, or else its writer."""
+    """Return the indented lines in the docstring of the format's reader, or else its writer.
+
+    In a module of several formats lines that follow the names of others are theirs.
+    """
     for module in filter(None, (FORMATS[name].reader, FORMATS[name].writer)):
-        text = import_module(module).__doc__ or ""
-        if lines := [line[4:] for line in text.split("\n") if line.startswith("    ")]:
+        formats = {other for other, row in FORMATS.items() if module in (row.reader, row.writer)}
+        said, lines = formats, list[str]()
+        for line in (import_module(module).__doc__ or "").split("\n"):
+            if line.startswith("    "):
+                lines += [line[4:]] * (name in said)
+            elif line:
+                said = formats.intersection(re.findall(r"[\w-]+", line.lower())) or said
+        if lines:
             return [line if len(line) <= WIDTH - 4 else f"{line[: WIDTH - 7].rstrip()} .." for line in lines]
     return []
 

@@ -1,4 +1,4 @@
-"""Calibrations in YAML and JSON: Autoware's, easy_handeye's, tables of nuScenes, and extrinsics by hand.
+"""Calibrations in YAML and JSON (autoware, handeye, nuscenes), and extrinsics by hand (named).
 
     base_link: {sensor_kit_base_link: {x: 0.9, y: 0.0, z: 2.0, roll: -0.001, pitch: 0.015, yaw: -0.0364}}
         Autoware: the pose of the inner frame in the outer one; radians, about the fixed axes x, y, z

@@ -1,4 +1,4 @@
-r"""Drawings of trees for graphviz and mermaid: one node per frame, an arrow from parent to child with its pose.
+r"""Drawings of trees for graphviz (dot) and mermaid: one node per frame, an arrow from parent to child with its pose.
 
     "base" -> "camera" [label="xyz 0.1 0.0 1.2\nrpy 0.0 15.0 0.0 deg"];               dot
     n0["base"] -->|"xyz 0.1 0.0 1.2<br>rpy 0.0 15.0 0.0 deg"| n1["camera"]             mermaid

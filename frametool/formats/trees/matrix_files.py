@@ -1,4 +1,4 @@
-"""Files of matrices by name: camera chains of Kalibr, OpenVINS and okvis, sensors of EuRoC, OpenCV's FileStorage.
+"""Files of matrices by name (camchain, euroc-sensor, opencv): chains of cameras, sensors, FileStorage of OpenCV.
 
     cam0:
       T_cam_imu: [[..], [..], [..], [0.0, 0.0, 0.0, 1.0]]     Kalibr: maps points of the IMU to the camera

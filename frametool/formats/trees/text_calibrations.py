@@ -1,6 +1,6 @@
-r"""Calibrations as text: KITTI's, and Kalibr's results.
+r"""Calibrations as text: those of KITTI, and results of Kalibr.
 
-KITTI: cameras, lidar and IMU, a name and its numbers per line.
+KITTI (kitti-calib): cameras, lidar and IMU, a name and its numbers per line.
 
     P0: 718.856 0 607.193 0 0 718.856 185.216 0 0 0 1 0       odometry, object: projection of a rectified camera
     Tr: 12 numbers                                            odometry: cam0<-velo, cam0 rectified

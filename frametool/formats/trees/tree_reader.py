@@ -1,4 +1,4 @@
-"""Frame trees in YAML and JSON: nested, as a list, or as ROS messages; documents in, edges out.
+"""Frame trees in YAML and JSON, and of Apollo: nested, as a list, or as ROS messages; documents in, edges out.
 
     frames: {base: {lidar: {xyz: [0.9, 0, 2], rpy_deg: [0, 0, 90]}}}          nested: a root's keys are its children
     frames: [{name: lidar, parent: base, xyz: [0.9, 0, 2]}]                   list, any order
