@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import uncertainty, validation
+from frametool.geometry import placed, uncertainty, validation
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,7 +35,7 @@ def compose(a: Transform, cov_a: Covariance, b: Transform, cov_b: Covariance) ->
     first, second = _placed(a, cov_a), _placed(b, cov_b)
 
     def kernel(*parts: Any) -> Components | None:
-        return uncertainty.covariance_of(uncertainty.compose(parts[: len(first)], parts[len(first) :]))
+        return placed.covariance_of(placed.compose(parts[: len(first)], parts[len(first) :]))
 
     return _found(kernel, uncertainty.POSE, (*first, *second))
 
@@ -44,7 +44,7 @@ def invert(a: Transform, cov_a: Covariance) -> Any:
     """Return the covariance of a.inverse(), along the axes of the former child."""
 
     def kernel(*parts: Any) -> Components | None:
-        return uncertainty.covariance_of(uncertainty.inverse(parts))
+        return placed.covariance_of(placed.inverse(parts))
 
     return _found(kernel, uncertainty.POSE, _placed(a, cov_a))
 
@@ -56,8 +56,8 @@ def point(a: Transform, cov_a: Covariance, p: Numbers, cov_p: Covariance = None)
 
     def kernel(*parts: Any) -> Components | None:
         moved, numbers = parts[:end], parts[end : end + 3]
-        of_pose = uncertainty.covariance_of(moved)
-        return uncertainty.of_three(uncertainty.pose_of(moved), of_pose, numbers, parts[end + 3 :] or None)
+        of_pose = placed.covariance_of(moved)
+        return uncertainty.of_three(placed.pose_of(moved), of_pose, numbers, parts[end + 3 :] or None)
 
     return _found(kernel, uncertainty.POINT, (*pose, *at, *own))
 

@@ -236,13 +236,13 @@ class Frames:
         down, up = self.between(target, source, at_ns)
         if (down or up) and self.covariances.keys().isdisjoint((*down, *up)):
             raise ValueInvalid(f"no edge between {bare(target)} and {bare(source)} has a sigma or a covariance")
-        from frametool.geometry import uncertainty
+        from frametool.geometry import placed, uncertainty
 
         def edge(child: str) -> Components:
             return *(sample(self._tracks[child]) or IDENTITY), *self.covariances.get(child, ())
 
-        steps = [*(uncertainty.inverse(edge(child)) for child in reversed(down)), *map(edge, reversed(up))]
-        found = uncertainty.covariance_of(reduce(uncertainty.compose, steps, IDENTITY)) or (0.0,) * uncertainty.POSE
+        steps = [*(placed.inverse(edge(child)) for child in reversed(down)), *map(edge, reversed(up))]
+        found = placed.covariance_of(reduce(placed.compose, steps, IDENTITY)) or (0.0,) * uncertainty.POSE
         return tuple(entry + 0.0 for entry in uncertainty.symmetric(found))
 
     # --- many lookups ---

@@ -1,7 +1,4 @@
-"""Poses with a scale or a covariance; covariances of points, twists and wrenches; all to first order.
-
-Components of a pose are seven alone, eight with s of the similarity p' = s R p + t, 43 with a covariance.  A pose alone
-is exact and has scale 1.  No pose has both.
+"""Covariances of poses, points, twists and wrenches, to first order: transformation, composition and inversion.
 
 Of a pose: over (x, y, z, rotation about X, Y, Z), metres and radians, along the fixed axes of its parent, as in ROS:
 t + d[:3], Exp(d[3:]) R.  Entries are row-major, 36 of a pose and 9 of a point, floats or arrays; None is exact.
@@ -14,8 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from frametool.errors import ValueInvalid, warn
-from frametool.geometry import quaternion, rigid
-from frametool.geometry.rigid import EXACT, SCALED, UNCERTAIN
+from frametool.geometry import quaternion
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -34,68 +30,6 @@ NEGATIVE = 1e-9  # of the largest eigenvalue
 WIDE = 0.2  # radians
 WIDE_RULE = "wide"
 FIRST_ORDER = "sigma of a turn is {:.2g} rad: the first order is a few per cent off above 0.2"
-NOT_BOTH = "the covariance cannot be carried through a scale; leave one of them out"
-SIMILARITY = "scale: a similarity, not a pose; apply --transform, compose and invert take it"
-
-
-def compose(a: Components, b: Components) -> Components:
-    """Return a_from_c of a_from_b and b_from_c: s = s1 s2, R = R1 R2, t = t1 + s1 R1 t2."""
-    if len(a) == len(b) == EXACT:
-        return rigid.compose(*a, *b)
-    first, second = pose_of(a), pose_of(b)
-    if SCALED in (len(a), len(b)):
-        if UNCERTAIN in (len(a), len(b)):
-            raise ValueInvalid(NOT_BOTH)
-        s1, s2 = scale_of(a), scale_of(b)
-        x, y, z = second[:3]
-        return (*rigid.compose(*first, s1 * x, s1 * y, s1 * z, *second[3:]), s1 * s2)
-    entries = propagate_compose(first, covariance_of(a), second, covariance_of(b))
-    return (*rigid.compose(*first, *second), *(entries or ()))
-
-
-def inverse(a: Components) -> Components:
-    """Return b_from_a of a_from_b: 1/s, R', -R' t / s."""
-    pose = pose_of(a)
-    x, y, z, *rotation = rigid.inverse(*pose)
-    if len(a) == SCALED:
-        s = scale_of(a)
-        return (x / s, y / s, z / s, *rotation, 1.0 / s)
-    if len(a) == EXACT:
-        return (x, y, z, *rotation)
-    return (x, y, z, *rotation, *propagate_inverse(pose, a[EXACT:]))
-
-
-def relative(a: Components, b: Components) -> Components:
-    """Return the pose of b in a: inverse(a) b."""
-    first, second = pose_of(a), pose_of(b)
-    pose = rigid.relative(*first, *second)
-    if len(a) == len(b) == EXACT:
-        return pose
-    if SCALED in (len(a), len(b)):
-        raise ValueInvalid(SIMILARITY)
-    of_a = covariance_of(a)
-    of_back = of_a and propagate_inverse(first, of_a)
-    entries = propagate_compose(rigid.inverse(*first), of_back, second, covariance_of(b))
-    return (*pose, *(entries or ()))
-
-
-def pose_of(a: Components) -> Rigid:
-    """Return the seven components of a pose."""
-    tx, ty, tz, x, y, z, w = a[:EXACT]
-    return tx, ty, tz, x, y, z, w
-
-
-def covariance_of(a: Components) -> Components | None:
-    """Return the covariance of a pose; None if it is exact."""
-    return a[EXACT:] if len(a) == UNCERTAIN else None
-
-
-def scale_of(a: Components) -> Number:
-    """Return the scale of a similarity; 1 for a pose."""
-    return a[EXACT] if len(a) == SCALED else 1.0
-
-
-# --- covariances ---
 
 
 def propagate(jacobian: Rows, entries: Entries) -> Components:

@@ -13,7 +13,7 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, bare, did_you_mean, overheard, shown
-from frametool.geometry import floats, quaternion, uncertainty
+from frametool.geometry import floats, placed, quaternion
 from frametool.geometry.representations import LIST, NAMED, NAMED_AXES, REPRESENTATIONS, ROTATIONS, ROWS, axes_name
 from frametool.geometry.representations import notation as parse_notation
 from frametool.grammar import readers
@@ -110,7 +110,7 @@ class Pose(NamedTuple):
         Raises ValueInvalid if it has both.
         """
         if self.covariance is not None and self.scale != 1.0:
-            raise ValueInvalid(uncertainty.NOT_BOTH)
+            raise ValueInvalid(placed.NOT_BOTH)
         return (*self.components, *(self.covariance or ()), *([self.scale] * (self.scale != 1.0)))
 
     @property
@@ -179,7 +179,7 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
 
 def inverted(pose: Pose) -> Pose:
     """Return the inverse numbers under the same names: the meaning of `inverse: true`."""
-    back = Pose.of(uncertainty.inverse(pose.placed))
+    back = Pose.of(placed.inverse(pose.placed))
     return pose._replace(
         position=None if pose.position is None else back.position,
         rotation=None if pose.rotation is None else back.rotation,

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FormatError, ValueInvalid, listing, warn
 from frametool.geometry import rigid, uncertainty
+from frametool.geometry.placed import NOT_BOTH, inverse, pose_of, scale_of
 from frametool.geometry.quaternion import TOLERATED
 from frametool.geometry.rigid import EXACT, SCALED
-from frametool.geometry.uncertainty import NOT_BOTH, UNKNOWN, inverse, pose_of, scale_of
+from frametool.geometry.uncertainty import UNKNOWN
 from frametool.grammar.covariance import (
     COVARIANCE,
     SIGMA,

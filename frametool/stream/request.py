@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import quaternion, rigid, uncertainty
+from frametool.geometry import placed, quaternion, rigid
 from frametool.geometry.floats import RADIAN
 from frametool.geometry.representations import HEADING, notation
 from frametool.geometry.rigid import EXACT, SCALED, UNCERTAIN
@@ -288,7 +288,7 @@ class Operation(NamedTuple):
         """Return the resulting pose, how far it goes if poses are compared, and its covariance or scale, if any."""
         result = poses[0]
         if self.inverse:
-            result = rigid.inverse(*result) if len(result) == EXACT else uncertainty.inverse(result)
+            result = rigid.inverse(*result) if len(result) == EXACT else placed.inverse(result)
         if self.mirrors:
             result = rigid.mirrored(*result)
         left = edge or self.left
@@ -303,7 +303,7 @@ class Operation(NamedTuple):
         others = poses[1:] if self.fixed is None else (self.fixed,)
         first, second = (*others, result) if self.of == "first" else (result, *others)
         exact = len(first) == len(second) == EXACT
-        result = rigid.relative(*first, *second) if exact else uncertainty.relative(first, second)
+        result = rigid.relative(*first, *second) if exact else placed.relative(first, second)
         tx, ty, tz, x, y, z, w = result[:EXACT]
         metres, angle = rigid.extent(tx, ty, tz, x, y, z, w, xp)
         return (*result[:EXACT], metres, angle, angle * RADIAN, *result[EXACT:])
@@ -327,7 +327,7 @@ def _with_velocity(parts: Components, seconds: Number, xp: Namespace) -> Compone
 
 
 def _product(a: Components, b: Components) -> Components:
-    return rigid.compose(*a, *b) if len(a) == len(b) == EXACT else uncertainty.compose(a, b)
+    return rigid.compose(*a, *b) if len(a) == len(b) == EXACT else placed.compose(a, b)
 
 
 def thing_pose(shape: Shape, own: Components, rotation: Callable[[Components], Components]) -> Rigid:
