@@ -191,7 +191,7 @@ class MovingTrack:
         self._unpack()
         columns: tuple[list[Any], ...] = self.stamps, self.parents, self.samples
         if len(self.late) > FEW:
-            rows = [*self.walk(), *self.late]
+            rows = [*islice(zip(*columns, strict=True), self.begin, None), *self.late]
             rows.sort(key=itemgetter(0))
             self.stamps[:], self.parents[:], self.samples[:] = zip(*rows, strict=True)
             self.begin = 0

@@ -2,11 +2,11 @@
 
 rows or listed poses -> the operation -> blocks of poses -> the text of the other format
 
-`read` makes of the rows of a table frames that move, of which each is a pose at its time; csv, tsv, semicolon:
+`read` makes of the rows of a table frames that move, of which each is a pose at its time:
 
-    stamp,x,y,z,qx,qy,qz,qw                  frames as --frames says, `world` and `body` if it does not
-    stamp_ns,parent,name,x,y,yaw_deg         each row names its frames
-    parent,name,x,y,z,roll,pitch,yaw         no stamps: frames that are static
+stamp,x,y,z,qx,qy,qz,qw                      frames as --frames says, `world` and `body` if it does not
+stamp_ns,parent,name,x,y,yaw_deg             each row names its frames
+parent,name,x,y,z,roll,pitch,yaw             no stamps: frames that are static
 
 Without names of columns rows are those of tum, t x y z qx qy qz qw,
 
