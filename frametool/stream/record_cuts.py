@@ -11,9 +11,8 @@ from frametool.stream.evaluate import Plan
 from frametool.stream.faults import NULL, SKIP, Fault
 from frametool.stream.layout import In, Renamed
 from frametool.stream.record import KEYS_REMEDY
-from frametool.stream.record_text import column_in
 from frametool.stream.rows import Block
-from frametool.stream.splice import quoted_name
+from frametool.stream.splice import column_in, quoted_name
 from frametool.stream.splitter import DOCUMENTS, LINES, Part
 from frametool.stream.stamp_columns import read_extra
 from frametool.stream.template import Template

@@ -21,8 +21,9 @@ from frametool.grammar.result import NoResult
 from frametool.stream import stamp_source
 from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote
 from frametool.stream.record_results import BlockResults
-from frametool.stream.record_text import ROUNDED, Outside, RecordText, attempt, column_in, fault_at, null_of, nulled
+from frametool.stream.record_text import ROUNDED, Outside, RecordText
 from frametool.stream.record_values import plain, values_of_text
+from frametool.stream.splice import attempt, column_in, fault_at, null_of, nulled, rendered
 from frametool.stream.splitter import ARRAY, NO_END, Splitter
 from frametool.text.lines import Pieces, read_blocks, readiness
 
@@ -276,7 +277,7 @@ class RecordBlocks:
 
     def results(self, known: RecordText, answers: list[Answer], text: bytes, part: Part) -> Iterable[tuple[int, Any]]:
         """Return what a record becomes, and its place: its text."""
-        return [_put(text, part, known.rendered(answers) or text[part.start : part.end])]
+        return [_put(text, part, rendered(known, answers) or text[part.start : part.end])]
 
     def without(self, text: bytes, part: Part) -> Iterable[tuple[int, Any]]:
         """Return what replaces a record without a result: itself with null in the place of numbers."""

@@ -1,41 +1,34 @@
-"""The records of a text, read once: one record of a stream, an argument or a document, and the text of its result."""
+"""The records of a text, read once: one record of a stream, an argument or a document, and what becomes of it."""
 
 from __future__ import annotations
 
-import re
 from contextlib import suppress
 from functools import cached_property, partial
 from itertools import islice
 from math import isfinite, isinf
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.documents.document import Aliased, Document, Node, locate_many, parse_documents, parse_nodes
+from frametool.documents.document import Document, Node, locate_many, parse_documents, parse_nodes
 from frametool.documents.json import strict_json
-from frametool.documents.source import Source, check_text, decode
-from frametool.errors import Finding, FormatError, FrametoolError, ValueInvalid
+from frametool.documents.source import Source, check_text
+from frametool.errors import Finding, FrametoolError, ValueInvalid
 from frametool.geometry import floats
 from frametool.grammar.names import in_nanoseconds
 from frametool.grammar.readers import Misfit, Reading, within
-from frametool.stream.faults import ZONES, Fault, RowNote
-from frametool.stream.layout import Const, IfLocked, In, Out, Renamed, Word, number_text
+from frametool.stream.faults import ZONES, RowNote
 from frametool.stream.record import find_records, value_at
 from frametool.stream.row_layout import FLAT, LEAVES_PLANE, checked_rotation
-from frametool.stream.splice import Splicer, numbers_in, target_of
-from frametool.stream.stamp_source import key_path, read_header_stamp, read_stamp, replaced, stamp_keys
+from frametool.stream.stamp_source import key_path, read_header_stamp, read_stamp, stamp_keys
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from frametool.geometry.types import Components, Rigid
     from frametool.grammar.readers import Path
-    from frametool.stream.layout import Piece
     from frametool.stream.record import Record
     from frametool.stream.request import Operation, Request
     from frametool.stream.row_layout import Target
     from frametool.stream.splice import Edit
-    from frametool.stream.splitter import Part
-
-_OTHER_START = re.compile(r"^(?=[A-Z\t\[\d$^])", re.MULTILINE)  # no key that ROS prints begins so
 
 ROUNDED = "rounded"  # rule of the warning about rotations that were normalised
 MOST_LEAVES = 2000  # scalars of a record: an expression that cuts those written alike takes longer for more
@@ -75,6 +68,13 @@ class Entry(NamedTuple):
         if len(texts) > 1:
             return read_header_stamp(*texts)
         return read_stamp(texts[0], in_ns=in_nanoseconds(str(self.stamp[0][-1])))
+
+
+def target_of(record: Record, request: Request) -> Target:
+    """Choose how the result of a record is written; conventions of Euler angles share a key and are together."""
+    names = [each.representation.name for each in request.notations]
+    together = sorted(request.notations, key=lambda each: names.index(each.representation.name))
+    return request._replace(notations=tuple(together)).target(record.shape)
 
 
 class Answer(NamedTuple):
@@ -247,34 +247,6 @@ class RecordText:
             raise Outside("beyond --start or --stop")
         return found
 
-    def spliced(self) -> list[Edit]:
-        """Return what changes in the text; a name that several records share changes once."""
-        edits: list[Edit] = []
-        first = 0
-        for entry in self.entries:
-            edits += Splicer(self.root, entry, self.request, json=self.json, first=first).run()
-            first += self.request.result_size(entry.record.shape, entry.target)
-        return list(dict.fromkeys(edits))
-
-    def rendered(self, answers: Sequence[Answer]) -> bytes:
-        """Return the text with results in the place of numbers, some of them as words; b"" where nothing is in it."""
-        numbers = [number for each in answers for number in written(each)]
-        precision, exponent = self.request.precision, "e" if self.json else ".0e"
-        fmt = "" if precision is None else f"z.{precision}f"
-        locked = any(each.entry.target.locked(each.parts) for each in answers)
-        stretches, pieces = cut(len(self.text), (), self.edits)
-        shown = []
-        for piece in pieces:
-            if isinstance(piece, In):
-                shown.append(self.text[slice(*stretches[piece.part])])
-            elif isinstance(piece, Out):
-                shown.append(number_text(numbers[piece.first], fmt, exponent))
-            elif isinstance(piece, Word):
-                shown.append(piece.text(numbers[piece.number]).decode())
-            elif isinstance(piece, (Const, Renamed)) or (locked and isinstance(piece, IfLocked)):
-                shown.append(piece.text.decode())
-        return "".join(shown).encode() if self.entries else b""
-
     def row_notes(self) -> Iterator[RowNote]:
         """Yield warnings that hold for all records that are written alike."""
         for entry in self.entries:
@@ -309,94 +281,11 @@ class RecordText:
         return found
 
 
-def cut(
-    length: int, cuts: Sequence[tuple[int, int]], edits: Iterable[Edit]
-) -> tuple[list[tuple[int, int]], list[Piece]]:
-    """Cut a text into stretches, each number one of its own; return them with the pieces of the result."""
-    stretches: list[tuple[int, int]] = []
-    pieces: list[Piece] = []
-    slots = list(reversed(cuts))
-
-    def walk(start: int, end: int, *, shown: bool) -> None:
-        """Add the stretches from start to end; they are pieces of the result if they are shown."""
-        while start < end:
-            slot = slots[-1] if slots and slots[-1][1] <= end else None
-            stop = end if slot is None else slot[0] if slot[0] > start else slots.pop()[1]
-            stretches.append((start, stop))
-            if shown:
-                pieces.append(In(len(stretches) - 1))
-            start = stop
-
-    at = 0
-    for edit in sorted(edits, key=lambda each: (each.start, each.end)):
-        start = max(edit.start, at)
-        walk(at, start, shown=True)
-        pieces += edit.pieces
-        walk(start, max(edit.end, start), shown=False)
-        at = max(edit.end, start)
-    walk(at, length, shown=True)
-    return stretches, pieces
-
-
 def json_documents(source: Source) -> list[Document]:
     """Read strict JSON: what only YAML would take is a fault of the record."""
     check_text(source)
     values = strict_json(source)
     return [Document(value, index, source) for index, value in enumerate(values) if value is not None]
-
-
-def nulled(text: str, *, json: bool) -> str | None:
-    """Return the text of a record with null in the place of our numbers; None if it has none that can be found."""
-    try:
-        json_documents(Source("", text)) if json else parse_documents(text, "")
-        edits = [(node.start, node.end, "null") for root in parse_nodes(text) for node in numbers_in(root)]
-    except FormatError:
-        return None
-    return replaced(text, edits) if edits else None
-
-
-def null_of(record: bytes, *, json: bool) -> bytes:
-    """Return what replaces a record without a result: its keys with null in the place of ours, or null."""
-    body = record.rstrip(b"\r\n")
-    try:
-        text = nulled(body.decode(), json=json)
-    except UnicodeDecodeError:
-        text = None
-    return (b"null" if text is None else text.encode()) + record[len(body) :]
-
-
-def column_in(text: bytes, place: int) -> int:
-    """Return the column, from 1, at which a place is in its line."""
-    return len(text[text.rfind(b"\n", 0, place) + 1 : place].decode("utf-8", "replace")) + 1
-
-
-def attempt(text: bytes, part: Part, line: int = 0, *, fmt: str, request: Request, name: str) -> RecordText | Fault:
-    """Read one record of a stream, or say what is wrong with it; line: where it begins, counted from 0."""
-    if part.problem:
-        return Fault(line, "", part.problem, final=part.final)
-    source = Source(name, "", line + 1, column_in(text, part.start))
-    try:
-        decoded = decode(text[part.start : part.end], name)
-        if fmt == "yaml" and _OTHER_START.search(decoded):
-            decoded = without_noise(decoded)
-        source = source._replace(text=decoded)
-        found = RecordText(source, request, json=fmt == "json")
-        if not request.canonical:
-            found.edits = found.spliced()
-    except Aliased as error:
-        return fault_at(source, error.in_text(source.text))
-    except FormatError as error:
-        return fault_at(source, error)
-    except FrametoolError as error:
-        return Fault.of(line, getattr(error, "column_name", ""), error)
-    return found
-
-
-def fault_at(source: Source, error: FormatError) -> Fault:
-    """Return an error in a record as a fault with its place."""
-    line, column = source.place(max(error.line, 1), error.column)
-    named = getattr(error, "column_name", "") or (str(column) if error.column else "")
-    return Fault(line - 1, named, error.message, kind=error.kind)
 
 
 def without_noise(text: str) -> str:

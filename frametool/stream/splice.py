@@ -1,4 +1,4 @@
-"""What changes in the text of a record: numbers where they are, members that are replaced, added or left out.
+"""Records in the text of a stream: numbers are replaced where they are, members are replaced, added or left out.
 
 Everything else stays as it is, byte for byte.  Knows the syntax of JSON and YAML only as far as members go: what
 stands between them, and how one is written.
@@ -6,31 +6,38 @@ stands between them, and how one is written.
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.documents.source import Verbatim
+from frametool.documents.document import Aliased, parse_documents, parse_nodes
+from frametool.documents.source import Source, Verbatim, decode
 from frametool.documents.yaml_writer import dump as yaml
 from frametool.documents.yaml_writer import flow, quoted
+from frametool.errors import FormatError, FrametoolError
 from frametool.geometry.representations import ROTATIONS
 from frametool.grammar.names import EARTH_FRAMES, PLACE_KEYS
 from frametool.grammar.pose import LISTED_WORDS, ROTATION_KEYS, Pose
 from frametool.grammar.readers import AXES_KEY
 from frametool.grammar.result import Result, Style, with_entries
-from frametool.stream.layout import Const, IfLocked, Item, Out, Renamed, Word
+from frametool.stream.faults import Fault
+from frametool.stream.layout import Const, IfLocked, In, Item, Out, Renamed, Word, number_text
 from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ, outermost
+from frametool.stream.record_text import RecordText, json_documents, without_noise, written
 from frametool.stream.row_layout import POINT, POSE, SIX, TURNED, VECTOR, count_of
+from frametool.stream.stamp_source import replaced
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.documents.document import Node
     from frametool.stream.layout import Piece
-    from frametool.stream.record import Name, Record
-    from frametool.stream.record_text import Entry
+    from frametool.stream.record import Name
+    from frametool.stream.record_text import Answer, Entry
     from frametool.stream.request import Request
-    from frametool.stream.row_layout import Target
+    from frametool.stream.splitter import Part
 
 MARK = "\0"
+_OTHER_START = re.compile(r"^(?=[A-Z\t\[\d$^])", re.MULTILINE)  # no key that ROS prints begins so
 SAMPLE = (0.5, 0.5, 0.5, 0.5)
 OURS = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *XYZ, "linear", "angular", "force", "torque")).union(
     *({column, f"{column}_deg", f"{column}_rad"} for row in ROTATIONS.values() for column in row.columns)
@@ -43,13 +50,6 @@ class Edit(NamedTuple):
     start: int
     end: int
     pieces: tuple[Piece, ...]
-
-
-def target_of(record: Record, request: Request) -> Target:
-    """Choose how the result of a record is written; conventions of Euler angles share a key and are together."""
-    names = [each.representation.name for each in request.notations]
-    together = sorted(request.notations, key=lambda each: names.index(each.representation.name))
-    return request._replace(notations=tuple(together)).target(record.shape)
 
 
 def numbers_in(node: Node) -> Iterator[Node]:
@@ -369,3 +369,116 @@ def _with_numbers(text: str, first: int) -> Iterator[Piece]:
             yield Out(first + index - 1, first + index, b"")
         if part:
             yield Const(part.encode())
+
+
+def edits_of(known: RecordText) -> list[Edit]:
+    """Return what changes in the text; a name that several records share changes once."""
+    edits: list[Edit] = []
+    first = 0
+    for entry in known.entries:
+        edits += Splicer(known.root, entry, known.request, json=known.json, first=first).run()
+        first += known.request.result_size(entry.record.shape, entry.target)
+    return list(dict.fromkeys(edits))
+
+
+def rendered(known: RecordText, answers: Sequence[Answer]) -> bytes:
+    """Return the text with results in the place of numbers, some of them as words; b"" where nothing is in it."""
+    numbers = [number for each in answers for number in written(each)]
+    precision, exponent = known.request.precision, "e" if known.json else ".0e"
+    fmt = "" if precision is None else f"z.{precision}f"
+    locked = any(each.entry.target.locked(each.parts) for each in answers)
+    stretches, pieces = cut(len(known.text), (), known.edits)
+    shown = []
+    for piece in pieces:
+        if isinstance(piece, In):
+            shown.append(known.text[slice(*stretches[piece.part])])
+        elif isinstance(piece, Out):
+            shown.append(number_text(numbers[piece.first], fmt, exponent))
+        elif isinstance(piece, Word):
+            shown.append(piece.text(numbers[piece.number]).decode())
+        elif isinstance(piece, (Const, Renamed)) or (locked and isinstance(piece, IfLocked)):
+            shown.append(piece.text.decode())
+    return "".join(shown).encode() if known.entries else b""
+
+
+def cut(
+    length: int, cuts: Sequence[tuple[int, int]], edits: Iterable[Edit]
+) -> tuple[list[tuple[int, int]], list[Piece]]:
+    """Cut a text into stretches, each number one of its own; return them with the pieces of the result."""
+    stretches: list[tuple[int, int]] = []
+    pieces: list[Piece] = []
+    slots = list(reversed(cuts))
+
+    def walk(start: int, end: int, *, shown: bool) -> None:
+        """Add the stretches from start to end; they are pieces of the result if they are shown."""
+        while start < end:
+            slot = slots[-1] if slots and slots[-1][1] <= end else None
+            stop = end if slot is None else slot[0] if slot[0] > start else slots.pop()[1]
+            stretches.append((start, stop))
+            if shown:
+                pieces.append(In(len(stretches) - 1))
+            start = stop
+
+    at = 0
+    for edit in sorted(edits, key=lambda each: (each.start, each.end)):
+        start = max(edit.start, at)
+        walk(at, start, shown=True)
+        pieces += edit.pieces
+        walk(start, max(edit.end, start), shown=False)
+        at = max(edit.end, start)
+    walk(at, length, shown=True)
+    return stretches, pieces
+
+
+def nulled(text: str, *, json: bool) -> str | None:
+    """Return the text of a record with null in the place of our numbers; None if it has none that can be found."""
+    try:
+        json_documents(Source("", text)) if json else parse_documents(text, "")
+        edits = [(node.start, node.end, "null") for root in parse_nodes(text) for node in numbers_in(root)]
+    except FormatError:
+        return None
+    return replaced(text, edits) if edits else None
+
+
+def null_of(record: bytes, *, json: bool) -> bytes:
+    """Return what replaces a record without a result: its keys with null in the place of ours, or null."""
+    body = record.rstrip(b"\r\n")
+    try:
+        text = nulled(body.decode(), json=json)
+    except UnicodeDecodeError:
+        text = None
+    return (b"null" if text is None else text.encode()) + record[len(body) :]
+
+
+def column_in(text: bytes, place: int) -> int:
+    """Return the column, from 1, at which a place is in its line."""
+    return len(text[text.rfind(b"\n", 0, place) + 1 : place].decode("utf-8", "replace")) + 1
+
+
+def attempt(text: bytes, part: Part, line: int = 0, *, fmt: str, request: Request, name: str) -> RecordText | Fault:
+    """Read one record of a stream, or say what is wrong with it; line: where it begins, counted from 0."""
+    if part.problem:
+        return Fault(line, "", part.problem, final=part.final)
+    source = Source(name, "", line + 1, column_in(text, part.start))
+    try:
+        decoded = decode(text[part.start : part.end], name)
+        if fmt == "yaml" and _OTHER_START.search(decoded):
+            decoded = without_noise(decoded)
+        source = source._replace(text=decoded)
+        found = RecordText(source, request, json=fmt == "json")
+        if not request.canonical:
+            found.edits = edits_of(found)
+    except Aliased as error:
+        return fault_at(source, error.in_text(source.text))
+    except FormatError as error:
+        return fault_at(source, error)
+    except FrametoolError as error:
+        return Fault.of(line, getattr(error, "column_name", ""), error)
+    return found
+
+
+def fault_at(source: Source, error: FormatError) -> Fault:
+    """Return an error in a record as a fault with its place."""
+    line, column = source.place(max(error.line, 1), error.column)
+    named = getattr(error, "column_name", "") or (str(column) if error.column else "")
+    return Fault(line - 1, named, error.message, kind=error.kind)

@@ -19,9 +19,8 @@ from frametool.grammar.pose import DESCRIPTIVE, LISTED_WORDS, POSE_KEYS, ROTATIO
 from frametool.grammar.readers import AXES_KEY
 from frametool.stream.layout import Const, Renamed
 from frametool.stream.record import POINT_KEYS
-from frametool.stream.record_text import cut
 from frametool.stream.row_layout import POSE
-from frametool.stream.splice import OURS
+from frametool.stream.splice import OURS, cut
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence

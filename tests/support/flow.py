@@ -22,10 +22,9 @@ from frametool.grammar.result import Style
 from frametool.stream.faults import MOST, BadRows, run
 from frametool.stream.record import find_records
 from frametool.stream.record_stream import run_records
-from frametool.stream.record_text import Entry, answer
+from frametool.stream.record_text import Entry, answer, target_of
 from frametool.stream.record_values import read_poses, results
 from frametool.stream.request import Operation, Request
-from frametool.stream.splice import target_of
 from frametool.stream.stamp_columns import read_stamps
 from frametool.stream.stamp_source import read_stamp
 from frametool.stream.table_stream import run_table
