@@ -19,14 +19,13 @@ from frametool.geometry.floats import RADIAN as DEGREES
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 from frametool.grammar.pose import Pose
-from frametool.grammar.result import Result
+from frametool.grammar.result import Result, Style
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.geometry.types import Array, Components
-    from frametool.grammar.result import Style
 
 
 class Measure(float):

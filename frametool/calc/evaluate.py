@@ -18,25 +18,22 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.calc import functions
 from frametool.calc.functions import FUNCTIONS
-from frametool.calc.parser import PLAIN, RESERVED, UNITS, CalcError, NoTree, frame_text, parse_line
-from frametool.calc.values import LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TWIST, VECTOR, Term, Type, wanted
+from frametool.calc.parser import PLAIN, RESERVED, UNITS, Branch, CalcError, Line, NoTree, frame_text, parse_line
+from frametool.calc.values import LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TWIST, VECTOR, RowValues, Term, Type, wanted
 from frametool.documents.document import parse_documents
 from frametool.documents.source import Source, error_at
 from frametool.errors import FormatError, FrametoolError, did_you_mean, shown, warn
 from frametool.geometry import floats
 from frametool.grammar.names import EARTH_FRAMES, may_be_on_earth
-from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, read_pose
+from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose, read_pose
 from frametool.grammar.readers import Misfit, Reading, kind, read_numbers, slash_note, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from frametool.calc.parser import Branch, Line
-    from frametool.calc.values import RowValues
     from frametool.frames.lookups import Frames
     from frametool.geometry.place import Earth
     from frametool.geometry.types import Components
-    from frametool.grammar.pose import Pose
 
 TAKEN = frozenset(FUNCTIONS)
 PI = 3.141592653589793

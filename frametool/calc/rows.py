@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.calc.evaluate import AXES, PLACED, evaluate_line, literal, once_a_block, term_of_pose
+from frametool.calc.evaluate import AXES, PLACED, Scope, evaluate_line, literal, once_a_block, term_of_pose
 from frametool.calc.functions import in_radians
-from frametool.calc.parser import RADIAN, CalcError, needs_time, reads_row, walk
+from frametool.calc.parser import RADIAN, CalcError, Line, needs_time, reads_row, walk
 from frametool.calc.values import ANGLES, LIST, NUMBER, POINT, POSE, TREE, VECTOR, RowValues, Term, Type
-from frametool.documents.source import opened
+from frametool.documents.source import Source, opened
 from frametool.errors import FormatError, FrametoolError
 from frametool.geometry.floats import RADIAN as DEGREES
 from frametool.geometry.representations import notation
@@ -32,9 +32,6 @@ from frametool.stream.trajectories import gathered
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.calc.evaluate import Scope
-    from frametool.calc.parser import Line
-    from frametool.documents.source import Source
     from frametool.geometry.types import Components, Namespace, Number
     from frametool.grammar.result import Style
 

@@ -16,14 +16,13 @@ from frametool.cli.command import Inputs, Text, inputs, misuse, option, refuse, 
 from frametool.errors import FormatError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
 from frametool.geometry.euler import AXES
-from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, WORLDS, notations
+from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, WORLDS, Notation, notations
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
 
     from frametool.cli.command import Adds
-    from frametool.geometry.representations import Notation
 
 STREAMED = ("records", "rows", "arrays")
 READ = readers("tree", "records", "rows", "arrays", "joints", "drawing")

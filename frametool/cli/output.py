@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 from click import UsageError
 
-from frametool.cli.command import refuse
+from frametool.cli.command import Inputs, refuse
 from frametool.cli.options import FULL
 from frametool.cli.sink import in_colour, is_special, say, writing
-from frametool.errors import ValueInvalid, first_of, listing, printable, shown, warn
+from frametool.errors import FrametoolError, ValueInvalid, first_of, listing, printable, shown, warn
 from frametool.formats import table
 from frametool.geometry.representations import EARTH_FRAMES, Notation, notation
 from frametool.grammar.result import RecordingStyle, Result, Style, sample_results
@@ -27,9 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
     from contextlib import AbstractContextManager
 
-    from frametool.cli.command import Inputs
     from frametool.cli.sink import Write
-    from frametool.errors import FrametoolError
     from frametool.frames.lookups import Frames
     from frametool.stream.record_results import BlockResults, ResultWriter
     from frametool.stream.record_values import Value

@@ -18,22 +18,20 @@ from frametool.cli.command import OPTIONAL, Inputs, option, refuse, say_if_typed
 from frametool.cli.output import Output
 from frametool.cli.poses import inline_misuse, is_pasted, pasted_stream, pose_source, values_of, without_inverse
 from frametool.cli.sink import say, say_error
-from frametool.documents.source import HEAD, Source, has_line, has_record, opened
+from frametool.documents.source import HEAD, InputFile, Source, has_line, has_record, opened
 from frametool.errors import FormatError, FrametoolError, heard_by, warn
 from frametool.formats import table
 from frametool.formats.table import BAG, FORMATS, has_no_text, holds_arrays, is_trajectory, readers
-from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRow, BadRows
+from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRow, BadRows, Outcome
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Sequence
 
     from frametool.cli.command import Adds
-    from frametool.documents.source import InputFile
     from frametool.explain.derive import DerivationStyle
     from frametool.explain.operations import WrittenPose
     from frametool.explain.render import Explanation
     from frametool.grammar.edges import Diagnostics
-    from frametool.stream.faults import Outcome
     from frametool.stream.request import Request
 
 TOP = 2  # lines of a table up to its first row: what is bad there may be bad in every row

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FrametoolError, ValueInvalid, printable, shown
 from frametool.explain import operations
-from frametool.explain.operations import WrittenPose, chain, frames_of
+from frametool.explain.operations import OtherAxes, WrittenPose, chain, frames_of
 from frametool.explain.render import Explanation
 from frametool.explain.run import DIGITS, Row, Sheet
 from frametool.frames.lookups import Frames
@@ -24,7 +24,6 @@ from frametool.grammar.result import Result, Style, pose_numbers
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.explain.operations import OtherAxes
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Rigid
     from frametool.grammar.pose import Pose

@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.explain.formula_tree import as_latex, as_text, latex_number, parsed
-from frametool.explain.run import CAVEAT, HEADING, SENTENCE, MatrixLine, SheetResult, SheetStep, Words
+from frametool.explain.run import CAVEAT, HEADING, SENTENCE, Item, MatrixLine, Row, SheetResult, SheetStep, Words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.explain.run import Item, Row
 
 WIDTH = 80
 INDENT = "   "

@@ -13,7 +13,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid, warn
 from frametool.fit.least_squares import align_vectors, length, solve_normal
-from frametool.frames.trajectory import BODY, WORLD
+from frametool.frames.trajectory import BODY, WORLD, Trajectory
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 from frametool.stream.samples import HandEyeSamples
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.fit.comparison import Delta
-    from frametool.frames.trajectory import Trajectory
     from frametool.geometry.types import Array, Indices
 
 

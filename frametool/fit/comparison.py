@@ -10,11 +10,11 @@ import numpy as np
 
 from frametool.errors import ValueInvalid, shown
 from frametool.fit import alignment as pairing
-from frametool.fit.alignment import ALIGNMENTS, Fit, Unaligned, clock_offset, fitted, lever_arm, principal_axes
+from frametool.fit.alignment import ALIGNMENTS, Fit, Pairs, Unaligned, clock_offset, fitted, lever_arm, principal_axes
 from frametool.fit.least_squares import require_near
 from frametool.fit.numbers import ROUNDING, absolute_errors, all_pairs, chained, relative_errors, segment_errors
 from frametool.frames.stamps import format_stamp
-from frametool.frames.trajectory import way
+from frametool.frames.trajectory import Trajectory, way
 from frametool.geometry import earth
 from frametool.geometry.place import ENU, Origin
 from frametool.geometry.rotation import Rotation
@@ -24,9 +24,7 @@ from frametool.grammar.names import EARTH_FRAMES
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from frametool.fit.alignment import Pairs
     from frametool.fit.numbers import AbsoluteErrors, RelativeErrors, SegmentErrors
-    from frametool.frames.trajectory import Trajectory
     from frametool.geometry.types import Array
 
 AUTO = "auto"

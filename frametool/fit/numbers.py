@@ -15,7 +15,7 @@ import numpy as np
 from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.fit.alignment import SCALED
 from frametool.fit.least_squares import length
-from frametool.frames.trajectory import way
+from frametool.frames.trajectory import Trajectory, way
 from frametool.geometry import arrays
 from frametool.geometry.floats import half_sincos
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from frametool.fit.comparison import Comparison, Delta
-    from frametool.frames.trajectory import Trajectory
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Array, Indices
 

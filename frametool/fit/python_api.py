@@ -9,7 +9,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid, alternatives, warn
 from frametool.fit.alignment import resampled, stamps_at_rate, stamps_every
-from frametool.fit.comparison import AUTO, EVO, Settings, parse_delta
+from frametool.fit.comparison import AUTO, EVO, Comparison, Settings, parse_delta
 from frametool.fit.comparison import compare as compared
 from frametool.fit.measured_tree import TreeSolution, solve_tree
 from frametool.fit.numbers import whole_estimate
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from typing import TypeAlias
 
-    from frametool.fit.comparison import Comparison
 
     Given: TypeAlias = Trajectory | str | PathLike[str]
     Measured: TypeAlias = str | PathLike[str] | Iterable[tuple[str, str, Transform] | tuple[str, str, Transform, Any]]

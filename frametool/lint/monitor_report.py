@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FormatError, Misused, shown
-from frametool.formats.load import refuse_unknown_joints
+from frametool.formats.load import FrameFile, refuse_unknown_joints
 from frametool.frames.edge_log import EdgeLog, chain
 from frametool.frames.path import frames_on
 from frametool.frames.stamps import BILLION
@@ -14,7 +14,6 @@ from frametool.grammar.edges import stop
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.formats.load import FrameFile
     from frametool.grammar.edges import Report
 
 

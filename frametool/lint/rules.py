@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.documents.document import locate_many, parse_documents
 from frametool.errors import BadTopology, Finding, FormatError, Unanswered, first_of, shown
 from frametool.formats.detect import by_sign
-from frametool.formats.load import refuse_unknown_joints
+from frametool.formats.load import FrameFile, refuse_unknown_joints
 from frametool.formats.trees.tree_reader import edges_of, located, read_edges
 from frametool.frames import topology
 from frametool.frames.edge_log import EdgeLog
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from frametool.documents.source import Source
-    from frametool.formats.load import FrameFile
     from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Edge

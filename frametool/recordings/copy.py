@@ -17,7 +17,7 @@ from frametool.frames.stamps import BILLION
 from frametool.frames.topology import resolve_name, static_and_moving, to_root, two_parents
 from frametool.geometry import floats, quaternion, rigid, uncertainty
 from frametool.grammar.edges import Diagnostics, Names, Topics
-from frametool.recordings.messages import POSE_ARRAY, numbers_of, posed_messages
+from frametool.recordings.messages import POSE_ARRAY, RawTransform, numbers_of, posed_messages
 from frametool.ros.message_stream import unit_components
 from frametool.ros.messages import PATH, STAMPS, stamp_problem
 
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
-    from frametool.recordings.messages import RawTransform
     from frametool.recordings.read import Channel, MessageTypes
 
 SAME = 1e-12  # metres, for positions of about a metre, and radians: the rounding of composing and writing numbers

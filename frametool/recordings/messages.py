@@ -21,8 +21,8 @@ import numpy as np
 
 from frametool.errors import FormatError, Unanswered, ValueInvalid, first_of, listing, shown
 from frametool.frames.stamps import BILLION
-from frametool.grammar.edges import Edge, EdgeColumns
-from frametool.recordings.read import opened_recording
+from frametool.grammar.edges import Diagnostics, Edge, EdgeColumns, Options
+from frametool.recordings.read import Channel, MessageTypes, Recorded, RecordingReader, opened_recording
 from frametool.ros.message_stream import edge_columns, unit_components
 from frametool.ros.messages import PATH, POSES, STAMPS, body_of, on_topic, stamp_problem
 from frametool.text.lines import Pieces
@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Diagnostics, Options
-    from frametool.recordings.read import Channel, MessageTypes, Recorded, RecordingReader
 
 
 CLOUD, POSE_ARRAY = "sensor_msgs/msg/PointCloud2", "geometry_msgs/msg/PoseArray"

@@ -22,14 +22,13 @@ from frametool.documents.yaml_writer import dump, quoted
 from frametool.errors import ValueInvalid
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry.representations import notation
-from frametool.grammar.result import edge_results, rotation_numbers
+from frametool.grammar.result import Result, Style, edge_results, rotation_numbers
 from frametool.ros.messages import MESSAGE_KEYS, STAMPS, stamp_problem
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from frametool.frames.lookups import FrameTree
-    from frametool.grammar.result import Result, Style
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:

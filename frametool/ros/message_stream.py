@@ -34,12 +34,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool import sizes
 from frametool.documents.document import Piece, counted_from, documents, lines, parse_documents
 from frametool.documents.json import JSON_NUMBER
-from frametool.documents.source import Source
+from frametool.documents.source import InputFile, Source
 from frametool.errors import FormatError, ValueInvalid, first_of, shown
 from frametool.frames.stamps import BILLION
 from frametool.geometry import floats, quaternion
-from frametool.grammar.edges import Edge, EdgeColumns
-from frametool.grammar.readers import Misfit, Reading, as_mapping
+from frametool.grammar.edges import Diagnostics, Edge, EdgeColumns, Options
+from frametool.grammar.readers import Misfit, Path, Reading, as_mapping
 from frametool.ros import messages
 from frametool.ros.messages import STAMPS, body_of, is_pose, on_topic, stamp_problem
 
@@ -47,10 +47,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
     from typing import BinaryIO
 
-    from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Diagnostics, Options
-    from frametool.grammar.readers import Path
 
 
 def _axes(part: str, axes: str = "xyz") -> list[str]:

@@ -19,13 +19,12 @@ from typing import TYPE_CHECKING, Any
 from frametool.errors import FormatError, shown
 from frametool.frames.stamps import BILLION, NotATime, parse_stamp
 from frametool.grammar.pose import read_rotation
-from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
+from frametool.grammar.readers import Misfit, Path, Quaternion, Reading, Vector, as_mapping, kind, read_numbers, within
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.grammar.edges import Answers, Edge, Options
-    from frametool.grammar.readers import Path, Quaternion, Reading, Vector
 
 
 STAMPS = (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec"))  # ROS 2, ROS 1, Foxglove

@@ -14,22 +14,19 @@ import re
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from frametool.documents.source import Source
+from frametool.documents.source import InputFile, Source
 from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.frames.topology import own_parent
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Edge
+from frametool.grammar.edges import Edge, Options
 from frametool.grammar.pose import ROTATION_KEYS, Pose, rotation_of
 from frametool.grammar.readers import INDICES, Reading, read_number
-from frametool.grammar.result import edge_results, rotation_numbers
+from frametool.grammar.result import Result, Style, edge_results, rotation_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from frametool.documents.source import InputFile
     from frametool.frames.lookups import Frames
-    from frametool.grammar.edges import Options
-    from frametool.grammar.result import Result, Style
 
 CALL = "static_transform_publisher"
 ROS_ARGUMENTS = "--ros-args"

@@ -8,20 +8,18 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, printable
-from frametool.explain.derive import CLOSE, METRES, REPORT, DerivationWrong, explained, row
+from frametool.explain.derive import CLOSE, METRES, REPORT, DerivationStyle, DerivationWrong, explained, row
 from frametool.explain.operations import spans
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.sim.drivers import ARRIVED, frame_of
-from frametool.sim.simulate import simulate
+from frametool.sim.simulate import IssuedCommand, simulate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from frametool.explain.derive import DerivationStyle
     from frametool.explain.render import Explanation
     from frametool.explain.run import Sheet, Values
     from frametool.sim.scene import Follow, Scene
-    from frametool.sim.simulate import IssuedCommand
 
     Sample = tuple[int, float, float, float]  # the pose of a frame in its parent: stamp in ns, x, y, theta
 

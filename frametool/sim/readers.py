@@ -23,7 +23,7 @@ from frametool.errors import FormatError, ValueInvalid, alternatives, shown
 from frametool.formats.detect import detect
 from frametool.formats.rows.csv import split_line
 from frametool.frames.stamps import BILLION, FURTHEST_NS, format_stamp, parse_time
-from frametool.grammar.readers import Misfit, as_mapping, kind, read_number, read_numbers, within
+from frametool.grammar.readers import Misfit, Path, as_mapping, kind, read_number, read_numbers, within
 from frametool.ros.message_stream import NOISE
 from frametool.sim.drivers import KEYS
 from frametool.sim.turtle import Twist
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
     from typing import TypeVar
 
-    from frametool.grammar.readers import Path
     from frametool.sim.drivers import TimedTwist
 
     NumberedLines = Iterator[tuple[int, str]]

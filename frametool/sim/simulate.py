@@ -16,16 +16,14 @@ from frametool.errors import LookupFailed, ValueInvalid, printable
 from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import BILLION
 from frametool.sim.drivers import CARROT_NS, EndOfRun, Heading, frame_of, offset, planar
-from frametool.sim.scene import Follow
-from frametool.sim.turtle import TICK_NS, ServiceRefused, TurtlePose, TurtleState, World
+from frametool.sim.scene import Follow, Scene, ServiceCall
+from frametool.sim.turtle import TICK_NS, Pen, ServiceRefused, TurtlePose, TurtleState, Twist, WallHit, World
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from frametool.geometry.transform import Transform
     from frametool.sim.drivers import MakeLeader
-    from frametool.sim.scene import Scene, ServiceCall
-    from frametool.sim.turtle import Pen, Twist, WallHit
 
     Process = Iterator[int]  # yields the nanoseconds at which it is to be resumed; ends when it has finished
     Watch = Callable[["SimulationStep"], object]

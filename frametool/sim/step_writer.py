@@ -17,13 +17,12 @@ from frametool.errors import ValueInvalid, printable
 from frametool.formats.rows.csv import row
 from frametool.frames.stamps import BILLION
 from frametool.grammar.pose import Pose
-from frametool.grammar.result import Result
+from frametool.grammar.result import Result, Style
 from frametool.ros.echo_format import message_text, transform_stamped
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-    from frametool.grammar.result import Style
     from frametool.sim.simulate import IssuedCommand, SimulationStep
 
     Record = dict[str, Any]

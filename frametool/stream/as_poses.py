@@ -32,7 +32,7 @@ import numpy as np
 from frametool.documents.source import InputFile, not_text
 from frametool.errors import FormatError, Misused, ValueInvalid, warn
 from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, describe, rows_of
-from frametool.formats.table import FORMATS, is_recording, is_trajectory
+from frametool.formats.table import FORMATS, Poses, is_recording, is_trajectory
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Answers, Diagnostics, Edge, Options, Samples, Topics, stop
@@ -45,17 +45,15 @@ from frametool.stream.row_layout import POINT, POSE, Shape, Target
 from frametool.stream.row_poses import RowPoses, kept
 from frametool.stream.rows import Block, spans_of
 from frametool.stream.table import rename_of
-from frametool.stream.table_stream import TableRows
+from frametool.stream.table_stream import PlannedRows, TableRows
 from frametool.stream.writers import LEARNED, RowsWriter, TextWriter
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Sequence
 
-    from frametool.formats.table import Poses
     from frametool.geometry.types import Components
     from frametool.stream.array_writer import ArrayWriter
     from frametool.stream.recording_writer import RecordingWriter
-    from frametool.stream.table_stream import PlannedRows
     from frametool.text.lines import ByteStream
     from frametool.text.spans import Ints
 

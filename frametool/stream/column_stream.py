@@ -19,10 +19,10 @@ from frametool.formats.rows.column_file import FLOATS, ColumnFile, Made, OutColu
 from frametool.formats.table import FORMATS
 from frametool.grammar.names import NORMALS, in_nanoseconds
 from frametool.stream.array_writer import ColumnsWriter
-from frametool.stream.faults import SKIP, STOP, Outcome
+from frametool.stream.faults import SKIP, STOP, Fault, Outcome, RowNote
 from frametool.stream.layout import Fixed, Kept, Named, New, quoted
 from frametool.stream.request import Operation, Request
-from frametool.stream.row_poses import objects, taken
+from frametool.stream.row_poses import RowPoses, objects, taken
 from frametool.stream.rows import Block, coded_texts
 from frametool.stream.table import Table
 from frametool.stream.table_stream import PlannedRows
@@ -35,8 +35,6 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Style
     from frametool.recordings.messages import PointCloud
     from frametool.stream.evaluate import Run
-    from frametool.stream.faults import Fault, RowNote
-    from frametool.stream.row_poses import RowPoses
     from frametool.text.spans import Flags, Floats, Ints
 
 DOUBLE = np.dtype(np.float64)

@@ -14,12 +14,12 @@ from frametool.errors import FrametoolError
 from frametool.frames.stamps import BILLION
 from frametool.geometry import arrays, floats, quaternion, uncertainty
 from frametool.geometry.batch_validation import read_rotations
-from frametool.geometry.representations import UPPER_ROWS
+from frametool.geometry.representations import UPPER_ROWS, BatchRule
 from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
 from frametool.grammar.pose import FEW_DIGITS
 from frametool.stream.faults import DEGREES, NULL, STOP, Fault, RowNote
-from frametool.stream.layout import Const, In, Instead, Out, Word
-from frametool.stream.request import PAIR, START, no_step, thing_pose
+from frametool.stream.layout import Const, In, Instead, Out, Piece, Word
+from frametool.stream.request import PAIR, START, Request, no_step, thing_pose
 from frametool.stream.row_layout import (
     FLAT,
     IDENTITY,
@@ -32,22 +32,17 @@ from frametool.stream.row_layout import (
     doubt,
     wrong_tail,
 )
-from frametool.stream.rows import assemble, chosen, coded, number_spans, read_each, separators, texts_as_rows
+from frametool.stream.rows import Block, assemble, chosen, coded, number_spans, read_each, separators, texts_as_rows
 from frametool.stream.stamp_columns import by_frame, by_time
 from frametool.text.numbers import parse_number, read_number_or_angle
 from frametool.text.parse import half_units, parse_floats
-from frametool.text.spans import Spans
+from frametool.text.spans import Flags, Floats, Ints, Spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from frametool.geometry.representations import BatchRule
     from frametool.geometry.types import Components, Rigid
-    from frametool.stream.layout import Piece
-    from frametool.stream.request import Request
     from frametool.stream.row_layout import Target
-    from frametool.stream.rows import Block
-    from frametool.text.spans import Flags, Floats, Ints
 
 COLUMNS_REMEDY = "give --deg, or name the columns _deg"
 

@@ -31,7 +31,7 @@ from frametool.grammar.covariance import (
 )
 from frametool.grammar.names import RATES
 from frametool.grammar.pose import LEFT_OUT, SCALE, read_angle_unit
-from frametool.grammar.readers import Misfit, NotARotation, read_number, within
+from frametool.grammar.readers import Misfit, NotARotation, Path, Reading, read_number, within
 from frametool.ros.messages import whole_list
 from frametool.stream.row_layout import IDENTITY, MOVERS, NORMAL, PARTS, POINT, POSE, RATE, TWIST, VECTOR, WRENCH, Shape
 
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
     from frametool.geometry.types import Components, Namespace
-    from frametool.grammar.readers import Path, Reading
     from frametool.stream.record import Record, RecordPlace
     from frametool.stream.request import Operation, Request
     from frametool.stream.table import Table

@@ -15,18 +15,16 @@ from os.path import commonprefix
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, Misused, ValueInvalid, bare, did_you_mean, listing, shown
-from frametool.geometry.representations import NAMED, ROTATIONS, UPPER_ROWS
+from frametool.geometry.representations import NAMED, ROTATIONS, UPPER_ROWS, Notation, Representation
 from frametool.geometry.representations import notation as parse_notation
 from frametool.grammar.names import COLUMN_WORDS, NORMALS
-from frametool.stream.row_layout import POINT, POSE, SIX, TWIST, WRENCH, Shape, six_names
+from frametool.stream.row_layout import POINT, POSE, SIX, TWIST, WRENCH, Shape, Unit, six_names
 from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS
 
 if TYPE_CHECKING:
     from collections.abc import Container, Iterable, Iterator, Sequence
 
-    from frametool.geometry.representations import Notation, Representation
     from frametool.stream.request import Request
-    from frametool.stream.row_layout import Unit
 
     Spot = tuple[int, str]  # a column's place, and the unit that its name says
 

@@ -17,8 +17,8 @@ from frametool.errors import (
     shown,
     warn,
 )
-from frametool.formats.robots.joints import find_joint_columns
-from frametool.formats.robots.model import TURNING, JointValue
+from frametool.formats.robots.joints import JointColumn, JointState, find_joint_columns
+from frametool.formats.robots.model import TURNING, Joint, JointValue, Robot
 from frametool.formats.table import FORMATS
 from frametool.ros import messages
 from frametool.stream.record_text import without_noise
@@ -29,8 +29,6 @@ from frametool.stream.splitter import Splitter
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.formats.robots.joints import JointColumn, JointState
-    from frametool.formats.robots.model import Joint, Robot
     from frametool.geometry.types import Components, Namespace, Number
 
 SLACK = 1e-9  # by which a value may lie beyond a limit

@@ -17,28 +17,24 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import Verbatim
 from frametool.errors import FormatError, ValueInvalid, alternatives, did_you_mean, first_of, shown, warn
-from frametool.formats.load import EdgePlace, close_all, lines_of
+from frametool.formats.load import EdgePlace, FrameFile, close_all, lines_of
 from frametool.formats.trees.tree_reader import MOST_KEYS, read_edges
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 from frametool.grammar.covariance import AXES, columns, is_sigma
 from frametool.grammar.names import NAME_KEYS, STAMP_KEYS
 from frametool.grammar.pose import COVARIANCE_KEYS, Pose, inverted, read_angle_unit
-from frametool.grammar.readers import Misfit, Reading, kind, tell, within
+from frametool.grammar.readers import Misfit, Path, Reading, kind, tell, within
 from frametool.stream.faults import BadRows
-from frametool.stream.record import INNER, KNOWN, find_records, pose_of, value_at
+from frametool.stream.record import INNER, KNOWN, Record, find_records, pose_of, value_at
 from frametool.stream.record_values import stamp_of
 from frametool.stream.request import COMBINED, Operation, Request
-from frametool.stream.row_layout import POSE
+from frametool.stream.row_layout import POSE, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.formats.load import FrameFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.readers import Path
-    from frametool.stream.record import Record
-    from frametool.stream.row_layout import Shape
     from frametool.text.lines import ByteStream
 
 LISTS = ("measurements", "frames")

@@ -13,11 +13,11 @@ from frametool.stream.layout import In, Renamed
 from frametool.stream.record import KEYS_REMEDY
 from frametool.stream.rows import Block
 from frametool.stream.splice import column_in, quoted_name
-from frametool.stream.splitter import DOCUMENTS, LINES, Part
+from frametool.stream.splitter import DOCUMENTS, LINES, Part, Splitter
 from frametool.stream.stamp_columns import read_extra
 from frametool.stream.template import Template
 from frametool.text.cells import without_quotes
-from frametool.text.spans import MARGIN, Spans, framed
+from frametool.text.spans import MARGIN, Bytes, Ints, Spans, framed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -25,9 +25,7 @@ if TYPE_CHECKING:
 
     from frametool.stream.record_text import RecordText
     from frametool.stream.request import Request
-    from frametool.stream.splitter import Splitter
     from frametool.stream.template import Names
-    from frametool.text.spans import Bytes, Ints
 
     Places: TypeAlias = Sequence[tuple[int, int]]
     Hit: TypeAlias = tuple[Template, Places]

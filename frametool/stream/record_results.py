@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
 from frametool import sizes
 from frametool.errors import FrametoolError
 from frametool.formats.rows.csv import cells_of, row
-from frametool.grammar.result import write_poses
+from frametool.grammar.result import Style, write_poses
 from frametool.stream.faults import STOP, Outcome
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterable, Iterator, Sequence
 
-    from frametool.grammar.result import Style
     from frametool.stream.record_rows import RecordBatch
     from frametool.stream.record_values import Value
     from frametool.stream.row_poses import RowPoses

@@ -16,7 +16,7 @@ from frametool.formats.rows.csv import cells_of
 from frametool.geometry import floats
 from frametool.geometry.representations import notation
 from frametool.grammar.names import in_nanoseconds
-from frametool.grammar.result import Result
+from frametool.grammar.result import Result, Style
 from frametool.stream.record_cuts import Cut, names_of, plan_of
 from frametool.stream.record_text import Answer
 from frametool.stream.record_values import (
@@ -44,18 +44,16 @@ from frametool.stream.text_rows import (
     leaf_mark,
     words,
 )
-from frametool.text.spans import MARGIN, Spans
+from frametool.text.spans import MARGIN, Bytes, Floats, Ints, Spans
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from frametool.grammar.result import Style
     from frametool.stream.evaluate import Plan, Run
     from frametool.stream.record_values import Value
     from frametool.stream.request import Request
     from frametool.stream.template import Template
     from frametool.stream.text_rows import Syntax
-    from frametool.text.spans import Bytes, Floats, Ints
 
 QUATERNIONS = ((notation("quaternion"), False),)
 MOST_ENTRIES = 8  # points or poses of a record: each is looked at for itself

@@ -33,7 +33,7 @@ from frametool.recordings.copy import (
 from frametool.recordings.messages import TYPES, RawTransform, recorded_edges
 from frametool.recordings.read import ITSELF, SERIALIZED, Recorded, broken, read_metadata, typestore
 from frametool.recordings.write import KINDS, SECONDS_ROS2, RecordingFile, new_channel, serialised
-from frametool.stream.faults import STOP, Fault
+from frametool.stream.faults import STOP, BadRows, Fault
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from frametool.grammar.edges import EdgeColumns, Report, Samples
     from frametool.recordings.copy import AddedEdge
     from frametool.recordings.read import Channel, RecordingReader
-    from frametool.stream.faults import BadRows
 
     Advance = Callable[[int, int], None]  # takes the number of messages and bytes that were read
 

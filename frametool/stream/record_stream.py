@@ -17,27 +17,24 @@ from frametool import sizes
 from frametool.documents.document import parse_nodes
 from frametool.errors import FormatError, FrametoolError
 from frametool.grammar.pose import Pose
-from frametool.grammar.result import NoResult
+from frametool.grammar.result import NoResult, Style
 from frametool.stream import stamp_source
 from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote
 from frametool.stream.record_results import BlockResults
-from frametool.stream.record_text import ROUNDED, Outside, RecordText
+from frametool.stream.record_text import ROUNDED, Answer, Outside, RecordText
 from frametool.stream.record_values import plain, values_of_text
 from frametool.stream.splice import attempt, column_in, fault_at, null_of, nulled, rendered
-from frametool.stream.splitter import ARRAY, NO_END, Splitter
+from frametool.stream.splitter import ARRAY, NO_END, Part, Splitter
 from frametool.text.lines import Pieces, read_blocks, readiness
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterable, Iterator, Sequence
 
     from frametool.geometry.types import Components
-    from frametool.grammar.result import Style
     from frametool.stream.evaluate import Plan, Run, State
     from frametool.stream.record_cuts import Cut, Hit, RecordCutter
     from frametool.stream.record_rows import RecordBatch, RecordRows
-    from frametool.stream.record_text import Answer
     from frametool.stream.request import Request
-    from frametool.stream.splitter import Part
     from frametool.stream.template import Template
     from frametool.text.lines import ByteStream
     from frametool.text.spans import Bytes

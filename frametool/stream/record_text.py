@@ -14,20 +14,17 @@ from frametool.documents.source import Source, check_text
 from frametool.errors import Finding, FrametoolError, ValueInvalid
 from frametool.geometry import floats
 from frametool.grammar.names import in_nanoseconds
-from frametool.grammar.readers import Misfit, Reading, within
+from frametool.grammar.readers import Misfit, Path, Reading, within
 from frametool.stream.faults import ZONES, RowNote
-from frametool.stream.record import find_records, value_at
-from frametool.stream.row_layout import FLAT, LEAVES_PLANE, checked_rotation
+from frametool.stream.record import Record, find_records, value_at
+from frametool.stream.row_layout import FLAT, LEAVES_PLANE, Target, checked_rotation
 from frametool.stream.stamp_source import key_path, read_header_stamp, read_stamp, stamp_keys
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.geometry.types import Components, Rigid
-    from frametool.grammar.readers import Path
-    from frametool.stream.record import Record
     from frametool.stream.request import Operation, Request
-    from frametool.stream.row_layout import Target
     from frametool.stream.splice import Edit
 
 ROUNDED = "rounded"  # rule of the warning about rotations that were normalised

@@ -17,9 +17,9 @@ from frametool.errors import FormatError, Misused, ValueInvalid, shown, warn
 from frametool.formats.table import is_recording
 from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import SCALE, Pose
-from frametool.grammar.readers import Misfit, NotARotation, Reading, tell
-from frametool.grammar.result import Result, with_entries
-from frametool.stream.record import STALE, pose_of, value_at
+from frametool.grammar.readers import Misfit, NotARotation, Path, Reading, tell
+from frametool.grammar.result import Result, Style, with_entries
+from frametool.stream.record import STALE, Record, pose_of, value_at
 from frametool.stream.record_text import Answer, Outside, RecordText, wide_turn, written
 from frametool.stream.request import Request
 from frametool.stream.row_layout import AS_READ, PARTS, POSE, ROTATION, VECTOR
@@ -28,9 +28,6 @@ from frametool.stream.stamp_source import read_stamp
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from frametool.grammar.readers import Path
-    from frametool.grammar.result import Style
-    from frametool.stream.record import Record
 
     Value = Result | dict[str, Any]
 

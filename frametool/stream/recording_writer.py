@@ -12,14 +12,13 @@ from frametool.geometry import arrays, earth, quaternion
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.recordings.write import KINDS, RecordingFile, check_stamps, filled, serialised
 from frametool.stream.row_layout import POINT, POSE
-from frametool.stream.row_poses import plain_cells
+from frametool.stream.row_poses import RowPoses, plain_cells
 from frametool.stream.writers import refuse_scale_in
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.grammar.result import Style
-    from frametool.stream.row_poses import RowPoses
     from frametool.text.spans import Floats, Ints
 
 KINDS_OF = {POSE: ("pose", "tf", "path", "fix"), POINT: ("point", "fix")}  # what rows can become

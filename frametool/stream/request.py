@@ -10,21 +10,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.errors import ValueInvalid
 from frametool.geometry import placed, quaternion, rigid
 from frametool.geometry.floats import RADIAN
-from frametool.geometry.representations import HEADING, notation
+from frametool.geometry.representations import HEADING, Notation, notation
 from frametool.geometry.rigid import EXACT, SCALED, UNCERTAIN
 from frametool.grammar.pose import SCALE, VELOCITY
 from frametool.stream.faults import STOP
-from frametool.stream.row_layout import MOVERS, POINT, POSE, RATE, SIX, TURNED, VECTOR, Shape, Target
+from frametool.stream.row_layout import MOVERS, POINT, POSE, RATE, SIX, TURNED, VECTOR, Shape, Target, Unit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from frametool.geometry.place import Earth, Place
-    from frametool.geometry.representations import Notation
     from frametool.geometry.types import Components, Namespace, Number, Rigid
     from frametool.stream.gathering import Gathered
     from frametool.stream.layout import Word
-    from frametool.stream.row_layout import Unit
     from frametool.stream.stamp_source import Timed
 
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")

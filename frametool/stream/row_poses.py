@@ -19,7 +19,7 @@ from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.result import NoResult, Result, with_entries
 from frametool.stream.row_layout import AS_READ, NOWHERE, PARTS
 from frametool.text.cells import without_quotes
-from frametool.text.spans import Spans
+from frametool.text.spans import Floats, Ints, Spans
 from frametool.text.write import rounded_to_single, shortest_spans
 
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from frametool.geometry.place import Place, Spot
     from frametool.geometry.types import Components
-    from frametool.text.spans import Floats, Ints
     Cells: TypeAlias = Spans | NDArray[Any]
 
 NO_STAMP = np.iinfo(np.int64).min  # of a bad row that is kept

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import ValueInvalid
-from frametool.stream.layout import Const, IfLocked, In, Instead, Out, Word
+from frametool.errors import FrametoolError, ValueInvalid
+from frametool.stream.layout import Const, IfLocked, In, Instead, Out, Piece, Word
 from frametool.text.cells import without_quotes
-from frametool.text.spans import MARGIN, Spans, framed, join
+from frametool.text.spans import MARGIN, Floats, Ints, Spans, framed, join
 from frametool.text.write import fixed_spans, replaced, shortest_spans
 
 if TYPE_CHECKING:
@@ -22,10 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from frametool.errors import FrametoolError
     from frametool.stream.faults import Fault
-    from frametool.stream.layout import Piece
-    from frametool.text.spans import Floats, Ints
 
 
 class BlockNames(NamedTuple):

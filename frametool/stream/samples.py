@@ -22,7 +22,7 @@ from frametool.formats.table import FORMATS
 from frametool.formats.trees.tree_reader import MOST_KEYS
 from frametool.geometry.transform import Transform
 from frametool.grammar.pose import COVARIANCE_KEYS, Pose, inverted
-from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, tell, within
+from frametool.grammar.readers import Misfit, Path, Reading, as_mapping, kind, tell, within
 from frametool.grammar.result import Result
 from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Array
     from frametool.grammar.edges import Answers
-    from frametool.grammar.readers import Path
     from frametool.text.lines import ByteStream
 
 ROBOT = "robot"

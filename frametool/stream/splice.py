@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.documents.document import Aliased, parse_documents, parse_nodes
+from frametool.documents.document import Aliased, Node, parse_documents, parse_nodes
 from frametool.documents.source import Source, Verbatim, decode
 from frametool.documents.yaml_writer import dump as yaml
 from frametool.documents.yaml_writer import flow, quoted
@@ -20,19 +20,15 @@ from frametool.grammar.pose import LISTED_WORDS, ROTATION_KEYS, Pose
 from frametool.grammar.readers import AXES_KEY
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream.faults import Fault
-from frametool.stream.layout import Const, IfLocked, In, Item, Out, Renamed, Word, number_text
-from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ, outermost
-from frametool.stream.record_text import RecordText, json_documents, without_noise, written
+from frametool.stream.layout import Const, IfLocked, In, Item, Out, Piece, Renamed, Word, number_text
+from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ, Name, outermost
+from frametool.stream.record_text import Answer, Entry, RecordText, json_documents, without_noise, written
 from frametool.stream.row_layout import POINT, POSE, SIX, TURNED, VECTOR, count_of
 from frametool.stream.stamp_source import replaced
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from frametool.documents.document import Node
-    from frametool.stream.layout import Piece
-    from frametool.stream.record import Name
-    from frametool.stream.record_text import Answer, Entry
     from frametool.stream.request import Request
     from frametool.stream.splitter import Part
 

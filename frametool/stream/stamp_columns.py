@@ -16,10 +16,10 @@ from frametool.grammar.names import in_nanoseconds
 from frametool.stream.row_layout import NOWHERE
 from frametool.stream.row_poses import NO_STAMP, texts_of
 from frametool.stream.rows import numbered, read_each
-from frametool.stream.stamp_source import read_header_stamp, read_stamp
+from frametool.stream.stamp_source import Timed, read_header_stamp, read_stamp
 from frametool.text.numbers import parse_number
 from frametool.text.parse import LOWEST, parse_floats, trimmed
-from frametool.text.spans import windows
+from frametool.text.spans import Bytes, Flags, Ints, Spans, Words, windows
 from frametool.text.write import TENS, ZEROS, first_point, not_digits, read_eight_digits
 
 if TYPE_CHECKING:
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Rigid
     from frametool.stream.request import Request
-    from frametool.stream.stamp_source import Timed
-    from frametool.text.spans import Bytes, Flags, Ints, Spans, Words
 
     Blame = Callable[[int, str, str | FrametoolError], None]
 

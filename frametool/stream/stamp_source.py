@@ -5,18 +5,16 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, AnyStr, NamedTuple
 
-from frametool.documents.document import parse_nodes
+from frametool.documents.document import Node, parse_nodes
 from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.geometry.rigid import EXACT
 from frametool.grammar.names import STAMP_KEYS, in_nanoseconds
-from frametool.grammar.readers import Misfit, kind
+from frametool.grammar.readers import Misfit, Path, kind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from frametool.documents.document import Node
     from frametool.geometry.types import Components
-    from frametool.grammar.readers import Path
 
 LARGEST = (1 << 63) - 1
 HEADER = "header.stamp"

@@ -20,21 +20,18 @@ from frametool.geometry.representations import UPPER_ROWS, notation
 from frametool.grammar.names import EARTH_FRAMES, in_nanoseconds, stamp_column
 from frametool.stream.faults import Fault
 from frametool.stream.header import Columns, PoseColumns, has_pose_column
-from frametool.stream.layout import ADDED, NAMED, quoted
+from frametool.stream.layout import ADDED, NAMED, Layout, quoted
 from frametool.stream.rows import Block, BlockNames, Coded, coded, spans_of
 from frametool.stream.stamp_columns import read_extra, read_stamps
 from frametool.stream.stamp_source import replaced, stamp_text
-from frametool.text.cells import split_blank, split_delimited, torn_record, without_quotes
-from frametool.text.spans import MARGIN, Spans
+from frametool.text.cells import Cells, split_blank, split_delimited, torn_record, without_quotes
+from frametool.text.spans import MARGIN, Ints, Spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.stream.layout import Layout
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Shape
-    from frametool.text.cells import Cells
-    from frametool.text.spans import Ints
     Names = tuple[str | None, str | None]  # parent, name
     Texts = tuple[str, str]
     Bad = dict[int, tuple[str, str | FrametoolError]]

@@ -32,19 +32,15 @@ from frametool.stream.header import (
     row_shape,
     wholes_of,
 )
-from frametool.stream.layout import NAME, PARENT, Fixed, Kept, Layout, Named, New, lay_out, refuse_repeated
-from frametool.stream.request import PAIR, PLAIN
-from frametool.stream.row_layout import NORMAL, POINT, POSE, RATE, SIX, Shape, place_of, six_names
-from frametool.stream.table import rename_of
+from frametool.stream.layout import NAME, PARENT, Column, Fixed, Kept, Layout, Named, New, lay_out, refuse_repeated
+from frametool.stream.request import PAIR, PLAIN, Request, Shown
+from frametool.stream.row_layout import NORMAL, POINT, POSE, RATE, SIX, Shape, Target, place_of, six_names
+from frametool.stream.table import Table, rename_of
 from frametool.text.numbers import number_or_none
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from frametool.stream.layout import Column
-    from frametool.stream.request import Request, Shown
-    from frametool.stream.row_layout import Target
-    from frametool.stream.table import Table
 
 
 def plan_table(

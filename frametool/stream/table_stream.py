@@ -18,7 +18,7 @@ from frametool.stream.header import listed
 from frametool.stream.layout import New
 from frametool.stream.row_layout import POSE, Shape
 from frametool.stream.row_poses import RowPoses, taken
-from frametool.stream.rows import written
+from frametool.stream.rows import Block, written
 from frametool.stream.table import (
     BYTE_ORDER_MARK,
     UNCLOSED,
@@ -30,17 +30,15 @@ from frametool.stream.table import (
     without_comments,
 )
 from frametool.stream.table_plan import own_count, plan_table
-from frametool.text.cells import RecordEnds, torn_record
+from frametool.text.cells import Cells, RecordEnds, torn_record
 from frametool.text.lines import read_blocks, whole_lines
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence
 
     from frametool.stream.request import Request
-    from frametool.stream.rows import Block
     from frametool.stream.stamp_source import Timed
     from frametool.stream.table import Table
-    from frametool.text.cells import Cells
     from frametool.text.lines import ByteStream
     from frametool.text.spans import Floats, Ints
 

@@ -16,9 +16,9 @@ from frametool.documents.json import JSON_NUMBER
 from frametool.errors import FrametoolError
 from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, may_be_uncertain
 from frametool.grammar.pose import DESCRIPTIVE, LISTED_WORDS, POSE_KEYS, ROTATION_KEYS
-from frametool.grammar.readers import AXES_KEY
+from frametool.grammar.readers import AXES_KEY, Path
 from frametool.stream.layout import Const, Renamed
-from frametool.stream.record import POINT_KEYS
+from frametool.stream.record import POINT_KEYS, Record
 from frametool.stream.row_layout import POSE
 from frametool.stream.splice import OURS, cut
 
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
     from frametool.documents.document import Node
-    from frametool.grammar.readers import Path
-    from frametool.stream.record import Record
     from frametool.stream.record_text import RecordText
     from frametool.stream.request import Request
 

@@ -13,14 +13,13 @@ from frametool.documents import json
 from frametool.documents.yaml_writer import quoted as quoted_in_yaml
 from frametool.formats.rows.csv import cell, quoted
 from frametool.stream.rows import constant, number_spans, spans_of
-from frametool.text.spans import Spans
+from frametool.text.spans import Floats, Spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from frametool.grammar.result import Style
     from frametool.stream.record_values import Value
-    from frametool.text.spans import Floats
 
 # marks: of numbers (those of a pose; more of them are 0.7310585786300049 + n), stamps, names, and scalars
 NUMBERS = (0.1370842961, -3.7208412957, 29.6518402397, 0.22360679774997896, -0.37416573867739417, 0.5099019513592785,

@@ -34,8 +34,8 @@ from frametool.geometry import arrays, floats, quaternion, rigid
 from frametool.geometry.representations import notation
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose import SCALE, Pose
-from frametool.grammar.result import Result, with_entries
-from frametool.stream.layout import Const, In, Out
+from frametool.grammar.result import Result, Style, with_entries
+from frametool.stream.layout import Const, In, Out, Piece
 from frametool.stream.record_results import BlockResults, Documents, csv_rows
 from frametool.stream.row_layout import POSE, SIX, Target
 from frametool.stream.row_poses import (
@@ -61,18 +61,15 @@ from frametool.stream.text_rows import (
     leaf_mark,
     words,
 )
-from frametool.text.spans import Spans, join
+from frametool.text.spans import Flags, Floats, Ints, Spans, join
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from frametool.geometry.place import Place
     from frametool.geometry.types import Components
-    from frametool.grammar.result import Style
-    from frametool.stream.layout import Piece
     from frametool.stream.row_poses import RowPoses
     from frametool.stream.text_rows import Syntax
-    from frametool.text.spans import Flags, Floats, Ints
 
 LEARNED = ("csv", "json", "yaml")
 

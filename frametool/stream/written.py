@@ -10,7 +10,7 @@ from frametool.explain.operations import WrittenPose
 from frametool.geometry import floats
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
-from frametool.stream.record import pose_of
+from frametool.stream.record import Record, pose_of
 from frametool.stream.record_values import read_text
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_layout import POINT, POSE, VECTOR
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from frametool.explain.render import Explanation
     from frametool.explain.run import Sheet
     from frametool.frames.lookups import Frames
-    from frametool.stream.record import Record
 
 
 class ByTree(NamedTuple):

@@ -22,7 +22,7 @@ from frametool.fit.numbers import SHORT, number_at
 from frametool.formats.rows.csv import write_points
 from frametool.grammar.result import Style
 from frametool.view import pictures
-from frametool.view.pictures import Chart, ChartLine, Picture, stacked
+from frametool.view.pictures import Chart, ChartLine, Picture, SvgElement, stacked
 from frametool.view.pose_text import WIDTH
 from frametool.view.reports import columns, fixed
 
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.fit.comparison import Comparison
-    from frametool.view.pictures import SvgElement
 
 NAME, LONGEST_NAME = 18, 24  # characters; a longer one does not push the rest aside
 STATISTICS = ("rmse", "mean", "median", "p95", "max")

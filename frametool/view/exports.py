@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from zlib import compress
 
 from frametool import __version__
-from frametool.formats.robots.model import JointValue
+from frametool.formats.robots.model import JointValue, Solid
 from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry.rigid import IDENTITY
@@ -33,7 +33,6 @@ from frametool.view.stills import SIZE
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from frametool.formats.robots.model import Solid
     from frametool.frames.track import MovingTrack
     from frametool.geometry.types import Rigid
     from frametool.sim.simulate import SimulationStep

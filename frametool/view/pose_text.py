@@ -12,16 +12,14 @@ from frametool.documents.json import dump
 from frametool.errors import printable
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
-from frametool.geometry.representations import ROTATIONS, ROWS, notation
+from frametool.geometry.representations import ROTATIONS, ROWS, Notation, notation
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose import TIMES, Pose
-from frametool.grammar.result import ROUNDED_TO_ZERO, Result, is_locked, placed, rotation_entry, rotation_numbers
+from frametool.grammar.result import ROUNDED_TO_ZERO, Result, Style, is_locked, placed, rotation_entry, rotation_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from frametool.geometry.representations import Notation
-    from frametool.grammar.result import Style
 
 
 OVERVIEW = [name + unit for name, row in ROTATIONS.items() for unit in row.overview]

@@ -14,8 +14,8 @@ from frametool.formats.table import CHOICES, FORMATS
 from frametool.frames.edge_log import motion
 from frametool.frames.stamps import format_stamp
 from frametool.geometry.transform import Transform
-from frametool.grammar.result import edge_label
-from frametool.lint.tree_diff import SAME
+from frametool.grammar.result import Style, edge_label
+from frametool.lint.tree_diff import SAME, Apart, Difference
 from frametool.view.pose_text import WIDTH, in_width, largest_sigmas, sigmas_of
 
 if TYPE_CHECKING:
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import Frames
     from frametool.frames.track import Track
     from frametool.grammar.pose import Pose
-    from frametool.grammar.result import Style
-    from frametool.lint.tree_diff import Apart, Difference
 
 
 LARGE, NOTHING = 1e6, 1e-9  # from where on numbers have an exponent, and below which they are rounding

@@ -11,7 +11,7 @@ from frametool.frames.lookups import Frames
 from frametool.frames.stamps import BILLION
 from frametool.sim.turtle import SIZE as WORLD
 from frametool.view.pictures import ChartLine, Picture, box, dot, line, shade_of, stacked, words, write_svg
-from frametool.view.scene import SLANTED, FrameScene, Labels, Projection, Size, nice, text_width
+from frametool.view.scene import SLANTED, FrameScene, Label, Labels, Projection, Size, nice, text_width
 from frametool.view.terminal import BACKGROUND, ON_WHITE, colours_of
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from frametool.sim.simulate import SimulationStep
     from frametool.sim.turtle import Pen, TurtleState
     from frametool.view.pictures import Point, SvgElement
-    from frametool.view.scene import Label
 
 PIECES, LAST_SHADE = 24, 0.85  # of a trail, from dark when it begins to a green that white paper still shows
 WIDTH, HEIGHT = 1000.0, 700.0

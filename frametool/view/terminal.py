@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import cells, printable
 from frametool.frames.stamps import BILLION, format_stamp
-from frametool.sim.turtle import SIZE
+from frametool.sim.turtle import SIZE, TurtleState
 from frametool.view.progress import coloured_console
-from frametool.view.scene import SLANTED, FrameScene, Labels, Projection, Size, nice, words_of
+from frametool.view.scene import SLANTED, Flat, FrameScene, Label, Labels, Projection, Size, nice, words_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import IssuedCommand, SimulationStep
-    from frametool.sim.turtle import TurtleState
-    from frametool.view.scene import Flat, Label
 
     Run = tuple[str, str]  # text and its style
     Spot = tuple[int, int]  # line and column

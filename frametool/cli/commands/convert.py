@@ -9,7 +9,7 @@ import click
 
 from frametool.cli import options, poses
 from frametool.cli.command import Inputs, argument, command_named, misuse, option, refuse
-from frametool.cli.output import QUATERNION
+from frametool.cli.output import QUATERNION, Output
 from frametool.cli.sink import say
 from frametool.cli.streaming import EXPLAIN, ONE_RECORD, PoseTask, one_argument, pose_stream_options
 from frametool.documents.source import Source
@@ -23,7 +23,6 @@ from frametool.text.numbers import parse_angle, parse_number
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.cli.output import Output
     from frametool.explain.operations import OtherAxes
     from frametool.stream.request import Operation
 
