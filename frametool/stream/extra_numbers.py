@@ -16,19 +16,7 @@ from frametool.geometry.placed import NOT_BOTH, inverse, pose_of, scale_of
 from frametool.geometry.quaternion import TOLERATED
 from frametool.geometry.rigid import EXACT, SCALED
 from frametool.geometry.uncertainty import UNKNOWN
-from frametool.grammar.covariance import (
-    COVARIANCE,
-    SIGMA,
-    check,
-    entries_of,
-    find_columns,
-    in_unit,
-    of_position,
-    of_sigmas,
-    read_covariance,
-    read_scale,
-    refuse_scale,
-)
+from frametool.grammar import covariance
 from frametool.grammar.names import RATES
 from frametool.grammar.pose import LEFT_OUT, SCALE, read_angle_unit
 from frametool.grammar.readers import Misfit, NotARotation, Path, Reading, read_number, within
@@ -59,10 +47,10 @@ def with_covariances(
     operation, shape, path = request.operation, record.shape, place.path
     there = [key for key in place.covariances if key in holder]
     is_own = shape.kind in PLACED and around == path
-    flat = [*holder] if is_own and SIGMA not in holder and not there else []
-    flat = [flat[at] for at in find_columns(flat, 36 if shape.kind == POSE else POINT_ENTRIES)[0]]
-    has_sigma = is_own and (SIGMA in holder or bool(flat))
-    said = (*there, *(flat or [SIGMA] * has_sigma))
+    flat = [*holder] if is_own and covariance.SIGMA not in holder and not there else []
+    flat = [flat[at] for at in covariance.find_columns(flat, 36 if shape.kind == POSE else POINT_ENTRIES)[0]]
+    has_sigma = is_own and (covariance.SIGMA in holder or bool(flat))
+    said = (*there, *(flat or [covariance.SIGMA] * has_sigma))
     is_left_out = operation.formula is not None and around == path and not operation.only_adds
     if is_left_out:
         reading.here = (*above, *path)
@@ -75,9 +63,9 @@ def with_covariances(
         for key in there * is_own:
             within((*around, key), _entries, holder[key], (36, 9))
         return record
-    if operation.formula is not None or (not operation.moves and there not in ([], [COVARIANCE])):
+    if operation.formula is not None or (not operation.moves and there not in ([], [covariance.COVARIANCE])):
         what = "the covariance would be wrong afterwards; leave it out, or move the message with apply"
-        raise Misfit(what, (*around, [*there, SIGMA][0]))
+        raise Misfit(what, (*around, [*there, covariance.SIGMA][0]))
     if has_sigma:
         return _with_sigmas(record, holder, path, reading, flat)
     sizes = (36,) if shape.kind in PARTS else (36, 9)[: 1 + operation.moves] if shape.kind == POSE else (9,)
@@ -88,7 +76,7 @@ def with_covariances(
         if numbers[0] == UNKNOWN and operation.moves:
             record = record._replace(begins=(*record.begins, paths[0]))
             continue
-        within(below, check, numbers)
+        within(below, covariance.check, numbers)
         record = record._replace(
             shape=record.shape._replace(covariance=(*record.shape.covariance, len(numbers))),
             numbers=record.numbers + paths, values=(*record.values, *numbers), covariances=(*record.covariances, key),
@@ -99,7 +87,7 @@ def with_covariances(
 
 def _entries(value: Any, sizes: Sequence[int]) -> list[tuple[Path, float]]:
     """Read a covariance, as `entries_of`; one that was cut short when it was printed says so."""
-    return entries_of(whole_list(value, " or ".join(f"{size} numbers" for size in sizes)), sizes)
+    return covariance.entries_of(whole_list(value, " or ".join(f"{size} numbers" for size in sizes)), sizes)
 
 
 def is_unknown(value: Any, sizes: Sequence[int]) -> bool:
@@ -110,9 +98,9 @@ def is_unknown(value: Any, sizes: Sequence[int]) -> bool:
 def _of_flat(own: dict[str, Any], reading: Reading, *, flat: Sequence[str], size: int) -> Components:
     """Read the covariance that keys say as columns do: `c11` .. `c66`, or `sigma_x` .."""
     numbers = [within((key,), read_number, own[key]) for key in flat]
-    _, sigma = find_columns(flat, size)
+    _, sigma = covariance.find_columns(flat, size)
     if not sigma:
-        within((flat[0],), check, numbers)
+        within((flat[0],), covariance.check, numbers)
         return tuple(numbers)
     if negative := next((key for key, number in zip(flat, numbers, strict=True) if number < 0.0), ""):
         raise NotARotation(f"sigma is negative: {own[negative]}", (negative,))
@@ -127,8 +115,8 @@ def _with_unit(sigma: Sequence[tuple[int, str]], *, degrees: bool) -> tuple[tupl
 def _of_sources(numbers: Sequence[Any], sigma: Sequence[tuple[int, str]], size: int) -> Components:
     """Return the covariance of sigmas, each from one of some numbers in its unit, or 0."""
     zero = numbers[0] - numbers[0]
-    entries = of_sigmas([zero if at < 0 else in_unit(numbers[at], unit) for at, unit in sigma])
-    return entries if size == len(entries) else of_position(entries)
+    entries = covariance.of_sigmas([zero if at < 0 else covariance.in_unit(numbers[at], unit) for at, unit in sigma])
+    return entries if size == len(entries) else covariance.of_position(entries)
 
 
 def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Reading, flat: Sequence[str]) -> Record:
@@ -137,25 +125,25 @@ def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Readi
     degrees = reading.degrees
     reading.degrees = read_angle_unit(own["angles"]) if "angles" in own else degrees
     try:
-        read = partial(_of_flat, flat=flat, size=size) if flat else read_covariance
+        read = partial(_of_flat, flat=flat, size=size) if flat else covariance.read_covariance
         entries = within(path, read, own, reading=reading)
     finally:
         reading.degrees = degrees
     if size < len(entries) and any(entries[18:]):
-        raise Misfit("a point does not turn; its sigma has xyz alone", (*path, SIGMA))
-    entries = entries if size == len(entries) else of_position(entries)
+        raise Misfit("a point does not turn; its sigma has xyz alone", (*path, covariance.SIGMA))
+    entries = entries if size == len(entries) else covariance.of_position(entries)
     return record._replace(
         shape=record.shape._replace(covariance=(size,), rewritten=True), numbers=(*record.numbers, *[None] * size),
-        values=(*record.values, *entries), others=(*record.others, *(flat or (SIGMA,))),
+        values=(*record.values, *entries), others=(*record.others, *(flat or (covariance.SIGMA,))),
     )  # fmt: skip
 
 
 def with_scale(record: Record, value: Any, around: Path, above: Path, request: Request) -> Record:
     """Add the scale of a pose, where the operation takes one; else it can only be 1."""
     if not request.operation.similar or around != record.path[len(above) :] or type(value) in (dict, list):
-        within(around, refuse_scale, value)
+        within(around, covariance.refuse_scale, value)
         return record
-    scale = within(around, read_scale, value)
+    scale = within(around, covariance.read_scale, value)
     if record.shape.covariance and request.operation.of != "arguments":
         raise NotARotation(NOT_BOTH, (*around, SCALE), key=True)
     return record._replace(
@@ -177,7 +165,7 @@ def covariance_columns(
     if passes or not kinds or not {*PLACED}.issuperset(kinds):
         return (), shapes
     try:
-        places, sigma = find_columns(table.names or (), 36 if POSE in kinds else 9)
+        places, sigma = covariance.find_columns(table.names or (), 36 if POSE in kinds else 9)
     except NotARotation as error:
         raise FormatError(str(error), source=source, line=1) from None
     shape = shapes[0]
@@ -200,7 +188,7 @@ def covariance_columns(
 
 def _refuse_extra(table: Table, axes: str, others: str, source: str) -> None:
     """Raise FormatError for the columns of a covariance that would stay along axes which a result does not have."""
-    if any(find_columns(table.names or (), size)[0] for size in (9, 36)):
+    if any(covariance.find_columns(table.names or (), size)[0] for size in (9, 36)):
         wording, remedy = (f"along {axes}", "") if axes else ("along the axes there", f", or say --local-axes {others}")
         message = f"the covariance is {wording}, the result along {others}; leave its columns out{remedy}"
         raise FormatError(message, source=source, line=1)

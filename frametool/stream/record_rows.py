@@ -19,14 +19,7 @@ from frametool.grammar.names import in_nanoseconds
 from frametool.grammar.result import Result, Style
 from frametool.stream.record_cuts import Cut, names_of, plan_of
 from frametool.stream.record_text import Answer
-from frametool.stream.record_values import (
-    SPELLED,
-    plain,
-    plain_scalar,
-    stamp_key,
-    unit_of,
-    values_of_unit,
-)
+from frametool.stream.record_values import SPELLED, plain, plain_scalar, stamp_key, unit_of, values_of_unit
 from frametool.stream.row_layout import AS_READ, POINT, POSE, ROTATION, VECTOR, Target
 from frametool.stream.row_poses import RowPoses, objects
 from frametool.stream.rows import spans_of

@@ -21,15 +21,7 @@ from frametool.errors import (
 from frametool.formats.load import FrameFile, Rules, load_sources
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.grammar.edges import Edge, Options, stop
-from frametool.recordings.copy import (
-    MOST_NAMED,
-    MOVED_TYPES,
-    STATIC,
-    EdgePlan,
-    MessageMover,
-    RecordedEdges,
-    replaced,
-)
+from frametool.recordings.copy import MOST_NAMED, MOVED_TYPES, STATIC, EdgePlan, MessageMover, RecordedEdges, replaced
 from frametool.recordings.messages import TYPES, RawTransform, recorded_edges
 from frametool.recordings.read import ITSELF, SERIALIZED, Recorded, broken, read_metadata, typestore
 from frametool.recordings.write import KINDS, SECONDS_ROS2, RecordingFile, new_channel, serialised

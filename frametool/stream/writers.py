@@ -38,16 +38,7 @@ from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream.layout import Const, In, Out, Piece
 from frametool.stream.record_results import BlockResults, Documents, csv_rows
 from frametool.stream.row_layout import POSE, SIX, Target
-from frametool.stream.row_poses import (
-    block_of,
-    kept,
-    plain_cell,
-    plain_cells,
-    points_of,
-    results_of,
-    spelled,
-    texts_of,
-)
+from frametool.stream.row_poses import block_of, kept, plain_cell, plain_cells, points_of, results_of, spelled, texts_of
 from frametool.stream.rows import assemble, number_spans, separators, spans_of
 from frametool.stream.text_rows import (
     CELL,
