@@ -493,7 +493,8 @@ def _chosen_rotation(header: Header, places: Sequence[int], expected: Notation |
     for notation in wholes_of(expected):
         row = notation.representation
         if row.whole and size == len(row.whole.columns):
-            return size, _rotation(_chosen(header, places), row, notation)._replace(whole=True, unit=1.0)
+            found = _rotation(_chosen(header, places), row, expected)
+            return size, found._replace(whole=True, unit=1.0, notation=notation)
     if expected is None:
         raise Misused(f"--columns: {size} columns do not say what they are; add --from REP")
     if size not in expected.counts:

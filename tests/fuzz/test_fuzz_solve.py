@@ -53,7 +53,7 @@ def samples(seeds: range, count: int) -> list[bool]:
         sigma = np.sqrt(np.trace(found.covariance_x[:3, :3])), np.sqrt(np.trace(found.covariance_x[3:, 3:]))
         rough = any("rough" in each for each in found.warnings)
         assert (off < (30 if rough else 6) * np.array(sigma)).all() or count == FEWEST, (seed, off, sigma)
-        warned.append(any("fit about as well" in each for each in found.warnings))
+        warned.append(any("fit with and without" in each for each in found.warnings))
     return warned
 
 
