@@ -285,7 +285,7 @@ OPERATORS: dict[str, tuple[str, Sequence[Overload]]] = {
         Overload("twist.a -> twist.a", _NEGATED),
         Overload("free -> point", _NEGATED),
     ]),
-    "list": ("make a point (3 lengths) or a twist (3 lengths, 3 angles) of these; rotations say {{rpy_deg: [..]}}", [
+    "list": ("make a point (3 lengths) or twist (lengths, angles) of {count} numbers; rotations: {{rpy_deg: [..]}}", [
         Overload("scale scale scale -> point", _SAME),
         Overload("scale scale scale angle angle angle -> twist", _SAME),
     ]),
@@ -307,7 +307,7 @@ def operated(sign: str, *terms: Term) -> Term:
     if (found := _result(overloads, sign, terms)) is not None:
         return found
     remedy = next((text for kind, text in REMEDIES.items() if kind in [term.type.kind for term in terms]), "")
-    raise CalcError(f"cannot {refusal.format(*(term.type.named for term in terms))}{remedy}")
+    raise CalcError(f"cannot {refusal.format(*(term.type.named for term in terms), count=len(terms))}{remedy}")
 
 
 def power(base: Term, exponent: Term) -> Term:

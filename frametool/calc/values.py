@@ -96,6 +96,7 @@ class Term(NamedTuple):
             raise CalcError("row is known in streams only: -i FILE, or standard input")
         return self.compute(row)
 
+
 def made(type_: Type, kernel: Kernel, *operands: Term, check: Check | None = None) -> Term:
     """Return the result of a kernel for the numbers of all operands: at once if they are known, else for each row.
 

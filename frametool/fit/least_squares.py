@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     Mask: TypeAlias = NDArray[np.bool_]
     Rows: TypeAlias = slice | list[int] | Mask
 
+
 class NotSettled(ValueInvalid):
     """Equations that have no solution."""
 

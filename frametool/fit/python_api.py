@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from typing import TypeAlias
 
-
     Given: TypeAlias = Trajectory | str | PathLike[str]
     Measured: TypeAlias = str | PathLike[str] | Iterable[tuple[str, str, Transform] | tuple[str, str, Transform, Any]]
 

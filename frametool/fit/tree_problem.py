@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     Pairs = Sequence[tuple[int, int]]
 
+
 class SpanningTree(NamedTuple):
     """Rows that connect every body to the root by one path.
 

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from frametool.geometry.place import Earth
 
 
-
 Path = tuple[str | int, ...]  # keys and indices that lead to a value
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]

@@ -28,7 +28,6 @@ from frametool.stream.stamp_source import read_stamp
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-
     Value = Result | dict[str, Any]
 
 SPELLED = ("yaml", "json", "csv")  # formats in which other keys keep their names

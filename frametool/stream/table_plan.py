@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 
-
 def plan_table(
     table: Table, request: Request, source: str, normals: Sequence[tuple[str, ...]], *, stamped: bool
 ) -> tuple[Plan, Layout]:

@@ -181,6 +181,8 @@ def explain_angle(text: str) -> str:
 
 _UNKNOWN = "is not a number"
 _NO_LENGTH = "is not a length; write metres, or a unit: 2cm, 20mm, 0.02m"
+
+
 def half_unit(text: str) -> float:
     """Return half a unit of the last written digit of a number; 0 without a point: such a number is exact."""
     digits, _, exponent = text.strip(" \t\"'").lower().partition("e")

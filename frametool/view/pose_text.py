@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
 
-
 OVERVIEW = [name + unit for name, row in ROTATIONS.items() for unit in row.overview]
 
 

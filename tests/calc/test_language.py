@@ -169,7 +169,7 @@ frametool: cannot negate the pose map<-tool; poses have a * b, inv(a), inv(a) * 
 frametool: unknown name 'map'; a frame is asked for as TARGET<-SOURCE
   map
   ^
-frametool: cannot make a point (3 lengths) or a twist (3 lengths, 3 angles) of these; rotations say {rpy_deg: [..]}
+frametool: cannot make a point (3 lengths) or twist (lengths, angles) of 4 numbers; rotations: {rpy_deg: [..]}
   [0, 0, 0, 1]
   ^
 frametool: cannot add a number in m and a number in rad

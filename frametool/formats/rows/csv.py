@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
 
-
 PLAIN = ("point", "vector", "xyz")  # whose numbers are x, y, z
 SIX = ("twist", "wrench")
 HALVES = ("linear", "angular", "force", "torque")

@@ -20,7 +20,6 @@ from frametool.ros.messages import MARKS
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
 
-
     Schema = dict[str, Any]
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
