@@ -249,7 +249,6 @@ def _flat(node: Node, unit: Path, made: Answer, request: Request, fmt: str) -> d
     entry = made.entry
     kind = entry.record.shape.kind
     named: dict[str, Any] = {"frame": entry.parent} if entry.parent is not None else {}
-    antenna = {"name": entry.name} if entry.record.placed and entry.name else {}
     numbers = written(made)[: entry.target.size]
     extra = _extras(made, request, len(numbers))
     if kind in PARTS:
@@ -264,7 +263,7 @@ def _flat(node: Node, unit: Path, made: Answer, request: Request, fmt: str) -> d
         holder = node.at(entry.record.path[len(unit) :])
         named |= {AS_READ: read} if (read := _place_as_read(holder, entry.record)) else {}
     rest = with_stamp_ns(_rest(node, unit, entry.record), fmt)
-    return antenna | named | _header_stamp(entry.record) | extra | rest
+    return ({"name": entry.name} if entry.name else {}) | named | _header_stamp(entry.record) | extra | rest
 
 
 def _place_as_read(node: Node, record: Record) -> list[float]:

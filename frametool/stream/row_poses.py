@@ -199,16 +199,17 @@ def points_of(
     block: RowPoses, kind: str, extras: Sequence[str] = (), place: Place | None = None
 ) -> list[dict[str, Any]]:
     """Return a block of points or vectors as mappings, one each, or of points on the Earth at a place."""
-    frames = block.for_each(block.parents)
+    names, frames = map(block.for_each, (block.names, block.parents))
     made = []
     for at, (numbers, said) in enumerate(_each(block, extras)):
+        own: dict[str, Any] = {"name": names[at]} if names[at] else {}
         if place is not None and numbers is not None:
             from frametool.grammar.place import point_entry
 
-            made.append(point_entry(frames[at], numbers, place, block.spot(at)) | said)
+            made.append(own | point_entry(frames[at], numbers, place, block.spot(at)) | said)
         else:
-            named: dict[str, Any] = {"frame": frames[at]} if frames[at] else {}
-            made.append(named | spelled(kind, numbers) | said)
+            own |= {"frame": frames[at]} if frames[at] else {}
+            made.append(own | spelled(kind, numbers) | said)
     return made
 
 

@@ -297,9 +297,9 @@ class RowsWriter:
 
     def _marked(self, block: RowPoses) -> Marked:
         """Make a result with what this block's have; what differs from row to row is marked."""
-        far = 1.0 if self.target.place is None else 1e6  # nothing near the Earth's centre has a latitude
         size = {POSE: 7, **dict.fromkeys(SIX, 6)}.get(self.kind, 3)
-        own = (*(far * part for part in NUMBERS[:3]), *NUMBERS[3:size])
+        # nothing near the Earth's centre has a latitude
+        own = (*((1.0 if self.target.place is None else 1e6) * part for part in NUMBERS[:3]), *NUMBERS[3:size])
         numbers = [*self.target.written(own, floats), *self.more]
         columns = {repr(number): at for at, number in enumerate(numbers) if type(number) is float}
         name, parent = (
@@ -314,12 +314,13 @@ class RowsWriter:
         if self.kind == POSE:
             pose = Pose.of(own, name, parent)
             return Marked(Result(pose if self.placed else pose._replace(position=None), extras), columns, len(numbers))
-        named: dict[str, Any] = {} if parent is None else {"frame": parent}
+        named: dict[str, Any] = {} if name is None else {"name": name}
         if self.target.place is None:
+            named |= {} if parent is None else {"frame": parent}
             return Marked(named | spelled(self.kind, own) | extras, columns, len(numbers))
         from frametool.grammar.place import point_entry
 
-        return Marked(point_entry(EARTH_FRAMES[0], own, self.target.place) | extras, columns, len(numbers))
+        return Marked(named | point_entry(EARTH_FRAMES[0], own, self.target.place) | extras, columns, len(numbers))
 
 
 def refuse_infinite(values: Floats) -> None:

@@ -196,3 +196,16 @@ def test_a_stream_of_many_frames_takes_little_more_than_one_of_one(run: Run) -> 
         return process_time() - begin
 
     assert min(took(60), took(60)) < 3 * min(took(1), took(1))
+
+
+@pytest.mark.parametrize("count", [2, 300])
+@pytest.mark.parametrize("source", ["json", "csv"])
+def test_points_keep_their_names_in_another_format(run: Callable[..., Any], source: str, count: int) -> None:
+    names = [f"n{at % 7}" for at in range(count)]
+    records = "".join(f'{{"name": "{name}", "point": [1, 2, 3]}}\n' for name in names)
+    rows = "name,x,y,z\n" + "".join(f"{name},1,2,3\n" for name in names)
+    text, into = (records, "csv") if source == "json" else (rows, "json")
+    done = run("apply", "--transform", "{xyz: [1, 0, 0]}", "--in", source, "-f", into, stdin=text)
+    assert done.status == 0
+    lines = done.out.splitlines()[source == "json" :]
+    assert [line.split(",")[0] if source == "json" else json.loads(line)["name"] for line in lines] == names
