@@ -216,7 +216,7 @@ def html_of(value: Any) -> str | None:
         svg = b64encode(write_svg(still_picture(FrameScene(value), title=value.name)).encode()).decode()
         return f'<img alt="frames of {escape(value.name)}" src="data:image/svg+xml;base64,{svg}">'
     if hasattr(value, "as_dict"):
-        from frametool.view.comparison import write_comparison
+        from frametool.view.comparison_report import write_comparison
 
         return f"<pre>{escape(write_comparison(value.as_dict()))}</pre>"
     if hasattr(value, "stamps_ns"):

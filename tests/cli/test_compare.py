@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 import frametool
-from frametool.view.comparison import write_report
+from frametool.view.comparison_report import write_report
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -141,7 +141,7 @@ def compare_command(inputs: Inputs) -> int:
         for path in reports:
             _write_report(found, path, force=force)
         if explain:
-            from frametool.view.comparison import write_explanation
+            from frametool.view.comparison_report import write_explanation
 
             output.text("\n".join(map(write_explanation, every)))
         elif not instead:
@@ -159,7 +159,7 @@ def _write_report(found: Sequence[Comparison], path: str, *, force: bool) -> Non
     """Write the pictures of a comparison, with the command that made them."""
     import shlex
 
-    from frametool.view.comparison import write_report
+    from frametool.view.comparison_report import write_report
 
     line = shlex.join(["frametool", *click.get_current_context().obj])
     with writing(path, force=force) as write:
@@ -169,7 +169,7 @@ def _write_report(found: Sequence[Comparison], path: str, *, force: bool) -> Non
 def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], rows: str | None) -> None:
     """Write rows, a table, or each comparison by itself."""
     from frametool.fit.numbers import rows as rows_of
-    from frametool.view.comparison import write_comparison, write_table
+    from frametool.view.comparison_report import write_comparison, write_table
 
     fmt = output.style.format
     if rows:
