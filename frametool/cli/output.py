@@ -144,7 +144,7 @@ class Output:
         self.style.axes = (stated or known) if operation is None or operation.keeps_child else ""
         self.style.in_camera = operation is not None and operation.looks_back
         row = table.FORMATS.get(self.style.format)
-        if self.style.axes and row and row.poses.axes:
+        if self.style.axes and row and row.rows.axes:
             self._inputs.ask("camera_axes")
 
     def take_axes_in(self, tree: Frames, source: str) -> None:

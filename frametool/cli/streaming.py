@@ -224,7 +224,7 @@ class Stream:
             stream = at_other_times(stream, fmt, request.offset_ns)
         elif request.offset_ns and "arrays" in FORMATS[fmt].reads:
             raise click.UsageError(f"--time-offset is for text, {fmt} holds numbers; convert it to csv first")
-        output.take_axes(FORMATS[fmt].poses.axes, request.operation)
+        output.take_axes(FORMATS[fmt].rows.axes, request.operation)
         if is_trajectory(fmt) and not output.notations:
             request = request._replace(notations=())  # its rows stay what they are
         if fmt in RECORDS and (output.chosen or fmt) != fmt and request.gathered is None:

@@ -94,7 +94,7 @@ class FrameFile(InputFile):
         """Return what the file does not specify; of tables also frames without columns, of recordings poses."""
         row = FORMATS[self.format]
         if self.format in ("csv", "tsv", "semicolon"):
-            words = {word.strip('"# \r') for word in Beginning(self.head()).first_line.split(row.delimiter)}
+            words = {word.strip('"# \r') for word in Beginning(self.head()).first_line.split(row.rows.delimiter)}
             return row.required_options[0 if words.isdisjoint(PARENT_COLUMNS) or words.isdisjoint(NAME_KEYS) else 1 :]
         return (*row.required_options, *["frames"] * bool(self.topics.chosen))
 
@@ -348,7 +348,7 @@ class TreeBuilder:
             made.drawn |= file.tally.drawn
             made.cameras = {**made.cameras, **file.cameras}
             made.robots = [*made.robots, *([] if file.tally.robot is None else [file.tally.robot])]
-            held += [file] * FORMATS[file.format].cameras
+            held += [file] * ("cameras" in FORMATS[file.format].reads)
         if held:
             made.read_cameras = partial(_read_cameras, made, held)
         return made

@@ -6,9 +6,11 @@ import os
 from typing import Any, NamedTuple
 
 
-class Poses(NamedTuple):
-    """How a format writes its poses.
+class Rows(NamedTuple):
+    """How the rows of a format look, and the poses in them.
 
+    delimiter: between the cells, "" for blanks; None if there are no such rows
+    columns: in order, if there is no header; widths: allowed numbers of columns, if others are refused
     rotation: the notation of the numbers after the position
     inverse: the file has the pose of the world in the body, not of the body in the world
     axes: of a camera, `optical` or `opengl`
@@ -16,11 +18,14 @@ class Poses(NamedTuple):
     counted: what the numbers are that replace stamps; "" if rows have stamps
     """
 
-    rotation: str
+    delimiter: str | None = None
+    columns: tuple[str, ...] = ()
+    widths: tuple[int, ...] = ()
+    rotation: str = "quaternion"
     inverse: bool = False
     axes: str = ""
     frames: tuple[str, str] = ("world", "body")
-    counted: str = "numbers of poses"
+    counted: str = ""
 
 
 class Format(NamedTuple):
@@ -30,19 +35,17 @@ class Format(NamedTuple):
     suffixes: of files in this format; names: file names for which it is written
     reads: what is read from it: `tree` by `read` of `reader`, `joints` (values by name) by its `read_joints`;
         `records` and `rows` by the streams, columns of numbers as `arrays` by its `open_columns`; `trajectory`: it
-        holds one moving frame; a `drawing`: edges without poses, by `read`, for `tree` alone
+        holds one moving frame; a `drawing`: edges without poses, by `read`, for `tree` alone; `cameras`: it may hold
+        intrinsics too
     writes: what is written in it, by `write_poses` (also a `trajectory`: the poses of one frame over time),
-        `write_points` (also for a `report`), `write_tree` of `writer`; as `arrays` by its `create`; if all poses
-        are written alike, `ROWS` of `writer` (a RowForm, or one for each format) replaces `write_poses`; as messages
-        of a `recording`, whose trees are written by `tree_pieces` of `writer`
+        `write_points` (also for a `report`), `write_tree` of `writer`; as `arrays` by its `create`, with
+        columns of `texts` if it has them; if all poses are written alike, `ROWS` of `writer` (a RowForm, or one for
+        each format) replaces `write_poses`; as messages of a `recording`, whose trees are written by `tree_pieces` of
+        `writer`
     magic: how it begins, as (kind, what); `frametool.formats.detect` defines the kinds
     conventions: the meaning of its numbers (frames, units, order)
     required_options: the options for what it does not specify
     not_stored: what a tree loses in this format, for a warning
-    delimiter: between the cells of its rows, "" for blanks; None if it has no such rows
-    columns: of its rows, in order, if there is no header; widths: allowed numbers of columns, if others are refused
-    poses: the meaning of its rows
-    texts: whether its `arrays` may have text columns; cameras: whether it may hold intrinsics too
     """
 
     summary: str
@@ -56,17 +59,12 @@ class Format(NamedTuple):
     required_options: tuple[str, ...] = ()
     not_stored: str = ""
     names: tuple[str, ...] = ()
-    delimiter: str | None = None
-    columns: tuple[str, ...] = ()
-    widths: tuple[int, ...] = ()
-    poses: Poses = Poses("quaternion", counted="")
-    texts: bool = False
-    cameras: bool = False
+    rows: Rows = Rows()
 
     @property
     def is_table(self) -> bool:
         """Return True if its lines are rows of cells."""
-        return self.delimiter is not None
+        return self.rows.delimiter is not None
 
 
 def _trajectory(summary: str, reader: str, **fields: Any) -> Format:
@@ -76,14 +74,14 @@ def _trajectory(summary: str, reader: str, **fields: Any) -> Format:
     return Format(summary, writer="frametool.formats.rows.pose_rows", **known | fields)
 
 
+def _read_tree(summary: str, module: str, *, reads: tuple[str, ...] = ("tree",), **fields: Any) -> Format:
+    """Return the row of a format of trees that is only read."""
+    return Format(summary, reads=reads, reader=module, **fields)
+
+
 def _tree(summary: str, module: str, **fields: Any) -> Format:
     """Return the row of a format of trees that one module reads and writes."""
-    return Format(summary, reads=("tree",), reader=module, writes=("tree",), writer=module, **fields)
-
-
-def _read_tree(summary: str, module: str, **fields: Any) -> Format:
-    """Return the row of a format of trees that is only read."""
-    return Format(summary, reads=("tree",), reader=module, **fields)
+    return _read_tree(summary, module, writes=("tree",), writer=module, **fields)
 
 
 _DRAWINGS = "frametool.formats.trees.drawings"
@@ -106,14 +104,16 @@ def _arrays(
 
 def _messages(summary: str, *magic: tuple[str, str | bytes], reader: str = _MESSAGES, **fields: Any) -> Format:
     """Return the row of a format of messages."""
-    return Format(summary, reads=("tree",), reader=reader, magic=magic, required_options=("frames",), **fields)
+    return _read_tree(summary, reader, magic=magic, required_options=("frames",), **fields)
 
 
 def _recording(summary: str, suffix: str, *magic: tuple[str, str | bytes]) -> Format:
     """Return the row of a format of recorded messages."""
     written = {"writes": ("poses", "points", "tree", "recording"), "writer": "frametool.recordings.write"}
-    return _messages(summary, *magic, reader=BAG, suffixes=(suffix,), cameras=True, **written)
+    return _messages(summary, *magic, reader=BAG, reads=_CAMERAS, suffixes=(suffix,), **written)
 
+
+_CAMERAS = ("tree", "cameras")
 
 # options for what the format of a file does not specify
 DIRECTIONS = ("parent-from-child", "child-from-parent")
@@ -168,7 +168,8 @@ _BIN = _arrays(
 )  # fmt: skip
 _XYZI = ("x", "y", "z", "intensity")
 _LAS_HEAD = rb"LASF.{100}"
-_ARROW = _arrays("", "frametool.formats.rows.arrow", texts=True)
+_TEXTS = ("poses", "points", "arrays", "texts")
+_ARROW = _arrays("", "frametool.formats.rows.arrow", writes=_TEXTS)
 
 FORMATS = {
     "yaml": Format(
@@ -191,25 +192,25 @@ FORMATS = {
         "CSV with a header", suffixes=(".csv",), reads=("tree", "rows"), reader=_TABLE,
         required_options=("frames", "stamps"), writes=("poses", "points", "report", "trajectory"),
         writer="frametool.formats.rows.csv", magic=(("begin", _ONE_COLUMN), ("header", r"[^\t]*,[^\t]*$")),
-        delimiter=",",
+        rows=Rows(","),
     ),
     "tsv": Format(
         "tab-separated values with a header", (".tsv", ".tab"), reads=("tree", "rows"), reader=_TABLE,
-        required_options=("frames", "stamps"), magic=(("header", r".*\t"),), delimiter="\t",
+        required_options=("frames", "stamps"), magic=(("header", r".*\t"),), rows=Rows("\t"),
     ),
     "semicolon": Format(
         "CSV with semicolons and a header", reads=("tree", "rows"), reader=_TABLE,
-        required_options=("frames", "stamps"), magic=(("line", r"[^\t,;:{]+(?:;[^\t,;:{]*)+$"),), delimiter=";",
+        required_options=("frames", "stamps"), magic=(("line", r"[^\t,;:{]+(?:;[^\t,;:{]*)+$"),), rows=Rows(";"),
     ),
     "columns": Format(
         "columns between blanks, # comments", reads=("rows",), required_options=("stamps",),
-        magic=(("header", r"#|\s*\S+\s+\S"),), delimiter="",
+        magic=(("header", r"#|\s*\S+\s+\S"),), rows=Rows(""),
     ),
     "tum": _trajectory(
         "trajectory: t x y z qx qy qz qw", _TABLE, suffixes=(".tum",),
         magic=(("line", rf"(?:{NUMBER}[ \t]+){{7}}{NUMBER}\s*$"),),
-        conventions="world<-body, seconds, metres, quaternion x y z w", required_options=("frames",), delimiter="",
-        columns=("t", "x", "y", "z", "qx", "qy", "qz", "qw"), poses=Poses("xyzw", counted=""),
+        conventions="world<-body, seconds, metres, quaternion x y z w", required_options=("frames",),
+        rows=Rows("", ("t", "x", "y", "z", "qx", "qy", "qz", "qw"), rotation="xyzw"),
     ),
     "echo": _messages(
         "messages as `ros2 topic echo` or `rostopic echo` print them",
@@ -255,11 +256,11 @@ FORMATS = {
             ("line", rf"\d{{19}}(?:\s*,\s*{NUMBER}){{7}}(?:(?:\s*,\s*{NUMBER}){{9}})?\s*$"),
         ),
         conventions="world<-body (R<-S), nanoseconds, metres, quaternion w x y z", required_options=("frames",),
-        delimiter=",", columns=_EUROC, widths=(8, 17), poses=Poses("wxyz", counted=""),
+        rows=Rows(",", _EUROC, (8, 17), "wxyz"),
     ),
     "colmap": _trajectory(
         "COLMAP images.txt", "frametool.formats.rows.pose_rows", names=("images.txt",),
-        poses=Poses("wxyz", inverse=True, axes="optical", frames=_CAMERA, counted="image ids"),
+        rows=Rows(rotation="wxyz", inverse=True, axes="optical", frames=_CAMERA, counted="image ids"),
         magic=(
             ("text", r"\A\ufeff?(?:\s*#[^\n]*\n)*?# *(?:Image|Frame) list with"),
             ("line", rf"\d+(?:[ \t]+{NUMBER}){{7}}[ \t]+\d+[ \t]+\S*[^\s\d.]"),
@@ -267,21 +268,24 @@ FORMATS = {
         conventions="the file holds camera<-world, quaternion w x y z",
     ),
     "nerf": _trajectory(
-        "NeRF transforms.json", "frametool.formats.rows.pose_rows", names=("transforms.json",), cameras=True,
-        poses=Poses("matrix", axes="opengl", frames=_CAMERA, counted="places in its list"),
+        "NeRF transforms.json", "frametool.formats.rows.pose_rows", names=("transforms.json",),
+        reads=("tree", "trajectory", "rows", "cameras"),
+        rows=Rows(rotation="matrix", axes="opengl", frames=_CAMERA, counted="places in its list"),
         magic=(("json path", "frames/transform_matrix"),), conventions="world<-camera; opengl (y up, z back)",
     ),
     "kitti": _trajectory(
         "KITTI poses", _TABLE,
-        magic=(("line", rf"(?:{NUMBER}[ \t]+){{11}}{NUMBER}\s*$"),), conventions="world<-cam0, metres", delimiter="",
-        columns=("r11", "r12", "r13", "tx", "r21", "r22", "r23", "ty", "r31", "r32", "r33", "tz"), widths=(12,),
-        poses=Poses("matrix", axes="optical", frames=("world", "cam0"), counted="numbers of pictures"),
+        magic=(("line", rf"(?:{NUMBER}[ \t]+){{11}}{NUMBER}\s*$"),), conventions="world<-cam0, metres",
+        rows=Rows(
+            "", ("r11", "r12", "r13", "tx", "r21", "r22", "r23", "ty", "r31", "r32", "r33", "tz"), (12,), "matrix",
+            axes="optical", frames=("world", "cam0"), counted="numbers of pictures",
+        ),
     ),
     "g2o": _trajectory(
         "g2o pose graph", "frametool.formats.rows.pose_rows", suffixes=(".g2o",),
         magic=(("line", r"(?:VERTEX|EDGE|PARAMS)_[A-Z0-9_]+(?::[A-Z_]+)?\s+\d|FIX\s+\d"),),
         conventions="world<-vertex or vertex<-vertex (--edges), quaternion x y z w",
-        poses=Poses("quaternion", counted="ids of vertices"), required_options=("frames", "stamps", "edges"),
+        rows=Rows(counted="ids of vertices"), required_options=("frames", "stamps", "edges"),
     ),
     "autoware": _tree(
         "Autoware sensor calibration", "frametool.formats.trees.calibrations",
@@ -303,7 +307,7 @@ FORMATS = {
             ("text", rf"(?m)^(?:\{{\s*|[ \t]+(?=\"))?[\"']?(?:{_TWO_FRAMES})[\"']?:\s*(?:\[|-)\s*[\[-]\s*[-+.\d]"),
         ),
         conventions="target<-source as each key says; metres; intrinsics: frametool project",
-        required_options=("direction", "frames"), cameras=True,
+        required_options=("direction", "frames"), reads=_CAMERAS,
     ),
     "kalibr": _read_tree(
         "results of Kalibr as text", "frametool.formats.trees.text_calibrations",
@@ -324,12 +328,12 @@ FORMATS = {
             ("yaml key", "trans_matrix"),  # of OpenLORIS-Scene
         ),
         conventions="target<-source as each key says, camera<-object by rvec and tvec; metres",
-        required_options=("direction", "frames"), cameras=True,
+        required_options=("direction", "frames"), reads=_CAMERAS,
     ),
     "euroc-sensor": _read_tree(
         "sensor.yaml of EuRoC", "frametool.formats.trees.matrix_files",
         magic=(("yaml key", "T_BS"), ("json key", "T_BS")),
-        conventions="T_BS is body<-sensor, metres", required_options=("frames",), cameras=True,
+        conventions="T_BS is body<-sensor, metres", required_options=("frames",), reads=_CAMERAS,
     ),
     "apollo": _read_tree(
         "Apollo extrinsics: a TransformStamped", _TREE, magic=(("yaml inner", "euler_angles_degree"),),
@@ -338,7 +342,7 @@ FORMATS = {
     "kitti-calib": _read_tree(
         "KITTI calibration", "frametool.formats.trees.text_calibrations", magic=(("text", _KITTI),),
         conventions="parent<-child, metres, optical axes of cameras by default",
-        required_options=("frames", "camera_axes"), cameras=True,
+        required_options=("frames", "camera_axes"), reads=_CAMERAS,
     ),
     "handeye": _tree(
         "hand-eye calibration of easy_handeye", "frametool.formats.trees.calibrations",
@@ -349,7 +353,7 @@ FORMATS = {
         "nuScenes table", "frametool.formats.trees.calibrations",
         magic=(("text", r'\A\s*\[\s*\{[^{}]*?"(?:sensor_)?token"\s*:\s*"'),),
         conventions="ego<-sensor, global<-ego, metres, w first, microseconds", required_options=("frames",),
-        cameras=True,
+        reads=_CAMERAS,
     ),
     "dh": _read_tree(
         "Denavit-Hartenberg table", "frametool.formats.robots.dh", magic=(("text", _DH),),
@@ -376,7 +380,7 @@ FORMATS = {
         conventions="parent<-child, metres, radians, rpy about fixed axes",
     ),
     "npy": _arrays(
-        "NPY of numpy: n x 3 points, n x 7 poses, records with fields", "frametool.formats.rows.npy", texts=True,
+        "NPY of numpy: n x 3 points, n x 7 poses, records with fields", "frametool.formats.rows.npy", writes=_TEXTS,
         suffixes=(".npy",), magic=(("magic", rb"\x93NUMPY"),),
     ),
     "pcd": _arrays(
@@ -387,8 +391,8 @@ FORMATS = {
         "PLY point cloud or mesh", "frametool.formats.rows.ply", suffixes=(".ply",), writes=("points", "arrays"),
         magic=(("magic", rb"ply\r?\n"),), conventions="metres",
     ),
-    "kitti-bin": _BIN._replace(summary="point cloud of KITTI, .bin", columns=_XYZI),
-    "nuscenes-bin": _BIN._replace(summary="point cloud of nuScenes, .pcd.bin", columns=(*_XYZI, "ring")),
+    "kitti-bin": _BIN._replace(summary="point cloud of KITTI, .bin", rows=Rows(columns=_XYZI)),
+    "nuscenes-bin": _BIN._replace(summary="point cloud of nuScenes, .pcd.bin", rows=Rows(columns=(*_XYZI, "ring"))),
     "las": _LAS._replace(summary="LAS laser scan", suffixes=(".las",), magic=(("magic", _LAS_HEAD + rb"[\x00-\x7f]"),)),
     "laz": _LAS._replace(summary="LAZ laser scan", suffixes=(".laz",), magic=(("magic", _LAS_HEAD + rb"[\x80-\xff]"),)),
     "parquet": _ARROW._replace(

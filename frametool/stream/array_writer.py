@@ -113,7 +113,8 @@ class ColumnsWriter:
             if column.kind is None and not is_all:
                 column = column._replace(longest=max(SPARE, 2 * column.longest))
             reason = self._misfit(column)
-            as_cells = not (FORMATS[self.style.format].texts or all(map(is_typed, parts)))  # read everywhere
+            # doubles are read everywhere
+            as_cells = not ("texts" in FORMATS[self.style.format].writes or all(map(is_typed, parts)))
             if (reason or as_cells) and _is_exact(column.kind, parts):
                 column = column._replace(kind=DOUBLE)
                 reason = self._misfit(column)
@@ -131,7 +132,7 @@ class ColumnsWriter:
 
     def _misfit(self, column: OutColumn) -> str:
         """Return the reason why a column has no place in the format; "" where it has one."""
-        if column.kind is None and not FORMATS[self.style.format].texts:
+        if column.kind is None and "texts" not in FORMATS[self.style.format].writes:
             return "it holds numbers"
         reason: str = self.module.misfit(column) if hasattr(self.module, "misfit") else ""
         return reason

@@ -32,7 +32,7 @@ import numpy as np
 from frametool.documents.source import InputFile, not_text
 from frametool.errors import FormatError, Misused, ValueInvalid, warn
 from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, describe, rows_of
-from frametool.formats.table import FORMATS, Poses, is_recording, is_trajectory
+from frametool.formats.table import FORMATS, Rows, is_recording, is_trajectory
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Answers, Diagnostics, Edge, Options, Samples, Topics, stop
@@ -170,7 +170,7 @@ class FormatConverter:
 
     def _rows(self, stream: ByteStream, *, header: bool) -> Iterator[Step]:
         """Yield the rows of a table, with the stamps of a file, their own, or their numbers as seconds."""
-        fmt = FORMATS[self.fmt].poses
+        fmt = FORMATS[self.fmt].rows
         file = StampFile(self.answers.stamps) if self.answers.stamps else None
         rows = TableRows(stream, self.fmt, self.request, self.source, header=header)
         self._begin(rows, line=1)
@@ -192,7 +192,7 @@ class FormatConverter:
         if is_trajectory(self.fmt):
             describe(Options(self.tally, Topics(), answers=self.answers), fmt, count, named=False)
 
-    def _held(self, stamps_ns: Ints | None, fmt: Poses) -> Ints | None:
+    def _held(self, stamps_ns: Ints | None, fmt: Rows) -> Ints | None:
         """Return stamps, unless they only count and the other format has no place for them: they are not lost then."""
         counts = bool(fmt.counted) and not self.answers.stamps
         holds = getattr(rows_of(self.style.format), "holds", ("stamps",))
@@ -248,7 +248,7 @@ class FormatConverter:
         if request.on_error != STOP:
             report = lambda error: faults.append(Fault(max(error.line, 1) - 1, "", error.message))  # noqa: E731
         file, options = self._opened(stream)
-        fmt: Poses = module.form_of(file, options)
+        fmt: Rows = module.form_of(file, options)
         self.placed, self.shape, plan, state = True, Shape(POSE, 1.0, QUATERNION), _plan_listed(request), State()
         rename = rename_of(request) or (lambda parent, name: (parent, name))
         for each in module.blocks(file, options._replace(report=report), named=False):
@@ -292,7 +292,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
 
     Raises or reports FormatError with the line of a row that is no pose.
     """
-    fmt = FORMATS[file.format].poses
+    fmt = FORMATS[file.format].rows
     if what := not_text(file.head()):
         raise FormatError(what, source=file.name)
     converter = FormatConverter(file.format, Request(normalize=options.normalize), file.name, answers=options.answers)
@@ -320,7 +320,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
         options.tally.rough += [1] * rows.mended
 
 
-def _check(rows: PlannedRows, fmt: Poses, file: InputFile, options: Options) -> None:
+def _check(rows: PlannedRows, fmt: Rows, file: InputFile, options: Options) -> None:
     """Refuse poses without time and names."""
     if rows.layout.time is None and not fmt.counted and not options.answers.stamps and len(rows.roles) < 2:
         lacking = ", ".join(name for role, name in enumerate(("parent", "name")) if role not in rows.roles)
@@ -339,7 +339,7 @@ def _nameless(block: RowPoses, rows: PlannedRows) -> dict[int, str]:
     return found
 
 
-def _pieces(block: RowPoses, line: int, fmt: Poses, options: Options) -> Iterator[Edge | Samples]:
+def _pieces(block: RowPoses, line: int, fmt: Rows, options: Options) -> Iterator[Edge | Samples]:
     """Yield the poses of a block: as samples of one frame after the other, or as edges that are static."""
     columns: Components = tuple(block.numbers.T)
     if len(columns) == len("xyzw"):

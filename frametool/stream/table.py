@@ -134,7 +134,7 @@ def as_trajectory(table: Table, fmt: str, request: Request, source: str) -> Tabl
 
     Raises FormatError for a count of columns that the format does not have.
     """
-    row = FORMATS[fmt]
+    row = FORMATS[fmt].rows
     if request.given or request.columns:
         return table
     if row.widths and table.width not in row.widths and (fmt == "kitti" or not table.names):
@@ -150,7 +150,7 @@ def as_trajectory(table: Table, fmt: str, request: Request, source: str) -> Tabl
         if (at := stamp_column(names)) is not None and not in_nanoseconds(names[at]):
             names = (*names[:at], f"{names[at]} [ns]", *names[at + 1 :])  # whatever the file calls them
         return table._replace(names=names, pose=_euroc(names, row.columns, source))
-    tum = FORMATS["tum"].columns
+    tum = FORMATS["tum"].rows.columns
     columns = row.columns or (tum if table.width == len(tum) else ())
     return table if table.names or not columns else table._replace(names=columns, width=len(columns))
 
@@ -222,7 +222,7 @@ def open_table(
 
     expected: what --from says of numbers without names
     """
-    row = FORMATS[fmt]
+    row = FORMATS[fmt].rows
     delimiter = (row.delimiter or "").encode()
     mark = BYTE_ORDER_MARK if block.startswith(BYTE_ORDER_MARK) else b""
     rest = without_comments(block[len(mark) :])
@@ -239,7 +239,7 @@ def open_table(
     if named is not None and not (own and has_pose_column(map(_unquoted, cells))):
         return named._replace(head=mark + named.head), rest
     if not own:
-        if header and not expected and delimiter and not row.columns and len(cells) != len(FORMATS["tum"].columns):
+        if header and not expected and delimiter and not row.columns and len(cells) != len(FORMATS["tum"].rows.columns):
             raise FormatError("the first line holds numbers and no names; give --no-header", source=source, line=1)
         return Table(delimiter, None, len(cells), mark + comments), rest
     title = line.rstrip(b"\r\n")

@@ -165,7 +165,7 @@ class TableRows(PlannedRows):
         self, stream: ByteStream, fmt: str, request: Request, source: str, *, header: bool = True
     ) -> None:
         """Read the head of a table in a format, and plan its rows; raises FormatError or Misused."""
-        delimiter = (FORMATS[fmt].delimiter or "").encode()
+        delimiter = (FORMATS[fmt].rows.delimiter or "").encode()
         blocks = read_blocks(stream, whole=RecordEnds(delimiter) if delimiter else whole_lines)
         first = _first_rows(blocks)
         if first is None:

@@ -147,10 +147,10 @@ def read_stamps(path: str, report: Report) -> list[int]:
         file.close()
     if not words:
         raise FormatError(NO_TIMES, source=file.name)
-    text = _with_title(text, (known.delimiter or "").encode() or None)
+    text = _with_title(text, (known.rows.delimiter or "").encode() or None)
     titled = not is_list or stamp_column([words[0].decode("utf-8", "replace")]) is not None
     table, rest = open_table(text, fmt, header=titled, source=file.name)
-    named = table.names or (known.columns or ("t",))[: table.width]
+    named = table.names or (known.rows.columns or ("t",))[: table.width]
     at, below = (0, None) if fmt == "euroc" else stamp_places(named)
     if at is None:
         columns = f"; columns: {listed(named)}" if table.names else ""
@@ -238,7 +238,7 @@ def gathered(steps: Iterable[tuple[RowPoses | None, Outcome]], bad: BadRows, col
 
 def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows, asked: Request) -> Trajectory:
     """Gather the rows of a table, of columns of numbers, or of a file that lists poses."""
-    row = FORMATS[fmt].poses
+    row = FORMATS[fmt].rows
     counts = row is not None and bool(row.counted)
     own = answers if counts or fmt == "csv" else answers._replace(stamps="")
     request = asked._replace(operation=Operation(moves=True), rename=lambda parent, name: (parent, name))

@@ -171,7 +171,7 @@ class TextWriter:
             dropped.turned = is_turned(self.style)
         tx, ty, tz, x, y, z, w = columns_of(block, placed=self.placed)[:7]  # as the format has them: axes, direction
         pose = turned(self.style, (tx, ty, tz, *quaternion.unit(x, y, z, w, arrays)))
-        tx, ty, tz, x, y, z, w = rigid.inverse(*pose) if FORMATS[self.style.format].poses.inverse else pose
+        tx, ty, tz, x, y, z, w = rigid.inverse(*pose) if FORMATS[self.style.format].rows.inverse else pose
         turn = (x, y, z, w) if self.style.keep_sign else quaternion.from_quaternion(x, y, z, w, arrays)
         values = np.array(fmt.numbers(tx, ty, tz, *turn)).T + 0.0  # none is -0.0
         refuse_infinite(values)

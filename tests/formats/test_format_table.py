@@ -93,7 +93,7 @@ def test_a_row_names_modules_that_do_what_it_says(name: str) -> None:
     if "recording" in row.writes:  # poses and points are messages there
         functions = dict.fromkeys(("poses", "points"), "RecordingFile") | dict.fromkeys(("tree", "recording"), "tree_pieces")
     if "arrays" in row.writes:  # poses and points are columns there
-        functions |= {"poses": "create", "points": "create"}
+        functions |= dict.fromkeys(("poses", "points", "texts"), "create")
     for what in row.writes:
         module = import_module(row.writer)
         by_rows = functions[what] == "write_poses" and isinstance(rows_of(name), RowForm)

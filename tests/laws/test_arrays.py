@@ -40,7 +40,7 @@ POINTS = {
     "points.yaml": "x: 1.0\ny: 2.0\nz: 3.0\n---\nx: 4.0\ny: 5.0\nz: 6.0\n",
 }
 # forms whose points have the same numbers always refuse what lacks one: tests/formats/test_bin_clouds.py
-ARRAYS = [name for name, row in FORMATS.items() if "arrays" in row.writes and not row.columns]
+ARRAYS = [name for name, row in FORMATS.items() if "arrays" in row.writes and not row.rows.columns]
 OTHERS = [form for form in ARRAYS if form != "npy"]
 MOVES = (("convert",), ("invert",), ("apply", "--transform", "{xyz: [1, 0, 0], rpy_deg: [0, 0, 90]}"), ("convert", "--to", "rpy"), ("convert", "--to", "matrix"))
 

@@ -1,6 +1,6 @@
 """A form is one row of FORMATS and one file: made-up ones, of rows and of columns, serve every command and option.
 
-The row of poses says in `columns` and `delimiter` what its lines hold; all else is as in the row of TUM.
+The row of poses says in `rows` what its lines hold; all else is as in the row of TUM.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ def create(columns, count, style):
 '''
 ROWS = r"""
 FORMATS["bars"] = FORMATS["tum"]._replace(
-    summary="a toy trajectory", suffixes=(".bars",), writer="toy_bars", delimiter="|",
-    columns=("qw", "qx", "qy", "qz", "x", "y", "z", "stamp"), magic=(("line", r"[-\d.]+(?:\|[-\d.]+){7}$"),),
+    summary="a toy trajectory", suffixes=(".bars",), writer="toy_bars",
+    rows=FORMATS["tum"].rows._replace(delimiter="|", columns=("qw", "qx", "qy", "qz", "x", "y", "z", "stamp")), magic=(("line", r"[-\d.]+(?:\|[-\d.]+){7}$"),),
 )
 """
 ARRAYS = r"""

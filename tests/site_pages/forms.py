@@ -17,6 +17,7 @@ READ = {  # what is read from a form, in words
     "rows": "rows of a table, a pose or a point each",
     "arrays": "columns of numbers: points or poses by the million",
     "joints": "values of joints by name (`--joints`)",
+    "cameras": "cameras, the intrinsics (`--camera`)",
     "drawing": "who hangs under whom, without poses, by `frametool tree` alone",
 }
 WRITTEN = {
@@ -25,6 +26,7 @@ WRITTEN = {
     "tree": "a tree of frames",
     "trajectory": "a trajectory, the poses of one frame over time",
     "arrays": "columns of numbers",
+    "texts": "columns of text among them",
     "report": "reports: tables of what a command found",
     "recording": "a recording: messages with their stamps",
 }
@@ -71,7 +73,7 @@ def _text(name: str, row: Format) -> str:
         "What its numbers mean": [inline(row.conventions)],
         "Suffixes": [f"`{each}`" for each in row.suffixes],
         "Files called": [f"`{each}`" for each in row.names],
-        "Columns": [f"`{' '.join(row.columns)}`" if row.columns else ""],
+        "Columns": [f"`{' '.join(row.rows.columns)}`" if row.rows.columns else ""],
         "Read as": [READ.get(each, each) for each in row.reads],
         "Written from": [WRITTEN.get(each, each) for each in row.writes],
         "How it is recognised": _signs(name, row),

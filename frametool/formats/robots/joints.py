@@ -435,7 +435,7 @@ def _of_table(
 def _cells(fmt: str, line: str) -> list[str]:
     if fmt == "csv":
         return [cell.text for cell in split_line(line)]
-    return [cell.strip().strip('"') for cell in line.split(FORMATS[fmt].delimiter or None)]
+    return [cell.strip().strip('"') for cell in line.split(FORMATS[fmt].rows.delimiter or None)]
 
 
 def _refused(message: TextMessage, path: Path, problem: str, below: Path) -> FormatError:

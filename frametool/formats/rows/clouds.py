@@ -294,13 +294,13 @@ class BinCloud(column_file.RecordFile):
 
     def __init__(self, file: InputFile) -> None:
         """Count the points; raises FormatError if the last one is incomplete."""
-        names = FORMATS[file.format].columns
+        names = FORMATS[file.format].rows.columns
         record = column_file.record_of([_SINGLE] * len(names))
         file.stream = column_file.seekable(file, self)
         size = column_file.bytes_left(file.stream) or 0
         if size % record.itemsize:
             others = [name for name, row in FORMATS.items() if row.reader == __name__ and name != file.format]
-            fits = [name for name in others if size % (_SINGLE.itemsize * len(FORMATS[name].columns)) == 0]
+            fits = [name for name in others if size % (_SINGLE.itemsize * len(FORMATS[name].rows.columns)) == 0]
             hint = f"; --in {fits[0]} fits" if fits else "; is it whole?"
             points = f"points of {record.itemsize} bytes (float32 {' '.join(names)})"
             raise file.error(f"{size} bytes are no whole number of {points}{hint}")
@@ -310,7 +310,7 @@ class BinCloud(column_file.RecordFile):
         """Yield the points; raises FormatError for invalid rings."""
         done = 0
         for batch in super().batches():
-            rings = batch.column(self.width - 1) if "ring" in FORMATS[self.file.format].columns else np.zeros(0)
+            rings = batch.column(self.width - 1) if "ring" in FORMATS[self.file.format].rows.columns else np.zeros(0)
             bad = np.flatnonzero((rings != np.rint(rings)) | (rings < 0))
             if len(bad):
                 found = f"ring: {rings[bad[0]]:g} is not a ring number; is it --in kitti-bin?"
@@ -330,7 +330,7 @@ class PointsWriter:
     def __init__(self, columns: Sequence[OutColumn], fmt: str) -> None:
         """Find the columns; raises ValueInvalid if one is missing, and warns about those that are omitted."""
         self.columns, self.format = columns, fmt
-        self.names = FORMATS[fmt].columns
+        self.names = FORMATS[fmt].rows.columns
         self.off = 0.0
         at_input = [column.name for column in columns if column.kind is not None]
         if missing := [name for name in self.names if name not in at_input]:

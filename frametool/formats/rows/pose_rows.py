@@ -37,7 +37,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.documents.document import format_error, lines, parse_documents
 from frametool.documents.source import InputFile, read_text
 from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
-from frametool.formats.table import FORMATS, Poses
+from frametool.formats.table import FORMATS, Rows
 from frametool.frames.stamps import BILLION, format_stamp, parse_stamp, whole_stamp
 from frametool.geometry import euler, floats, quaternion, rigid
 from frametool.geometry.representations import notation
@@ -115,7 +115,7 @@ class DroppedFields:
         said += [self.format.constants] * bool(self.format.constants)
         said += ["without stamps, poses are numbered in seconds: 0, 1, 2 .."] * self.counted
         said += ["pictures are named by their stamps"] * self.by_stamp
-        axes = FORMATS[self.style.format].poses.axes
+        axes = FORMATS[self.style.format].rows.axes
         if self.turned:
             said.append(f"camera axes turned from {self.style.axes} to {axes}, half a turn about x")
         elif axes and not self.style.axes:
@@ -135,7 +135,7 @@ def turned(style: Style, pose: Components) -> Components:
 
 def is_turned(style: Style) -> bool:
     """Return True if the axes of a camera differ from those of the format it is written in."""
-    axes = FORMATS[style.format].poses.axes if style.format in FORMATS else ""
+    axes = FORMATS[style.format].rows.axes if style.format in FORMATS else ""
     return bool(axes and style.axes and axes != style.axes)
 
 
@@ -167,7 +167,7 @@ ROWS = {
     "tum": RowForm(("seconds", b" ", Numbers(7), b"\n")),
     "euroc": RowForm(
         ("nanoseconds", b",", Numbers(7, b","), b"\n"), lambda tx, ty, tz, x, y, z, w: (tx, ty, tz, w, x, y, z),
-        head=",".join(FORMATS["euroc"].columns[:8]).encode() + b"\n",
+        head=",".join(FORMATS["euroc"].rows.columns[:8]).encode() + b"\n",
     ),
     "kitti": RowForm((Numbers(12), b"\n"), rows_of_matrix, holds=()),
     "colmap": RowForm(
@@ -194,7 +194,7 @@ def rows_of(spec: str) -> RowForm | None:
 # --- what is common to files of poses of one body ---
 
 
-def describe(options: Options, spec: Poses, count: int, *, named: bool = True) -> None:
+def describe(options: Options, spec: Rows, count: int, *, named: bool = True) -> None:
     """Record the assumptions about a trajectory, to be reported with the name of its file."""
     parent, child = options.answers.names(*spec.frames)
     said = []
@@ -265,14 +265,14 @@ class PoseBlock(NamedTuple):
     rows: Sequence[Written]
 
 
-def form_of(file: InputFile, options: Options) -> Poses:
+def form_of(file: InputFile, options: Options) -> Rows:
     """Return the meaning of the poses of a file."""
-    return EDGES if options.answers.edges else FORMATS[file.format].poses
+    return EDGES if options.answers.edges else FORMATS[file.format].rows
 
 
 def read(file: InputFile, options: Options) -> Iterator[Samples]:
     """Yield the poses of a file as samples of one frame; assumptions are reported with the file's name."""
-    spec = FORMATS[file.format].poses
+    spec = FORMATS[file.format].rows
     parent, child = options.answers.names(*spec.frames)
     for block in blocks(file, options):
         columns = [part.tolist() for part in block.poses]
@@ -302,7 +302,7 @@ def blocks(file: InputFile, options: Options, *, named: bool = True) -> Iterator
     describe(options, spec, count, named=named)
 
 
-def _checked(some: Sequence[Written], spec: Poses, file: InputFile, options: Options) -> tuple[list[int], Components]:
+def _checked(some: Sequence[Written], spec: Rows, file: InputFile, options: Options) -> tuple[list[int], Components]:
     """Return the valid rows, and the poses of the body in the world."""
     import numpy as np
 
@@ -405,7 +405,7 @@ def _colmap_pose(file: InputFile, line: int, text: str, *, of_frame: bool) -> Wr
 
 # --- g2o ---
 
-EDGES = Poses("quaternion", counted="")
+EDGES = Rows()
 # other tags of g2o: landmarks, parameters, other measurements
 NO_POSE = r"FIX|PARAMS_\w+|ROBOTLASER\d|VERTEX_(?:XY|\w+XYZ?|CAM|SW\w*)|EDGE_(?:SE[23]|PRIOR|BEARING|PR|SW|PO)\w+"
 IN_SPACE, IN_PLANE = "x y z qx qy qz qw", "x y theta"
