@@ -19,6 +19,7 @@ from frametool.geometry.transform import Transform
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Style
 from frametool.sim.followed import FollowStep, derive_follow
+from frametool.stream.request import RowOptions
 from frametool.stream.written import ByTree, derive_record, written_poses
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ def _apply(plan: DerivationStyle, *operands: Any, at_ns: int | None = None, kind
     else:
         pose, record = operands
         way = _pose(pose, degrees=degrees)
-    return derive_record(plan, way, _record(record, kind), kind=kind, degrees=degrees)
+    return derive_record(plan, way, _record(record, kind), RowOptions(kind=kind, degrees=degrees))
 
 
 def _record(value: Any, kind: str) -> Source:

@@ -25,7 +25,7 @@ from frametool.grammar.readers import tell as tell_notes
 from frametool.ros.messages import LISTS
 from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows
-from frametool.stream.request import Formula, Operation, Request
+from frametool.stream.request import Formula, Operation, Request, RowOptions
 from frametool.stream.row_layout import Target
 from frametool.stream.trajectories import gathered
 
@@ -173,7 +173,7 @@ def _row_type(row: str, parent: str | None, name: str | None) -> Type:
 
 def poses_of_table(path: str, fmt: str, *, normalize: bool, degrees: bool) -> Term:
     """Return the poses or points of a table as a list; raises FormatError at the first bad row."""
-    request = Request(Operation(moves=True), normalize=normalize, degrees=degrees)
+    request = Request(Operation(moves=True), RowOptions(normalize=normalize, degrees=degrees))
     with opened(path) as stream:
         rows = gathered(FormatConverter(fmt, request, path).steps(stream), BadRows(path)).numbers.tolist()
     is_turned = len(rows[0]) > len(AXES)
@@ -200,7 +200,7 @@ def values_of_document(source: Source, scope: Scope) -> Term | None:
             raise misfit.placed(source, 0) from None
         tell_notes(source, [note._replace(path=(0, *note.path)) for note in reading.notes])
         return found
-    poses = read_poses(source, Request(degrees=scope.degrees, normalize=scope.normalize))
+    poses = read_poses(source, Request(rows=RowOptions(degrees=scope.degrees, normalize=scope.normalize)))
     if not poses:
         raise FormatError("nothing in it", source=source.name)
     scope.leave_out(any(pose.covariance for pose in poses))

@@ -95,8 +95,8 @@ def pasted_stream(
     from frametool.grammar.pasted import begins_freely
     from frametool.ros.pasted_blocks import MOST_PASTED, in_grammar, may_be_pasted
 
-    moves, alone = request.operation.moves, request.poses == 1 and request.operation.keeps_position
-    notation = None if moves else request.given or notation
+    moves, alone = request.operation.moves, request.rows.poses == 1 and request.operation.keeps_position
+    notation = None if moves else request.rows.given or notation
     is_free = may_be_pasted(head) and begins_freely(head, notation, moves=moves, alone=alone)
     if is_free is None:
         raise Misused("three rows of three numbers may be a rotation or positions; give --from matrix, or --in columns")
@@ -106,7 +106,7 @@ def pasted_stream(
     if len(data) > MOST_PASTED:
         raise FormatError(f"begins as what is pasted, which is {MOST_PASTED} bytes at most; give --in", source=name)
     source = Source(name, decode(data, name))
-    found = in_grammar(source, notation, normalize=request.normalize, points=request.operation.moves)
+    found = in_grammar(source, notation, normalize=request.rows.normalize, points=request.operation.moves)
     return found, BufferedReader(BytesIO(data))
 
 
@@ -143,12 +143,12 @@ def _inverses(source: Source, request: Request) -> Source:
     from frametool.geometry.representations import notation
     from frametool.grammar.result import Style
     from frametool.stream.record_values import results
-    from frametool.stream.request import Operation, Request
+    from frametool.stream.request import Operation, Request, RowOptions
 
     own = request.operation
     asked = Request(
-        Operation(similar=own.similar, multiples=own.multiples), degrees=request.degrees,
-        normalize=request.normalize, earth=request.earth, kind="pose",
+        Operation(similar=own.similar, multiples=own.multiples), earth=request.earth,
+        rows=RowOptions(kind="pose", degrees=request.rows.degrees, normalize=request.rows.normalize),
     ).of_inverses()  # fmt: skip
     style = Style("json", (notation("quaternion"),), keep_sign=True)
     found: Iterable[Any] = results(source, asked, style)
@@ -181,7 +181,7 @@ def pose_source(argument: str | Source, request: Request) -> Source:
         bare, is_inverse = without_inverse(argument)
         if is_inverse:
             return _inverses(pose_source(bare, request), request)
-        argument = Source(INLINE, bare) if is_pasted(bare, request.given) else bare
+        argument = Source(INLINE, bare) if is_pasted(bare, request.rows.given) else bare
     source = source_of(argument)
     if request.offset_ns:
         from frametool.documents.document import parse_documents
@@ -197,14 +197,14 @@ def pose_source(argument: str | Source, request: Request) -> Source:
 
         refuse_robots(source.text.encode(), source.name)
     points = request.operation.moves
-    return rewritten(source, request.given, normalize=request.normalize, points=points) or source
+    return rewritten(source, request.rows.given, normalize=request.rows.normalize, points=points) or source
 
 
 def values_of(arguments: Sequence[str | Source], request: Request, output: Output) -> Iterator[Result | dict[str, Any]]:
     """Yield the results of the records of arguments."""
     from frametool.stream.record_values import results
 
-    request = request._replace(notations=request.notations or output.notations)
+    request = request.with_results(notations=request.results.notations or output.notations)
     for argument in arguments:
         yield from read_with(argument, request, partial(results, style=output.style))
 
@@ -361,6 +361,6 @@ def misuse_unless_rotations(reading: Reading) -> Iterator[None]:
 
 def pose_from_numbers(texts: Sequence[str], request: Request) -> Pose:
     """Read bare numbers; raises click.UsageError for what is no such list, ValueInvalid for what is no rotation."""
-    reading = Reading(Source(INLINE, ""), degrees=request.degrees, normalize=request.normalize)
+    reading = Reading(Source(INLINE, ""), degrees=request.rows.degrees, normalize=request.rows.normalize)
     with misuse_unless_rotations(reading):
-        return pose_of_numbers(texts, request.given, reading)
+        return pose_of_numbers(texts, request.rows.given, reading)

@@ -139,10 +139,10 @@ class Stream:
         from frametool.cli.trees import answers
         from frametool.grammar.result import Style
         from frametool.stream.as_poses import FormatConverter
-        from frametool.stream.request import Request
+        from frametool.stream.request import Request, ResultOptions
 
         bad, row = self.policy(self.name, "row"), 1
-        request = Request(on_error=self.inputs.on_error, by_default=True)
+        request = Request(on_error=self.inputs.on_error, results=ResultOptions(by_default=True))
         for made in FormatConverter(fmt, request, self.name, Style("csv", ()), answers()).outcomes(opened):
             bad.take([fault._replace(line=fault.line + row) for fault in made.faults])
             row += made.lines
@@ -212,7 +212,7 @@ class Stream:
                 say(f"{self.name}: read as {fmt} ({FORMATS[fmt].summary})")
         if fmt == "kitti" and self.notation and not self.chosen_format():
             fmt = "columns"  # --from says what the numbers are, and nothing of pictures
-        if request.poses:
+        if request.rows.poses:
             self.inputs.ask(*FORMATS[fmt].required_options)
         if output.chosen is None and (output.path or "").endswith(".bin") and not fmt.endswith("-bin"):
             raise click.UsageError(f"-o {output.path} does not name its format; give -f kitti-bin or nuscenes-bin")
@@ -226,7 +226,7 @@ class Stream:
             raise click.UsageError(f"--time-offset is for text, {fmt} holds numbers; convert it to csv first")
         output.take_axes(FORMATS[fmt].rows.axes, request.operation)
         if is_trajectory(fmt) and not output.notations:
-            request = request._replace(notations=())  # its rows stay what they are
+            request = request.with_results(notations=())  # its rows stay what they are
         if fmt in RECORDS and (output.chosen or fmt) != fmt and request.gathered is None:
             return self._run_as_values(stream, fmt, request)
         return self._run_blocks(stream, fmt, request)
@@ -286,7 +286,7 @@ class Stream:
         converts = chosen not in (None, fmt) or no_room or turns
         if (listed and gathers) or ((listed or converts) and not (gathers or is_kindred or fmt in RECORDS)):
             return self._poses(stream, fmt, request)
-        return self._in_place(stream, fmt, request._replace(notations=()) if gathers else request), fmt, None
+        return self._in_place(stream, fmt, request.with_results(notations=()) if gathers else request), fmt, None
 
     def _in_place(self, stream: Any, fmt: str, request: Request) -> Generator[Outcome]:
         """Put the results where the numbers stood; all other text stays."""
@@ -306,7 +306,7 @@ class Stream:
         output = self.output
         target = output.chosen or (fmt if "poses" in FORMATS[fmt].writes and not output.notations else "csv")
         refuse(target not in FORMATS, f"--format {target} is for single results and records, not for a stream of {fmt}")
-        request = request._replace(by_default=not output.notations)
+        request = request.with_results(by_default=not output.notations)
         converted = FormatConverter(fmt, request, self.name, output.style.changed(format=target), answers())
         return converted.outcomes(stream, header=self.inputs.header), target, converted.tally
 
@@ -322,7 +322,7 @@ class Stream:
         written = FORMATS[output.chosen].writer if output.chosen and request.gathered is None else FORMATS[fmt].reader
         into = None if written == FORMATS[fmt].reader else import_module(written)
         style = output.style.changed(format=output.chosen or fmt)
-        request = request._replace(by_default=not output.notations)
+        request = request.with_results(by_default=not output.notations)
         return run_columns(columns, request, style, source=self.name, into=into)
 
     def _says_columns(self) -> bool:
@@ -349,9 +349,9 @@ class Stream:
         chosen, output = self.output.chosen or "", self.output
         if self.inputs.on_error == NULL and chosen not in ("csv", *RECORDS):
             raise click.UsageError(f"--on-error null: {chosen} cannot hold a row without a result; give skip")
-        request = request._replace(by_default=has_no_text(chosen) and not output.notations)
+        request = request.with_results(by_default=has_no_text(chosen) and not output.notations)
         if table.is_recording(chosen):
-            request = request._replace(place=None)  # a fix is made of ecef, unless of what was read
+            request = request.with_results(place=None)  # a fix is made of ecef, unless of what was read
         bad, writer = self.policy(self.name), output.writer()
         outcomes = run_records(stream, fmt, request, source=self.name, style=output.style)
         outcomes = written_by(writer, outcomes, bad.on_error)
@@ -377,22 +377,23 @@ class Stream:
         """Add what the stream's options say to the request."""
         inputs, output = self.inputs, self.output
         is_table, alone = fmt not in RECORDS, request.gathered is None
-        adds = bool(request.poses) or request.operation.formula is None  # look-ups add by themselves
+        adds = bool(request.rows.poses) or request.operation.formula is None  # look-ups add by themselves
         if is_table and output.chosen not in RECORDS and adds and alone:
-            request = request._replace(keep=inputs.keep)
+            request = request.with_results(keep=inputs.keep)
         if (is_table or request.operation.only_adds) and alone:
-            request = request._replace(prefix=inputs.prefix)
-        if request.poses:
+            request = request.with_results(prefix=inputs.prefix)
+        if request.rows.poses:
             inputs.ask("from_rep")
-            request = request._replace(columns=inputs.columns)
-        several = not is_table and "," in ",".join(request.columns)
+            request = request.with_rows(columns=inputs.columns)
+        several = not is_table and "," in ",".join(request.rows.columns)
         refuse(several, "--columns names one key of records, as detections.pose")
         if not has_no_text(output.chosen or fmt):
             inputs.ask("precision")
-        return request._replace(
-            given=request.given or self.notation, notations=request.notations or output.notations,
-            place=output.style.changed(format=output.chosen or fmt).place, given_place=self.place,
-            precision=output.style.precision, keep_sign=output.style.keep_sign, on_error=inputs.on_error,
+        request = request.with_rows(given=request.rows.given or self.notation, given_place=self.place)
+        style = output.style.changed(format=output.chosen or fmt)
+        return request._replace(on_error=inputs.on_error).with_results(
+            notations=request.results.notations or output.notations, place=style.place,
+            precision=style.precision, keep_sign=style.keep_sign,
         )  # fmt: skip
 
     def at_places(self, request: Request) -> Request:
@@ -402,8 +403,9 @@ class Stream:
             return request
         from frametool.cli.earth import earth
 
-        usual = request.by_default or not self.output.notations
-        return request._replace(place=place, given_place=self.place, earth=earth(), by_default=usual)
+        usual = request.results.by_default or not self.output.notations
+        request = request._replace(earth=earth()).with_rows(given_place=self.place)
+        return request.with_results(place=place, by_default=usual)
 
 
 def open_columns(file: InputFile, fmt: str) -> Any:
@@ -458,20 +460,26 @@ class PoseTask(Stream):
         self.plan = self._plan() if inputs.explain else None
         self.derives = self.plan is not None
 
-    def request(self, **rest: Any) -> Request:
+    def request(
+        self, *, poses: int = 1, extra_column: str | None = None, notations: tuple[Any, ...] = (), **rest: Any
+    ) -> Request:
         """Return what is done with rows and records: they are read as the options say."""
-        from frametool.stream.request import Request
+        from frametool.stream.request import Request, ResultOptions, RowOptions
 
         offset_ns = 0 if self.inputs.reads_trees else self.inputs.time_offset or 0
         if self.window:
             self.inputs.ask("start", "stop")
-            rest["extra_column"] = rest.get("extra_column") or ""
+            extra_column = extra_column or ""
         said = [self.inputs.peek(name) or () for name in ("values", "poses", "pose", "a", "b")]
         texts = [text for each in said for text in ([each] if isinstance(each, str) else each)]
-        if rest.get("poses") != 0 and not (texts and all(map(_says_all, texts))):
+        if poses and not (texts and all(map(_says_all, texts))):
             self.inputs.ask("from_rep")
-        own = {"given": self.notation, "degrees": self.output.style.degrees, "normalize": self.normalize}
-        made = self.at_places(Request(offset_ns=offset_ns, window=self.window, **own, **rest))
+        rows = RowOptions(
+            poses, given=self.notation, degrees=self.output.style.degrees, normalize=self.normalize,
+            extra_column=extra_column,
+        )  # fmt: skip
+        made = Request(rows=rows, results=ResultOptions(notations), offset_ns=offset_ns, window=self.window, **rest)
+        made = self.at_places(made)
         self.output.take_axes("", made.operation)
         return made
 
@@ -522,7 +530,7 @@ class PoseTask(Stream):
         request = self.request()
         with inline_misuse(), heard_by(lambda *_: None) if warned else nullcontext():
             source = pose_source(one_argument(argument), request)
-            found = written_poses(source, degrees=request.degrees, normalize=request.normalize)
+            found = written_poses(source, degrees=request.rows.degrees, normalize=request.rows.normalize)
         refuse(len(found) != 1, f"--explain derives one pose, {source.name} holds {len(found)}")
         if found[0].pose.covariance is not None:
             warn(f"{source.name}: --explain derives the pose alone; its covariance is left out")

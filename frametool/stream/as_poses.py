@@ -40,7 +40,7 @@ from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.result import Style
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, BadRow, Fault, Outcome, RowNote
-from frametool.stream.request import Request
+from frametool.stream.request import Request, RowOptions
 from frametool.stream.row_layout import POINT, POSE, Shape, Target
 from frametool.stream.row_poses import RowPoses, kept
 from frametool.stream.rows import Block, spans_of
@@ -95,7 +95,7 @@ class FormatConverter:
         self, fmt: str, request: Request, source: str, style: Style = AS_VALUES, answers: Answers = Answers()  # noqa: B008
     ) -> None:
         """Take what is asked for; raises Misused for what only a table can hold."""
-        if request.keep or (request.prefix and request.operation.formula is None):
+        if request.results.keep or (request.results.prefix and request.operation.formula is None):
             raise Misused("--keep and --prefix are for tables that stay in their form")
         self.fmt = fmt
         self.source = source
@@ -103,8 +103,9 @@ class FormatConverter:
         self.tally = Diagnostics()
         self.is_table = FORMATS[fmt].is_table
         self.style = style.changed()
-        self.request = request._replace(all_numbers=True, notations=(QUATERNION,), keep_sign=True, place=None)
-        self.looks_up_places = request.place is not None and not request.poses  # whose TARGET each row was checked for
+        self.request = request.with_results(all_numbers=True, notations=(QUATERNION,), keep_sign=True, place=None)
+        # whose TARGET each row was checked for
+        self.looks_up_places = request.results.place is not None and not request.rows.poses
         self.to_arrays, self.has_points = ("arrays" in (writes := FORMATS[style.format].writes)), "points" in writes
         if request.on_error == NULL and not (self.is_table and (self.to_arrays or style.format in LEARNED)):
             raise Misused(f"--on-error null: {style.format} of {fmt} cannot hold a row without a result; give skip")
@@ -140,7 +141,7 @@ class FormatConverter:
         """Choose what writes the results, by what they are."""
         operation = self.request.operation
         kind = operation.result_kind(self.shape.kind)
-        extras = [self.request.prefix + name for name in self.request.extras(self.shape)]
+        extras = [self.request.results.prefix + name for name in self.request.extras(self.shape)]
         if operation.only_adds or not kind or (extras and kind != POSE and operation.formula is not None):
             raise Misused(f"a stream of {self.fmt} with such results stays one; leave -f {self.style.format} out")
         return writer_for(self.style, kind, extras, placed=self.placed)
@@ -160,7 +161,7 @@ class FormatConverter:
         """Decide what rows become: without a rotation points, where nobody asked for one; raises FormatError."""
         self.rows, shape, (target, *_) = rows, rows.shape, rows.plan.targets
         self.placed = target.unit is not None
-        is_bare = shape.kind == POSE and shape.notation is None and bool(self.request.poses)
+        is_bare = shape.kind == POSE and shape.notation is None and bool(self.request.rows.poses)
         has_none = is_bare and not target.notations
         if (is_bare and self.request.keeps_position and not has_none) or (has_none and not self.has_points):
             raise FormatError(NO_ROTATION.format(rows.columns), source=self.source, line=line)
@@ -223,7 +224,7 @@ class FormatConverter:
         """Return the stream as a file, and how it is read."""
         file = InputFile("-" if self.source == "stdin" else self.source, cast("BinaryIO", stream))
         file.format = self.fmt
-        return file, Options(self.tally, Topics(), normalize=self.request.normalize, answers=self.answers)
+        return file, Options(self.tally, Topics(), normalize=self.request.rows.normalize, answers=self.answers)
 
     def _with_place(self, poses: RowPoses) -> RowPoses:
         """Add to points of the Earth their lat, lon and alt as they were read, where these are written again."""
@@ -239,9 +240,9 @@ class FormatConverter:
     def _listed(self, stream: ByteStream) -> Iterator[Step]:
         """Yield the poses of a format whose lines are no table."""
         module, request = import_module(FORMATS[self.fmt].reader), self.request
-        if request.frames:
+        if request.rows.frames:
             raise ValueInvalid("poses do not say their frame; name SOURCE")
-        if request.poses > 1:
+        if request.rows.poses > 1:
             raise FormatError(f"{self.fmt} lists one pose after the other; two a row are wanted", source=self.source)
         faults: list[Fault] = []
         report = stop
@@ -278,7 +279,7 @@ def _plan_listed(request: Request) -> Plan:
     timed = request.timed
     edge = request.pose_from_frame if request.operation.moves and timed else None
     timed = timed if timed and timed.name else None
-    request = request._replace(timed=timed, extra_column=None, unwrap=False)
+    request = request._replace(timed=timed).with_rows(extra_column=None).with_results(unwrap=False)
     target = Target(1.0, ((QUATERNION, False),), keep_sign=True)
     names = "x", "y", "z", *QUATERNION.columns
     return Plan((Shape(POSE, 1.0, QUATERNION),), (target,), request, names, edge_of=edge)
@@ -295,7 +296,8 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
     fmt = FORMATS[file.format].rows
     if what := not_text(file.head()):
         raise FormatError(what, source=file.name)
-    converter = FormatConverter(file.format, Request(normalize=options.normalize), file.name, answers=options.answers)
+    request = Request(rows=RowOptions(normalize=options.normalize))
+    converter = FormatConverter(file.format, request, file.name, answers=options.answers)
     line = count = 0
     for block, outcome in converter.steps(cast("ByteStream", file.stream)):
         if not line:

@@ -71,7 +71,7 @@ class ColumnRows(PlannedRows):
         self.faults: list[Fault] = []
         self.notes: list[RowNote] = []
         self.narrow: dict[int, Kind] = {}  # numbers that are rounded to fewer digits than they are computed with
-        for column in self.layout.columns if not request.all_numbers else ():  # all of them are written as doubles
+        for column in () if request.results.all_numbers else self.layout.columns:  # all of them are written as doubles
             if isinstance(column, New) and not column.words:
                 kind = self._kind_of(column)
                 self.narrow |= {column.number: kind} if kind.itemsize < DOUBLE.itemsize else {}
@@ -294,8 +294,8 @@ def _in_other_format(
 def move_along(file: ColumnFile, request: Request) -> None:
     """Let what else has a place among the points of a file move with them."""
     operation, timed = request.operation, request.timed
-    if operation.moves and not request.keep and request.gathered is None:
-        by_row = request.frames or (timed is not None and timed.name)
+    if operation.moves and not request.results.keep and request.gathered is None:
+        by_row = request.rows.frames or (timed is not None and timed.name)
         file.moved_by(None if by_row else operation.left)
 
 

@@ -184,7 +184,7 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
     """
     groups = _grouped(names)
     every = sorted((spot, field) for spots in groups.values() for field, spot in spots.items())
-    earth, expected = request.earth or Earth(), request.given_place
+    earth, expected = request.earth or Earth(), request.rows.given_place
     in_ecef = {spot.place for spot, field in every if field in ECEF_COLUMNS and not expected}
     positions = find_positions(_header_of(names, in_ecef))
     if not expected and positions:
@@ -203,7 +203,7 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
     if found is None or found.position is None:
         return None
     taken = {place for columns in found if columns for place in columns.places}
-    turned = find_rotations(_header_of(names, taken), request.given)
+    turned = find_rotations(_header_of(names, taken), request.rows.given)
     turned += [found.rotation] if found.rotation else []
     if len(turned) > 1:
         several = " and ".join(each.shown for each in turned)
@@ -221,11 +221,11 @@ def _header_of(names: Sequence[str], taken: Collection[int]) -> Header:
 
 def _check_found(found: PoseColumns | None, names: Sequence[str], fields: Collection[str], request: Request) -> None:
     """Raise ValueInvalid for an incomplete position, for the one of --from that is not there, and for an idle zone."""
-    expected = request.given_place
+    expected = request.rows.given_place
     if found is not None:
         place = place_of(found.position.unit) if found.position else None
         says_zone = expected == UTM and place is not None and ZONE in place.fields
-        is_asked = request.place is not None and UTM in [each.name for each in request.place.all]
+        is_asked = request.results.place is not None and UTM in [each.name for each in request.results.place.all]
         if says_zone and not is_asked and request.earth is not None and request.earth.zone is not None:
             raise ValueInvalid("--zone has no effect: each row says its zone")
     elif row := POSITIONS.get(expected):
@@ -246,7 +246,7 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
     Raises Misused for names that are not there, or a count that the place does not have.
     """
     called, places = places_named(spec, names, width)
-    kind, earth = request.given_place, request.earth or Earth()
+    kind, earth = request.rows.given_place, request.earth or Earth()
     most = _count(kind, earth)
     fields = POSITIONS[kind].names[-most:]
     own, behind = places[:most], places[most:]
@@ -265,7 +265,7 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
 
 def of_width(width: int, request: Request) -> str:
     """Return which columns of a table without names are a place: all of them, or those behind a stamp."""
-    return f"2-{width}" if width == _count(request.given_place, request.earth or Earth()) + 1 else f"1-{width}"
+    return f"2-{width}" if width == _count(request.rows.given_place, request.earth or Earth()) + 1 else f"1-{width}"
 
 
 def _count(kind: str, earth: Earth) -> int:
@@ -356,13 +356,13 @@ def settle(
     is_formula = operation.formula is not None
     stays = not (is_formula or operation.moves)
     says_itself = stays and (on_earth or not {*PARENT_COLUMNS}.isdisjoint(names))
-    if says_itself or (not is_formula and (request.place is None or request.frames)):
+    if says_itself or (not is_formula and (request.results.place is None or request.rows.frames)):
         return request, shapes  # a look-up looks at each row, an expression at its own frames
     rename = (request.for_kind(shapes[0].kind) if shapes else request).rename
     frame = None if stays or rename is None else rename(ECEF if on_earth and is_formula else None, None)[0]
     try:
-        if request.place is not None:
-            check_in_ecef(frame, request.place)
+        if request.results.place is not None:
+            check_in_ecef(frame, request.results.place)
     except ValueInvalid as error:
         raise FormatError(str(error), source=source, line=1) from None
     return request, shapes
@@ -375,20 +375,20 @@ def _check_rows(
 
     Raises FormatError for a rotation whose axes nobody says.
     """
-    operation = request.operation
-    reads = operation.moves or not operation.keeps_frames or request.place is not None or request.all_numbers
+    operation, asked = request.operation, request.results
+    reads = operation.moves or not operation.keeps_frames or asked.place is not None or asked.all_numbers
     if shape.kind == VECTOR:
         raise Misused("a vector has no place on the Earth; leave --as vector out")
     if place.name in (LLA, UTM) and not {"alt", "msl"}.intersection(place.fields) and reads:
         warn(f"{source}: {NO_ALT}")
     if request.gathered is not None:
         request.gathered.frame = ECEF
-    if operation.keeps_frames and request.place is None:
-        bare = shape.notation is None and all(each.representation.name == "quaternion" for each in request.notations)
-        request = request._replace(place=Place.written((ECEF,), Earth()), by_default=request.by_default or bare)
+    if operation.keeps_frames and asked.place is None:
+        bare = shape.notation is None and all(each.representation.name == "quaternion" for each in asked.notations)
+        request = request.with_results(place=Place.written((ECEF,), Earth()), by_default=asked.by_default or bare)
     if shape.notation is None and not (operation.inverse or operation.similar):
         has_idle_axes = request.earth and request.earth.axes and operation.keeps_frames
-        if has_idle_axes and not (request.all_numbers or any(map(may_be_uncertain, names))):
+        if has_idle_axes and not (asked.all_numbers or any(map(may_be_uncertain, names))):
             raise Misused("--local-axes has no effect: the rows have no rotation")
         return request, shape
     if shape.notation is None or not (place.axes or AXES in place.fields):
@@ -421,10 +421,10 @@ def placed_record(
     own = [key for key in value if key in EARTH_KEYS]
     in_ecef = value.get("frame", value.get("parent")) in EARTH_FRAMES
     if AT not in value and ((positions and not in_ecef) or {"x", "y", "z"} <= value.keys()):
-        if request.poses and not request.operation.keeps_frames:
+        if request.rows.poses and not request.operation.keeps_frames:
             reading.note(STAYS.format(", ".join(own)), own[0], rule="stays")
         return None
-    if request.kind == VECTOR:
+    if request.rows.kind == VECTOR:
         raise Misfit("a vector has no place on the Earth; leave --as vector out")
     operation, gathered = request.operation, request.gathered
     if gathered is not None:
@@ -438,7 +438,7 @@ def placed_record(
     if pose.rotation is None and (operation.inverse or operation.similar) and gathered is None:
         raise Misfit(UNSAID)  # as a factor it is a pose
     takes_points = (operation.takes_points or operation.keeps_frames) and gathered is None
-    is_point = pose.rotation is None and request.kind != POSE and takes_points
+    is_point = pose.rotation is None and request.rows.kind != POSE and takes_points
     numbers: tuple[float, ...] = pose.components[: 7 if pose.rotation is not None else 3]
     shape = Shape(POINT if is_point else POSE, 1.0, None if pose.rotation is None else notation("quaternion"))
     if covariance and not is_point:  # of a pose whose turn is exact
@@ -474,8 +474,8 @@ def _extra(pose: Pose, reading: Reading, request: Request, *, is_point: bool) ->
     """Return the covariance of a pose or point in ECEF where it counts; where it does not, that is noted."""
     if pose.covariance is None:
         return ()
-    if request.gathered is not None or request.operation.formula is not None or request.place is not None:
-        reading.note(LEFT_OUT.format("a result at a place" if request.place else "this"), rule="left-out")
+    if request.gathered is not None or request.operation.formula is not None or request.results.place is not None:
+        reading.note(LEFT_OUT.format("a result at a place" if request.results.place else "this"), rule="left-out")
         return ()
     return of_position(tuple(pose.covariance)) if is_point else tuple(pose.covariance)
 
@@ -488,7 +488,8 @@ def _of_fix(value: dict[str, Any], mapping: dict[str, Any], reading: Reading, re
     status = value.get("status")
     if type(status) is dict and status.get("status") == NO_FIX:
         raise NotARotation("status -1: there was no fix", ("status", "status"))
-    if FIX not in value or value.get(FIX_TYPE, "1") == "0" or request.place is not None or request.gathered is not None:
+    is_left_out = request.results.place is not None or request.gathered is not None
+    if FIX not in value or value.get(FIX_TYPE, "1") == "0" or is_left_out:
         return ()
     entries = [number for _, number in within((FIX,), entries_of, value[FIX], (9,))]
     within((FIX,), check, entries)

@@ -116,7 +116,7 @@ class Run:
         weights = block.stamps[0] if self.request.weighs and self.count else None
         if weights is not None and weights.dtype == np.float64:  # labels may be any
             for row in np.flatnonzero(weights < 0.0).tolist():
-                self._blame(row, self.request.extra_column or "", f"weight {weights[row]:g} is negative")
+                self._blame(row, self.request.rows.extra_column or "", f"weight {weights[row]:g} is negative")
         if self.outside:
             self.reasons = {row: why for row, why in self.reasons.items() if row not in self.outside}
             self.mended = [row for row in self.mended if row not in self.outside]
@@ -128,7 +128,7 @@ class Run:
             kept = np.isin(np.arange(self.count), self.rows)
             for shape, parts in zip(plan.shapes, self.moved, strict=False):
                 self.request.gathered.take(shape, parts, kept, weights, block.line_of)
-        if self.request.unwrap and len(self.rows):
+        if self.request.results.unwrap and len(self.rows):
             _unwrap(self.results, self.rows, plan.targets[0].angle_columns(), state)
 
     def _blame(self, row: int, column: str, reason: str | FrametoolError) -> None:
@@ -301,7 +301,7 @@ class Run:
         steps = at - before
         for index in np.flatnonzero(steps <= 0).tolist():
             reason = no_step(int(before[index]), int(at[index]))
-            self._blame(int(good[index]), self.request.extra_column or "", reason)
+            self._blame(int(good[index]), self.request.rows.extra_column or "", reason)
         seconds[good] = np.where(steps > 0, steps, BILLION) / BILLION
         self.lone = {int(good[0])} if known is None else set()
         state.stamp_ns = int(at[-1])
@@ -315,7 +315,7 @@ class Run:
         names = self.plan.names[first : first + shape.size]
         if shape.joined:
             self._check_tail(numbers, names, shape.joined.tail)
-        read = partial(read_rotations, shape.notation, degrees=shape.degrees, normalize=self.request.normalize)
+        read = partial(read_rotations, shape.notation, degrees=shape.degrees, normalize=self.request.rows.normalize)
         found = read(values)
         rule = shape.notation.representation.batch
         is_text = isinstance(self.block.numbers, Spans)
@@ -326,7 +326,7 @@ class Run:
             self._blame(row, names[shape.rotation_at[0]], reason)
         for row in found.mended[:1].tolist():
             own = [float(column[row]) for column in numbers]
-            for about, sentence in checked_rotation(shape, own, normalize=self.request.normalize)[1]:
+            for about, sentence in checked_rotation(shape, own, normalize=self.request.rows.normalize)[1]:
                 self._note(row, first + shape.rotation_at[0], about, sentence)
         self.mended += found.mended.tolist()
         self.off = max(self.off, found.off)
@@ -340,7 +340,7 @@ class Run:
         halves = [half_units(Spans(cells.data, cells.starts[rows, at], cells.ends[rows, at])) for at in places]
         meant = rule.explained is not None and rule.explained(own, halves, arrays)
         off = rule.deviation(*own, arrays)
-        far = np.flatnonzero(meant & (off > quaternion.TOLERATED) & (off < np.inf) & (not self.request.normalize))
+        far = np.flatnonzero(meant & (off > quaternion.TOLERATED) & (off < np.inf) & (not self.request.rows.normalize))
         self.mended += rows[far].tolist()
         for at in far[:1].tolist():
             self._note(int(rows[at]), places[0], "rounded", FEW_DIGITS.format(off[at]))
@@ -455,7 +455,7 @@ class Run:
         results = self.results if len(self.rows) == self.count else self.results[self.rows]
         if after := separators(plan.pieces):
             shown = results[:, : len(after)]
-            values = number_spans(shown, self.request.precision, after, yaml=plan.yaml, null=plan.null)
+            values = number_spans(shown, self.request.results.precision, after, yaml=plan.yaml, null=plan.null)
         return assemble(plan.pieces, self._parts(self.rows), values, self.locked[self.rows], results)
 
     def parts_of(self, row: int) -> list[tuple[float, ...]]:

@@ -59,7 +59,7 @@ def with_covariances(
         request.gathered.uncertain = True
     if request.gathered is not None or is_left_out:
         return record._replace(others=(*record.others, *said))
-    if operation.keeps_frames and not (shape.inverse or (has_sigma and request.canonical)):
+    if operation.keeps_frames and not (shape.inverse or (has_sigma and request.results.canonical)):
         for key in there * is_own:
             within((*around, key), _entries, holder[key], (36, 9))
         return record
@@ -160,8 +160,8 @@ def covariance_columns(
     kinds = [shape.kind for shape in shapes]
     passes = request.operation.keeps_frames and request.gathered is None
     own = shapes[0].place if shapes else None
-    if passes and own is not None and request.place is not None and own.axes != request.place.axes:
-        _refuse_extra(table, own.axes, request.place.axes, source)
+    if passes and own is not None and request.results.place is not None and own.axes != request.results.place.axes:
+        _refuse_extra(table, own.axes, request.results.place.axes, source)
     if passes or not kinds or not {*PLACED}.issuperset(kinds):
         return (), shapes
     try:
@@ -182,7 +182,7 @@ def covariance_columns(
     if len(shapes) != 1:
         message = "a covariance beside several poses in a row: whose it is nobody can tell"
         raise FormatError(message, source=source, line=1)
-    sigma = _with_unit(sigma, degrees=request.degrees)
+    sigma = _with_unit(sigma, degrees=request.rows.degrees)
     return places, (shape._replace(covariance=(len(places),), rewritten=True, sigma=sigma),)
 
 

@@ -423,11 +423,11 @@ def row_shape(pose: PoseColumns, request: Request) -> Shape:
         return Shape(position.kind, None)
     unit = position.unit if position and not (rotation and rotation.whole) else None
     if rotation is None or rotation.notation is None:
-        moved = request.operation.takes_points and request.kind != POSE
-        return Shape((request.kind or POINT) if moved else POSE, unit)
-    if request.kind not in ("", POSE) and request.operation.moves:
+        moved = request.operation.takes_points and request.rows.kind != POSE
+        return Shape((request.rows.kind or POINT) if moved else POSE, unit)
+    if request.rows.kind not in ("", POSE) and request.operation.moves:
         raise Misused(
-            f"rows have a rotation, {rotation.shown}, and cannot be taken for a {request.kind}; "
+            f"rows have a rotation, {rotation.shown}, and cannot be taken for a {request.rows.kind}; "
             "name the three with --columns"
         )
     notation = rotation.notation
@@ -454,7 +454,7 @@ def named_pose(spec: str, names: Sequence[str] | None, width: int, request: Requ
     if kind in SIX:
         return PoseColumns(_six(places, called, kind), None)
     header = Header(called)
-    count, rotation = _chosen_rotation(header, places, request.given)
+    count, rotation = _chosen_rotation(header, places, request.rows.given)
     if count == len(places):
         return PoseColumns(None, rotation)
     match = _chosen(header, places[: len(places) - count])

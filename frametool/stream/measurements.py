@@ -28,7 +28,7 @@ from frametool.grammar.readers import Misfit, Path, Reading, kind, tell, within
 from frametool.stream.faults import BadRows
 from frametool.stream.record import INNER, KNOWN, Record, find_records, pose_of, value_at
 from frametool.stream.record_values import stamp_of
-from frametool.stream.request import COMBINED, Operation, Request
+from frametool.stream.request import COMBINED, Operation, Request, RowOptions
 from frametool.stream.row_layout import POSE, Shape
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def read_measurements(
     Raises FormatError with the place of what is no measurement: a frame that moves, or is measured from itself, an
     exact one; a missing name or pose.
     """
-    request = Request(kind=POSE, degrees=degrees, normalize=normalize)
+    request = Request(rows=RowOptions(kind=POSE, degrees=degrees, normalize=normalize))
     found: list[Measurement] = []
     try:
         for file in files:
@@ -176,7 +176,7 @@ def _problem(row: MeasuredRow, first: dict[tuple[str, str], MeasuredRow]) -> str
 
 def _of_edges(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
     """Yield the edges of a file that holds a tree; what recordings say again at one time they say once."""
-    edges = [edge for edge in file.edges(normalize=request.normalize) if edge.parent is not None]
+    edges = [edge for edge in file.edges(normalize=request.rows.normalize) if edge.parent is not None]
     lines = lines_of([EdgePlace(file, edge) for edge in edges])
     said = {edge[:4] if edge.stamp_ns is not None else at: at for at, edge in reversed([*enumerate(edges)])}
     for at in sorted(said.values()):
@@ -225,12 +225,12 @@ def _of_table(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
 def _of_documents(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
     """Yield the measurements of a YAML or JSON text."""
     source = file.source
-    reading = Reading(source, normalize=request.normalize)
+    reading = Reading(source, normalize=request.rows.normalize)
     found: list[tuple[Measurement, Path, int | None]] = []
     for document in parse_documents(source.text, source.name):
         try:
             for path, row in _rows(document.value, (document.index,), reading):
-                asked = request._replace(operation=COMBINED, degrees=reading.degrees or request.degrees)
+                asked = request._replace(operation=COMBINED).with_rows(degrees=reading.degrees or request.rows.degrees)
                 for record, each in _of_row(row, path, asked, reading):
                     last = max(at for at, step in enumerate(record.path) if type(step) is int)
                     stamp_ns = stamp_of({document.index: document.value}, record, source)

@@ -137,9 +137,9 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
     """
     formula = request.operation.formula
     try:
-        search = _search_under if request.columns else _search
-        found = list(search(document, (), (), request)) if request.poses else []
-        is_bare = request.poses and not request.operation.takes_points
+        search = _search_under if request.rows.columns else _search
+        found = list(search(document, (), (), request)) if request.rows.poses else []
+        is_bare = request.rows.poses and not request.operation.takes_points
         if not found and is_bare and type(document) is dict and NOTHING_BUT.issuperset(document):
             reading.here = path
             reading.note("neither position nor rotation: taken as the identity", rule="identity")
@@ -159,7 +159,7 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
 def _search_under(document: Any, path: Path, outer: tuple[Path, ...], request: Request) -> Iterator[RecordPlace]:
     """Search what is under the key `detections.pose`, which --columns names; a list stands for its items."""
     found = [(document, path, outer)]
-    for key in request.columns[0].split("."):
+    for key in request.rows.columns[0].split("."):
         items = [(value_at(each, at), (*above, *at), around) for each, above, around in found for at in _mappings(each)]
         found = [(each[key], (*above, key), (*around, above)) for each, above, around in items if key in each]
         if not found:
@@ -338,7 +338,7 @@ def _holds_position(key: str, value: Any) -> bool:
 
 def _record(document: Any, place: RecordPlace, request: Request, reading: Reading, above: Path) -> Record:
     """Read one record, with all its paths below `above`."""
-    path = place.path
+    path, has_poses = place.path, request.rows.poses > 0
     value = value_at(document, path)
     reading.here = here = (*above, *path)
     try:
@@ -347,8 +347,8 @@ def _record(document: Any, place: RecordPlace, request: Request, reading: Readin
         if place.kind:
             record = _of_message(value, place, here, reading, request)
         else:
-            record = _mapping(value, here, reading, request) if request.poses else _only_asked(value, here, request)
-        if request.poses and request.operation.formula is not None:
+            record = _mapping(value, here, reading, request) if has_poses else _only_asked(value, here, request)
+        if has_poses and request.operation.formula is not None:
             record = _for_formula(record, value, request.operation.formula)
     except Misfit as misfit:
         raise misfit.below(*here) from None
@@ -360,7 +360,7 @@ def _record(document: Any, place: RecordPlace, request: Request, reading: Readin
         record = _with_asked(record, document, path, above, request)
         if request.operation.only_adds:
             _refuse_repeated(record, document, path, request)
-        return _with_names(record, document, path, place.outer, above, request) if request.poses else record
+        return _with_names(record, document, path, place.outer, above, request) if request.rows.poses else record
     except Misfit as misfit:
         raise misfit.below(*above) from None
 
@@ -402,8 +402,8 @@ def _refuse_repeated(record: Record, document: Any, path: Path, request: Request
     """Stop where a key that an expression adds is there already, unless it gives way."""
     said, holder = request.operation.shown, value_at(document, outermost(path))
     for name in (*request.extras(record.shape), *(said.members if said and not said.replaces else ())):
-        if request.prefix + name in holder:
-            raise Misfit(f"key {shown(request.prefix + name)} is there already; take another name, or --prefix", path)
+        if (key := request.results.prefix + name) in holder:
+            raise Misfit(f"key {shown(key)} is there already; take another name, or --prefix", path)
 
 
 def _with_asked(record: Record, document: Any, path: Path, above: Path, request: Request) -> Record:
@@ -432,8 +432,8 @@ def _of_message(value: Any, place: RecordPlace, path: Path, reading: Reading, re
     An orientation with a covariance that begins with -1 is unknown: nothing of it is read, and it stays.
     """
     field, kind = place.field, place.kind
-    if request.kind not in ("", kind):
-        raise Misfit(f"{field} cannot be taken for a {request.kind}")
+    if request.rows.kind not in ("", kind):
+        raise Misfit(f"{field} cannot be taken for a {request.rows.kind}")
     if kind == VECTOR:
         return _with_position(Record(path, Shape(kind), key=field), value[field], 1.0, partial=False)
     if known := value.get(place.covariances[0]):
@@ -441,7 +441,7 @@ def _of_message(value: Any, place: RecordPlace, path: Path, reading: Reading, re
 
         if within(place.covariances, is_unknown, known, (9,)):
             return Record(path, Shape("", None), rotation=field)
-    reading.degrees = request.degrees
+    reading.degrees = request.rows.degrees
     within((field,), read_rotation, field, value[field], reading)
     record = _with_rotation(value[field], field, Record(path, Shape(POSE, None)), (field,), reading, request)
     return record._replace(shape=record.shape._replace(kind=kind))
@@ -496,7 +496,7 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
         record = _with_position(record, value[key], POINT_KEYS[key], partial="header" not in value)
     elif flat and flat.position:
         record = _with_members(record, value, flat.position)
-    reading.degrees = read_angle_unit(value["angles"]) if "angles" in value else request.degrees
+    reading.degrees = read_angle_unit(value["angles"]) if "angles" in value else request.rows.degrees
     if flat and flat.rotation:
         record = _with_flat_rotation(record, value, flat, flat.rotation, reading, request)
     elif rotations:
@@ -510,21 +510,21 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     shape = record.shape._replace(inverse=flag == "true")
     record = record._replace(shape=shape, others=(*rotations[1:], *positions[1:]))
     is_ecef = flat and flat.position and flat.position.prefix.lower().endswith("ecef_")
-    place = request.given_place or ("ecef" if is_ecef else "")
-    return _given_on_earth(record, request._replace(given_place=place)) if place else record
+    place = request.rows.given_place or ("ecef" if is_ecef else "")
+    return _given_on_earth(record, request.with_rows(given_place=place)) if place else record
 
 
 def _given_on_earth(record: Record, request: Request) -> Record:
     """Return a record whose x, y, z are in ecef or the axes of an origin, as --from says."""
     from frametool.geometry.place import Earth, Place
 
-    place = Place.of_xyz(request.given_place, request.earth or Earth())
+    place = Place.of_xyz(request.rows.given_place, request.earth or Earth())
     shape = record.shape
     if place is None or shape.whole or shape.unit is None:
         return record
     if shape.unit != 1.0:
-        raise Misfit(f"--from {request.given_place} takes metres")
-    is_point = shape.notation is None and not request.kind and request.operation.keeps_frames
+        raise Misfit(f"--from {request.rows.given_place} takes metres")
+    is_point = shape.notation is None and not request.rows.kind and request.operation.keeps_frames
     if request.gathered is not None:
         request.gathered.frame, is_point = EARTH_FRAMES[0], False
     shape = shape._replace(unit=place, kind=POINT if is_point else shape.kind)
@@ -543,7 +543,7 @@ def _pose_at_place(rest: dict[str, Any], path: Path, reading: Reading, request: 
     positions = [key for key in bare if _holds_position(key, bare[key])]
     if not (rotations or positions or _flat_pose(bare, rotations)):
         return Pose(covariance=covariance), []
-    record = _mapping(bare, path, reading, request._replace(kind=POSE))
+    record = _mapping(bare, path, reading, request.with_rows(kind=POSE))
     keys = [*rotations, *positions, *record.members, *record.flat, *(["angles"] if "angles" in bare else ())]
     return pose_of(record, request)._replace(covariance=covariance), keys
 
@@ -552,7 +552,7 @@ def pose_of(record: Record, request: Request) -> Pose:
     """Return a record as a named pose; position or rotation is None where it has none."""
     shape, values = record.shape, record.values
     position = shape.position(values) if shape.whole or shape.unit is not None else None
-    check = partial(checked_rotation, shape, normalize=request.normalize)
+    check = partial(checked_rotation, shape, normalize=request.rows.normalize)
     if shape.multiple:
         from frametool.stream.extra_numbers import of_multiple
 
@@ -571,8 +571,8 @@ def pose_of(record: Record, request: Request) -> Pose:
 
 def _two_vectors(value: dict[str, Any], name: str, path: Path, request: Request) -> Record:
     """Read a twist or a wrench."""
-    if request.kind not in ("", name) or not request.operation.moves:
-        raise NotARotation(f"a {name} cannot be taken for a {request.kind or POSE}")
+    if request.rows.kind not in ("", name) or not request.operation.moves:
+        raise NotARotation(f"a {name} cannot be taken for a {request.rows.kind or POSE}")
     halves = [within((part,), _three, value[part], (*path, part)) for part in PARTS[name]]
     paths, numbers = (first + second for first, second in zip(*halves, strict=True))
     return Record(path, Shape(name, None), paths, numbers)
@@ -665,7 +665,7 @@ def _with_flat_rotation(
     names = rotation.names
     if record.key:
         flat = flat._replace(position=Columns((), (), unit=record.shape.unit))
-    shape = row_shape(flat, request._replace(degrees=reading.degrees, kind=POSE))
+    shape = row_shape(flat, request.with_rows(degrees=reading.degrees, kind=POSE))
     paths, values = ((), ()) if shape.whole else (record.numbers, record.values)
     numbers = [_number(value, name, shape.in_degrees(at)) for at, name in enumerate(names, len(values))]
     if shape.notation is not None:
@@ -709,20 +709,20 @@ def _turns_in_doubt(value: dict[str, Any]) -> bool:
 
 def _kind(key: str, rotations: object, request: Request) -> str:
     """Decide what a mapping is: with a rotation a pose, else a point or a vector, or what --as says."""
-    if request.kind in PARTS:
-        raise Misfit(f"a {request.kind} has {' and '.join(PARTS[request.kind])}, two vectors {{x:, y:, z:}}")
-    if rotations or request.kind == POSE or not request.operation.takes_points:
-        if rotations and request.kind not in ("", POSE):
-            raise Misfit(f"a record has a rotation and cannot be taken for a {request.kind}")
+    if request.rows.kind in PARTS:
+        raise Misfit(f"a {request.rows.kind} has {' and '.join(PARTS[request.rows.kind])}, two vectors {{x:, y:, z:}}")
+    if rotations or request.rows.kind == POSE or not request.operation.takes_points:
+        if rotations and request.rows.kind not in ("", POSE):
+            raise Misfit(f"a record has a rotation and cannot be taken for a {request.rows.kind}")
         return POSE
-    return request.kind or (VECTOR if key == "vector" else POINT)
+    return request.rows.kind or (VECTOR if key == "vector" else POINT)
 
 
 def _stays_point(value: dict[str, Any], key: str, request: Request) -> bool:
     """Tell a PointStamped or Vector3Stamped that is written anew and for which nobody asked for a rotation."""
-    operation = request.operation
+    operation, asked = request.operation, request.rows
     is_kept = operation.changes_nothing and operation.formula is None and request.gathered is None
-    is_usual = not (request.kind or request.given) and {each.spec for each in request.notations} <= {"quaternion"}
+    is_usual = not (asked.kind or asked.given) and {each.spec for each in request.results.notations} <= {"quaternion"}
     return "header" in value and key in (POINT, VECTOR) and is_kept and is_usual
 
 

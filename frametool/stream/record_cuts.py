@@ -147,7 +147,7 @@ def block_of(cut: Cut, data: Bytes, text: bytes, request: Request) -> Block:
         return text.count(b"\n", 0, start), str(column_in(text, start))
 
     stamps, bad = list[Any](), dict[int, tuple[str, str]]()
-    column = request.timed.column if request.timed else request.extra_column or ""
+    column = request.timed.column if request.timed else request.rows.extra_column or ""
     for each in template.stamps:
         found, late = read_extra([without_quotes(parts[index]) for index in each], request, column)
         stamps.append(found)
@@ -208,11 +208,11 @@ def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
     timed = request.timed
     if timed is not None and not timed.name and request.operation.formula is not None:
         timed = timed._replace(name=key if len(stamp) == 1 else "")  # what was found says by its own name what it is
-    extra = None if request.extra_column is None else key
+    extra = None if request.rows.extra_column is None else key
     return Plan(
         tuple(entry.record.shape for entry in entries),
         tuple(entry.target for entry in entries),
-        request._replace(on_error=on_error, timed=timed, extra_column=extra, offset_ns=0),
+        request._replace(on_error=on_error, timed=timed, offset_ns=0).with_rows(extra_column=extra),
         tuple(".".join(map(str, (path or ())[1:])) for entry in entries for path in entry.record.numbers),
         (In(after + 1), *pieces, In(after)),
         b"null",

@@ -339,10 +339,10 @@ class RecordResults(RecordBlocks):
 
     def __init__(self, fmt: str, request: Request, source: str, style: Style) -> None:
         """Start without templates."""
-        super().__init__(fmt, request._replace(canonical=True), source)
+        super().__init__(fmt, request.with_results(canonical=True), source)
         self.style = style
         operation = request.operation
-        self.is_singly = operation.shown is not None or (request.place is not None and not operation.looks_back)
+        self.is_singly = operation.shown is not None or (request.results.place is not None and not operation.looks_back)
 
     @cached_property
     def rows(self) -> RecordRows:

@@ -69,9 +69,9 @@ class Entry(NamedTuple):
 
 def target_of(record: Record, request: Request) -> Target:
     """Choose how the result of a record is written; conventions of Euler angles share a key and are together."""
-    names = [each.representation.name for each in request.notations]
-    together = sorted(request.notations, key=lambda each: names.index(each.representation.name))
-    return request._replace(notations=tuple(together)).target(record.shape)
+    names = [each.representation.name for each in request.results.notations]
+    together = sorted(request.results.notations, key=lambda each: names.index(each.representation.name))
+    return request.with_results(notations=tuple(together)).target(record.shape)
 
 
 class Answer(NamedTuple):
@@ -87,7 +87,7 @@ def read_entries(document: Document, request: Request, source: Source, notes: li
 
     Raises FormatError with the place of a record that cannot be read.
     """
-    reading = Reading(source, degrees=request.degrees, normalize=request.normalize, earth=request.earth)
+    reading = Reading(source, degrees=request.rows.degrees, normalize=request.rows.normalize, earth=request.earth)
     try:
         records = list(find_records(document.value, request, reading, (document.index,)))
         if reading.notes:
@@ -118,8 +118,8 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
         stamp = record.stamps[:2]
     elif timed is not None and operation.formula is not None and not operation.shown:
         stamp = _scalar(document, record)
-    elif request.extra_column is not None:
-        stamp = (not request.extra_column and record.stamps[:2]) or _scalar(document, record, request.extra_column)
+    elif (key := request.rows.extra_column) is not None:
+        stamp = (not key and record.stamps[:2]) or _scalar(document, record, key)
     elif request.pose_from_frame is not None:
         edge = request.pose_from_frame(record.parent.text)
     request = request.for_kind(record.shape.kind)
@@ -155,7 +155,7 @@ def answer(entry: Entry, stamp: Sequence[str], request: Request) -> Answer:
         raise Outside("beyond --start or --stop")
     parts = operation.result(
         shape, entry.record.values, edge, floats,
-        rotation=lambda own: checked_rotation(shape, own, normalize=request.normalize)[0],
+        rotation=lambda own: checked_rotation(shape, own, normalize=request.rows.normalize)[0],
         compared=lambda pose: [pose], seconds=float, times_ns=at_ns,
     )  # fmt: skip
     return Answer(entry, parts, has_gaps=operation.shown is not None)
@@ -240,7 +240,7 @@ class RecordText:
         for entry in self.entries:
             with suppress(Outside):
                 found.append(self.answer(entry))
-        if len(found) < len(self.entries) and (not found or not self.request.canonical):
+        if len(found) < len(self.entries) and (not found or not self.request.results.canonical):
             raise Outside("beyond --start or --stop")
         return found
 

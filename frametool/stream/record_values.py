@@ -21,7 +21,7 @@ from frametool.grammar.readers import Misfit, NotARotation, Path, Reading, tell
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream.record import STALE, Record, pose_of, value_at
 from frametool.stream.record_text import Answer, Outside, RecordText, wide_turn, written
-from frametool.stream.request import Request
+from frametool.stream.request import Request, RowOptions
 from frametool.stream.row_layout import AS_READ, PARTS, POSE, ROTATION, VECTOR
 from frametool.stream.stamp_source import read_stamp
 
@@ -45,9 +45,8 @@ def read_poses(source: Source, asked: Request) -> list[Pose]:
 
 def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
     """Return every pose of a text as `read_poses` does, and the keys that come with any of them."""
-    request = Request(
-        asked.operation, kind=POSE, degrees=asked.degrees, normalize=asked.normalize, gathered=asked.gathered
-    )
+    own = RowOptions(kind=POSE, degrees=asked.rows.degrees, normalize=asked.rows.normalize)
+    request = Request(asked.operation, own, gathered=asked.gathered)
     poses: list[Pose] = []
     extra: set[str] = set()
     known = read_text(source, request)
@@ -84,7 +83,7 @@ def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
     """
     if request.operation.looks_back:
         raise Misused("rows are compared with those before them in streams; pipe them in as JSON lines, YAML or CSV")
-    known = read_text(source, request._replace(canonical=True))
+    known = read_text(source, request.with_results(canonical=True))
     if lost := next((entry.lost for entry in known.entries if entry.lost), ""):
         warn(f"{source.name}: frame {shown(lost)} is left out: the frames of the result are not known")
     answers = []
@@ -140,17 +139,17 @@ def _formula_result(node: Node, unit: Path, made: Answer, request: Request, fmt:
     entry, operation = made.entry, request.operation
     shape = entry.record.shape
     kind = operation.result_kind(shape.kind)
-    names = [request.prefix + name for name in request.extras(shape)]
+    names = [request.results.prefix + name for name in request.extras(shape)]
     extras: dict[str, Any] = dict(zip(names, made.parts[len(made.parts) - len(names) :], strict=True))
     if operation.shown is not None:
         numbers = tuple(extras.values())
-        members = operation.shown.values(request.prefix, numbers)
+        members = operation.shown.values(request.results.prefix, numbers)
         extras = operation.shown.cells(names, numbers) if fmt == "csv" else members
     if operation.only_adds:
         return with_stamp_ns(plain(node), fmt) | extras if type(node.value) is dict else extras
     rest = with_stamp_ns(_rest(node, unit, entry.record), fmt)
     if kind == POSE:
-        stamp = _header_stamp(entry.record) if not request.poses else {}
+        stamp = _header_stamp(entry.record) if not request.rows.poses else {}
         return Result(Pose.of(made.parts[:7], entry.name, entry.parent), stamp | extras | rest)
     seen_from = "frame" if kind or shape.kind != POSE else "parent"
     named = {key: name for key, name in (("name", entry.name), (seen_from, entry.parent)) if name is not None}

@@ -334,62 +334,84 @@ def thing_pose(shape: Shape, own: Components, rotation: Callable[[Components], C
     return rigid.inverse(*pose) if shape.inverse else pose
 
 
-class Request(NamedTuple):
-    """What one run does with its rows and how it writes the results.
+class RowOptions(NamedTuple):
+    """How rows are read.
 
     poses: how many poses each row holds; 0 where rows only name frames
     kind: what rows are taken for; "" as they look; kinds: of each of several points or poses in a row
-    given: the notation of their rotations
-    degrees: whether bare angles are in degrees
-    notations: those of the result; none means as read
-    by_default: nobody asked for these notations, so that what has no rotation gets none
-    columns: which columns are ours, one entry a pose
-    keep, prefix: results are added to the input, under other names
-    frames: columns that name a row's frame
-    pose_from_frame: the pose that moves a record expressed in a frame
-    timed: the poses that do so at the row's own time
-    rename: turns a record's (parent, name) into those of its result
-    frame_is_counter: a decimal `frame` is a counter, because no frame is called so
-    unwrap: angles go on beyond half a turn
+    given: the notation of their rotations; given_place: what unnamed numbers are of a position on the Earth
+    degrees: whether bare angles are in degrees; normalize: take any non-zero quaternion
+    columns: which columns are ours, one entry a pose; frames: columns that name a row's frame
     extra_column: the column or key of a stamp or weight that is read with the pose; "" is the usual stamp
-    gathered: takes the poses, nothing is written then
+    frame_is_counter: a decimal `frame` is a counter, because no frame is called so
+    """
+
+    poses: int = 1
+    kind: str = ""
+    kinds: tuple[str, ...] = ()
+    given: Notation | None = None
+    given_place: str = ""
+    degrees: bool = False
+    normalize: bool = False
+    columns: tuple[str, ...] = ()
+    frames: tuple[str, ...] = ()
+    extra_column: str | None = None
+    frame_is_counter: bool = True
+
+
+class ResultOptions(NamedTuple):
+    """How results are written.
+
+    notations: of their rotations; none means as read
+    by_default: nobody asked for these notations, so that what has no rotation gets none
+    keep, prefix: results are added to the input, under other names
+    unwrap: angles go on beyond half a turn
     all_numbers: all numbers of a result are wanted, also those that do not change
     canonical: results are written anew rather than in the text of their records
-    place: how positions on the Earth are written; given_place: what unnamed numbers are of one
+    place: how positions on the Earth are written
+    """
+
+    notations: tuple[Notation, ...] = ()
+    by_default: bool = False
+    keep_sign: bool = False
+    precision: int | None = None
+    keep: bool = False
+    prefix: str = ""
+    unwrap: bool = False
+    all_numbers: bool = False
+    canonical: bool = False
+    place: Place | None = None
+
+
+class Request(NamedTuple):
+    """What one run does with its rows, how it reads them and how it writes the results.
+
+    pose_from_frame: the pose that moves a record expressed in a frame; timed: the poses that do so at its own time
+    rename: turns a record's (parent, name) into those of its result
+    gathered: takes the poses, nothing is written then
     earth: what is said of all places: the origin, the axes of rotations, the zone
     offset_ns: added to the stamps of rows and records, also `FromFirst`; window: the first and the last that are left
     """
 
     operation: Operation = Operation()
-    poses: int = 1
-    kind: str = ""
-    kinds: tuple[str, ...] = ()
-    given: Notation | None = None
-    degrees: bool = False
-    normalize: bool = False
-    notations: tuple[Notation, ...] = ()
-    by_default: bool = False
-    keep_sign: bool = False
-    precision: int | None = None
-    columns: tuple[str, ...] = ()
-    keep: bool = False
-    prefix: str = ""
-    frames: tuple[str, ...] = ()
+    rows: RowOptions = RowOptions()
+    results: ResultOptions = ResultOptions()
     pose_from_frame: Callable[[str | None], Rigid] | None = None
     timed: Timed | None = None
     rename: Callable[[str | None, str | None], tuple[str | None, str | None]] | None = None
-    frame_is_counter: bool = True
-    unwrap: bool = False
-    extra_column: str | None = None
     gathered: Gathered | None = None
     on_error: str = STOP
-    all_numbers: bool = False
-    canonical: bool = False
-    place: Place | None = None
-    given_place: str = ""
     earth: Earth | None = None
     offset_ns: int = 0
     window: tuple[int, int] | None = None
+
+    def with_rows(self, **fields: Any) -> Request:
+        """Return it with other options of how rows are read."""
+        return self._replace(rows=self.rows._replace(**fields))
+
+    def with_results(self, **fields: Any) -> Request:
+        """Return it with other options of how results are written."""
+        return self._replace(results=self.results._replace(**fields))
 
     def of_inverses(self) -> Request:
         """Return what is done with the inverse of each row; its frames have changed places."""
@@ -403,22 +425,22 @@ class Request(NamedTuple):
     @property
     def weighs(self) -> bool:
         """Return True if the extra column holds weights or labels rather than stamps."""
-        return self.gathered is not None and bool(self.extra_column)
+        return self.gathered is not None and bool(self.rows.extra_column)
 
     @property
     def in_order(self) -> bool:
         """Return True if a row's result depends on the rows before it."""
         takes_first = self.earth is not None and self.earth[0] is not None and self.earth[0].place is None
-        return self.unwrap or self.operation.looks_back or self.gathered is not None or takes_first
+        return self.results.unwrap or self.operation.looks_back or self.gathered is not None or takes_first
 
     @property
     def keeps_position(self) -> bool:
         """Return True if positions stay as they are written."""
-        return self.operation.keeps_position and self.place is None
+        return self.operation.keeps_position and self.results.place is None
 
     def target(self, shape: Shape) -> Target:
         """Choose how results of things of a shape are written: as they were read unless set."""
-        kind = self.operation.result_kind(shape.kind)
+        asked, kind = self.results, self.operation.result_kind(shape.kind)
         if kind != shape.kind:
             shape = Shape(kind, shape.unit or 1.0)
         if not kind:
@@ -426,32 +448,33 @@ class Request(NamedTuple):
         if kind in SIX:
             return Target(None, (), plain=True)
         if kind not in TURNED:
-            if self.place is not None and kind != POINT:
-                raise ValueInvalid(f"a {kind} has no place on the Earth; leave --to {self.place.name} out")
+            if asked.place is not None and kind != POINT:
+                raise ValueInvalid(f"a {kind} has no place on the Earth; leave --to {asked.place.name} out")
             return Target(self._unit(shape), (), three=True)
         there = shape.whole or shape.unit is not None
         placed = there or (self.shifts and kind == POSE)
-        if self.notations or shape.notation is None or shape.notation.representation is HEADING:
-            stays = shape.notation is None and self._only_turns_around and (self.by_default or not self.notations)
-            notations = () if stays else self.notations or (notation("quaternion"),)
+        if asked.notations or shape.notation is None or shape.notation.representation is HEADING:
+            stays = shape.notation is None and self._only_turns_around and (asked.by_default or not asked.notations)
+            notations = () if stays else asked.notations or (notation("quaternion"),)
             written = tuple((each, self.in_degrees(each)) for each in notations)
             whole = there and len(notations) == 1 and notations[0].representation.whole is not None
-            target = Target(None, written, self.keep_sign, whole)
+            target = Target(None, written, asked.keep_sign, whole)
         else:
             first = 3 * (placed and shape.unit is None and not shape.whole)  # a position comes in front
             absent = tuple(at + first for at in shape.absent)
             written = ((shape.notation, shape.degrees),)
-            target = Target(None, written, self.keep_sign, shape.whole, radians_at=shape.radians_at, absent=absent)
+            target = Target(None, written, asked.keep_sign, shape.whole, radians_at=shape.radians_at, absent=absent)
         is_matrix = len(written) == 1 and written[0][0].representation.whole is not None
         scaled = is_matrix and self.operation.carried(shape) == (SCALE,)  # the scale of results is in the matrix
         return target._replace(unit=(self._unit(shape) or 1.0) if placed and not target.whole else None, scaled=scaled)
 
     def _unit(self, shape: Shape) -> Unit | None:
         """Return how positions are written: as asked for, as they were read, or in metres, as those of places are."""
-        if self.place is not None and shape.unit is not None:
-            return self.place
+        asked = self.results
+        if asked.place is not None and shape.unit is not None:
+            return asked.place
         own = shape.unit if shape.place is None else 1.0
-        return 1.0 if own is not None and self.all_numbers and (self.notations or shape.notation is None) else own
+        return 1.0 if own is not None and asked.all_numbers and (asked.notations or shape.notation is None) else own
 
     def extras(self, shape: Shape) -> tuple[str, ...]:
         """Name the numbers that come with a result as columns or keys of their own."""
@@ -466,7 +489,7 @@ class Request(NamedTuple):
     @property
     def by_row(self) -> bool:
         """Return True if each row has its own pose that moves it."""
-        return bool(self.frames) or self.timed is not None
+        return bool(self.rows.frames) or self.timed is not None
 
     @property
     def shifts(self) -> bool:
@@ -492,11 +515,11 @@ class Request(NamedTuple):
 
     def counts(self, frame: str) -> bool:
         """Return True if what is under `frame` is a counter rather than a frame's name."""
-        return self.frame_is_counter and frame.isdecimal()
+        return self.rows.frame_is_counter and frame.isdecimal()
 
     def in_degrees(self, notation: Notation) -> bool:
         """Return True if a notation's angles are degrees: its own word wins."""
-        return self.degrees if notation.degrees is None else notation.degrees
+        return self.rows.degrees if notation.degrees is None else notation.degrees
 
 
 def no_step(before: int, stamp_ns: int) -> str:

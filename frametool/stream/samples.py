@@ -29,7 +29,7 @@ from frametool.stream.faults import BadRows
 from frametool.stream.header import listed
 from frametool.stream.record import find_records, pose_of, value_at
 from frametool.stream.record_values import read_text
-from frametool.stream.request import Operation, Request
+from frametool.stream.request import Operation, Request, RowOptions
 from frametool.stream.row_layout import IDENTITY, POSE
 from frametool.stream.row_poses import RowPoses, block_of, plain_cells
 from frametool.stream.table import open_table
@@ -121,7 +121,7 @@ def _of_table(file: InputFile, fmt: str, columns: Sequence[str], *, normalize: b
         raise FormatError(f"no columns {what}; columns: {listed(names)}", source=file.name, line=1)
     sides, placed, places = list[Transform](), False, list[str]()
     for each in columns:
-        request = Request(Operation(moves=True), columns=(each,), normalize=normalize)
+        request = Request(Operation(moves=True), RowOptions(columns=(each,), normalize=normalize))
         poses = gathered(FormatConverter(fmt, request, file.name).steps(BytesIO(text)), BadRows(file.name))
         numbers = poses.numbers
         if numbers.shape[1] not in (4, 7):
@@ -165,7 +165,7 @@ def _pose(value: Any, path: Path, reading: Reading) -> Pose:
     """Read a record that is a pose, or the 16 numbers of a matrix; it has a rotation."""
     if type(value) is list and len(value) == 16:
         value = [value[at : at + 4] for at in range(0, 16, 4)]
-    request = Request(kind=POSE, normalize=reading.normalize)
+    request = Request(rows=RowOptions(kind=POSE, normalize=reading.normalize))
     records = [*find_records(value, request, reading, path)]
     found = pose_of(records[0], request)
     if len(records) > 1 or found.rotation is None:

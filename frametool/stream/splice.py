@@ -208,7 +208,7 @@ class Splicer:
 
     def _extras(self, first: int) -> list[tuple[Piece, ...]]:
         """Return what comes with a result as members; one of the record that gives way to such a one is replaced."""
-        said, prefix = self.request.operation.shown, self.request.prefix
+        said, prefix = self.request.operation.shown, self.request.results.prefix
         members = []
         if said is None:
             names = [prefix + name for name in self.request.extras(self.record.shape)]
@@ -230,7 +230,7 @@ class Splicer:
         begin = self._member({key: 0.5}, 0)[:-1]
         if isinstance(value, Word):
             return (*begin, value._replace(number=self.first + value.number))
-        precision = self.request.precision
+        precision = self.request.results.precision
         fmt, exponent = "" if precision is None else f"z.{precision}f", b"e" if self.json else b".0e"
         marks = [("[" * (not at), "]" if at == len(value) - 1 else ", ") for at in range(len(value))]
         marks = marks if value[1:] else [("", "")]
@@ -253,7 +253,7 @@ class Splicer:
             self._lead(self._member({"stamp_ns": Verbatim(str(record.stamp_ns))}, 0))
         if self.request.rename is None:
             return
-        if not self.request.poses and {"name", "parent"} & self.members.keys() - {*record.members}:
+        if not self.request.rows.poses and {"name", "parent"} & self.members.keys() - {*record.members}:
             return  # in a row that was no pose they say something else
         self._name(record.name, self.entry.name, "name")
         if record.parent.paths or not record.parent.text:
@@ -380,7 +380,7 @@ def edits_of(known: RecordText) -> list[Edit]:
 def rendered(known: RecordText, answers: Sequence[Answer]) -> bytes:
     """Return the text with results in the place of numbers, some of them as words; b"" where nothing is in it."""
     numbers = [number for each in answers for number in written(each)]
-    precision, exponent = known.request.precision, "e" if known.json else ".0e"
+    precision, exponent = known.request.results.precision, "e" if known.json else ".0e"
     fmt = "" if precision is None else f"z.{precision}f"
     locked = any(each.entry.target.locked(each.parts) for each in answers)
     stretches, pieces = cut(len(known.text), (), known.edits)
@@ -462,7 +462,7 @@ def attempt(text: bytes, part: Part, line: int = 0, *, fmt: str, request: Reques
             decoded = without_noise(decoded)
         source = source._replace(text=decoded)
         found = RecordText(source, request, json=fmt == "json")
-        if not request.canonical:
+        if not request.results.canonical:
             found.edits = edits_of(found)
     except Aliased as error:
         return fault_at(source, error.in_text(source.text))

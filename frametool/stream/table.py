@@ -47,10 +47,10 @@ class Naming:
         """Take from the request what it does to names; shape: what a row is."""
         self.layout, self.delimiter = layout, table.delimiter
         self.earth = EARTH_FRAMES[0] if shape.place is not None else None
-        self.places = (layout.frames[0] if layout.frames else None, layout.name) if request.poses else (None, None)
+        self.places = (layout.frames[0] if layout.frames else None, layout.name) if request.rows.poses else (None, None)
         named = self.places[self.places[0] is None]
         self.column = "" if named is None else table.name(named)
-        may_count = layout.frames and table.name(layout.frames[0]) == COUNTER and COUNTER not in request.frames
+        may_count = layout.frames and table.name(layout.frames[0]) == COUNTER and COUNTER not in request.rows.frames
         self.counts = request.counts if may_count else lambda _: False
         self.rename = rename_of(request)
         self.consecutive = request.operation.looks_back
@@ -135,7 +135,7 @@ def as_trajectory(table: Table, fmt: str, request: Request, source: str) -> Tabl
     Raises FormatError for a count of columns that the format does not have.
     """
     row = FORMATS[fmt].rows
-    if request.given or request.columns:
+    if request.rows.given or request.rows.columns:
         return table
     if row.widths and table.width not in row.widths and (fmt == "kitti" or not table.names):
         wanted = " or ".join(map(str, row.widths))

@@ -51,20 +51,20 @@ def plan_table(
     normals: the columns of vectors that turn with points; stamped: a column with the name of a stamp is one
     """
     formula, poses = request.operation.formula, list[PoseColumns]()
-    is_needed = formula is None or formula.reads_row or bool(request.columns)
+    is_needed = formula is None or formula.reads_row or bool(request.rows.columns)
     with suppress(*() if is_needed else (FormatError,)):
         poses = _find(table, request, source)
     on_earth = bool(poses) and poses[0].position is not None and place_of(poses[0].position.unit) is not None
     is_point = request.operation.turns and poses and poses[0].rotation is None
-    passes = not (request.operation.moves or request.all_numbers or is_point or request.gathered)
-    if request.poses == 1 and not on_earth and passes and request.keeps_position:
+    passes = not (request.operation.moves or request.results.all_numbers or is_point or request.gathered)
+    if request.rows.poses == 1 and not on_earth and passes and request.keeps_position:
         poses = [_without_position(poses[0], request, table, source)]
     if wrong := next((each.wrong for pose in poses for each in pose if each and each.wrong), ""):
         raise _refusal(wrong, source)
     names = table.names or ()
     asked = tuple(_place(name, _names_or_numbers(table), source) for name in request.operation.columns)
     shapes = _shapes(poses, request, len(asked))
-    if on_earth or request.place is not None:
+    if on_earth or request.results.place is not None:
         from frametool.stream.earth_columns import readers_of, settle
 
         request, shapes = settle(request, shapes, names, source, on_earth=on_earth)
@@ -85,13 +85,13 @@ def plan_table(
     has_one = not shapes or request.operation.of == PAIR  # what becomes of a row is one thing
     targets = tuple(map(request.target, shapes[:1] or (Shape(POSE),) if has_one else shapes))
     frames = _frame_columns(table, request, source, on_earth=on_earth)
-    stays = not request.poses or (request.operation.moves and request.rename is None)
+    stays = not request.rows.poses or (request.operation.moves and request.rename is None)
     name = None if stays else _first_called(NAME_KEYS, table)
-    moves_each = on_earth or request.frames or (frames and request.operation.moves)
+    moves_each = on_earth or request.rows.frames or (frames and request.operation.moves)
     edge_of = request.pose_from_frame if moves_each else None
     asked_at = range(shapes[0].own_size, shapes[0].size) if request.operation.shown else ()  # empty cells are not
     words, marked = readers_of(shapes[0]) if on_earth else ({}, dict.fromkeys(asked_at, number_or_none))
-    named = ({frames[0]: PARENT} if frames and request.poses else {}) | ({} if name is None else {name: NAME})
+    named = ({frames[0]: PARENT} if frames and request.rows.poses else {}) | ({} if name is None else {name: NAME})
     if on_earth and (position := poses[0].position):  # what is read and stays as it is
         position = position._replace(places=position.places[: len(position.places) - position.staying])
         poses = [poses[0]._replace(position=position)]
@@ -99,7 +99,7 @@ def plan_table(
     if table.header:
         refuse_repeated(written, names)
     time, below = _stamp_columns(table, request, places, frames, source, stamped=stamped)
-    pieces, stretches = ((), ()) if request.all_numbers else lay_out(written, table.width, table.delimiter)
+    pieces, stretches = ((), ()) if request.results.all_numbers else lay_out(written, table.width, table.delimiter)
     layout = Layout(tuple(written), places, frames, stretches, time, below, name)
     return Plan(
         shapes, targets, request, tuple(map(table.name, places)), pieces, b"" if table.delimiter else b"nan", edge_of,
@@ -109,24 +109,25 @@ def plan_table(
 
 def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
     """Find the columns of the poses, by --columns, by name, or by their number where there are no names."""
-    if not request.poses:
+    asked = request.rows
+    if not asked.poses:
         return []
-    if request.columns:
-        if len(request.columns) != request.poses:
-            raise Misused(f"--columns is given {len(request.columns)} times, for {request.poses} poses in a row")
-        kinds = request.kinds or (request.kind,) * request.poses
-        return [_chosen(spec, table, request, kind) for spec, kind in zip(request.columns, kinds, strict=True)]
-    if table.pose is not None and request.given is None and request.poses == 1:
+    if asked.columns:
+        if len(asked.columns) != asked.poses:
+            raise Misused(f"--columns is given {len(asked.columns)} times, for {asked.poses} poses in a row")
+        kinds = asked.kinds or (asked.kind,) * asked.poses
+        return [_chosen(spec, table, request, kind) for spec, kind in zip(asked.columns, kinds, strict=True)]
+    if table.pose is not None and asked.given is None and asked.poses == 1:
         return [table.pose]
     if table.names:
-        known = request.extra_column
+        known = asked.extra_column
         names = ["" if name == known or may_be_uncertain(name) else name for name in table.names]
         return _find_named(names, request, source)
     if spec := _by_width(table.width, request):
-        return [_chosen(spec, table, request, request.kind)]
+        return [_chosen(spec, table, request, asked.kind)]
     reason = f"{table.width} columns without names do not say what they are; give --from REP, or --columns"
-    if request.poses == 1 and request.given:
-        reason = f"{request.given.counted}; found {table.width} columns without names; or give --columns"
+    if asked.poses == 1 and asked.given:
+        reason = f"{asked.given.counted}; found {table.width} columns without names; or give --columns"
     raise _refusal(reason, source)
 
 
@@ -137,7 +138,7 @@ def _refusal(reason: str, source: str) -> FormatError:
 
 def _chosen(spec: str, table: Table, request: Request, kind: str) -> PoseColumns:
     """Return the columns of a point or pose that are chosen by name or number."""
-    if not request.given_place:
+    if not request.rows.given_place:
         return named_pose(spec, table.names, table.width, request, kind)
     from frametool.stream.earth_columns import chosen_pose
 
@@ -149,38 +150,40 @@ def _by_width(width: int, request: Request) -> str:
 
     "" where they may be something else.
     """
-    if request.kind in SIX and width == len(six_names(request.kind)):
+    asked = request.rows
+    if asked.kind in SIX and width == len(six_names(asked.kind)):
         return f"1-{width}"
-    if request.poses > 1:
+    if asked.poses > 1:
         return ""
-    if request.given_place:
+    if asked.given_place:
         from frametool.stream.earth_columns import of_width
 
         return of_width(width, request)
-    if (notation := request.given) is None:
+    if (notation := asked.given) is None:
         return f"1-{width}" if width in (len(XYZ), *(each.counts[-1] for each in wholes_of(None))) else ""
     return f"1-{width}" if width in notation.counts else f"2-{width}" if width - 1 in notation.counts[1:] else ""
 
 
 def _find_named(names: Sequence[str], request: Request, source: str) -> list[PoseColumns]:
     """Find points, poses, a twist or a wrench by their names; with a pose a twist is another column."""
-    six = find_six(names, request.kind if request.kind in SIX else "")
-    if request.kind in SIX and six is None:
-        wanted = " ".join(six_names(request.kind))
-        found = f"no columns of a {request.kind} ({wanted}) among: {listed(names)}"
+    asked = request.rows
+    six = find_six(names, asked.kind if asked.kind in SIX else "")
+    if asked.kind in SIX and six is None:
+        wanted = " ".join(six_names(asked.kind))
+        found = f"no columns of a {asked.kind} ({wanted}) among: {listed(names)}"
         raise _refusal(f"{found}; name them with --columns", source)
     taken = () if six is None else six.places
     others = ["" if place in taken else name for place, name in enumerate(names)]
-    if six is not None and (request.kind in SIX or not has_pose_column(others)):
+    if six is not None and (asked.kind in SIX or not has_pose_column(others)):
         return [PoseColumns(six, None)]
     if not (request.operation.moves or request.operation.changes_nothing):
         others = list(names)  # what a pose has with it would no longer be true
-    if request.poses == 1 and (request.given_place or any(map(may_be_on_earth, names))):
+    if asked.poses == 1 and (asked.given_place or any(map(may_be_on_earth, names))):
         from frametool.stream.earth_columns import find_pose
 
         if (pose := find_pose(others, request, source)) is not None:
             return [pose]
-    return find_poses(others, request.given, request.poses, source)
+    return find_poses(others, asked.given, asked.poses, source)
 
 
 def _turning_along(
@@ -188,10 +191,10 @@ def _turning_along(
     source: str,
 ) -> list[tuple[PoseColumns, str]]:  # fmt: skip
     """Find the vectors that turn along with the point or pose of a row, each with its kind."""
-    operation, known = request.operation, {*names}
-    if not poses or request.columns or operation.formula is not None:
+    operation, known, kind = request.operation, {*names}, request.rows.kind
+    if not poses or request.rows.columns or operation.formula is not None:
         return []
-    there = [each for each in normals if known >= {*each}] if known >= {*XYZ} and request.kind in ("", POINT) else []
+    there = [each for each in normals if known >= {*each}] if known >= {*XYZ} and kind in ("", POINT) else []
     if there and operation.turns and (operation.left is not None or operation.mirrors):
         named = ", ".join(map(" ".join, there))
         raise Misused(f"{named} would keep to the old axes; --columns x,y,z turns the points alone, apply all of them")
@@ -211,8 +214,8 @@ def own_count(plan: Plan, width: int) -> int:
 
 def _shapes(poses: Sequence[PoseColumns], request: Request, asked: int) -> tuple[Shape, ...]:
     """Return what the numbers of a row mean; those an expression asks for come last."""
-    kinds = request.kinds or (request.kind,) * len(poses)
-    shapes = tuple(row_shape(pose, request._replace(kind=kind)) for pose, kind in zip(poses, kinds, strict=True))
+    kinds = request.rows.kinds or (request.rows.kind,) * len(poses)
+    shapes = tuple(row_shape(pose, request.with_rows(kind=kind)) for pose, kind in zip(poses, kinds, strict=True))
     if request.operation.formula is None:
         return shapes
     return ((shapes[0] if shapes else Shape("", None))._replace(extra=asked),)
@@ -220,29 +223,30 @@ def _shapes(poses: Sequence[PoseColumns], request: Request, asked: int) -> tuple
 
 def _without_position(pose: PoseColumns, request: Request, table: Table, source: str) -> PoseColumns:
     """Leave the position to pass as it is where only the rotation is rewritten."""
-    if pose.rotation is None and request.by_default:
+    if pose.rotation is None and request.results.by_default:
         return pose
     if pose.rotation is None:
-        wanted = "; give --from REP or --columns" if request.given is None else ""
+        wanted = "; give --from REP or --columns" if request.rows.given is None else ""
         known = listed(table.names or ("columns without names",))
         raise _refusal(f"no columns of a rotation among: {known}{wanted}", source)
-    leaves_plane = pose.position and not pose.position.wrong and pose.position.absent and request.notations
-    is_whole = len(request.notations) == 1 and request.notations[0].representation.whole is not None
+    leaves_plane = pose.position and not pose.position.wrong and pose.position.absent and request.results.notations
+    is_whole = len(request.results.notations) == 1 and request.results.notations[0].representation.whole is not None
     stays = not (is_whole or pose.rotation.whole or leaves_plane)
     return PoseColumns(None, pose.rotation) if stays else pose
 
 
 def _frame_columns(table: Table, request: Request, source: str, *, on_earth: bool) -> tuple[int, ...]:
     """Find the columns that name frames: for look-ups those named, else the one a row is expressed in."""
+    asked = request.rows
     names = table.names or ()
     if on_earth:
         return tuple(place for place, name in enumerate(names) if name == PARENT_KEYS[0])[:1]
-    if not (request.poses or request.frames):
+    if not (asked.poses or asked.frames):
         return ()
-    if request.frames and request.frames != ("",):
-        return tuple(_place(name, names, source) for name in request.frames)
+    if asked.frames and asked.frames != ("",):
+        return tuple(_place(name, names, source) for name in asked.frames)
     found = _first_called(PARENT_COLUMNS, table)
-    if found is None and request.frames:
+    if found is None and asked.frames:
         remedy = "name SOURCE, or give --frame-column"
         raise _refusal(f"rows do not say their frame; {remedy}; columns: {', '.join(names)}", source)
     return () if found is None else (found,)
@@ -275,7 +279,7 @@ def _stamp_columns(
 
     Where all numbers are wanted it may be one that no option names.
     """
-    name = request.timed.name if request.timed else request.extra_column
+    name = request.timed.name if request.timed else request.rows.extra_column
     if name is not None:
         time = _place(name, _names_or_numbers(table), source)
         if request.gathered is None:  # else it is a weight
@@ -284,10 +288,10 @@ def _stamp_columns(
             except ValueInvalid as error:
                 raise Misused(str(error), source=source, line=1) from None
         return time, nanoseconds_beside(table.names, time) if table.names else None
-    if not (stamped and request.all_numbers):
+    if not (stamped and request.results.all_numbers):
         return None, None
     usual, below = stamp_places(table.names)
-    if not (table.names or request.columns) and min(places, default=0) == 1:
+    if not (table.names or request.rows.columns) and min(places, default=0) == 1:
         usual = 0  # what is before the numbers that --from speaks of
     return (None, None) if usual in frames else (usual, below)
 
@@ -306,11 +310,12 @@ def _columns(
     named: the columns of names and their roles.  Raises Misused for several that have other numbers.
     """
     columns: list[Column] = [Kept(place) for place in range(table.width)]
-    only_turned = request.operation.changes_nothing and not request.operation.moves and request.place is None
-    if only_turned and request.by_default and not (request.all_numbers or targets[0].notations or request.keep):
+    operation, asked = request.operation, request.results
+    only_turned = operation.changes_nothing and not operation.moves and asked.place is None
+    if only_turned and asked.by_default and not (asked.all_numbers or targets[0].notations or asked.keep):
         return columns
     ours: dict[int, list[Column]] = {place: [] for pose in poses for place in pose.places}
-    adds = request.keep or request.operation.only_adds or not ours
+    adds = request.results.keep or request.operation.only_adds or not ours
     at: dict[int, list[Column]] = {}
     for place, role in named.items() if not adds and rename_of(request) is not None else ():
         at[place] = [Named(place, role)]
@@ -320,11 +325,11 @@ def _columns(
     for number, target in enumerate(targets):
         pose = poses[number] if len(poses) == len(targets) else PoseColumns(None, None)  # of a pair
         shape, places = shapes[number] if shapes else Shape(POSE), pose.places or tuple(ours)
-        several = len(targets) > 1 and (request.poses > 1 or number > 0)
+        several = len(targets) > 1 and (request.rows.poses > 1 or number > 0)
         first += request.result_size(shapes[number - 1], targets[number - 1]) if number else 0
         position, rotation, extras = _new_columns(pose, target, request, shape, first, several=several)
         in_place = _in_place(pose, shape, target)
-        if several and (not in_place or (request.notations and request.poses > 1)):
+        if several and (not in_place or (request.results.notations and request.rows.poses > 1)):
             raise Misused("several --columns are moved as they are written; for --to, or a rotation alone, give one")
         if adds:
             added += [*position, *rotation, *extras]
@@ -381,7 +386,7 @@ def _new_columns(
 
     several: it is one of several, so that its names are those of its columns
     """
-    rotation, alone, prefix = pose.rotation, not request.prefix or several, request.prefix
+    rotation, alone, prefix = pose.rotation, not request.results.prefix or several, request.results.prefix
     before, behind = (rotation.prefix, rotation.suffix) if rotation and alone else (prefix, "")
     turned = [before + name + behind for name in target.names]
     if rotation and alone and _same(pose, target) and rotation.whole == target.whole:

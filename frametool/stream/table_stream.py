@@ -66,7 +66,7 @@ def _first_rows(blocks: Iterator[bytes]) -> bytes | None:
 
 def settle_stamps(table: Table, request: Request, source: str) -> tuple[Request, Timed | None]:
     """Find the column of stamps that a request needs; or, where no option names one, the one nobody asked for."""
-    timed, extra, operation = request.timed, request.extra_column, request.operation
+    timed, extra, operation = request.timed, request.rows.extra_column, request.operation
     found, _ = stamp_places(table.names)
 
     def stamps(who: str) -> str:
@@ -79,7 +79,7 @@ def settle_stamps(table: Table, request: Request, source: str) -> tuple[Request,
     is_cut = (request.window or request.offset_ns) and extra is None and not (timed and timed.name)
     if extra == "" or is_cut:
         who = "a velocity" if operation.velocity else "--start, --stop, --time-offset"
-        request = request._replace(extra_column=stamps(who))
+        request = request.with_rows(extra_column=stamps(who))
     if timed is None or timed.name:
         return request, None
     if operation.formula is not None and not operation.shown:
@@ -170,7 +170,7 @@ class TableRows(PlannedRows):
         first = _first_rows(blocks)
         if first is None:
             raise FormatError("nothing in it", source=source)
-        known = request.given or request.given_place
+        known = request.rows.given or request.rows.given_place
         table, rest = open_table(first, fmt, header=header, source=source, expected=known)
         super().__init__(as_trajectory(table, fmt, request, source), request, source)
         self.texts = chain((rest,) if rest else (), blocks)

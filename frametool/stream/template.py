@@ -102,7 +102,7 @@ class Template:
         frames = [_frames_of(known.root, entry.record, known.request, json=self.json) for entry in self.entries]
         self._patterns |= {_text_of(node): FRAME[self.json, node.quote] for node in chain(*frames) if node is not None}
         leaves: dict[Span, Node] = {}
-        if known.request.canonical and self.regular:
+        if known.request.results.canonical and self.regular:
             own = [known.root.at(path) for _, path in paths if path is not None]
             leaves = {_text_of(node): node for node in (*own, *chain(*frames)) if node is not None}
             leaves |= self._cut_leaves(cuts | self._patterns.keys())
@@ -183,7 +183,7 @@ class Template:
     @cached_property
     def expression(self) -> bytes:
         """Return the regular expression, one group a stretch, that all records match that are alike."""
-        free = iter(() if self._request.canonical else self._free_leaves())
+        free = iter(() if self._request.results.canonical else self._free_leaves())
         leaf = next(free, None)
         groups = []
         for start, end in self.stretches:
@@ -273,8 +273,8 @@ def _leaves(node: Node, path: Path) -> Iterator[tuple[Path, Node]]:
 
 def _frames_of(root: Node, record: Record, request: Request, *, json: bool) -> tuple[Node | None, Node | None]:
     """Return where the frames of a record are named, parent and name, if all that is alike may name others."""
-    is_placed = record.placed or record.shape.place or request.place or request.given_place
-    if is_placed or not request.poses:
+    is_placed = record.placed or record.shape.place or request.results.place or request.rows.given_place
+    if is_placed or not request.rows.poses:
         return None, None
     parent, name = (
         root.at(each.paths[0]) if each.text and len(each.paths) == 1 else None for each in (record.parent, record.name)

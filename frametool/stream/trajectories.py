@@ -31,7 +31,7 @@ from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows, Outcome, run
 from frametool.stream.header import listed
 from frametool.stream.record_stream import run_records
-from frametool.stream.request import Operation, Request
+from frametool.stream.request import Operation, Request, RowOptions
 from frametool.stream.row_poses import RowPoses, block_of, objects, plain_cells
 from frametool.stream.table import open_table
 from frametool.text.cells import without_quotes
@@ -90,7 +90,7 @@ def read_trajectory(
 
         if (found := open_trajectory(name, topics, Diagnostics())) is not None:
             bad = policy(name)
-            asked = Request(normalize=normalize, on_error=bad.on_error)
+            asked = Request(rows=RowOptions(normalize=normalize), on_error=bad.on_error)
             with closing(InputFile(name, found[0])) as file:
                 return _of_records(file, "json", bad, asked, body_of(found[1], answers))
     if os.path.isdir(name) or inside or topics:
@@ -102,7 +102,7 @@ def read_trajectory(
         if not is_record and {"rows", "arrays"}.isdisjoint(FORMATS[fmt].reads):
             return _of_tree(name, fmt, topics, answers, inside, file, normalize=normalize)
         bad = policy(file.name)
-        asked = Request(normalize=normalize, on_error=bad.on_error)
+        asked = Request(rows=RowOptions(normalize=normalize), on_error=bad.on_error)
         return _of_records(file, fmt, bad, asked) if is_record else _of_rows(file, fmt, answers, bad, asked)
     finally:
         file.close()

@@ -12,7 +12,7 @@ from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 from frametool.stream.record import Record, pose_of
 from frametool.stream.record_values import read_text
-from frametool.stream.request import Operation, Request
+from frametool.stream.request import Operation, Request, RowOptions
 from frametool.stream.row_layout import POINT, POSE, VECTOR
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class ByTree(NamedTuple):
 
 def written_poses(source: Source, *, degrees: bool = False, normalize: bool = False) -> list[WrittenPose]:
     """Read the poses of a text as they are written; raises as `read_poses` does."""
-    request = Request(kind=POSE, degrees=degrees, normalize=normalize)
+    request = Request(rows=RowOptions(kind=POSE, degrees=degrees, normalize=normalize))
     return [_written_pose(record, request) for record in read_text(source, request).records]
 
 
@@ -52,14 +52,13 @@ def _written_pose(record: Record, request: Request) -> WrittenPose:
 
 
 def derive_record(
-    plan: DerivationStyle, way: ByTree | WrittenPose, source: Source, *, kind: str = "", degrees: bool = False,
-    normalize: bool = False, counters: bool = True, timeless: bool = False,
-) -> Explanation:  # fmt: skip
+    plan: DerivationStyle, way: ByTree | WrittenPose, source: Source, rows: RowOptions, *, timeless: bool = False
+) -> Explanation:
     """Derive where a record is in the target's frame.
 
     way: a lookup, or a pose.  source: text that holds one record.  timeless: the stamp of its header does not matter.
     """
-    request = Request(Operation(moves=True), kind=kind, degrees=degrees, normalize=normalize, frame_is_counter=counters)
+    request = Request(Operation(moves=True), rows)
     records = read_text(source, request).records
     if len(records) != 1:
         raise ValueInvalid(f"a derivation is of one record, {source.name} holds {len(records)}")

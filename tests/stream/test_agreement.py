@@ -166,7 +166,7 @@ def test_an_argument_has_the_numbers_of_a_line(kind: str, wanted: str) -> None:
     if kind == "plane" and wanted in ("move", "compose"):
         return  # leaves the plane, which only a stream has to keep
     if RECORDS[kind].get("header") is None and kind not in ONLY_MOVED:
-        request = request._replace(notations=convert("quaternion").notations)
+        request = request.with_results(notations=convert("quaternion").results.notations)
     text = json.dumps(RECORDS[kind])
     line = flow(f"{text}\n".encode(), request, "json")
     if line.status:

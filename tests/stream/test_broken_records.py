@@ -48,7 +48,7 @@ def test_consecutive_poses_follow_the_text_however_they_are_spelled(count: int, 
 
 def test_angles_of_records_go_on_beyond_half_a_turn() -> None:
     text = "".join(f'{{"rpy_deg":[0,0,{yaw}]}}\n' for yaw in (170, 190, 320, 90)).encode()
-    result = flow(text, convert("rpy_deg")._replace(unwrap=True), "json")
+    result = flow(text, convert("rpy_deg").with_results(unwrap=True), "json")
     yaws = [json.loads(line)["rpy_deg"]["yaw"] for line in result.text.splitlines()]
     assert yaws == pytest.approx([170, 190, 320, 450])
 

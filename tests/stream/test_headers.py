@@ -69,7 +69,7 @@ def test_a_result_that_leaves_the_plane_is_a_bad_row_that_says_what_to_do() -> N
     text = b"x,y,yaw\n1,2,0\n"
     result = flow(text, UP._replace(on_error="skip"))
     assert result.told[0] == "in:2: the result leaves the plane: z is 1 and has no column; give --to rpy (row skipped)"
-    assert flow(text, UP._replace(notations=convert("rpy").notations)).text == (
+    assert flow(text, UP.with_results(notations=convert("rpy").results.notations)).text == (
         b"x,y,z,roll,pitch,yaw\n1.0,2.0,1.0,0.0,0.0,0.0\n"
     )
     assert flow(b"x,y,z,yaw\n1,2,0,0\n", UP).text == b"x,y,z,yaw\n1.0,2.0,1.0,0.0\n"
@@ -106,14 +106,14 @@ def test_x_y_z_w_are_a_quaternion_alone_and_refused_beside_others() -> None:
     assert flow(b"x,y,z,w\n0,0,0.6,0.8\n", INVERT).text == b"x,y,z,w\n0.0,0.0,-0.6,0.8\n"
     beside = b"id,x,y,z,w\n1,0,0,0.6,0.8\n"
     assert "x y z w may be a quaternion or a point and a number" in flow(beside, MOVE).told[0]
-    assert flow(beside, MOVE._replace(columns=("x,y,z",))).text == b"id,x,y,z,w\n1,1.0,2.0,3.6,0.8\n"
-    assert flow(beside, INVERT._replace(given=convert("xyzw").notations[0])).text == b"id,x,y,z,w\n1,0.0,0.0,-0.6,0.8\n"
+    assert flow(beside, MOVE.with_rows(columns=("x,y,z",))).text == b"id,x,y,z,w\n1,1.0,2.0,3.6,0.8\n"
+    assert flow(beside, INVERT.with_rows(given=convert("xyzw").results.notations[0])).text == b"id,x,y,z,w\n1,0.0,0.0,-0.6,0.8\n"
 
 
 def test_halves_do_no_harm_beside_a_whole_rotation_or_a_choice() -> None:
     whole = b"x,y,z,qx,qy,qz,qw,roll,pitch\n1,2,3,0,0,0,1,9,9\n"
     assert flow(whole, SHIFT).text.splitlines()[1] == b"2.0,2.0,3.0,0.0,0.0,0.0,1.0,9,9"
-    chosen = MOVE._replace(columns=("x,y,z",))
+    chosen = MOVE.with_rows(columns=("x,y,z",))
     assert flow(b"x,y,z,qx,qy,qz\n1,2,3,4,5,6\n", chosen).text.splitlines()[1] == b"-1.0,3.0,6.0,4,5,6"
 
 
@@ -130,14 +130,14 @@ def test_halves_do_no_harm_beside_a_whole_rotation_or_a_choice() -> None:
 )
 @pytest.mark.parametrize("form", ["columns", "csv"])
 def test_numbers_without_names_are_what_from_says(row: bytes, spec: str, wanted: bytes, form: str) -> None:
-    given = convert("rpy")._replace(given=convert(spec).notations[0] if spec else None)
+    given = convert("rpy").with_rows(given=convert(spec).results.notations[0] if spec else None)
     between = b"," if form == "csv" else b" "
     result = flow(row.replace(b" ", between) + b"\n", given, form, header=form != "csv")
     assert result.text == wanted.replace(b" ", between) + b"\n", result.told
 
 
 def test_columns_are_chosen_by_number_where_they_have_no_names() -> None:
-    chosen = convert("rpy")._replace(given=convert("wxyz").notations[0], columns=("5,6,7,8",))
+    chosen = convert("rpy").with_rows(given=convert("wxyz").results.notations[0], columns=("5,6,7,8",))
     assert flow(b"7 1 2 3 1 0 0 0\n", chosen, "columns").text == b"7 1 2 3 0.0 0.0 0.0\n"
 
 

@@ -103,7 +103,7 @@ def test_a_row_in_another_frame_than_source_is_bad_and_names_both(run: Run, colu
 def test_a_counter_called_frame_stays_unless_frames_are_called_so() -> None:
     table = b"frame,x,y,z\n7,0,0,0\nlidar,0,0,0\n"
     assert flow(table, MOVES).text == b"frame,x,y,z\n7,1.0,2.0,3.0\nmap,1.0,2.0,3.0\n"
-    result = flow(table, MOVES._replace(frame_is_counter=False))
+    result = flow(table, MOVES.with_rows(frame_is_counter=False))
     assert result.text == b"frame,x,y,z\nmap,1.0,2.0,3.0\n"
     assert result.told[0].startswith("in:2:frame: '7' is not 'lidar'")
     assert flow(b"frame_id,x,y,z\n7,0,0,0\n", MOVES).status == 3

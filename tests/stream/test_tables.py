@@ -67,16 +67,16 @@ def test_more_than_one_candidate_is_an_error_that_lists_them() -> None:
     result = flow(b"a.x,a.y,a.z,b.x,b.y,b.z\n1,2,3,4,5,6\n", MOVE)
     assert (result.status, result.text) == (1, b"")
     assert "a.x a.y a.z; b.x b.y b.z" in result.told[0]
-    assert flow(b"a.x,a.y,a.z,b.x,b.y,b.z\n1,2,3,4,5,6\n", MOVE._replace(columns=("b.x,b.y,b.z",))).status == 0
+    assert flow(b"a.x,a.y,a.z,b.x,b.y,b.z\n1,2,3,4,5,6\n", MOVE.with_rows(columns=("b.x,b.y,b.z",))).status == 0
 
 
 def test_results_beside_their_source_need_other_names() -> None:
     text = b"qx,qy,qz,qw,t\n0,0,0,1,a\n"
     assert (
-        flow(text, convert("rpy")._replace(keep=True)).text == b"qx,qy,qz,qw,t,roll,pitch,yaw\n0,0,0,1,a,0.0,0.0,0.0\n"
+        flow(text, convert("rpy").with_results(keep=True)).text == b"qx,qy,qz,qw,t,roll,pitch,yaw\n0,0,0,1,a,0.0,0.0,0.0\n"
     )
-    assert "--prefix" in flow(text, INVERT._replace(keep=True)).told[0]
-    kept = flow(text, INVERT._replace(keep=True, prefix="inv_"))
+    assert "--prefix" in flow(text, INVERT.with_results(keep=True)).told[0]
+    kept = flow(text, INVERT.with_results(keep=True, prefix="inv_"))
     assert kept.text.splitlines()[0] == b"qx,qy,qz,qw,t,inv_qx,inv_qy,inv_qz,inv_qw"
 
 
@@ -153,7 +153,7 @@ def test_consecutive_rows_are_compared_across_blocks_and_bad_rows(size: int) -> 
 @pytest.mark.parametrize("size", [0, 40])
 def test_unwrapped_angles_never_jump(size: int) -> None:
     text = b"roll_deg,pitch_deg,yaw_deg\n" + b"".join(b"0,0,%d\n" % (turn * 100) for turn in range(-9, 20))
-    result = flow(text, convert("rpy_deg")._replace(unwrap=True, precision=3), size=size)
+    result = flow(text, convert("rpy_deg").with_results(unwrap=True, precision=3), size=size)
     yaws = [float(line.split(b",")[2]) for line in result.text.splitlines()[1:]]
     assert {round(after - before) for before, after in pairwise(yaws)} == {100}
 
@@ -171,7 +171,7 @@ def test_each_row_may_name_its_frame() -> None:
 def test_every_representation_goes_there_and_back(spec: str) -> None:
     text = b"qx,qy,qz,qw\n0.1,-0.2,0.3,0.9273618495495703\n0.5,0.5,-0.5,0.5\n"
     there = flow(text, convert(spec))
-    back = flow(there.text, convert("quaternion")._replace(given=convert(spec).notations[0]))
+    back = flow(there.text, convert("quaternion").with_rows(given=convert(spec).results.notations[0]))
     for line, start in zip(back.text.splitlines()[1:], text.splitlines()[1:], strict=True):
         assert [float(cell) for cell in line.split(b",")] == pytest.approx(
             [float(cell) for cell in start.split(b",")], abs=1e-15
@@ -186,12 +186,12 @@ def test_poses_as_whole_matrices_go_there_and_back() -> None:
 
 
 def test_fixed_decimals_are_those_of_percent_f() -> None:
-    result = flow(b"x,y,z\n1.0000005,2.5,1e15\n", MOVE._replace(precision=6))
+    result = flow(b"x,y,z\n1.0000005,2.5,1e15\n", MOVE.with_results(precision=6))
     assert result.text.splitlines()[1] == b"%.6f,%.6f,%.6f" % (1.0 - 2.5, 2.0 + 1.0000005, 3.0 + 1e15)
 
 
 def test_tables_without_header_are_read_by_position() -> None:
-    request = MOVE._replace(columns=("2-4",))
+    request = MOVE.with_rows(columns=("2-4",))
     assert flow(b"a,0,0,0\nb,1,1,1\n", request, header=False).text == b"a,1.0,2.0,3.0\nb,0.0,3.0,4.0\n"
     assert "--no-header" in flow(b"1,2,3\n", MOVE).told[0]
 
@@ -220,7 +220,7 @@ def test_a_quote_that_opens_nothing_is_text() -> None:
 
 @pytest.mark.parametrize("first", [b"", b"7 "])
 def test_sixteen_columns_are_a_matrix(first: bytes) -> None:
-    given = convert("quaternion")._replace(given=convert("matrix").notations[0])
+    given = convert("quaternion").with_rows(given=convert("matrix").results.notations[0])
     row = first + b"1 0 0 1 0 1 0 2 0 0 1 3 0 0 0 1\n"
     assert flow(row, given, "columns", header=False).text == first + b"1.0 2.0 3.0 0.0 0.0 0.0 1.0\n"
 

@@ -24,7 +24,7 @@ from frametool.stream.record import find_records
 from frametool.stream.record_stream import run_records
 from frametool.stream.record_text import Entry, answer, target_of
 from frametool.stream.record_values import read_poses, results
-from frametool.stream.request import Operation, Request
+from frametool.stream.request import Operation, Request, ResultOptions, RowOptions
 from frametool.stream.stamp_columns import read_stamps
 from frametool.stream.stamp_source import read_stamp
 from frametool.stream.table_stream import run_table
@@ -43,9 +43,10 @@ ON_ERROR = ("stop", "skip", "null")
 
 
 def asked(**options: Any) -> Asked:
-    """Ask for an operation, by the fields of `Operation`, with options, by those of `Request`."""
+    """Ask for an operation, by the fields of `Operation`, with options, by those of `Request` and what it is made of."""
     operation = {name: options.pop(name) for name in [*options] if name in Operation._fields}
-    return Request(Operation(**operation), **options)
+    rows, results = ({name: options.pop(name) for name in [*options] if name in each._fields} for each in (RowOptions, ResultOptions))
+    return Request(Operation(**operation), RowOptions(**rows), ResultOptions(**results), **options)
 
 
 MOVE = asked(left=QUARTER, moves=True, pose_from_frame=lambda _own: QUARTER, rename=lambda _parent, name: (None, name))
@@ -112,7 +113,7 @@ def poses_in(text: str, **options: Any) -> list[Pose]:
 
 def values_of(text: str, request: Asked) -> list[Any]:
     """Give the results of the records of an argument."""
-    return [*results(Source("argument", text), request, Style("json", request.notations))]
+    return [*results(Source("argument", text), request, Style("json", request.results.notations))]
 
 
 class Moving:

@@ -275,10 +275,10 @@ def between_command(inputs: Inputs) -> None:
 def _vectors(text: str) -> list[Vector]:
     """Read the vectors of an argument."""
     from frametool.stream.record_values import read_text
-    from frametool.stream.request import Operation, Request
+    from frametool.stream.request import Operation, Request, RowOptions
     from frametool.stream.row_layout import VECTOR
 
-    request = Request(Operation(moves=True), kind=VECTOR)
+    request = Request(Operation(moves=True), RowOptions(kind=VECTOR))
     with poses.inline_misuse():
         records = read_text(poses.pose_source(text, request), request).records
         return [record.shape.position(record.values) for record in records]

@@ -234,13 +234,13 @@ def apply_command(inputs: Inputs) -> int:
         refuse(is_stream or len(records) != 1, f"a stream, or several records; {streaming.ONE_RECORD}")
         return _derived(task, plan, way, records[0], kind or "")
     request = way.request(*((inputs.frame_column, inputs.time_column) if is_stream else (None, None)))
-    request = request._replace(kind=kind or "", degrees=output.style.degrees, normalize=task.normalize)
+    request = request.with_rows(kind=kind or "", degrees=output.style.degrees, normalize=task.normalize)
     request = task.at_places(request)
     status = 0
     if is_stream:
         if (count := len(inputs.peek("columns"))) > 1:
             kinds = inputs.kinds if len(inputs.kinds) == count else (kind or "",) * count
-            request = request._replace(poses=count, kinds=kinds)
+            request = request.with_rows(poses=count, kinds=kinds)
         status = task.run(request)
     else:
         task.only_arguments(rest)
@@ -253,13 +253,15 @@ def apply_command(inputs: Inputs) -> int:
 
 def _derived(task: PoseTask, plan: DerivationStyle, way: Way, record: str | Source, kind: str) -> int:
     """Write the derivation of one record."""
-    from frametool.stream.request import Operation
+    from frametool.stream.request import Operation, RowOptions
     from frametool.stream.written import derive_record
 
     asked, timeless = task.request(operation=Operation(moves=True)), task.inputs.at is not None
     with inline_misuse():
-        made = derive_record(plan, way.explained(task), pose_source(record, asked), kind=kind, degrees=asked.degrees,
-                             normalize=task.normalize, counters=way.counters, timeless=timeless)  # fmt: skip
+        rows = RowOptions(
+            kind=kind, degrees=asked.rows.degrees, normalize=task.normalize, frame_is_counter=way.counters
+        )
+        made = derive_record(plan, way.explained(task), pose_source(record, asked), rows, timeless=timeless)
     return task.write(made)
 
 
@@ -320,14 +322,14 @@ class Way:
 
     def request(self, frame_column: str | None, time_column: str | None) -> Request:
         """Return how records move: from one frame or each from its own, all alike or each at its own time."""
-        from frametool.stream.request import Operation, Request
+        from frametool.stream.request import Operation, Request, RowOptions
 
         has_source = self.has_source and frame_column is None
         left = self.from_frame(None) if has_source and not time_column else None
         return Request(
             Operation(left=left, moves=True, uncertain=self.uncertain),
-            frames=() if has_source else (frame_column or "",), pose_from_frame=self.from_frame,
-            frame_is_counter=self.counters, rename=lambda _parent, name: (self.target, name),
+            RowOptions(frames=() if has_source else (frame_column or "",), frame_is_counter=self.counters),
+            pose_from_frame=self.from_frame, rename=lambda _parent, name: (self.target, name),
         )  # fmt: skip
 
 

@@ -337,12 +337,14 @@ def _over_rows(lines: Sequence[Line], flags: Sequence[bool], scope: Scope, outpu
 
 def _request(formula: RowExpressions, inputs: Inputs) -> Request:
     """Return what is asked of the rows."""
-    from frametool.stream.request import Operation, Request
+    from frametool.stream.request import Operation, Request, RowOptions
     from frametool.stream.stamp_source import Timed
 
     timed = Timed.of_rows(inputs.time_column or "") if formula.needs_time else None
     counters = not any(frame.isdecimal() for _, tree in formula.scope.trees for frame in tree.frames)
     return Request(
-        Operation(moves=True, formula=formula), kind=inputs.kind or "", degrees=inputs.deg,
-        normalize=inputs.normalize, timed=timed, frame_is_counter=counters, earth=formula.scope.earth,
+        Operation(moves=True, formula=formula), timed=timed, earth=formula.scope.earth,
+        rows=RowOptions(
+            kind=inputs.kind or "", degrees=inputs.deg, normalize=inputs.normalize, frame_is_counter=counters
+        ),
     )  # fmt: skip

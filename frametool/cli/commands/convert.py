@@ -75,19 +75,19 @@ def convert_command(inputs: Inputs) -> int:
     request = task.request(operation=operation, extra_column=inputs.time_column, notations=notations)
     if operation.turns and (values or task.path or task.has_input()):
         _say_other_side(axes, world)
-        _say_of_engines(world, request.given, output, is_anew=bool(values) and values != ("-",))
-    is_numbers = _are_numbers(values, has_from=request.given is not None or bool(request.given_place))
-    if is_numbers and request.given_place:
+        _say_of_engines(world, request.rows.given, output, is_anew=bool(values) and values != ("-",))
+    is_numbers = _are_numbers(values, has_from=request.rows.given is not None or bool(request.rows.given_place))
+    if is_numbers and request.rows.given_place:
         from frametool.cli.earth import mapping_of
 
-        values, is_numbers = (mapping_of(values, request.given_place),), False
+        values, is_numbers = (mapping_of(values, request.rows.given_place),), False
     bare, is_inverse = poses.without_inverse(values[0]) if len(values) == 1 and not is_numbers else ("", False)
     if bare == "-" or (bare and not task.path and task.has_table(bare)):
         refuse(task.derives, f"{values[0]} is a stream; {ONE_RECORD}")
         values, request = ("-",), request.of_inverses() if is_inverse else request
     is_alone = operation.turns and not values and (task.derives or not task.has_input())
     if not (is_numbers or ((values or is_alone) and all(map(poses.is_inline, values)))):
-        request = request._replace(unwrap=inputs.unwrap)
+        request = request.with_results(unwrap=inputs.unwrap)
     if values == ("-",) or not (values or is_alone):
         return task.run(request)
     task.only_arguments(values)
@@ -105,7 +105,8 @@ def convert_command(inputs: Inputs) -> int:
     if task.derives:
         refuse(len(found) != 1, f"--explain derives one pose, found {len(results)}")
         if not sources:
-            own = (values, request.given) if values else (list(map(repr, found[0].components[3:])), notation("xyzw"))
+            texts = list(map(repr, found[0].components[3:]))
+            own = (values, request.rows.given) if values else (texts, notation("xyzw"))
             sources = [Source(poses.INLINE, mapping_of_numbers(*own))]
         change = _named_change(axes, world, operation) if values else None
         return task.derive("convert", task.written(sources[0], warned=True), own=found[0], change=change)

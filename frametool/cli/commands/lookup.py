@@ -206,10 +206,10 @@ def _by_row(task: PoseTask, lookups: algebra.Lookups, target: str | None, source
     width = UNCERTAIN if lookups.carried else EXACT
     timed = None if inputs.time_column is None else Timed(inputs.time_column, many, edge_of, width=width)
     request = task.request(
-        poses=0, frames=frames, pose_from_frame=edge_of, notations=task.output.notations or QUATERNION,
+        poses=0, pose_from_frame=edge_of, notations=task.output.notations or QUATERNION,
         operation=Operation(uncertain=lookups.carried), timed=timed,
     )  # fmt: skip
-    return task.run(request, tables_only=True)
+    return task.run(request.with_rows(frames=frames), tables_only=True)
 
 
 @command_named("echo")
@@ -295,7 +295,7 @@ def fk_command(inputs: Inputs) -> int:
         raise click.UsageError(f"no rows of joint values: give -i FILE; for one posture, frametool lookup {words}")
     from frametool.formats.robots.urdf import robot_of
     from frametool.stream.joint_rows import JointRows, names_in
-    from frametool.stream.request import Operation, Request
+    from frametool.stream.request import Operation, Request, RowOptions
 
     (file,) = opened((inputs.tree,), streams=True)
     robot, posture = robot_of(file)
@@ -309,4 +309,4 @@ def fk_command(inputs: Inputs) -> int:
         file.tally.assumed = ""  # rows say where each joint on the way is
         state([file])
         operation = Operation(moves=True, formula=rows)
-        return stream.run(Request(operation, poses=0, degrees=inputs.deg, normalize=inputs.normalize))
+        return stream.run(Request(operation, RowOptions(poses=0, degrees=inputs.deg, normalize=inputs.normalize)))

@@ -164,7 +164,7 @@ class CameraTask(Stream):
             asked = self.way.request(frame_column, inputs.time_column if self.is_stream else None)
         operation = asked.operation._replace(formula=formula, shown=shown)
         inputs.ask("keep")
-        return asked._replace(operation=operation, rename=None, normalize=bool(inputs.normalize))
+        return asked._replace(operation=operation, rename=None).with_rows(normalize=bool(inputs.normalize))
 
     def answer(self, request: Request, records: Sequence[Source | str], seen: Seen) -> int:
         """Write the rows of the stream, or the results of records; then say what became of them."""
@@ -175,7 +175,7 @@ class CameraTask(Stream):
         else:
             if output.style.format == "text":
                 output.style = output.style.changed(format="yaml")
-            request = request._replace(prefix=self.inputs.prefix, precision=output.style.precision)
+            request = request.with_results(prefix=self.inputs.prefix, precision=output.style.precision)
             output.values(values_of(records, request, output))
         if (self.is_stream or seen.lost) and (summary := seen.summary()):
             is_wrong = seen.is_mostly_behind and not self.inputs.camera_axes
@@ -236,7 +236,7 @@ def unproject_command(inputs: Inputs) -> int:
     request = task.request(None, seen, seen.shown((task.way and task.way.target) or ""))
     if request.timed is not None and height is not None:
         request = request._replace(timed=request.timed._replace(width=2 * EXACT))
-    return task.answer(request._replace(poses=0, frames=()), records, seen)
+    return task.answer(request.with_rows(poses=0, frames=()), records, seen)
 
 
 class GroundWay(apply.TreeWay):
