@@ -229,11 +229,7 @@ class Stream:
             request = request.with_results(notations=())  # its rows stay what they are
         if fmt in RECORDS and (output.chosen or fmt) != fmt and request.gathered is None:
             return self._run_as_values(stream, fmt, request)
-        return self._run_blocks(stream, fmt, request)
-
-    def _run_blocks(self, stream: BufferedReader, fmt: str, request: Request) -> int:
-        """Write what becomes of each block as it comes, unless somebody gathers it; return the exit status."""
-        output, gathered = self.output, request.gathered
+        gathered = request.gathered
         outcomes, written, tally = self._outcomes(stream, fmt, request)
         bad = self.policy(self.name, "row" if holds_arrays(fmt) else "line")
         outcomes = outcomes if gathered is None else gathered.placing(outcomes, bad.place)
@@ -286,17 +282,14 @@ class Stream:
         converts = chosen not in (None, fmt) or no_room or turns
         if (listed and gathers) or ((listed or converts) and not (gathers or is_kindred or fmt in RECORDS)):
             return self._poses(stream, fmt, request)
-        return self._in_place(stream, fmt, request.with_results(notations=()) if gathers else request), fmt, None
-
-    def _in_place(self, stream: Any, fmt: str, request: Request) -> Generator[Outcome]:
-        """Put the results where the numbers stood; all other text stays."""
+        request = request.with_results(notations=()) if gathers else request
         if fmt in RECORDS:
             from frametool.stream.record_stream import run_records
 
-            return run_records(stream, fmt, request, source=self.name)
+            return run_records(stream, fmt, request, source=self.name), fmt, None
         from frametool.stream.table_stream import run_table
 
-        return run_table(stream, fmt, request, source=self.name, header=self.inputs.header)
+        return run_table(stream, fmt, request, source=self.name, header=self.inputs.header), fmt, None
 
     def _poses(self, stream: Any, fmt: str, request: Request) -> tuple[Generator[Outcome], str, Diagnostics]:
         """Write the results of rows, or of poses that no table holds, in another format."""

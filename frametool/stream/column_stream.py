@@ -21,7 +21,7 @@ from frametool.grammar.names import NORMALS, in_nanoseconds
 from frametool.stream.array_writer import ColumnsWriter
 from frametool.stream.faults import SKIP, STOP, Fault, Outcome, RowNote
 from frametool.stream.layout import Fixed, Kept, Named, New, quoted
-from frametool.stream.request import Operation, Request
+from frametool.stream.request import VELOCITIES, Operation, Request
 from frametool.stream.row_poses import RowPoses, objects, taken
 from frametool.stream.rows import Block, coded_texts
 from frametool.stream.table import Table
@@ -206,7 +206,7 @@ def run_columns(
     move_along(file, request)
     if not request.gathered:
         _say_rounded([rows], f"{source}: ")
-    drops = request.on_error == SKIP or request.operation.velocity
+    drops = request.on_error == SKIP or request.operation.of == VELOCITIES
     writer: ColumnWriter | None = None
     other = None if into is None else ColumnsWriter(style, into)
     if other is None and not request.gathered:

@@ -69,18 +69,15 @@ class PixelsOfPoints(Seen):
     """The pixel and the depth of each point, whether it is in the image, and its distance if that is wanted."""
 
     def __init__(
-        self, camera: Camera, first: float, *, ranged: bool, take: Callable[..., None] | None = None
+        self, camera: Camera, first: float, *, name: str, ranged: bool, take: Callable[..., None] | None = None
     ) -> None:
-        """Take the camera; take: is given the pixels and depths, and which of them are in the image."""
+        """Take the camera and its name, if any; take: is given the pixels and depths, and which are in the image."""
         super().__init__(camera, "point", first)
         self.names = ("u", "v", "depth", "in_image", *["range"] * ranged)
         self.take = take
-
-    def shown(self, name: str) -> Shown:
-        """Return how the numbers are written; name: the camera's, if it has one."""
         members: dict[str, Any] = {"camera": name} if name else {}
         members |= {"pixel": (0, 1), "depth": (2,), "in_image": Word(3, TRUTHS)}
-        return Shown({3: BITS}, members | dict.fromkeys(self.names[4:], (4,)))
+        self.shown = Shown({3: BITS}, members | dict.fromkeys(self.names[4:], (4,)))
 
     def extras(self, row: str) -> tuple[str, ...]:
         """Name the numbers; raise ValueInvalid for what is at no place."""
@@ -125,24 +122,24 @@ class PointsOfPixels(Seen):
 
     def __init__(
         self, camera: Camera, first: float, columns: Sequence[str], *, far: tuple[str, float | None] = ("", None),
-        height: float | None = None, into: Camera | None = None,
+        height: float | None = None, into: Camera | None = None, target: str = "",
     ) -> None:  # fmt: skip
-        """Take what pixels are made of."""
+        """Take what pixels are made of; target: the frame that the numbers are in, if it has a name."""
         super().__init__(camera, "pixel", first)
         self.columns = tuple(columns)
         self.far, self.constant = far
         self.height = height
         self.into = into
-
-    def shown(self, target: str) -> Shown:
-        """Return how the numbers are written; target: the frame that they are in, if it has a name."""
-        if self.into is not None:
-            listed = self.columns[0].startswith("pixel")
-            members: dict[str, Any] = {"pixel": (0, 1)} if listed else {self.columns[at]: (at,) for at in range(2)}
-            return Shown({}, members, replaces=True)
-        rays = {"origin": (0, 1, 2), "ray": (3, 4, 5)}
-        framed: dict[str, Any] = {"frame": target} if target else {}
-        return Shown({}, framed | (rays if self.extras("") == RAY else {"point": (0, 1, 2)}))
+        members: dict[str, Any] = {"frame": target} if target and into is None else {}
+        if self.extras("") == RAY:
+            members |= {"origin": (0, 1, 2), "ray": (3, 4, 5)}
+        elif into is None:
+            members["point"] = 0, 1, 2
+        elif self.columns[0].startswith("pixel"):
+            members["pixel"] = 0, 1
+        else:
+            members |= {self.columns[at]: (at,) for at in range(2)}
+        self.shown = Shown({}, members, replaces=into is not None)
 
     def extras(self, row: str) -> tuple[str, ...]:  # noqa: ARG002
         """Name the numbers."""

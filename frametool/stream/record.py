@@ -42,6 +42,7 @@ from frametool.grammar.pose import (
     length_reader,
     read_angle_unit,
     read_components,
+    read_pose,
     read_rotation,
     shape_of,
     unknown_keys,
@@ -504,7 +505,9 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
         if not (request.operation.multiples and row and row.representation.whole):
             within((rotations[0],), read_rotation, rotations[0], value[rotations[0]], reading)
         record = _with_rotation(value[rotations[0]], rotations[0], record, (rotations[0],), reading, request)
-    _refuse_disagreement(value, positions, rotations, reading)
+    if len(rotations) > 1 or len(positions) > 1:
+        keys = (*rotations, *(positions if len(positions) > 1 else ()))
+        read_pose({key: value[key] for key in value if key in keys}, reading)  # they have to say the same
     if (flag := value.get("inverse", "false")) not in ("true", "false"):
         raise Misfit(f"inverse must be true or false, found {kind(flag)}", ("inverse",))
     shape = record.shape._replace(inverse=flag == "true")
@@ -601,17 +604,6 @@ def _meant(key: str, value: Any, wanted: Collection[str]) -> str:
     """Return `; did you mean ..` for a key that is nearly a wanted one, or another word for it; "" for any other."""
     word = OTHER_WORDS.get(key.lower(), "") if type(value) in (list, dict) else ""
     return f"; did you mean {shown(word)}?" if word in wanted else did_you_mean(key, wanted, cutoff=0.75)
-
-
-def _refuse_disagreement(
-    value: dict[str, Any], positions: Sequence[str], rotations: Sequence[str], reading: Reading
-) -> None:
-    """Stop where several positions or rotations of one entry do not say the same."""
-    if len(rotations) > 1 or len(positions) > 1:
-        from frametool.grammar.pose import read_pose
-
-        keys = (*rotations, *(positions if len(positions) > 1 else ()))
-        read_pose({key: value[key] for key in value if key in keys}, reading)
 
 
 def _flat_pose(value: dict[str, Any], rotations: list[str]) -> PoseColumns | None:

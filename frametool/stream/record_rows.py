@@ -122,9 +122,26 @@ class RecordRows:
         self._plans: dict[Template, tuple[Plan, list[Marked]]] = {}
 
     def plan(self, template: Template) -> Plan:
-        """Return what is done to the records of a template."""
-        if template not in self._plans:
-            self._plans[template] = self._planned(template)
+        """Return what is done to the records of a template; without marks where their results are not made of them."""
+        if template in self._plans:
+            return self._plans[template][0]
+        plan = plan_of(template, self.request, yaml=self.is_yaml)._replace(pieces=())
+        entries, targets, found = template.entries, list[Target](), list[Marked]()
+        # few plain numbers, and no place on the Earth
+        is_plain = template.regular and len({entry.record.path for entry in entries}) == len(entries) <= MOST_ENTRIES
+        is_simple = is_plain and not any(
+            entry.record.shape.multiple or entry.record.shape.place or entry.record.placed or entry.target.place
+            or entry.target.scaled
+            for entry in entries
+        )  # fmt: skip
+        for at, entry in enumerate(entries if is_simple else ()):
+            target = self._target(entry.target, self.request.operation.result_kind(entry.record.shape.kind))
+            if (made := marked(template, at, self.request, self.style, target)) is None:
+                targets, found = [], []
+                break
+            targets.append(target)
+            found.append(made)
+        self._plans[template] = plan._replace(targets=tuple(targets) or plan.targets), found
         return self._plans[template][0]
 
     def take(self, cut: Cut, run: Run, data: Bytes, text: bytes) -> tuple[list[RecordBatch], set[int]]:
@@ -149,29 +166,6 @@ class RecordRows:
             batches.append(RecordBatch(each, own, data, own.starts[:, 0] + at, numbers, parents, names, stamps_ns))
             first += each.size
         return batches, left.intersection(run.rows.tolist())
-
-    def _planned(self, template: Template) -> tuple[Plan, list[Marked]]:
-        """Plan the records of a template; without marks where they are not simple."""
-        plan = plan_of(template, self.request, yaml=self.is_yaml)
-        targets, found = [], []
-        for at, entry in enumerate(template.entries if self._is_simple(template) else ()):
-            target = self._target(entry.target, self.request.operation.result_kind(entry.record.shape.kind))
-            made = marked(template, at, self.request, self.style, target)
-            if made is None:
-                return plan._replace(pieces=()), []
-            targets.append(target)
-            found.append(made)
-        return plan._replace(pieces=(), targets=tuple(targets) or plan.targets), found
-
-    def _is_simple(self, template: Template) -> bool:
-        """Return True if results are made of what may be marked: few plain numbers, and no place on the Earth."""
-        entries = template.entries
-        is_plain = template.regular and len({entry.record.path for entry in entries}) == len(entries) <= MOST_ENTRIES
-        return is_plain and not any(
-            entry.record.shape.multiple or entry.record.shape.place or entry.record.placed or entry.target.place
-            or entry.target.scaled
-            for entry in entries
-        )  # fmt: skip
 
     def _target(self, own: Target, kind: str) -> Target:
         """Choose which numbers of a result are written."""

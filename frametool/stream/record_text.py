@@ -67,13 +67,6 @@ class Entry(NamedTuple):
         return read_stamp(texts[0], in_ns=in_nanoseconds(str(self.stamp[0][-1])))
 
 
-def target_of(record: Record, request: Request) -> Target:
-    """Choose how the result of a record is written; conventions of Euler angles share a key and are together."""
-    names = [each.representation.name for each in request.results.notations]
-    together = sorted(request.results.notations, key=lambda each: names.index(each.representation.name))
-    return request.with_results(notations=tuple(together)).target(record.shape)
-
-
 class Answer(NamedTuple):
     """What became of a record: the components of its result; has_gaps: numbers of it may be nan."""
 
@@ -126,7 +119,11 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
     parent, name = record.parent.text, record.name.text
     if request.rename is not None:
         parent, name = request.rename(parent, name)
-    return Entry(record, target_of(record, request), edge, stamp, parent, name)
+    names = [each.representation.name for each in request.results.notations]
+    # conventions of Euler angles share a key and are together
+    together = sorted(request.results.notations, key=lambda each: names.index(each.representation.name))
+    target = request.with_results(notations=tuple(together)).target(record.shape)
+    return Entry(record, target, edge, stamp, parent, name)
 
 
 def _scalar(document: Document, record: Record, name: str = "") -> tuple[Path]:

@@ -215,19 +215,14 @@ def _read_stamp(key: str, value: Any) -> int:
     return read_stamp(str(value), in_ns=in_nanoseconds(key))
 
 
-def used_keys(record: Record) -> set[str]:
-    """Return the keys of a record that say its pose, or what is no longer true of the result."""
-    halves = PARTS.get(record.shape.kind, ())
-    own = record.key, record.rotation, *record.others, *record.flat, *record.members, *record.placed
-    return {*own, *halves, *NOT_PLAIN}
-
-
 def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
     """Return what a record and the mappings around it say besides the pose, its frames and its stamp.
 
     node: the thing that the record's result is; unit: the path of that
     """
-    used = used_keys(record)
+    # its pose, and what is no longer true of the result
+    used = {record.key, record.rotation, *record.others, *record.flat, *record.members, *record.placed, *NOT_PLAIN}
+    used.update(PARTS.get(record.shape.kind, ()))
     names = {path for each in (record.name, record.parent) for path in each.paths}
     rest: dict[str, Any] = {}
     for depth in range(len(unit), len(record.path) + 1):

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from frametool.stream.stamp_source import Timed
 
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
-START, PREVIOUS = "start", "previous"  # rows before that a row is compared with
+START, PREVIOUS, VELOCITIES = "start", "previous", "velocities"  # what a row is compared with that comes before it
 PAIR = "pair"  # the two poses of a row
 
 
@@ -36,12 +36,14 @@ class Formula:
     The kind of a row is that of its shape, "" where it holds neither point nor pose.
     columns: the columns, or keys, whose numbers it reads; reads_row: it reads the row's own point or pose
     needs_time: it reads the row's own time; adds: rows keep their columns and results are added
+    shown: how its numbers are written, if not as they are
     """
 
     columns: tuple[str, ...] = ()
     reads_row = True
     needs_time = False
     adds = True
+    shown: Shown | None = None
 
     def kind(self, row: str) -> str:  # noqa: ARG002 - by default all rows get numbers alone
         """Return whether a row becomes a pose, a point or a vector; "" for numbers alone, which are `extras`."""
@@ -105,14 +107,13 @@ class Operation(NamedTuple):
     left, right: applied as left @ row @ right[0] @ right[1] ..
     inverse: the row itself is inverted first
     of: what a row is compared with; "" for nothing, "first" inverse(fixed) row, "second" inverse(row) fixed,
-        "pair" the two poses of a row, "previous" the row before and this one, "start" the first row and this one
-    velocity: of "previous" also the twist that leads from one row to the next in the time between them
+        "pair" the two poses of a row, "previous" the row before and this one, "start" the first row and this one,
+        "velocities" as "previous", with the twist that leads from one row to the next in the time between them
     fixed: the pose that "first" and "second" need
     moves: the row is moved rather than composed: points and vectors are allowed
     turns: axes change: on the right only the rotation, the position, if there is one, stays as it is
     mirrors: the row is seen in a mirror across y, before all that is on its left
     formula: an expression, instead of all this; it is given points that are moved by their edge, or that edge alone
-    shown: how its numbers are written
     uncertain: what moves rows, each by its frame or its time, has a covariance that counts
     similar: a scale with a pose counts, and is that of the result; multiples: so is that of a matrix s R
     Poses are seven components, and may have a covariance or a scale behind them, as `geometry.placed` has it.
@@ -126,18 +127,16 @@ class Operation(NamedTuple):
     moves: bool = False
     turns: bool = False
     mirrors: bool = False
-    velocity: bool = False
     formula: Formula | None = None
     uncertain: bool = False
     similar: bool = False
     multiples: bool = False
-    shown: Shown | None = None
 
     def extras(self, shape: Shape) -> tuple[str, ...]:
         """Name the numbers that come with the result of a row, and have no place in the row as it was read."""
         if self.formula is not None:
             return self.formula.extras(shape.kind)
-        compared = RELATIVE_EXTRAS + VELOCITY * self.velocity if self.of and shape.kind == POSE else ()
+        compared = RELATIVE_EXTRAS + VELOCITY * (self.of == VELOCITIES) if self.of and shape.kind == POSE else ()
         return compared if shape.covariance and not shape.rewritten else (*compared, *self.carried(shape))
 
     def carried(self, shape: Shape) -> tuple[str, ...]:
@@ -166,6 +165,11 @@ class Operation(NamedTuple):
         return () if self.formula is None else self.formula.columns
 
     @property
+    def shown(self) -> Shown | None:
+        """Return how the numbers of an expression are written, if it says so."""
+        return None if self.formula is None else self.formula.shown
+
+    @property
     def only_adds(self) -> bool:
         """Return True if rows keep their columns and results are added."""
         return self.formula is not None and self.formula.adds
@@ -173,12 +177,12 @@ class Operation(NamedTuple):
     @property
     def keeps_child(self) -> bool:
         """Return True if a result is the pose of what its row is the pose of: of a camera with the same axes."""
-        return not (self.inverse or self.right or self.formula) and self.of in ("", "first", START, PREVIOUS)
+        return not (self.inverse or self.right or self.formula) and (self.of in ("", "first") or self.looks_back)
 
     @property
     def looks_back(self) -> bool:
         """Return True if a row's result depends on the rows before it."""
-        return self.of in (START, PREVIOUS)
+        return self.of in (START, PREVIOUS, VELOCITIES)
 
     @property
     def takes_points(self) -> bool:
@@ -269,7 +273,7 @@ class Operation(NamedTuple):
 
             own, extra = with_own(shape, own, extra, edge or self.left, mirrors=self.mirrors)
         found = self.pose(compared(own), edge, xp)
-        if self.velocity:
+        if self.of == VELOCITIES:
             last = EXACT + len(RELATIVE_EXTRAS)
             found = (*_with_velocity(found[:last], seconds(), xp), *found[last:])
         return self._with_place(shape, numbers, (*found, *extra))

@@ -50,7 +50,7 @@ def plan_table(
     Where all numbers are wanted no text is put together.
     normals: the columns of vectors that turn with points; stamped: a column with the name of a stamp is one
     """
-    formula, poses = request.operation.formula, list[PoseColumns]()
+    formula, poses, names = request.operation.formula, list[PoseColumns](), table.names or ()
     is_needed = formula is None or formula.reads_row or bool(request.rows.columns)
     with suppress(*() if is_needed else (FormatError,)):
         poses = _find(table, request, source)
@@ -61,9 +61,11 @@ def plan_table(
         poses = [_without_position(poses[0], request, table, source)]
     if wrong := next((each.wrong for pose in poses for each in pose if each and each.wrong), ""):
         raise _refusal(wrong, source)
-    names = table.names or ()
     asked = tuple(_place(name, _names_or_numbers(table), source) for name in request.operation.columns)
-    shapes = _shapes(poses, request, len(asked))
+    kinded = zip(poses, request.rows.kinds or (request.rows.kind,) * len(poses), strict=True)
+    shapes = tuple(row_shape(pose, request.with_rows(kind=kind)) for pose, kind in kinded)
+    if formula is not None:  # the numbers that it asks for come last
+        shapes = ((shapes[0] if shapes else Shape("", None))._replace(extra=len(asked)),)
     if on_earth or request.results.place is not None:
         from frametool.stream.earth_columns import readers_of, settle
 
@@ -78,9 +80,8 @@ def plan_table(
     if len({*places}) < len(places):
         twice = sorted({table.name(place) for place in places if places.count(place) > 1})
         raise Misused(f"--columns: {', '.join(twice)} appears twice")
-    along = _turning_along(names, poses, request, normals, source)
     places += asked
-    for pose, kind in along:
+    for pose, kind in _turning_along(names, poses, request, normals, source):
         poses, shapes, places = [*poses, pose], (*shapes, Shape(kind)), places + pose.places
     has_one = not shapes or request.operation.of == PAIR  # what becomes of a row is one thing
     targets = tuple(map(request.target, shapes[:1] or (Shape(POSE),) if has_one else shapes))
@@ -212,15 +213,6 @@ def own_count(plan: Plan, width: int) -> int:
     return width - len(XYZ) * (len(plan.targets) - 1) if has_vectors else width
 
 
-def _shapes(poses: Sequence[PoseColumns], request: Request, asked: int) -> tuple[Shape, ...]:
-    """Return what the numbers of a row mean; those an expression asks for come last."""
-    kinds = request.rows.kinds or (request.rows.kind,) * len(poses)
-    shapes = tuple(row_shape(pose, request.with_rows(kind=kind)) for pose, kind in zip(poses, kinds, strict=True))
-    if request.operation.formula is None:
-        return shapes
-    return ((shapes[0] if shapes else Shape("", None))._replace(extra=asked),)
-
-
 def _without_position(pose: PoseColumns, request: Request, table: Table, source: str) -> PoseColumns:
     """Leave the position to pass as it is where only the rotation is rewritten."""
     if pose.rotation is None and request.results.by_default:
@@ -328,7 +320,11 @@ def _columns(
         several = len(targets) > 1 and (request.rows.poses > 1 or number > 0)
         first += request.result_size(shapes[number - 1], targets[number - 1]) if number else 0
         position, rotation, extras = _new_columns(pose, target, request, shape, first, several=several)
-        in_place = _in_place(pose, shape, target)
+        # whether each number of the result stands where one of the input does
+        is_alike = not target.notations or shape.notation is None or _same(pose, target)
+        is_alike = is_alike and (shape.unit is None) == (target.unit is None) and shape.place is target.place is None
+        is_alike = is_alike and len(shape.absent) == len(target.absent) and shape.whole == target.whole
+        in_place = is_alike and (pose.position is not None or pose.rotation is not None)
         if several and (not in_place or (request.results.notations and request.rows.poses > 1)):
             raise Misused("several --columns are moved as they are written; for --to, or a rotation alone, give one")
         if adds:
@@ -364,14 +360,6 @@ def _extra(table: Table, columns: Sequence[Column], extras: Sequence[Column], sh
     more = {getattr(each, "name", at) if shown.replaces else at: each for at, each in enumerate(extras)}
     mixed = [more.pop(name, kept) for name, kept in zip(_names_or_numbers(table), columns, strict=True)]
     return [*mixed, *more.values()]
-
-
-def _in_place(pose: PoseColumns, shape: Shape, target: Target) -> bool:
-    """Return True if each number of the result is where one of the input did."""
-    same = not target.notations or shape.notation is None or _same(pose, target)
-    placed = (shape.unit is None) == (target.unit is None) and len(shape.absent) == len(target.absent)
-    placed = placed and shape.place is target.place is None
-    return same and placed and shape.whole == target.whole and (pose.position is not None or pose.rotation is not None)
 
 
 def _same(pose: PoseColumns, target: Target) -> bool:

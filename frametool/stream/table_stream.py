@@ -16,6 +16,7 @@ from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import Fault, Outcome, RowNote
 from frametool.stream.header import listed
 from frametool.stream.layout import New
+from frametool.stream.request import VELOCITIES
 from frametool.stream.row_layout import POSE, Shape
 from frametool.stream.row_poses import RowPoses, taken
 from frametool.stream.rows import Block, written
@@ -78,7 +79,7 @@ def settle_stamps(table: Table, request: Request, source: str) -> tuple[Request,
 
     is_cut = (request.window or request.offset_ns) and extra is None and not (timed and timed.name)
     if extra == "" or is_cut:
-        who = "a velocity" if operation.velocity else "--start, --stop, --time-offset"
+        who = "a velocity" if operation.of == VELOCITIES else "--start, --stop, --time-offset"
         request = request.with_rows(extra_column=stamps(who))
     if timed is None or timed.name:
         return request, None

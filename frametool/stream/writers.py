@@ -194,7 +194,9 @@ class TextWriter:
     def _field(self, name: str, block: RowPoses, first: int) -> Spans:
         """Return what is written in one field of each row."""
         size = len(block.numbers)
-        stamps = self._stamps(block)
+        stamps: list[int] = [at * BILLION for at in range(self.count, self.count + size)]
+        if block.stamps_ns is not None:
+            stamps = block.stamps_ns.tolist()
         if name == IMAGE:
             images = texts_of(block.extras[IMAGE]) if IMAGE in block.extras else [None] * size
             return spans_of([image_name(*each).encode() for each in zip(images, stamps, strict=True)])
@@ -204,13 +206,6 @@ class TextWriter:
         if NUMBER in block.extras and name == NUMBER:
             numbers = [int(text) for text in texts_of(block.extras[NUMBER])]
         return spans_of([field(name, stamp, number).encode() for stamp, number in zip(stamps, numbers, strict=True)])
-
-    def _stamps(self, block: RowPoses) -> list[int]:
-        if block.stamps_ns is None:
-            return [at * BILLION for at in range(self.count, self.count + len(block.numbers))]
-        stamps: list[int] = block.stamps_ns.tolist()
-        return stamps
-
 
 class PoseBatch(NamedTuple):
     """Rows of a block that are written alike; values: (n, k) the numbers that are written of each."""

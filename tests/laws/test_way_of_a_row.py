@@ -48,12 +48,12 @@ class Cost(NamedTuple):
 
 
 MOST = {
-    "one CSV point": Cost(functions=555, files=52, lines=3585),  # the aim: 320 functions, 30 files
-    "40 JSON records": Cost(functions=514, files=47, lines=3295),  # 340, 32
-    "40 JSON records to CSV": Cost(functions=512, files=49, lines=3272),  # 340, 32
-    "TUM to KITTI": Cost(functions=455, files=41, lines=2793),  # 320, 30
+    "one CSV point": Cost(functions=554, files=52, lines=3588),  # the aim: 320 functions, 30 files
+    "40 JSON records": Cost(functions=513, files=47, lines=3297),  # 340, 32
+    "40 JSON records to CSV": Cost(functions=512, files=49, lines=3282),  # 340, 32
+    "TUM to KITTI": Cost(functions=455, files=41, lines=2806),  # 320, 30
     "YAML lookup": Cost(functions=341, files=36, lines=1965),  # 220, 28
-    "convert of numbers": Cost(functions=157, files=21, lines=858),  # 120, 20
+    "convert of numbers": Cost(functions=157, files=21, lines=863),  # 120, 20
 }
 
 

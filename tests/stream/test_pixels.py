@@ -26,13 +26,13 @@ def camera_of(case: dict[str, Any]) -> Camera:
 
 
 def projecting(camera: Camera, first: float = 0.0, *, ranged: bool = False, **options: Any) -> Asked:
-    seen = PixelsOfPoints(camera, first, ranged=ranged)
-    return asked(formula=seen, shown=seen.shown("cam"), moves=True, **options)
+    seen = PixelsOfPoints(camera, first, name="cam", ranged=ranged)
+    return asked(formula=seen, moves=True, **options)
 
 
 def unprojecting(camera: Camera, columns: tuple[str, ...], first: float = 0.0, **options: Any) -> Asked:
-    seen = PointsOfPixels(camera, first, columns, **options)
-    return asked(formula=seen, shown=seen.shown("map"), moves=True, poses=0)
+    seen = PointsOfPixels(camera, first, columns, target="map", **options)
+    return asked(formula=seen, moves=True, poses=0)
 
 
 def table(rows: Any, names: str) -> bytes:

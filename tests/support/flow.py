@@ -22,7 +22,7 @@ from frametool.grammar.result import Style
 from frametool.stream.faults import MOST, BadRows, run
 from frametool.stream.record import find_records
 from frametool.stream.record_stream import run_records
-from frametool.stream.record_text import Entry, answer, target_of
+from frametool.stream.record_text import Entry, answer
 from frametool.stream.record_values import read_poses, results
 from frametool.stream.request import Operation, Request, ResultOptions, RowOptions
 from frametool.stream.stamp_columns import read_stamps
@@ -126,7 +126,7 @@ class Moving:
 
     def by(self, edge: Rigid) -> Sequence[float]:
         """Return the numbers behind an edge."""
-        made = answer(Entry(self.record, target_of(self.record, self.request), edge), (), self.request)
+        made = answer(Entry(self.record, self.request.target(self.record.shape), edge), (), self.request)
         assert made is not None
         return made.parts
 

@@ -115,13 +115,13 @@ def relative_command(inputs: Inputs) -> int:
     task, a, b = PoseTask(inputs), inputs.a, inputs.b
     if task.derives:
         return task.derive("relative", *map(task.written, [one_argument(each) for each in (a, b)]))
-    from frametool.stream.request import PREVIOUS, START, Operation
+    from frametool.stream.request import PREVIOUS, START, VELOCITIES, Operation
 
     if inputs.consecutive or inputs.first:
         velocity = inputs.consecutive and inputs.velocity
         refuse(b is not None, "rows are compared with one of themselves; leave A and B out")
         # a row is seen from another one of the same stream, which is the same thing at another moment
-        operation = Operation(of=PREVIOUS if inputs.consecutive else START, velocity=velocity)
+        operation = Operation(of=VELOCITIES if velocity else PREVIOUS if inputs.consecutive else START)
         column = (inputs.time_column or "") if velocity or task.window else None
         request = task.request(operation=operation, extra_column=column, rename=lambda _parent, name: (name, name))
         status = task.answer(a or "-", request)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from frametool.geometry.camera import Camera
     from frametool.geometry.types import Components
     from frametool.stream.pixels import Seen
-    from frametool.stream.request import Formula, Request, Shown
+    from frametool.stream.request import Formula, Request
 
 AXES = ("optical", "opengl", "flu")
 
@@ -101,8 +101,9 @@ def project_command(inputs: Inputs) -> int:
     no_size = "note: the camera has no size, in_image is empty; --size W,H gives it one"
     inputs.note(no_size if task.camera.size is None else None)
     take = None if overlay is None else overlay.take
-    seen = PixelsOfPoints(task.camera, inputs.first_pixel, ranged=bool(inputs.ranged), take=take)
-    request = task.request(inputs.frame_column if task.is_stream else None, seen, seen.shown(task.camera_name))
+    name, ranged = task.camera_name, bool(inputs.ranged)
+    seen = PixelsOfPoints(task.camera, inputs.first_pixel, name=name, ranged=ranged, take=take)
+    request = task.request(inputs.frame_column if task.is_stream else None, seen)
     status = task.answer(request, () if task.is_stream else [*apply.sources_of(task.rest, None)], seen)
     if overlay is not None:
         with writing(overlay.path, force=inputs.force) as write:
@@ -154,7 +155,7 @@ class CameraTask(Stream):
         inputs = self.inputs
         return self.camera.rectified(from_first=bool(inputs.from_first)) if inputs.rectified else self.camera
 
-    def request(self, frame_column: str | None, formula: Formula, shown: Shown) -> Request:
+    def request(self, frame_column: str | None, formula: Formula) -> Request:
         """Return what is done with rows."""
         from frametool.stream.request import Operation, Request
 
@@ -162,7 +163,7 @@ class CameraTask(Stream):
         asked = Request(Operation(moves=True))
         if self.way is not None:
             asked = self.way.request(frame_column, inputs.time_column if self.is_stream else None)
-        operation = asked.operation._replace(formula=formula, shown=shown)
+        operation = asked.operation._replace(formula=formula)
         inputs.ask("keep")
         return asked._replace(operation=operation, rename=None).with_rows(normalize=bool(inputs.normalize))
 
@@ -232,8 +233,9 @@ def unproject_command(inputs: Inputs) -> int:
         if task.way is None:
             raise click.UsageError("--ground needs TREE, TARGET and CAMERA: the tree says where the ground is")
         task.way = GroundWay(task.way, inputs.ground, task.camera_name)
-    seen = PointsOfPixels(task.camera, inputs.first_pixel, columns, far=far, height=height, into=into)
-    request = task.request(None, seen, seen.shown((task.way and task.way.target) or ""))
+    target = "" if task.way is None else task.way.target
+    seen = PointsOfPixels(task.camera, inputs.first_pixel, columns, far=far, height=height, into=into, target=target)
+    request = task.request(None, seen)
     if request.timed is not None and height is not None:
         request = request._replace(timed=request.timed._replace(width=2 * EXACT))
     return task.answer(request.with_rows(poses=0, frames=()), records, seen)
