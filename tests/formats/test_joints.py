@@ -9,7 +9,7 @@ import pytest
 
 import frametool
 from frametool.errors import BadAnswer, FormatError, FrametoolError, FrametoolWarning, ValueInvalid
-from frametool.formats.robots.joints import JointState, find_joint_columns, stamp_column
+from frametool.formats.robots.joints import JointState, find_joint_columns
 from frametool.formats.robots.model import Joint, JointValue, Mimic, motion, read_value
 from frametool.grammar.edges import Answers, Diagnostics, Options, Topics
 
@@ -225,6 +225,8 @@ MOVING = {
     "maps with stamps": '{"stamp": 1.5, "pan": 0.0, "reach": 0.1}\n{"stamp": 2.5, "pan": "0.5rad", "reach": "10cm"}\n',
     "a table with seconds": "t,pan,reach\n1.5,0.0,0.1\n2.5,0.5,0.1\n",
     "a table with nanoseconds": "pan,stamp_ns,reach\n0.0,1500000000,0.1\n0.5,2500000000,0.1\n",
+    "a table with milliseconds": "time [ms],pan,reach\n1500,0.0,0.1\n2500,0.5,0.1\n",
+    "a table of messages": "header.stamp,pan,reach\n1.5,0.0,0.1\n2.5,0.5,0.1\n",
     "a table in any order": "time [s],pan,reach\n2.5,0.5,0.1\n1.5,0.0,0.1\n",
 }
 
@@ -328,14 +330,6 @@ def test_columns_are_found_by_name_and_unit() -> None:
     found = [(each.joint, each.degrees, each.per_metre) for each in find_joint_columns(names, joints)]
     assert found == [("pan", True, 1.0), ("x_deg", False, 1.0), ("reach", False, 1.0)]
     assert [find_joint_columns([name], joints)[0].per_metre for name in ("reach_mm", "reach (cm)")] == [1000.0, 100.0]
-
-
-@pytest.mark.parametrize(
-    ("name", "found"),
-    [("t", (0, "")), ("stamp_ns", (0, "ns")), ("header.stamp", (0, "")), ("time [ms]", (0, "ms")), ("tt", None)],
-)
-def test_the_column_of_stamps_is_found(name: str, found: Any) -> None:
-    assert stamp_column([name, "pan"], {"pan": TURN}) == found
 
 
 def test_unknown_joints_from_python_are_refused(arm: Callable[..., Any]) -> None:

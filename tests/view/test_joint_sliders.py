@@ -146,6 +146,7 @@ GEOMS = """<mujoco><default><geom type="capsule" size="0.02"/></default><worldbo
 @pytest.mark.parametrize(("form", "text", "expected"), [
     ("urdf", SHAPES, [Solid("base", "box", (0.5, 0.35, 0.2), (0, 0, 0.1, 0, 0, 0, 1)), Solid("mast", "capsule", (0.03, 0.4), (0, 0, 0.2, 0, 0, 0, 1)), Solid("tool", "mesh", ())]),
     ("sdf", MODEL, [Solid("m::a", "cylinder", (0.1, 2.0), (0, 0, 1, 0, 0.5**0.5, 0, 0.5**0.5))]),
+    ("sdf", MODEL.replace("<radius>0.1</radius><length>2</length>", "<length>2</length><radius>0.1</radius>"), [Solid("m::a", "cylinder", (0.1, 2.0), (0, 0, 1, 0, 0.5**0.5, 0, 0.5**0.5))]),
     ("mjcf", GEOMS, [Solid("b", "capsule", (0.02, 1.0), (0, 0, 0.5, 0, 0, 0, 1)), Solid("b", "box", (2, 4, 6), (0, 0, 1, 0, 0, 0, 1))]),
 ])  # fmt: skip
 def test_solids_are_read_with_their_sizes_and_poses(tmp_path: Path, form: str, text: str, expected: list[Solid]) -> None:

@@ -282,28 +282,25 @@ TURN = 6.283185307179586
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield one edge per row, with joint values from options, default 0."""
+    """Yield one edge per row, with joint values from options, default 0; joints rotate about z or move along it."""
     rows = rows_of(file, options.tally)
     if not options.answers.dh:
         choice = "--dh standard (a and alpha behind the joint) or --dh modified (Craig: before it)"
         message = f"nothing in a table of Denavit-Hartenberg parameters says which they are: give {choice}"
         raise Unanswered(message, source=file.name, line=rows[0].line, column=1)
     frames = options.answers.names(*(f"link{number}" for number in range(len(rows) + 1)))
-    links = [_link(row, parent, child, options) for row, parent, child in zip(rows, frames, frames[1:], strict=False)]
+    links = []
+    for row, parent, child in zip(rows, frames, frames[1:], strict=False):
+        for name, amount in (("theta", row.theta), ("alpha", row.alpha)):
+            if not amount.degrees and abs(amount.number) > TURN:
+                message = f"{name} {amount.number:g} is more than a full turn in radians; degrees? write {name}_deg"
+                options.tally.note_each(message, row.line, "degrees")
+        theta = euler.to_quaternion(0.0, 0.0, row.theta.number, "sxyz", floats, degrees=row.theta.degrees)
+        alpha = euler.to_quaternion(row.alpha.number, 0.0, 0.0, "sxyz", floats, degrees=row.alpha.degrees)
+        along_z, along_x = (0.0, 0.0, row.d.number, *theta), (row.a, 0.0, 0.0, *alpha)
+        origin, after = rigid.IDENTITY, rigid.compose(*along_z, *along_x)
+        if options.answers.dh == "modified":
+            origin, after = rigid.compose(*along_x, *along_z), rigid.IDENTITY
+        joints = () if row.kind == "fixed" else (Joint(row.name, row.kind, AXIS, line=row.line),)
+        links.append(Link(parent, child, origin, joints, row.line, after, fixed="" if joints else row.name))
     yield from JointState.of(links, options, file.name).edges(links)
-
-
-def _link(row: DhRow, parent: str, child: str, options: Options) -> Link:
-    """Return the link of one row; its joint rotates about z or translates along it."""
-    for name, amount in (("theta", row.theta), ("alpha", row.alpha)):
-        if not amount.degrees and abs(amount.number) > TURN:
-            message = f"{name} {amount.number:g} is more than a full turn in radians; degrees? write {name}_deg"
-            options.tally.note_each(message, row.line, "degrees")
-    theta = euler.to_quaternion(0.0, 0.0, row.theta.number, "sxyz", floats, degrees=row.theta.degrees)
-    alpha = euler.to_quaternion(row.alpha.number, 0.0, 0.0, "sxyz", floats, degrees=row.alpha.degrees)
-    along_z, along_x = (0.0, 0.0, row.d.number, *theta), (row.a, 0.0, 0.0, *alpha)
-    modified = options.answers.dh == "modified"
-    origin = rigid.compose(*along_x, *along_z) if modified else rigid.IDENTITY
-    after = rigid.IDENTITY if modified else rigid.compose(*along_z, *along_x)
-    joints = () if row.kind == "fixed" else (Joint(row.name, row.kind, AXIS, line=row.line),)
-    return Link(parent, child, origin, joints, row.line, after, fixed="" if joints else row.name)

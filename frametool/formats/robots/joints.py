@@ -29,6 +29,7 @@ from frametool.formats.trees.tree_reader import read_time
 from frametool.frames.stamps import SUFFIXES, format_stamp, parse_stamp
 from frametool.geometry import floats, rigid
 from frametool.grammar.edges import Diagnostics, Edge, Options
+from frametool.grammar.names import STAMP_KEYS, in_nanoseconds, stamp_column
 from frametool.grammar.readers import Misfit, Path, as_mapping
 from frametool.ros import messages
 from frametool.ros.message_stream import TextMessage, line_texts, read_messages
@@ -68,14 +69,26 @@ class JointState:
         self._options = options
         self._fixed = frozenset(fixed)
         self._file = file
-        self._take_files()
-        self._take_options()
+        for path in options.answers.joint_files:  # later ones override earlier ones
+            self._take_file(path)
+        for name, text in options.answers.joints.items():  # which override files
+            joint = self.joints.get(name)
+            if joint is None:
+                options.tally.unknown_joints[name] = BadAnswer(f"--joint: {self._unknown(name)}")
+                continue
+            try:
+                source = Source(f"--joint {name}={text}", text)
+                self.series[name] = {None: read_value(joint, text, source, normalize=options.normalize)}
+            except ValueInvalid as error:
+                raise BadAnswer(f"--joint {shown(name)}: {error}") from None
         self._tell_limits()
         self.named = frozenset(self.series)
-        self.known = set(self.named)
-        self._follow()
-        options.tally.robot = self.still, [], [name for name in self.joints if name not in self.known]
-        options.tally.assumed = options.tally.assumed or self._about()
+        self._free = free = self._follow()
+        options.tally.robot = self.still, [], free
+        if free and not options.tally.assumed:
+            at_zero = all(self.joints[name].posed or self.series[name] == {None: JointValue(0.0)} for name in free)
+            many = f"{len(free)} joint{'s' * (len(free) > 1)}"
+            options.tally.assumed = f"{many} at {'0' if at_zero else 'rest'} ({STATES})"
 
     @classmethod
     def of(cls, links: Collection[Link], options: Options, file: str) -> JointState:
@@ -96,7 +109,7 @@ class JointState:
     def edges(self, links: Iterable[Link]) -> Iterator[Edge]:
         """Yield one edge per link: static, or a sample at each time at which one of its joints has a value."""
         links = [*links]
-        self._options.tally.robot = self.still, links, [name for name in self.joints if name not in self.known]
+        self._options.tally.robot = self.still, links, self._free
         for link in links:
             for stamp_ns, values in self.values(*(joint.name for joint in link.joints)):
                 yield Edge(link.parent, link.child, link.pose(values), stamp_ns, link.line)
@@ -120,94 +133,84 @@ class JointState:
             yield stamp_ns, [self._at(name, stamp_ns, times[name]) for name in names]
 
     def _at(self, name: str, stamp_ns: int, times: Sequence[int]) -> Value:
-        """Return the value of a joint at a time between its first and last sample, or its only value."""
+        """Return the value of a joint at a time between its first and last sample, or its only value.
+
+        It is interpolated linearly, a pose by slerp.
+        """
         series = self.series[name]
         if not times or stamp_ns in series:
             return series[stamp_ns if times else None]
         after = bisect_left(times, stamp_ns)
         begin, end = times[after - 1], times[after]
-        return _between(series[begin], series[end], (stamp_ns - begin) / (end - begin))
+        one, two, fraction = series[begin], series[end], (stamp_ns - begin) / (end - begin)
+        if not (isinstance(one, JointValue) and isinstance(two, JointValue)):
+            return rigid.interpolate(*cast("Rigid", one), *cast("Rigid", two), fraction, floats)
+        if one.degrees == two.degrees:
+            return JointValue(one.number + (two.number - one.number) * fraction, one.degrees)
+        return JointValue(one.plain + (two.plain - one.plain) * fraction)
 
-    def _take_files(self) -> None:
-        """Read all files; later ones override earlier ones, and all samples of a file are used."""
-        for path in self._options.answers.joint_files:
-            found: dict[str, list[tuple[int | None, Value]]] = {}
-            setting = None
-            for setting in read_joint_file(path, self.joints):
-                if setting.joint in self.joints:
-                    found.setdefault(setting.joint, []).append((setting.stamp_ns, self._read(setting, path)))
-                else:
-                    problem = unknown_joint(setting.joint, self.joints, self._fixed)
-                    self._options.tally.unknown_joints.setdefault(setting.joint, setting.refuse(problem, ()))
-            if setting is None:
-                raise FormatError("no values of joints in it", source=path)
-            for name, values in found.items():
-                self._take(name, values)
-
-    def _read(self, setting: JointSample, path: str) -> Value:
-        try:
-            joint, normalize = self.joints[setting.joint], self._options.normalize
-            return read_value(joint, setting.value, Source(path, ""), normalize=normalize)
-        except ValueInvalid as error:
-            raise setting.refuse(str(error), getattr(error, "path", ())) from None
-
-    def _take(self, name: str, values: Sequence[tuple[int | None, Value]]) -> None:
-        """Store the samples of one joint; constant ones are a single value, and without times the last counts."""
-        series = dict(values)
-        last = values[-1][1]
-        is_constant = None in series or all(value == last for value in series.values())
-        self.series[name] = {None: last} if is_constant else dict(sorted(series.items(), key=lambda each: each[0] or 0))
-
-    def _take_options(self) -> None:
-        """Read the values of `--joint`, which override files."""
-        for name, text in self._options.answers.joints.items():
-            joint = self.joints.get(name)
+    def _take_file(self, path: str) -> None:
+        """Read all values of a file: constant ones are a single value, and without times the last counts."""
+        found: dict[str, list[tuple[int | None, Value]]] = {}
+        sample = None
+        for sample in read_joint_file(path, self.joints):
+            joint = self.joints.get(sample.joint)
             if joint is None:
-                problem = unknown_joint(name, self.joints, self._fixed)
-                self._options.tally.unknown_joints[name] = BadAnswer(f"--joint: {problem}")
+                error = sample.refuse(self._unknown(sample.joint), ())
+                self._options.tally.unknown_joints.setdefault(sample.joint, error)
                 continue
             try:
-                source = Source(f"--joint {name}={text}", text)
-                value = read_value(joint, text, source, normalize=self._options.normalize)
+                value = read_value(joint, sample.value, Source(path, ""), normalize=self._options.normalize)
             except ValueInvalid as error:
-                raise BadAnswer(f"--joint {shown(name)}: {error}") from None
-            self._take(name, [(None, value)])
+                raise sample.refuse(str(error), getattr(error, "path", ())) from None
+            found.setdefault(sample.joint, []).append((sample.stamp_ns, value))
+        if sample is None:
+            raise FormatError("no values of joints in it", source=path)
+        for name, values in found.items():
+            series, last = dict(values), values[-1][1]
+            is_constant = None in series or all(value == last for value in series.values())
+            in_order = sorted(series.items(), key=lambda each: each[0] or 0)
+            self.series[name] = {None: last} if is_constant else dict(in_order)
 
-    def _follow(self) -> None:
-        """Set each joint without a value: from its leader, along chains of any length, or at rest."""
-        leaders = {name: [leader] for name in self.joints if (leader := self._leader(name)) is not None}
+    def _unknown(self, joint: str) -> str:
+        """Return the error that the robot has no such joint, or that it is fixed."""
+        if joint in self._fixed:
+            return f"joint {shown(joint)} is fixed and takes no value; joints: {listing(self.joints)}"
+        return f"no joint {shown(joint)}{alternatives(joint, self.joints, 'joints')}"
+
+    def _follow(self) -> list[str]:
+        """Set each joint without a value: from its leader, along chains of any length, or at rest.
+
+        Returns the names of those that no value determines.
+        """
+        leaders: dict[str, list[str]] = {name: [] for name in self.joints}  # one, or none
+        for name, joint in self.joints.items():
+            mimic = joint.mimic
+            if name in self.series or mimic is None or mimic.joint in self._fixed:
+                continue
+            leader = self.joints.get(mimic.joint)
+            if leader is None or leader.posed:
+                which = "no joint" if leader is None else leader.kind
+                problem = f"joint {shown(name)} mimics {shown(mimic.joint)}, which is {which}"
+                raise FormatError(problem, source=self._file, line=joint.line)
+            leaders[name].append(mimic.joint)
         try:
-            for name in TopologicalSorter({name: leaders.get(name, ()) for name in self.joints}).static_order():
-                self._settle(self.joints[name])
+            order = [*TopologicalSorter(leaders).static_order()]
         except CycleError as error:
-            circle = " -> ".join(map(shown, reversed(error.args[1][-8:])))
-            raise self._error(error.args[1][0], f"joints mimic each other in a circle: {circle}") from None
-
-    def _leader(self, name: str) -> str | None:
-        """Return the joint that determines one without a value."""
-        mimic = self.joints[name].mimic
-        if name in self.series or mimic is None or mimic.joint in self._fixed:
-            return None
-        leader = self.joints.get(mimic.joint)
-        if leader is None or leader.posed:
-            which = "no joint" if leader is None else leader.kind
-            raise self._error(name, f"joint {shown(name)} mimics {shown(mimic.joint)}, which is {which}")
-        return mimic.joint
-
-    def _error(self, joint: str, problem: str) -> FormatError:
-        return FormatError(problem, source=self._file, line=self.joints[joint].line)
-
-    def _settle(self, joint: Joint) -> None:
-        """Compute the value of a joint whose leader has one."""
-        name, mimic = joint.name, joint.mimic
-        if name in self.series:
-            return
-        leader = mimic.joint if mimic else ""
-        self.series[name] = {None: joint.start}
-        if leader in self.series:
-            self.series[name] = {at: followed(joint, value) for at, value in self.series[leader].items()}
-        if leader in self.known:
-            self.known.add(name)
+            circle = error.args[1]
+            problem = f"joints mimic each other in a circle: {' -> '.join(map(shown, reversed(circle[-8:])))}"
+            raise FormatError(problem, source=self._file, line=self.joints[circle[0]].line) from None
+        known = set(self.series)
+        for name in order:
+            if name in self.series:
+                continue
+            joint = self.joints[name]
+            self.series[name] = {None: joint.start}
+            for leading in leaders[name]:
+                self.series[name] = {at: followed(joint, value) for at, value in self.series[leading].items()}
+                if leading in known:
+                    known.add(name)
+        return [name for name in self.joints if name not in known]
 
     def _tell_limits(self) -> None:
         """Record values beyond limits, and steps that a pose cannot follow."""
@@ -223,25 +226,6 @@ class JointState:
             for wide in [at for at, one, two in steps if abs(two - one) >= HALF_TURN][:1]:
                 far = f"joint {shown(name)} turns by half a turn or more in the step from {format_stamp(wide or 0)}"
                 tally.note(f"{far}; poses between go the shorter way", joint.line)
-
-    def _about(self) -> str:
-        """Return how many joints are at rest because no value was set."""
-        free = [joint for joint in self.joints.values() if joint.name not in self.known]
-        if not free:
-            return ""
-        at_zero = all(joint.posed or self.series[joint.name] == {None: JointValue(0.0)} for joint in free)
-        many = f"{len(free)} joint{'s' * (len(free) > 1)}"
-        return f"{many} at {'0' if at_zero else 'rest'} ({STATES})"
-
-
-def _between(one: Value, two: Value, fraction: float) -> Value:
-    """Interpolate the value of a joint between two samples: linearly, and by slerp for a pose."""
-    if not (isinstance(one, JointValue) and isinstance(two, JointValue)):
-        begin, end = cast("Rigid", one), cast("Rigid", two)
-        return rigid.interpolate(*begin, *end, fraction, floats)
-    if one.degrees == two.degrees:
-        return JointValue(one.number + (two.number - one.number) * fraction, one.degrees)
-    return JointValue(one.plain + (two.plain - one.plain) * fraction)
 
 
 _HOLDERS = ("joint", "joints", "position", "positions", "joint_positions")  # before a dot
@@ -267,28 +251,22 @@ def find_joint_columns(names: Sequence[str], joints: Mapping[str, Joint]) -> lis
     """
     found: dict[str, JointColumn] = {}
     for place, name in enumerate(names):
-        column = _joint_column(place, name, joints)
-        if column is None:
+        own, unit = _with_unit(name.lstrip("#% ").strip(), joints)
+        joint = joints.get(own)
+        if joint is None:
             continue
-        if column.joint in found:
-            first = names[found[column.joint].place]
-            raise ValueInvalid(f"columns {shown(first)} and {shown(name)} are both joint {shown(column.joint)}")
-        found[column.joint] = column
+        problem = f"column {shown(name)}: joint {shown(own)} is {joint.kind}"
+        if joint.posed:
+            raise ValueInvalid(f"{problem}, which no number says")
+        turns = joint.kind in TURNING
+        if unit and unit not in (ANGLES if turns else LENGTHS):
+            units = ("rad", "deg") if turns else tuple(filter(None, LENGTHS))
+            raise ValueInvalid(f"{problem}; units: {listing(units)}")
+        if own in found:
+            first = names[found[own].place]
+            raise ValueInvalid(f"columns {shown(first)} and {shown(name)} are both joint {shown(own)}")
+        found[own] = JointColumn(place, own, ANGLES.get(unit, False), 1.0 if turns else LENGTHS[unit])
     return list(found.values())
-
-
-def _joint_column(place: int, name: str, joints: Mapping[str, Joint]) -> JointColumn | None:
-    bare_name, unit = _with_unit(name.lstrip("#% ").strip(), joints)
-    joint = joints.get(bare_name)
-    if joint is None:
-        return None
-    if joint.posed:
-        raise ValueInvalid(f"column {shown(name)}: joint {shown(joint.name)} is {joint.kind}, which no number says")
-    turns = joint.kind in TURNING
-    if unit and unit not in (ANGLES if turns else LENGTHS):
-        units = ("rad", "deg") if turns else tuple(filter(None, LENGTHS))
-        raise ValueInvalid(f"column {shown(name)}: joint {shown(joint.name)} is {joint.kind}; units: {listing(units)}")
-    return JointColumn(place, bare_name, ANGLES.get(unit, False), 1.0 if turns else LENGTHS[unit])
 
 
 def _with_unit(name: str, joints: Mapping[str, Joint]) -> tuple[str, str]:
@@ -300,14 +278,6 @@ def _with_unit(name: str, joints: Mapping[str, Joint]) -> tuple[str, str]:
         return _with_unit(rest, joints)
     match = re.search(BRACKETS, name) or _UNIT.search(name)
     return (name[: match.start()], match[1]) if match else (name, "")
-
-
-def stamp_column(names: Sequence[str], joints: Mapping[str, Joint]) -> tuple[int, str] | None:
-    """Return the index of the column of stamps and the unit in its name, if any; None if there is none."""
-    from frametool.grammar import names as known
-
-    place = known.stamp_column("" if name.strip() in joints else name.strip() for name in names)
-    return None if place is None else (place, SUFFIXES.get(known.in_nanoseconds(names[place].strip()), ""))
 
 
 class JointSample(NamedTuple):
@@ -356,7 +326,7 @@ def read_joint_file(path: str, joints: Mapping[str, Joint]) -> Iterator[JointSam
 
 
 def _of_value(value: Any, path: Path, message: TextMessage, joints: Mapping[str, Joint]) -> Iterator[JointSample]:
-    """Yield the values in a plain value: a JointState, a map, or a list of either."""
+    """Yield the values in a plain value: a JointState, a map, also the only one in a map, or a list of these."""
     if type(value) is list:
         for index, each in enumerate(value):
             yield from _of_value(each, (*path, index), message, joints)
@@ -365,30 +335,21 @@ def _of_value(value: Any, path: Path, message: TextMessage, joints: Mapping[str,
     else:
         try:
             mapping = as_mapping(value, "a map of joints, or a JointState")
-            if not messages.is_joint_state(mapping):
-                yield from _of_map(mapping, path, message, joints)
+            if messages.is_joint_state(mapping):
+                stamp_ns = messages.header_stamp(mapping.get("header"))
+                for joint, position, place in messages.positions(mapping):
+                    yield JointSample(joint, position, stamp_ns, partial(_refused, message, (*path, *place)))
                 return
-            stamp_ns = messages.header_stamp(mapping.get("header"))
-            for joint, position, place in messages.positions(mapping):
-                yield JointSample(joint, position, stamp_ns, partial(_refused, message, (*path, *place)))
+            times = [key for key in STAMP_KEYS if key in mapping and key not in joints]
+            stamp_ns = read_time(mapping, times[0], " like 12.5") if times else None
         except Misfit as misfit:
             raise misfit.below(*path) from None
-
-
-def _of_map(
-    mapping: dict[str, Any], path: Path, message: TextMessage, joints: Mapping[str, Joint]
-) -> Iterator[JointSample]:
-    """Yield the values of a map, or of the only map in it, as under `joints:`."""
-    from frametool.grammar.names import STAMP_KEYS
-
-    times = [key for key in STAMP_KEYS if key in mapping and key not in joints]
-    stamp_ns = read_time(mapping, times[0], " like 12.5") if times else None
-    keys = [key for key in mapping if key not in times]
-    if len(keys) == 1 and keys[0] not in joints and type(mapping[keys[0]]) is dict:
-        path, mapping = (*path, keys[0]), mapping[keys[0]]
-        keys = list(mapping)
-    for key in keys:
-        yield JointSample(key, mapping[key], stamp_ns, partial(_refused, message, (*path, key)))
+        keys = [key for key in mapping if key not in times]
+        if len(keys) == 1 and keys[0] not in joints and type(mapping[keys[0]]) is dict:
+            path, mapping = (*path, keys[0]), mapping[keys[0]]
+            keys = list(mapping)
+        for key in keys:
+            yield JointSample(key, mapping[key], stamp_ns, partial(_refused, message, (*path, key)))
 
 
 def _of_table(
@@ -409,8 +370,9 @@ def _of_table(
                 raise ValueInvalid(f"column {shown(name)} is not a joint{near}")
     except ValueInvalid as error:
         raise file.error(str(error), first) from None
-    stamp = stamp_column(names, joints)
-    used = {column.place for column in columns} | {stamp[0] if stamp else -1}
+    times = stamp_column("" if name.strip() in joints else name.strip() for name in names)
+    unit = "" if times is None else SUFFIXES.get(in_nanoseconds(names[times].strip()), "")
+    used = {times, *(column.place for column in columns)}
     if others := [name for place, name in enumerate(names) if place not in used]:
         warn(f"{file.name}:{first}: columns that are no joints were left out: {listing(others)}")
     stamp_ns, at = None, ""
@@ -422,9 +384,9 @@ def _of_table(
         if len(cells) != len(names):
             raise refuse(f"expected {len(names)} cells, found {len(cells)}")
         try:
-            if stamp:
-                at = names[stamp[0]]
-                stamp_ns = parse_stamp(cells[stamp[0]] + stamp[1])
+            if times is not None:
+                at = names[times]
+                stamp_ns = parse_stamp(cells[times] + unit)
             for place, joint, degrees, per_metre in columns:
                 at = names[place]
                 yield JointSample(joint, JointValue(parse_number(cells[place]) / per_metre, degrees), stamp_ns, refuse)
@@ -444,10 +406,3 @@ def _refused(message: TextMessage, path: Path, problem: str, below: Path) -> For
 
 def _refused_row(name: str, line: int, problem: str, _below: Path = ()) -> FormatError:
     return FormatError(problem, source=name, line=line)
-
-
-def unknown_joint(joint: str, joints: Mapping[str, Joint], fixed: frozenset[str]) -> str:
-    """Return the error that a robot has no such joint, or that it is fixed."""
-    if joint in fixed:
-        return f"joint {shown(joint)} is fixed and takes no value; joints: {listing(joints)}"
-    return f"no joint {shown(joint)}{alternatives(joint, joints, 'joints')}"

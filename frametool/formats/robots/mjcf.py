@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from itertools import islice
 from math import dist
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.xml import Element, read_xml
 from frametool.errors import FormatError, alternatives, shown
@@ -28,7 +28,7 @@ from frametool.geometry import floats, matrix, quaternion, rigid
 from frametool.grammar.edges import Diagnostics, Edge, Options, Topics
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
@@ -74,18 +74,7 @@ class MjcfModel:
             nodes += node.children if node.tag in NESTING else ()
             if node.tag in REFUSED:
                 raise node.error(f"<{node.tag}> is not expanded here; {WHOLE}")
-        self._read_compiler(root)
-        self.classes: dict[str, dict[str, Attributes]] = {MAIN: {}}
-        self._read_classes(root)
-        self.links: dict[str, Link] = {}
-        self.joints: dict[str, Joint] = {}
-        self._counts: dict[tuple[str, str], int] = {}
-        for section in root.all("worldbody"):
-            self._walk(section)
-
-    def _read_compiler(self, root: Element) -> None:
-        """Read the compiler sections, anywhere in the file: the last value of a setting counts; raises FormatError."""
-        said: dict[str, Element] = {}
+        said: dict[str, Element] = {}  # of the compiler sections, anywhere in the file: the last value counts
         for section in root.all("compiler"):
             said |= own_attributes(section)
         self.degrees = word(said, "angle", "degree", "radian") == "degree"
@@ -98,6 +87,17 @@ class MjcfModel:
         if word(said, "coordinate", "local", "global") == "global":
             message = "coordinate=global; MuJoCo reads it no more: save the model with MuJoCo 2.3.3 first"
             raise said["coordinate"].error(message, "coordinate")
+        self.classes: dict[str, dict[str, Attributes]] = {MAIN: {}}
+        self._read_classes(root)
+        self.links: dict[str, Link] = {}
+        self.joints: dict[str, Joint] = {}
+        self._counts: dict[tuple[str, str], int] = {}
+        for section in root.all("worldbody"):  # in the order of the file; with a stack, because bodies may be deep
+            pending = [(child, _Inside(WORLD, MAIN, rigid.IDENTITY)) for child in reversed(section.children)]
+            while pending:
+                node, around = pending.pop()
+                if (inside := self._take(node, around)) is not None:
+                    pending += [(child, inside) for child in reversed(node.children)]
 
     def _read_classes(self, root: Element) -> None:
         """Read the sections of defaults, each from a copy of the enclosing one; raises FormatError."""
@@ -121,24 +121,15 @@ class MjcfModel:
                 pending.append((child, inner))
 
     def attributes(self, node: Element, around: str) -> Attributes:
-        """Return the attributes of an element; `around` is the class inherited from the enclosing bodies, if any."""
-        own = own_attributes(node)
-        name = node.attributes["class"] if "class" in own else around or MAIN
-        self._check_class(name, node, "class")
-        return over(own, self.classes[name].get(node.tag, {}))
+        """Return the attributes of an element; `around` is the class inherited from the enclosing bodies."""
+        return over(own_attributes(node), self.classes[self._class(node, "class", around)].get(node.tag, {}))
 
-    def _check_class(self, name: str, node: Element, attribute: str) -> None:
-        """Raise FormatError for an undefined class; one may be used before it is defined."""
+    def _class(self, node: Element, attribute: str, around: str) -> str:
+        """Return the class that an attribute names, by default the inherited one; raises FormatError if undefined."""
+        name = node.attribute(attribute) or around
         if name not in self.classes:
             raise node.error(f"no default class {shown(name)}{alternatives(name, self.classes, 'classes')}", attribute)
-
-    def _walk(self, section: Element) -> None:
-        """Read the contents of a world in the order of the file; with a stack, because bodies may be deep."""
-        pending = [(child, _Inside(WORLD, "", rigid.IDENTITY)) for child in reversed(section.children)]
-        while pending:
-            node, around = pending.pop()
-            if (inside := self._take(node, around)) is not None:
-                pending += [(child, inside) for child in reversed(node.children)]
+        return name
 
     def _take(self, node: Element, inside: _Inside) -> _Inside | None:
         """Read one element; for a body or frame return the context of its children."""
@@ -146,32 +137,21 @@ class MjcfModel:
             self.options.tally.note_each(f"<{node.tag}> is left out: its bodies are made by MuJoCo; {WHOLE}", node.line)
         elif node.tag == "frame":
             pose = rigid.compose(*inside.frame, *self.pose(own_attributes(node)))
-            return inside._replace(around=self._class(node, inside.around), frame=pose)
+            return inside._replace(around=self._class(node, "childclass", inside.around), frame=pose)
         elif node.tag == "body":
             name = self._place(node, inside, self.pose(own_attributes(node)))
-            return _Inside(name, self._class(node, inside.around), rigid.IDENTITY)
+            return _Inside(name, self._class(node, "childclass", inside.around), rigid.IDENTITY)
         elif node.tag in JOINTS:
             self._join(node, inside)
         elif node.tag in ("site", "camera"):
-            self._mark(node, inside)
+            said = self.attributes(node, inside.around)
+            name = self._place(node, inside, self.pose_of_site(said) if node.tag == "site" else self.pose(said))
+            if node.tag == "camera":
+                self.options.tally.axes[name] = self.options.answers.camera_axes or "opengl"
+            if "mode" in said and (mode := said["mode"].attribute("mode")) != "fixed":
+                turns = f"{name} has the mode {shown(mode)}, in which MuJoCo rotates it over time"
+                self.options.tally.note_each(f"{turns}; its pose is as written", node.line)
         return None
-
-    def _class(self, node: Element, around: str) -> str:
-        """Return the default class for the children of a body or frame."""
-        name = node.attribute("childclass")
-        if name:
-            self._check_class(name, node, "childclass")
-        return name or around
-
-    def _mark(self, node: Element, inside: _Inside) -> None:
-        """Read a site or camera."""
-        attributes = self.attributes(node, inside.around)
-        name = self._place(node, inside, self.pose_of_site(attributes) if node.tag == "site" else self.pose(attributes))
-        if node.tag == "camera":
-            self.options.tally.axes[name] = self.options.answers.camera_axes or "opengl"
-        if "mode" in attributes and (mode := attributes["mode"].attribute("mode")) != "fixed":
-            message = f"{name} has the mode {shown(mode)}, in which MuJoCo rotates it over time; its pose is as written"
-            self.options.tally.note_each(message, node.line)
 
     def _place(self, node: Element, inside: _Inside, pose: Rigid) -> str:
         """Add a body, site or camera at its rest pose; return its name, whose prefix shows whether it is a body."""
@@ -189,7 +169,7 @@ class MjcfModel:
         return name
 
     def _join(self, node: Element, inside: _Inside) -> None:
-        """Read a joint of a body."""
+        """Read a joint of a body; enclosing frames transform its axis and anchor."""
         if inside.body == WORLD:
             raise node.error("the world has no joints; put it into a <body>")
         link = self.links[inside.body]
@@ -207,26 +187,23 @@ class MjcfModel:
         if link.joints and "floating" in (link.joints[0].kind, TYPES[kind]):
             message = f"joint {shown(name)} beside others in body {shown(link.child)}, one of them free; keep that"
             raise node.error(message)
-        joint = Joint(name, TYPES[kind], rest_pose=link.origin, line=node.line)  # free: its pose in the world
-        if kind != "free":
-            joint = self._hinged(joint._replace(rest_pose=rigid.IDENTITY), attributes, inside.frame)
+        joint = Joint(name, TYPES[kind], line=node.line)
+        if kind == "free":  # its value is its pose in the world
+            joint, link = joint._replace(rest_pose=link.origin), link._replace(origin=rigid.IDENTITY)
+        else:
+            joint = joint._replace(anchor=rigid.apply(*inside.frame, *numbers_of(attributes, "pos", "0 0 0")))
+        if kind in ("hinge", "slide"):
+            axis = direction(attributes, "axis", numbers_of(attributes, "axis", "0 0 1"))
+            unit = floats.DEGREE if kind == "hinge" and self.degrees else 1.0
+            rest = unit * numbers_of(attributes, "ref", "0")[0]
+            limited = word(attributes, "limited", "auto", "true", "false")
+            lower = upper = None
+            if "range" in attributes and (limited == "true" or (limited == "auto" and self.limits_apply)):
+                lower, upper = (unit * limit for limit in numbers_of(attributes, "range", "0 0"))
+            turned = quaternion.rotate(*inside.frame[3:], *axis)
+            joint = joint._replace(axis=turned, lower=lower, upper=upper, rest=rest)
         self.joints[name] = joint
-        origin = rigid.IDENTITY if kind == "free" else link.origin
-        self.links[link.child] = link._replace(origin=origin, joints=(*link.joints, joint))
-
-    def _hinged(self, joint: Joint, attributes: Attributes, frame: Rigid) -> Joint:
-        """Read the axis, anchor, limits and reference of a joint; enclosing frames transform axis and anchor."""
-        anchor = rigid.apply(*frame, *numbers_of(attributes, "pos", "0 0 0"))
-        if joint.kind == "ball":
-            return joint._replace(anchor=anchor)
-        axis = quaternion.rotate(*frame[3:], *direction(attributes, "axis", numbers_of(attributes, "axis", "0 0 1")))
-        unit = floats.DEGREE if joint.kind == "revolute" and self.degrees else 1.0
-        rest = unit * numbers_of(attributes, "ref", "0")[0]
-        limited = word(attributes, "limited", "auto", "true", "false")
-        lower = upper = None
-        if "range" in attributes and (limited == "true" or (limited == "auto" and self.limits_apply)):
-            lower, upper = (unit * limit for limit in numbers_of(attributes, "range", "0 0"))
-        return joint._replace(axis=axis, lower=lower, upper=upper, rest=rest, anchor=anchor)
+        self.links[link.child] = link._replace(joints=(*link.joints, joint))
 
     def pose(self, attributes: Attributes) -> Rigid:
         """Read position and orientation."""
@@ -261,8 +238,14 @@ class MjcfModel:
             case "axisangle":
                 axis = direction(attributes, kind, numbers[:3])
                 return quaternion.from_axis_angle(*axis, numbers[3], floats, degrees=self.degrees)
-            case "euler":
-                return self._euler(numbers)
+            case "euler":  # about the axes of eulerseq: a moving axis multiplies on the right, a fixed one on the left
+                turned = rigid.IDENTITY[3:]
+                for letter, angle in zip(self.eulerseq, numbers, strict=True):
+                    half_sincos = floats.half_sincos_deg if self.degrees else floats.half_sincos
+                    sine, cosine = half_sincos(angle, floats)
+                    turn = *(sine if axis == letter.lower() else 0.0 for axis in "xyz"), cosine
+                    turned = quaternion.compose(*((*turned, *turn) if letter.islower() else (*turn, *turned)))
+                return turned
             case "xyaxes":  # x is used, and the part of y orthogonal to it
                 x = direction(attributes, kind, numbers[:3])
                 along = sum(a * b for a, b in zip(x, numbers[3:], strict=True))
@@ -270,16 +253,6 @@ class MjcfModel:
                 z = quaternion.cross(*x, *y)
                 return matrix.to_quaternion(x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2], floats)
         return _turning_z(*direction(attributes, kind, numbers))
-
-    def _euler(self, angles: Sequence[float]) -> Quaternion:
-        """Multiply the rotations about the axes of eulerseq: a moving axis on the right, a fixed one on the left."""
-        turned = (0.0, 0.0, 0.0, 1.0)
-        for letter, angle in zip(self.eulerseq, angles, strict=True):
-            sine, cosine = floats.half_sincos_deg(angle, floats) if self.degrees else floats.half_sincos(angle, floats)
-            x, y, z = (sine if axis == letter.lower() else 0.0 for axis in "xyz")
-            turn = x, y, z, cosine
-            turned = quaternion.compose(*turned, *turn) if letter.islower() else quaternion.compose(*turn, *turned)
-        return turned
 
 
 def own_attributes(node: Element) -> Attributes:
@@ -343,7 +316,15 @@ def read_joints(file: InputFile, state: str) -> Iterator[JointSample]:
     root = read_xml(file, "mujoco")
     links = MjcfModel(root, Options(Diagnostics(), Topics())).links.values()
     joints = [joint for link in links for joint in link.joints]  # a body's before those of its children
-    key = _key(root, state)
+    keys = [key for frames in root.all("keyframe") for key in frames.all("key")]
+    if not keys:
+        raise file.error("no <key> in it, which would have joint values")
+    names = {key.attribute("name") or str(index): key for index, key in enumerate(keys)}
+    states = {str(index): key for index, key in enumerate(keys)} | names
+    if state not in states:
+        message = f"no key {shown(state)}" if state else f"name one of its keys: {file.name}:{next(iter(names))}"
+        raise file.error(f"{message}{alternatives(state, names, 'keys')}")
+    key = states[state]
     if not key.attribute("qpos"):
         raise key.error(f"key {shown(state)} has no qpos")
     sizes = [IN_QPOS.get(joint.kind, 1) for joint in joints]
@@ -353,7 +334,16 @@ def read_joints(file: InputFile, state: str) -> Iterator[JointSample]:
         return key.error(problem, "qpos")
 
     for joint, size in zip(joints, sizes, strict=True):
-        yield JointSample(joint.name, _value(joint, list(islice(numbers, size)), refuse), None, refuse)
+        found = list(islice(numbers, size))
+        if size == 1:
+            yield JointSample(joint.name, JointValue(found[0]), None, refuse)
+            continue
+        w, x, y, z = found[-4:]
+        if w == x == y == z == 0.0:
+            raise refuse(f"qpos of joint {shown(joint.name)}: 0 0 0 0 has no direction", ())
+        pose = {"xyzw": [repr(part) for part in quaternion.normalized(x, y, z, w, floats)]}
+        pose |= {"xyz": [repr(part) for part in found[:3]]} if joint.kind == "floating" else {}
+        yield JointSample(joint.name, pose, None, refuse)
 
 
 class _Geoms(MjcfModel):
@@ -384,28 +374,3 @@ class _Geoms(MjcfModel):
 def read_solids(file: InputFile) -> list[Solid]:
     """Return the geoms of a model."""
     return _Geoms(read_xml(file, "mujoco")).solids
-
-
-def _key(root: Element, state: str) -> Element:
-    """Return the key of a name or number."""
-    keys = [key for frames in root.all("keyframe") for key in frames.all("key")]
-    file = root.file.name
-    if not keys:
-        raise FormatError("no <key> in it, which would have joint values", source=file)
-    names = {key.attribute("name") or str(index): key for index, key in enumerate(keys)}
-    states = {str(index): key for index, key in enumerate(keys)} | names
-    if state not in states:
-        message = f"no key {shown(state)}" if state else f"name one of its keys: {file}:{next(iter(names))}"
-        raise FormatError(f"{message}{alternatives(state, names, 'keys')}", source=file)
-    return states[state]
-
-
-def _value(joint: Joint, numbers: list[float], refuse: Callable[[str, Path], FormatError]) -> Any:
-    """Return the value of a joint: a number, or a mapping with a pose; quaternions w first."""
-    if joint.kind not in IN_QPOS:
-        return JointValue(numbers[0])
-    w, x, y, z = numbers[-4:]
-    if w == x == y == z == 0.0:
-        raise refuse(f"qpos of joint {shown(joint.name)}: 0 0 0 0 has no direction", ())
-    pose: dict[str, Any] = {"xyzw": [repr(part) for part in quaternion.normalized(x, y, z, w, floats)]}
-    return pose | {"xyz": [repr(part) for part in numbers[:3]]} if joint.kind == "floating" else pose

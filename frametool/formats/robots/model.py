@@ -34,7 +34,7 @@ from frametool.text.numbers import parse_angle, parse_length
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
     from frametool.documents.xml import Element
     from frametool.geometry.types import Components, Condition, Namespace, Number, Numbers, Rigid
@@ -217,7 +217,7 @@ def read_value(joint: Joint, value: Any, source: Source, *, normalize: bool = Fa
 
 
 def _read_posed(joint: Joint, value: Any, source: Source, *, normalize: bool) -> Rigid:
-    """Read the pose of a planar, floating or ball joint."""
+    """Read the pose of a planar, floating or ball joint; one outside of its degrees of freedom is refused."""
     example = "'{xyz: [1, 2, 0], rpy_deg: [0, 0, 90]}'"
     expected = f"joint {shown(joint.name)} is {joint.kind}: it takes a POSE, as {example}"
     if type(value) is str and value.lstrip().startswith("{"):
@@ -231,13 +231,7 @@ def _read_posed(joint: Joint, value: Any, source: Source, *, normalize: bool) ->
     pose = read_pose(as_mapping(value, expected), Reading(source, normalize=normalize))
     if pose.name is not None or pose.parent is not None:
         raise Misfit(f"joint {shown(joint.name)} names its frames itself; leave name and parent out")
-    _check_freedom(joint, pose.components)
-    return pose.components
-
-
-def _check_freedom(joint: Joint, components: Rigid) -> None:
-    """Refuse a pose outside of the joint's degrees of freedom."""
-    tx, ty, tz, x, y, z, _ = components
+    tx, ty, tz, x, y, z, _ = pose.components
     ax, ay, az = joint.axis
     if joint.kind == "ball" and (tx or ty or tz):
         raise Misfit(f"joint {shown(joint.name)} is a ball joint: it turns only; leave the position out")
@@ -247,6 +241,7 @@ def _check_freedom(joint: Joint, components: Rigid) -> None:
         if max(abs(along), tilt) > OUT_OF_PLANE * (1.0 + max(map(abs, (tx, ty, tz)))):
             normal = f"{ax:g} {ay:g} {az:g}"
             raise Misfit(f"joint {shown(joint.name)} is planar: this pose leaves the plane across {normal}")
+    return pose.components
 
 
 # --- solids, as files draw them ---
@@ -274,12 +269,18 @@ def read_solids(file: InputFile, fmt: str) -> list[Solid]:
     return [*read(file)] if read else []
 
 
-def solids_of(
-    name: str, link: Element, pose_of: Callable[[Element], Rigid], numbers_of: Callable[[Element], Iterable[float]]
-) -> list[Solid]:
+def solids_of(name: str, link: Element, pose_of: Callable[[Element], Rigid]) -> list[Solid]:
     """Return what a link shows; of one that shows only meshes the simple shapes it collides with, if there are any."""
+
+    def size(shape: Element) -> Iterator[float]:
+        for part, count in PARTS.items():  # attributes in URDF, elements in SDF
+            if part in shape.attributes:
+                yield from shape.numbers(count, part)
+            elif held := shape.first(part):
+                yield from held.numbers(count)
+
     visual, collision = (
-        [Solid(name, shape.tag, tuple(numbers_of(shape)), pose_of(node))
+        [Solid(name, shape.tag, tuple(size(shape)), pose_of(node))
          for node in link.all(tag) for geometry in node.all("geometry") for shape in geometry.all(*SHAPES)]
         for tag in ("visual", "collision")
     )  # fmt: skip
@@ -331,15 +332,15 @@ class Robot:
         Raises UnknownFrame, NotConnected; ValueInvalid for missing or unknown joints.
         """
         chain = self.chain(base, tip)
-        values = self._values(joints) if hasattr(joints, "keys") else _of_array(joints, chain.needs)
-        if missing := chain.missing(values):
-            raise ValueInvalid(f"no value for {listing(missing)}; the joints on the way are {listing(chain.needs)}")
-        return Transform.of(*chain.run(values))
-
-    def _values(self, joints: Any) -> dict[str, Value]:
-        """Check the joint values."""
         values: dict[str, Value] = {}
-        for name, value in joints.items():
+        named: Any = joints
+        if not hasattr(joints, "keys"):
+            array = as_numbers(joints, "joints")
+            if array.ndim == 0 or array.shape[-1] != len(chain.needs):
+                wanted = f"(..., {len(chain.needs)}) for {listing(chain.needs)}"
+                raise ValueInvalid(f"joints: expected shape {wanted}, got {array.shape}")
+            named = {name: array[..., at] for at, name in enumerate(chain.needs)}
+        for name, value in named.items():
             joint = self.joints.get(name)
             if joint is None:
                 raise ValueInvalid(f"no joint {shown(name)}{alternatives(name, self.joints, 'joints')}")
@@ -351,16 +352,9 @@ class Robot:
                 values[name] = read_value(joint, value, Source(f"joint {name}", ""))
             else:
                 values[name] = JointValue(scalars(value, name))
-        return values
-
-
-def _of_array(joints: Numbers, names: Sequence[str]) -> dict[str, Value]:
-    """Split the last axis of an array."""
-    array = as_numbers(joints, "joints")
-    if array.ndim == 0 or array.shape[-1] != len(names):
-        wanted = f"(..., {len(names)}) for {listing(names)}"
-        raise ValueInvalid(f"joints: expected shape {wanted}, got {array.shape}")
-    return {name: JointValue(scalars(array[..., at], "joints")) for at, name in enumerate(names)}
+        if missing := chain.missing(values):
+            raise ValueInvalid(f"no value for {listing(missing)}; the joints on the way are {listing(chain.needs)}")
+        return Transform.of(*chain.run(values))
 
 
 class Chain:
@@ -415,25 +409,19 @@ class Chain:
 
     def pose(self, values: Values, xp: Namespace) -> Rigid:
         """Return base_from_tip for values of the needed joints: all floats, or arrays of one block."""
-        top_from_base, top_from_tip = (self._along(links, values, xp) for links in (self._down, self._up))
+        known: dict[str, Value] = {}
+        for name in self._between:  # set, mimicked, or at rest
+            *followers, leader = self._followed(name, values)
+            known[name] = values[leader] if leader in values else self._joints[leader].start
+            for each in reversed(followers):
+                known[name] = followed(self._joints[each], known[name])
+        top_from_base, top_from_tip = (
+            reduce(rigid.go_on, (link.pose([known[joint.name] for joint in link.joints], xp) for link in links))
+            if links else rigid.IDENTITY
+            for links in (self._down, self._up)
+        )  # fmt: skip
         if not self._down:
             return top_from_tip
         if not self._up:
             return rigid.inverse(*top_from_base)
         return rigid.compose(*rigid.inverse(*top_from_base), *top_from_tip)
-
-    def _along(self, links: Sequence[Link], values: Values, xp: Namespace) -> Rigid:
-        """Compose one branch, as `frametool.frames.path` does."""
-        product = None
-        for link in links:
-            pose = link.pose([self._value(joint.name, values) for joint in link.joints], xp)
-            product = pose if product is None else rigid.go_on(product, pose)
-        return product or rigid.IDENTITY
-
-    def _value(self, name: str, values: Values) -> Value:
-        """Return the value of a joint: set, mimicked, or at rest."""
-        *followers, leader = self._followed(name, values)
-        value = values[leader] if leader in values else self._joints[leader].start
-        for each in reversed(followers):
-            value = followed(self._joints[each], value)
-        return value

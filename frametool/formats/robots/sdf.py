@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.documents.xml import Element, read_xml
 from frametool.errors import alternatives, shown
 from frametool.formats.robots.joints import JointState
-from frametool.formats.robots.model import PARTS, Joint, Link, Mimic, Solid, read_quaternion, solids_of
+from frametool.formats.robots.model import Joint, Link, Mimic, Solid, read_quaternion, solids_of
 from frametool.frames.lookups import FrameTree
 from frametool.frames.topology import Groups
 from frametool.geometry import euler, floats, quaternion, rigid
@@ -94,20 +94,51 @@ class SdfFrame:
         self.relative_to = self.attached_to = self.scope
         self.placement: SdfFrame | None = None
 
-    def below(self, scope: SdfFrame) -> list[SdfFrame]:
-        """Return the frames on the path up from this one to an enclosing scope, without that."""
+    def way(self) -> list[SdfFrame]:
+        """Return the frames on the path up from this one to the world, without that."""
         way, frame = [], self
-        while frame is not scope:
+        while frame is not frame.scope:
             way.append(frame)
             frame = frame.scope
         return way
 
 
-class SdfFrames:
-    """All frames of a file by name."""
+KINDS = {  # number of axes of each
+    "revolute": 1, "continuous": 1, "prismatic": 1, "universal": 2, "revolute2": 2, "ball": 0, "fixed": 0,
+    "screw": 0, "gearbox": 0,
+}  # fmt: skip
+STILL = ("screw", "gearbox")
+UNLIMITED = 1e15  # SDF writes 1e16 for no limit
+
+
+class SdfJoint(NamedTuple):
+    """The connection of two bodies, links or the world.
+
+    motions: what moves, outermost first; empty for a fixed joint
+    """
+
+    frame: SdfFrame
+    parent: SdfFrame
+    child: SdfFrame
+    motions: tuple[Joint, ...]
+
+    @property
+    def ends(self) -> tuple[SdfFrame, SdfFrame]:
+        """Return the child, and its parent in the tree: the world is always the parent."""
+        return (self.parent, self.child) if self.child.kind == WORLD else (self.child, self.parent)
+
+
+class SdfTree:
+    """All frames of a file, and the joints between them.
+
+    all: the frames by their names with scopes
+    names: the names of joints for their values, without scopes if these are unique
+    hung: link -> the joint above it
+    carried: model -> the link above its frame, if it is not the other way round
+    """
 
     def __init__(self, root: Element, options: Options) -> None:
-        """Read the frames and the poses; raises FormatError."""
+        """Read the frames, their poses, and the joints; raises FormatError."""
         self.options = options
         worlds = list(root.all("world"))
         if len(worlds) > 1:
@@ -118,19 +149,40 @@ class SdfFrames:
         parts = root.attribute("version").split(".")  # other words count as the newest version
         self.version = tuple(map(int, parts)) if all(part.isdecimal() for part in parts) else (2,)
         self.included = False
-        self._take([self.top])
+        self._take()
         frames = [frame for frame in self.all.values() if frame is not self.top]
         for frame in [*frames, *self.sensors]:
             self._read(frame)
         self.tree = FrameTree()
         self.seen: dict[str, dict[str, Rigid]] = {}  # frame -> those below it, seen from it: chains cost no square
         for frame in frames:
-            self._hang(frame)
+            placed = frame.placement or frame
+            if not self.tree.hang(frame.relative_to.name, placed.name, frame.pose):
+                named = f"{shown(frame.name)} -> {shown(frame.relative_to.name)}"
+                message = f"poses relative to each other in a circle: {named}"
+                raise (frame.holder.first("pose") or frame.holder).error(message)
+        of_joints = [frame for frame in frames if frame.kind == "joint"]
+        counts = Counter(frame.holder.attribute("name") for frame in of_joints)
+        self.names = {
+            frame.name: local if counts[local := frame.holder.attribute("name")] == 1 else frame.name
+            for frame in of_joints
+        }
+        self.joints = [self._joint(frame) for frame in of_joints]
+        self.hung: dict[str, SdfJoint] = {}
+        self._hang_links()
+        ends = [end for joint in self.joints for end in (joint.parent, joint.child)]
+        self.in_world = self.top.holder.tag == "world" or self.top in ends
+        self.carried: dict[str, SdfFrame] = {}
+        for model in frames:
+            link = self.body(model) if model.kind == "model" else None
+            if link is not None and link.name in self.hung:
+                self.carried[model.name] = link
 
-    def _take(self, scopes: list[SdfFrame]) -> None:
-        """Register the contents of some scopes, and of those below."""
+    def _take(self) -> None:
+        """Register the contents of the world or file, and of all models in it."""
+        scopes = [self.top]
         for scope in scopes:  # grows during the loop
-            if len(scope.below(self.top)) > DEEPEST_MODEL:
+            if len(scope.way()) > DEEPEST_MODEL:
                 raise scope.holder.error(f"more than {DEEPEST_MODEL} models inside one another")
             for holder in scope.holder.children:
                 if holder.tag == "include":
@@ -217,14 +269,6 @@ class SdfFrames:
         inside = [frame.local for frame in self.all.values() if frame.scope is scope and frame is not scope]
         raise holder.error(f"{message}{alternatives(name, inside, 'frames')}", attribute)
 
-    def _hang(self, frame: SdfFrame) -> None:
-        """Put the pose of a frame into the tree; raises FormatError for frames relative to each other in a circle."""
-        placed = frame.placement or frame
-        if not self.tree.hang(frame.relative_to.name, placed.name, frame.pose):
-            named = f"{shown(frame.name)} -> {shown(frame.relative_to.name)}"
-            message = f"poses relative to each other in a circle: {named}"
-            raise (frame.holder.first("pose") or frame.holder).error(message)
-
     def relative(self, outer: SdfFrame, frame: SdfFrame) -> Rigid:
         """Return the pose of one frame in another with all joints at rest; unchanged if it was written like that."""
         if frame.relative_to is outer and frame.placement is None:
@@ -242,77 +286,6 @@ class SdfFrames:
             known[track.child] = rigid.compose(*known[track.parent], *track.components)
         return known[frame.name]
 
-
-KINDS = {  # number of axes of each
-    "revolute": 1, "continuous": 1, "prismatic": 1, "universal": 2, "revolute2": 2, "ball": 0, "fixed": 0,
-    "screw": 0, "gearbox": 0,
-}  # fmt: skip
-STILL = ("screw", "gearbox")
-UNLIMITED = 1e15  # SDF writes 1e16 for no limit
-
-
-class SdfJoint(NamedTuple):
-    """The connection of two bodies, links or the world.
-
-    motions: what moves, outermost first; empty for a fixed joint
-    """
-
-    frame: SdfFrame
-    parent: SdfFrame
-    child: SdfFrame
-    motions: tuple[Joint, ...]
-
-    @property
-    def ends(self) -> tuple[SdfFrame, SdfFrame]:
-        """Return the child, and its parent in the tree: the world is always the parent."""
-        return (self.parent, self.child) if self.child.kind == WORLD else (self.child, self.parent)
-
-
-def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the edges of a world or model, with joint values from options, default as in the file."""
-    yield from _SdfTree(read_xml(file, "sdf"), options).edges()
-
-
-def read_solids(file: InputFile) -> Iterator[Solid]:
-    """Yield the solids of the links."""
-    frames = SdfFrames(read_xml(file, "sdf"), Options(Diagnostics(), Topics()))
-
-    def numbers(shape: Element) -> Iterator[float]:
-        for part in shape.all(*PARTS):
-            yield from part.numbers(PARTS[part.tag])
-
-    for frame in frames.all.values():
-        if frame.kind == "link":
-            yield from solids_of(frame.name, frame.holder, lambda node: read_pose(node, frames.options)[0], numbers)
-
-
-class _SdfTree(SdfFrames):
-    """The tree of the frames of a file.
-
-    names: the names of joints for their values, without scopes if these are unique
-    """
-
-    def __init__(self, root: Element, options: Options) -> None:
-        super().__init__(root, options)
-        of_joints = [frame for frame in self.all.values() if frame.kind == "joint"]
-        counts = Counter(frame.holder.attribute("name") for frame in of_joints)
-        self.names = {
-            frame.name: local if counts[local := frame.holder.attribute("name")] == 1 else frame.name
-            for frame in of_joints
-        }
-        self.joints = [self._joint(frame) for frame in of_joints]
-        self.hung: dict[str, SdfJoint] = {}  # link -> the joint above it
-        self._groups = Groups[str]()  # of connected links
-        for joint in self.joints:
-            self._hang_link(joint)
-        ends = [end for joint in self.joints for end in (joint.parent, joint.child)]
-        self.in_world = self.top.holder.tag == "world" or self.top in ends
-        self.carried: dict[str, SdfFrame] = {}  # model -> the link above its frame, if it is not the other way round
-        for model in self.all.values():
-            link = self.body(model) if model.kind == "model" else None
-            if link is not None and link.name in self.hung:
-                self.carried[model.name] = link
-
     def body(self, frame: SdfFrame) -> SdfFrame | None:
         """Return the link, or the world, that a frame moves with; None for a model without links.
 
@@ -325,17 +298,17 @@ class _SdfTree(SdfFrames):
                 named = " -> ".join(shown(each.name) for each in [*seen, current][-3:])
                 raise frame.holder.error(f"frames attached to each other in a circle: {named}")
             seen.append(current)
-            current = self.canonical(current) if current.kind == "model" else current.attached_to
+            if current.kind != "model":
+                current = current.attached_to
+            elif name := current.holder.attribute("canonical_link"):
+                current = self.find(name, current, current.holder, "canonical_link")
+            else:  # its first link, also of nested models
+                inside = [each for each in self.all.values() if each.scope is current]
+                current = next((each for kind in ("link", "model") for each in inside if each.kind == kind), None)
         return current
 
-    def canonical(self, model: SdfFrame) -> SdfFrame | None:
-        """Return the link that a model's frame is attached to: the named one, or the first, also of nested models."""
-        if name := model.holder.attribute("canonical_link"):
-            return self.find(name, model, model.holder, "canonical_link")
-        inside = [frame for frame in self.all.values() if frame.scope is model]
-        return next((frame for kind in ("link", "model") for frame in inside if frame.kind == kind), None)
-
     def _joint(self, frame: SdfFrame) -> SdfJoint:
+        """Read a joint: the bodies that it connects, and what moves between them."""
         holder = frame.holder
         kind = holder.attribute("type")
         if kind not in KINDS:
@@ -347,24 +320,19 @@ class _SdfTree(SdfFrames):
         if kind in STILL:
             named = f"joint {shown(frame.local)} is a {kind}"
             self.note(holder, f"{named}: it is fixed as in the file and takes no value")
-        return SdfJoint(frame, parent, child, self._motions(frame, kind))
-
-    def _motions(self, frame: SdfFrame, kind: str) -> tuple[Joint, ...]:
-        name, line = self.names[frame.name], frame.holder.line
-        if kind == "ball":
-            return (Joint(name, "ball", line=line),)
+        name, line = self.names[frame.name], holder.line
+        motions = [Joint(name, "ball", line=line)] if kind == "ball" else []
         plain = {"continuous": "continuous", "prismatic": "prismatic"}.get(kind, "revolute")
-        motions = []
         for tag, called in (("axis", name), ("axis2", f"{name}:2"))[: KINDS[kind]]:
-            if axis := frame.holder.first(tag):
+            if axis := holder.first(tag):
                 lower, upper = (self._limit(axis.first("limit"), which) for which in ("lower", "upper"))
                 if lower is None or upper is None or lower > upper:
                     lower = upper = None
                 direction, mimic = self._direction(frame, axis), self._mimic(frame, axis)
                 motions.append(Joint(called, plain, direction, lower, upper, mimic, line=line))
             else:
-                self.note(frame.holder, f"joint {shown(frame.local)} has no <{tag}>: it takes no value there")
-        return tuple(motions)
+                self.note(holder, f"joint {shown(frame.local)} has no <{tag}>: it takes no value there")
+        return SdfJoint(frame, parent, child, tuple(motions))
 
     def _direction(self, frame: SdfFrame, axis: Element) -> Vector:
         """Return an axis in the joint's frame."""
@@ -404,17 +372,19 @@ class _SdfTree(SdfFrames):
         multiplier, offset, reference = (usual if part is None else part.numbers(1)[0] for part, usual in held)
         return Mimic(name, multiplier, offset - multiplier * reference)
 
-    def _hang_link(self, joint: SdfJoint) -> None:
-        """Make a joint the parent of a link; one that would close a loop is omitted, with a note."""
-        link, outer = (end.name for end in joint.ends)
-        if link in self.hung:
-            where = f"{shown(link)} hangs on joint {shown(self.hung[link].frame.local)} already"
-        elif not self._groups.join(link, outer):
-            where = f"{shown(outer)} hangs on {shown(link)} already"
-        else:
-            self.hung[link] = joint
-            return
-        self.note(joint.frame.holder, f"joint {shown(joint.frame.local)} closes a loop and is left out: {where}")
+    def _hang_links(self) -> None:
+        """Make joints the parents of links; one that would close a loop is omitted, with a note."""
+        connected = Groups[str]()
+        for joint in self.joints:
+            link, outer = (end.name for end in joint.ends)
+            if link in self.hung:
+                where = f"{shown(link)} hangs on joint {shown(self.hung[link].frame.local)} already"
+            elif not connected.join(link, outer):
+                where = f"{shown(outer)} hangs on {shown(link)} already"
+            else:
+                self.hung[link] = joint
+                continue
+            self.note(joint.frame.holder, f"joint {shown(joint.frame.local)} closes a loop and is left out: {where}")
 
     def edges(self) -> Iterator[Edge]:
         """Yield every edge, and the root if there is no world."""
@@ -440,20 +410,29 @@ class _SdfTree(SdfFrames):
             outer = joint.ends[1]
             rest, inverted = relative(outer, frame), frame is joint.parent
             return Link(outer.name, frame.name, origin, joint.motions, line, after, rest, inverted)
-        outer = self._outer(frame)
-        model = frame.below(self.top)[-1]
+        if frame.kind in ("joint", "frame"):
+            outer = frame.attached_to
+        elif frame.name in self.carried:
+            outer = self.carried[frame.name]
+        else:  # the nearest enclosing model that no joint moves, or the world
+            outer = frame.scope
+            while outer.name in self.carried:
+                outer = outer.scope
+        model = frame.way()[-1]
         stays = outer is self.top and model.kind == "model" and relative(outer, model) == rigid.IDENTITY
         if stays and not self.in_world:
             return Link(None, frame.name, line=line)  # outside of any world, in a model without a pose in one
         return Link(outer.name, frame.name, relative(outer, frame), line=line)
 
-    def _outer(self, frame: SdfFrame) -> SdfFrame:
-        """Return the parent of a frame without a joint."""
-        if frame.kind in ("joint", "frame"):
-            return frame.attached_to
-        if link := self.carried.get(frame.name):
-            return link
-        scope = frame.scope  # the nearest enclosing model that no joint moves, or the world
-        while scope.name in self.carried:
-            scope = scope.scope
-        return scope
+
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield the edges of a world or model, with joint values from options, default as in the file."""
+    yield from SdfTree(read_xml(file, "sdf"), options).edges()
+
+
+def read_solids(file: InputFile) -> Iterator[Solid]:
+    """Yield the solids of the links."""
+    frames = SdfTree(read_xml(file, "sdf"), Options(Diagnostics(), Topics()))
+    for frame in frames.all.values():
+        if frame.kind == "link":
+            yield from solids_of(frame.name, frame.holder, lambda node: read_pose(node, frames.options)[0])

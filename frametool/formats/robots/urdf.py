@@ -21,7 +21,6 @@ from frametool.errors import BadTopology, FormatError, ValueInvalid, alternative
 from frametool.formats.detect import UNSUPPORTED
 from frametool.formats.load import FrameFile, refuse_unknown_joints
 from frametool.formats.robots.joints import JointState
-from frametool.formats.robots.model import PARTS as PARTS_OF_SHAPES
 from frametool.formats.robots.model import Joint, Link, Mimic, Robot, Solid, read_quaternion, solids_of
 from frametool.formats.table import FORMATS
 from frametool.frames.topology import two_parents
@@ -31,15 +30,14 @@ from frametool.geometry.representations import notation
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Diagnostics, Edge, Options, Topics
 from frametool.grammar.pose import TURN, Pose, agreeing_rotation
-from frametool.grammar.result import Style, rotation_numbers
+from frametool.grammar.result import Style, angles_of, of_angles, refuse_motion, rotation_numbers
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
     from os import PathLike
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
-    from frametool.grammar.readers import Vector
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
@@ -68,18 +66,34 @@ def describe(file: InputFile, options: Options) -> tuple[dict[str, int], list[Li
     Raises FormatError if it is not URDF; errors in one joint go to `options.report`.
     """
     root = read_xml(file, "robot", "URDF")
-    _refuse_xacro(root)
+    for element in (root, *root.children, *(inner for outer in root.children for inner in outer.children)):
+        if element.tag.startswith("xacro:"):
+            raise element.error(f"<{bare(element.tag)}> is {_XACRO}")
+        for name, value in element.attributes.items():
+            if "${" in value or "$(" in value:
+                raise element.error(f"{shown(value)} is {_XACRO}", name)
     frames: dict[str, int] = {}
     joints: dict[str, tuple[Link, Element]] = {}
     for element in root.all("link", "joint"):
         try:
-            if element.tag == "link":
-                _take_frame(element, frames, options)
-            else:
+            if element.tag == "joint":
                 joints[element.attributes["name"]] = _link(element, joints, options), element
+                continue
+            for inner in element.all("link", "joint"):
+                raise inner.error(f"<{inner.tag}> inside a <link>; links and joints are siblings in <robot>")
+            name = options.tally.names.bare(element.required("name"))
+            if name in frames:
+                raise element.error(f"link {shown(name)} twice; first in line {frames[name]}", "name")
+            frames[name] = element.line
         except FormatError as error:
             options.report(error)
-    links = list(_connected(joints, frames, options))
+    links: list[Link] = []
+    for name, (link, element) in joints.items():
+        if missing := [end for end in (link.parent, link.child) if end and end not in frames]:
+            known = alternatives(missing[0], frames, "links")
+            options.report(element.error(f"joint {shown(name)}: no link {shown(missing[0])}{known}"))
+        else:
+            links.append(link)
     posture = JointState.of(links, options, file.name)
     if not frames:
         raise file.error("no links in it")
@@ -88,26 +102,6 @@ def describe(file: InputFile, options: Options) -> tuple[dict[str, int], list[Li
         message = f"{len(roots)} roots, where a robot has one: {named}; they are not connected"
         options.tally.note(message, frames[roots[1]], "several-roots")
     return frames, links, posture
-
-
-def _refuse_xacro(root: Element) -> None:
-    """Refuse elements and expressions that xacro would have to expand first."""
-    for element in (root, *root.children, *(inner for outer in root.children for inner in outer.children)):
-        if element.tag.startswith("xacro:"):
-            raise element.error(f"<{bare(element.tag)}> is {_XACRO}")
-        for name, value in element.attributes.items():
-            if "$" in value and ("${" in value or "$(" in value):
-                raise element.error(f"{shown(value)} is {_XACRO}", name)
-
-
-def _take_frame(element: Element, frames: dict[str, int], options: Options) -> None:
-    """Read a link; raises FormatError."""
-    for inner in element.all("link", "joint"):
-        raise inner.error(f"<{inner.tag}> inside a <link>; links and joints are siblings in <robot>")
-    name = options.tally.names.bare(element.required("name"))
-    if name in frames:
-        raise element.error(f"link {shown(name)} twice; first in line {frames[name]}", "name")
-    frames[name] = element.line
 
 
 def _link(element: Element, joints: Mapping[str, tuple[Link, Element]], options: Options) -> Link:
@@ -154,46 +148,24 @@ def _origin(element: Element, options: Options) -> Rigid:
 
 def _moving(name: str, kind: str, line: int, parts: Mapping[str, Element], options: Options) -> Joint:
     """Read axis, limits, and the joint to mimic."""
-    axis = _axis(name, parts["axis"]) if "axis" in parts and kind in WITH_AXIS else (1.0, 0.0, 0.0)
-    lower, upper = _limits(name, parts["limit"], options) if "limit" in parts and kind in LIMITED else (None, None)
-    mimic = None
+    axis, lower, upper, mimic = (1.0, 0.0, 0.0), None, None, None
+    if "axis" in parts and kind in WITH_AXIS:
+        x, y, z = parts["axis"].numbers(3, "xyz", "1 0 0")
+        if not (x or y or z):
+            raise parts["axis"].error(f"joint {shown(name)} has the axis 0 0 0, which is not a direction", "xyz")
+        axis = (x, y, z) if x * x + y * y + z * z == 1.0 else unit_vector(x, y, z, floats)
+    limit = parts.get("limit")
+    if limit and kind in LIMITED and ("lower" in limit.attributes or "upper" in limit.attributes):
+        (lower,), (upper,) = limit.numbers(1, "lower", "0"), limit.numbers(1, "upper", "0")
+        if lower > upper:
+            message = f"joint {shown(name)} has the limits {lower:g} .. {upper:g}, which nothing fits"
+            options.tally.note(message, limit.line, "limit")
     if follows := parts.get("mimic"):
         leader = follows.required("joint")
         if kind in ("planar", "floating"):
             raise follows.error(f"joint {shown(name)} is {kind}: it follows no other")
         mimic = Mimic(leader, *follows.numbers(1, "multiplier", "1"), *follows.numbers(1, "offset", "0"))
     return Joint(name, kind, axis, lower, upper, mimic, line=line)
-
-
-def _axis(name: str, element: Element) -> Vector:
-    x, y, z = element.numbers(3, "xyz", "1 0 0")
-    if not (x or y or z):
-        raise element.error(f"joint {shown(name)} has the axis 0 0 0, which is not a direction", "xyz")
-    return (x, y, z) if x * x + y * y + z * z == 1.0 else unit_vector(x, y, z, floats)
-
-
-def _limits(name: str, element: Element, options: Options) -> tuple[float | None, float | None]:
-    """Read lower and upper; a missing one is 0, and no limits are None."""
-    if not ("lower" in element.attributes or "upper" in element.attributes):
-        return None, None
-    (lower,), (upper,) = element.numbers(1, "lower", "0"), element.numbers(1, "upper", "0")
-    if lower > upper:
-        message = f"joint {shown(name)} has the limits {lower:g} .. {upper:g}, which nothing fits"
-        options.tally.note(message, element.line, "limit")
-    return lower, upper
-
-
-def _connected(
-    joints: Mapping[str, tuple[Link, Element]], frames: Collection[str], options: Options
-) -> Iterator[Link]:
-    """Yield the links whose ends exist."""
-    for name, (link, element) in joints.items():
-        missing = next((end for end in (link.parent, link.child) if end and end not in frames), None)
-        if missing is None:
-            yield link
-        else:
-            message = f"joint {shown(name)}: no link {shown(missing)}{alternatives(missing, frames, 'links')}"
-            options.report(element.error(message))
 
 
 def read_solids(file: InputFile) -> Iterator[Solid]:
@@ -204,13 +176,8 @@ def read_solids(file: InputFile) -> Iterator[Solid]:
         origin = node.first("origin")
         return IDENTITY if origin is None else _origin(origin, options)
 
-    def numbers(shape: Element) -> Iterator[float]:
-        for part in PARTS_OF_SHAPES:
-            if part in shape.attributes:
-                yield from shape.numbers(PARTS_OF_SHAPES[part], part)
-
     for link in read_xml(file, "robot").all("link"):
-        yield from solids_of(link.attribute("name").lstrip("/"), link, pose, numbers)
+        yield from solids_of(link.attribute("name").lstrip("/"), link, pose)
 
 
 def load_robot(path: str | PathLike[str]) -> Robot:
@@ -252,30 +219,24 @@ def write_tree(tree: Frames, style: Style) -> str:
     Raises ValueInvalid for what URDF cannot hold: moving frames, several roots, names with characters not allowed in
     XML.
     """
-    from frametool.grammar.result import refuse_motion
-
     refuse_motion(tree, "URDF")
     if len(tree.roots) > 1:
         message = "URDF holds one tree, and this has the roots"
         raise ValueInvalid(f"{message} {listing(tree.roots)}; --with FILE adds what connects them")
-    links = "".join(f'  <link name="{_attribute(frame)}"/>\n' for frame in tree.frames)
-    joints = "".join(_joint(parent, child, transform.components, style) for parent, child, transform in tree.edges())
-    return f'<?xml version="1.0"?>\n<robot name="robot">\n{links}{joints}</robot>\n'
-
-
-def _joint(parent: str, child: str, components: Rigid, style: Style) -> str:
-    """Write one edge."""
-    from frametool.grammar.result import angles_of, of_angles
-
-    angles = angles_of(components[3:])
-    origin = f'xyz="{_numbers(components[:3], style)}" rpy="{_numbers(angles, style)}"'
-    exact = tuple(rotation_numbers(Pose.of(components), notation("xyzw"), style))
-    if of_angles(angles) != exact and style.precision is None:
-        origin += f' quat_xyzw="{_numbers(exact, style)}"'
-    return (
-        f'  <joint name="{_attribute(child)}_joint" type="fixed">\n    <origin {origin}/>\n'
-        f'    <parent link="{_attribute(parent)}"/>\n    <child link="{_attribute(child)}"/>\n  </joint>\n'
-    )
+    text = '<?xml version="1.0"?>\n<robot name="robot">\n'
+    text += "".join(f'  <link name="{_attribute(frame)}"/>\n' for frame in tree.frames)
+    for parent, child, transform in tree.edges():
+        position, rotation = transform.components[:3], transform.components[3:]
+        angles = angles_of(rotation)
+        origin = f'xyz="{_numbers(position, style)}" rpy="{_numbers(angles, style)}"'
+        exact = tuple(rotation_numbers(Pose.of(transform.components), notation("xyzw"), style))
+        if of_angles(angles) != exact and style.precision is None:
+            origin += f' quat_xyzw="{_numbers(exact, style)}"'
+        text += (
+            f'  <joint name="{_attribute(child)}_joint" type="fixed">\n    <origin {origin}/>\n'
+            f'    <parent link="{_attribute(parent)}"/>\n    <child link="{_attribute(child)}"/>\n  </joint>\n'
+        )
+    return f"{text}</robot>\n"
 
 
 def _numbers(values: Sequence[float], style: Style) -> str:
