@@ -63,7 +63,7 @@ class RowExpressions(Formula):
         self.degrees = style.degrees
         forms = style.notations or (notation("quaternion"),)
         whole = len(forms) == 1 and forms[0].representation.whole is not None
-        written = tuple((fmt, style.in_degrees(fmt)) for fmt in forms)
+        written = tuple((fmt, fmt.in_degrees(style.degrees)) for fmt in forms)
         self.target = Target(None if whole else 1.0, written, style.keep_sign, whole)
         self.adds = all(line.name for line in lines)
         parts = [branch for line in (*bindings, *lines) for branch in walk(line.tree)]

@@ -78,7 +78,7 @@ def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationSty
     if own.pose.position is not None:
         check_vector(sheet, derived[:3], own.pose.position)
     for each in plan.notations:
-        degrees, keep_sign = plan.style.in_degrees(each), plan.style.keep_sign
+        degrees, keep_sign = each.in_degrees(plan.style.degrees), plan.style.keep_sign
         found = operations.from_quaternion(sheet, derived[3:], each, degrees=degrees, keep_sign=keep_sign)
         check_rotation(sheet, each, found, own, plan)
     pose = own.pose
@@ -99,7 +99,7 @@ def check_rotation(
 
     Raises DerivationWrong.
     """
-    degrees = plan.style.in_degrees(notation)
+    degrees = notation.in_degrees(plan.style.degrees)
     target = quaternion.unit(*own.pose.components[3:], floats)
     found = notation.to_quaternion(tuple(numbers), floats, degrees=degrees)
     off = quaternion.distance(*quaternion.normalized(*found, floats), *target, floats) if any(found) else math.inf
@@ -134,7 +134,7 @@ def _rotation_rows(own: Result, notation: Notation, style: Style) -> list[Row]:
         return _rows(notation.spec, numbers, math.isqrt(len(numbers)))
     angles = notation.representation.angles
     first = angles[0] if angles else len(numbers)
-    unit = DEGREES if style.in_degrees(notation) else RADIANS
+    unit = DEGREES if notation.in_degrees(style.degrees) else RADIANS
     parts = [(notation.names[:first], numbers[:first], ""), (notation.names[first:], numbers[first:], unit)]
     return [row(notation.spec * (at == 0), *part) for at, part in enumerate(each for each in parts if each[1])]
 

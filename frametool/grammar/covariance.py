@@ -140,22 +140,17 @@ def read_sigmas(value: Any, reading: Reading) -> list[float]:
         if len(there) > 1:
             raise Misfit(f"{there[0]} and {there[1]} in one sigma; keep one", (there[1],), key=True)
         for key in there:
-            sigmas[first : first + 3] = _three(key, value[key], AXES[first : first + 3], reading)
+            texts, places = [value[key]] * 3, [(key,)] * 3  # a single number applies to all three
+            if type(value[key]) in (dict, list):
+                axes = AXES[first : first + 3]
+                texts = within((key,), read_texts, value[key], axes, partial=True)
+                places = [(key, *step) for step in (places_in(value[key]) if type(value[key]) is list else zip(axes))]
+            degrees = (reading.degrees if ANGLES[key] is None else ANGLES[key]) if key in ANGLES else None
+            numbers = [within(path, _sigma, text, degrees) for path, text in zip(places, texts, strict=True)]
+            unit = LENGTHS.get(key)
+            numbers = [each / unit for each in numbers] if unit else [*map(radians, numbers)] if degrees else numbers
+            sigmas[first : first + 3] = numbers
     return sigmas
-
-
-def _three(key: str, value: Any, axes: Sequence[str], reading: Reading) -> list[float]:
-    """Read the three numbers of a part of sigma in metres or radians; a single number applies to all three."""
-    texts, places = [value] * 3, [(key,)] * 3
-    if type(value) in (dict, list):
-        texts = within((key,), read_texts, value, axes, partial=True)
-        places = [(key, *step) for step in (places_in(value) if type(value) is list else zip(axes))]
-    degrees = reading.degrees if ANGLES.get(key) is None else ANGLES[key]
-    found = []
-    for path, text in zip(places, texts, strict=True):
-        number = within(path, _sigma, text, degrees if key in ANGLES else None)
-        found.append(number / LENGTHS[key] if key in LENGTHS else radians(number) if degrees else number)
-    return found
 
 
 def _sigma(text: Any, degrees: bool | None) -> float:  # noqa: FBT001 - None: it is no angle

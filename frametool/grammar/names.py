@@ -6,6 +6,7 @@ One table for mappings, messages and headers of tables: a name means the same ev
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from frametool.errors import ValueInvalid, shown
@@ -67,7 +68,12 @@ def in_nanoseconds(name: str) -> int:
 
 def stamp_column(names: Iterable[str] | None) -> int | None:
     """Return the index of the first column that has the name of a stamp, in a known unit."""
-    return next((at for at, name in enumerate(names or ()) if re.fullmatch(_STAMP, name) and _is_known(name)), None)
+    for at, name in enumerate(names or ()):
+        if re.fullmatch(_STAMP, name):
+            with suppress(ValueInvalid):
+                in_nanoseconds(name)
+                return at
+    return None
 
 
 def stamp_places(names: Iterable[str] | None) -> tuple[int | None, int | None]:
@@ -85,14 +91,6 @@ def nanoseconds_beside(names: Sequence[str], place: int) -> int | None:
     folded = [name.lower() for name in names] if found else []
     wanted = [f"{found[1]}{part}" for part in ("nanosec", "nanosecs", "nsec", "nsecs", "nanoseconds")] if found else []
     return next((folded.index(name) for name in wanted if name in folded), None)
-
-
-def _is_known(name: str) -> bool:
-    try:
-        in_nanoseconds(name)
-    except ValueInvalid:
-        return False
-    return True
 
 
 def may_be_on_earth(name: str) -> bool:

@@ -33,7 +33,6 @@ _NAMED = r"(?<![\w.)\]}])[A-Za-z_][\w.]*+\((?=\s*[-+.\d\[({A-Za-z])"  # array(, 
 _ARGUMENTS = r"(?:,\s*+[A-Za-z]\w*+\s*+=\s*+[\w.'\":<>]++){1,9}+\s*+(?=\))"  # dtype=float32
 _SCALE = rf"\s*({NUMBER})\s*\*\s*\n"  # MATLAB's `1.0e+03 *` above a matrix
 _SCALAR = r"(?:np|numpy)\.\w+\(([^()]*)\)"  # numpy 2 in lists: np.float64(0.5)
-_OPEN, _CLOSE = "[({", "])}"
 _BY_COLUMNS = r"(?:[dft]|high|med|low)?p?_?mat[34](?:x[34])?\("
 _UNSUPPORTED: Sequence[tuple[str, str]] = (  # prints that are recognised but not read, and the tools that print them
     (r"Out\[\d+\](?://\w+)?\s*=|\{\{?[^{}]*?\d(?:`|\*\^)", "Mathematica"),
@@ -69,18 +68,39 @@ def number_rows(text: str, *, any_text: bool = False) -> Rows | None:
     body = _undecorated(text).strip().rstrip(";")
     body = re.sub(LABEL, "", body, count=1) if re.match(LABEL, body) else body
     scale = re.match(_SCALE, body)
-    body = _side_by_side(body[scale.end() :] if scale else body)
+    body = body[scale.end() :] if scale else body
+    before, *blocks = re.split(_COLUMNS, body)
+    lines = [[line for line in block.splitlines() if line.strip()] for block in blocks]
+    if blocks and not before.strip() and len({*map(len, lines)}) == 1:  # the columns of a wide matrix, some at a time
+        body = "\n".join(map(" ".join, zip(*lines, strict=True)))
     if "..." in body and re.search(r"[0-9]\.?[\s,]*+\.\.\.", body):
         raise ValueInvalid("the print was cut at '...'; print all numbers")
-    pieces = _bracketed(body) if body[:1] and body[0] in _OPEN else re.split(r";|\n", body)
-    if pieces is None:
-        return None
-    rows = [_cells(piece) for piece in pieces if piece.strip()]
+    pieces: list[str] = re.split(r";|\n", body)
+    if body[:1] and body[0] in "[({":  # the innermost brackets hold the rows
+        plain = body.translate(str.maketrans("({)}", "[[]]"))
+        around = re.sub(r"\[[^\[\]]*\]", "", plain)
+        if plain.count("[") != plain.count("]") or re.sub(r"[\[\],;\s]", "", around):
+            return None
+        inner = re.findall(r"\[([^\[\]]*)\]", plain)
+        pieces = inner[0].split(";") if len(inner) == 1 else inner
+    rows = []
+    for piece in filter(str.strip, pieces):
+        row = piece.strip().removesuffix(",").strip()
+        gaps = re.findall(r"\s*,\s*|\s+", row)
+        if 0 < sum("," in gap for gap in gaps) < len(gaps):
+            both = f"{shown(row)} is separated by blanks and by commas"
+            raise ValueInvalid(f"{both}; are these decimal commas? write points")
+        rows.append(re.split(r"\s*,\s*|\s+", row))
     cells = [cell for row in rows for cell in row]
     fits = any if any_text and not re.search("[:=\"']", body) else all
-    if not cells or not fits(map(_is_number, cells)):
+    if not cells or not fits(re.fullmatch(rf"{NUMBER}|[-+]?(?:nan|inf)", cell, re.IGNORECASE) for cell in cells):
         return None
-    return [[_times(cell, scale[1]) for cell in row] for row in rows] if scale else rows
+    if not scale:
+        return rows
+    power = re.fullmatch(r"1(?:\.0*)?[eE]([-+]?\d+)", scale[1])
+    if not power or any("e" in cell.lower() for cell in cells):
+        raise ValueInvalid(f"a factor {shown(scale[1])} above numbers is not a power of ten; use format long")
+    return [[f"{cell}e{power[1]}" for cell in row] for row in rows]
 
 
 def _undecorated(text: str) -> str:
@@ -107,49 +127,6 @@ def unsupported_tool(text: str) -> str:
     return next(found, "")
 
 
-def _side_by_side(body: str) -> str:
-    """Join the blocks of columns into which a wide matrix was split."""
-    before, *blocks = re.split(_COLUMNS, body)
-    if not blocks:
-        return body
-    lines = [[line for line in block.splitlines() if line.strip()] for block in blocks]
-    if before.strip() or len({*map(len, lines)}) > 1:
-        return body
-    return "\n".join(map(" ".join, zip(*lines, strict=True)))
-
-
-def _bracketed(body: str) -> list[str] | None:
-    """Return the contents of the innermost brackets; None if there is other text around them."""
-    plain = body.translate(str.maketrans("({)}", "[[]]"))
-    inner = re.findall(r"\[([^\[\]]*)\]", plain)
-    around = re.sub(r"\[[^\[\]]*\]", "", plain)
-    if plain.count("[") != plain.count("]") or re.sub(r"[\[\],;\s]", "", around):
-        return None
-    return inner[0].split(";") if len(inner) == 1 else inner
-
-
-def _cells(row: str) -> list[str]:
-    """Split a row at its blanks or at its commas; raise ValueInvalid if both separate numbers."""
-    row = row.strip().removesuffix(",").strip()
-    gaps = re.findall(r"\s*,\s*|\s+", row)
-    commas = sum("," in gap for gap in gaps)
-    if 0 < commas < len(gaps):
-        raise ValueInvalid(f"{shown(row)} is separated by blanks and by commas; are these decimal commas? write points")
-    return re.split(r"\s*,\s*|\s+", row)
-
-
-def _is_number(cell: str) -> bool:
-    return re.fullmatch(rf"{NUMBER}|[-+]?(?:nan|inf)", cell, re.IGNORECASE) is not None
-
-
-def _times(cell: str, scale: str) -> str:
-    """Multiply a number, as text, by the power of ten above a matrix, exactly."""
-    power = re.fullmatch(r"1(?:\.0*)?[eE]([-+]?\d+)", scale)
-    if not power or "e" in cell.lower():
-        raise ValueInvalid(f"a factor {shown(scale)} above numbers is not a power of ten; use format long")
-    return f"{cell}e{power[1]}"
-
-
 _TERM = re.compile(rf"([-+]*)((?:{DECIMAL})?)\*?([ijk]?)")
 _MEMBERS = rf"\s*[A-Za-z_]\w*\s*[=:]\s*(?:{NUMBER}|[A-Za-z_][\w.]*\()"
 _ABOUT = rf"\((?:x=)?({NUMBER}),\s*(?:y=)?({NUMBER}),\s*(?:z=)?({NUMBER})\)"
@@ -159,20 +136,7 @@ _MOVED = "t|p|T|trans|translation|tvec"
 _PART = re.compile(rf"(?:^|(?<=[\s(]))({_TURNED}|{_MOVED})\s*[=:]\s*(?=[\[(]|\n|np\.|array|Rot|{NUMBER})")
 
 
-def named_values(text: str, default: Notation | None = None) -> list[Any] | None:
-    """Return the values of a print of objects, as documents have them; None for any other text.
-
-    Raises ValueInvalid for a known print that cannot be read.
-    """
-    robots = [_robot(line, default) for line in text.strip().splitlines() if line.strip()]
-    if robots and None not in robots:
-        return [*robots]
-    for read in (_algebra, _named_order, _members, _euler, _parts):
-        if (found := read(text)) is not None:
-            return [found]
-    return _origins(text) if re.match(r"\s*<(?!Matrix\b)", text) else None
-
-
+_UR = "[pP]"
 ABB = r"\[\s*\[([^\[\]]*)\]\s*,\s*\[([^\[\]]*)\]\s*((?:,\s*\[[^\[\]]*\]\s*){2})?\]"
 _DECLARED = r"(?:(?:LOCAL|TASK)\s+)?(?:CONST|PERS|VAR)\s+(?:robtarget|pose)\s+\w+\s*:=\s*"
 
@@ -201,9 +165,6 @@ def _robot(text: str, default: Notation | None) -> dict[str, Any] | None:
     return {"xyz_mm": xyz, "wxyz": turn}
 
 
-_UR = "[pP]"
-
-
 def _algebra(text: str) -> dict[str, Any] | None:
     """Read `0.7071 + 0.7071k`, `-j`, `0.5i + -0.5j + 0.5*k + 0.5`: each unit and the real part at most once."""
     plain = re.sub(LABEL, "", text, count=1).removeprefix("quaternion") if len(text) < 200 else ""
@@ -222,13 +183,6 @@ def _algebra(text: str) -> dict[str, Any] | None:
     return {"quaternion": {name: parts.get(unit, "0") for name, unit in zip("xyzw", ("i", "j", "k", ""), strict=True)}}
 
 
-def _named_order(text: str) -> dict[str, Any] | None:
-    """Read four numbers after `(x,y,z,w) =`."""
-    stated = re.match(r"\s*\((x,\s*y,\s*z,\s*w)\)\s*=\s*", text)
-    rows = number_rows(text[stated.end() :]) if stated else None
-    return {"xyzw": rows[0]} if rows and len(rows) == 1 and len(rows[0]) == 4 else None
-
-
 def _members(text: str) -> dict[str, Any] | None:
     """Read `geometry_msgs.msg.Transform(translation=..Vector3(x=1.0, ..), ..)`, or `x=1.0, y=2.0` without a name."""
     text = re.sub(r"\A\s*<Quaternion \((.*)\)>\s*\Z", r"Quaternion(\1)", text)
@@ -237,7 +191,8 @@ def _members(text: str) -> dict[str, Any] | None:
     import json
 
     body = re.sub(r"[A-Za-z_][\w.]*\(", "{", text.strip().rstrip(",")).replace(")", "}")
-    body = re.sub(rf"([A-Za-z_][\w.]*)\s*[=:]\s*({NUMBER})?", _member, body)
+    body = re.sub(rf"([A-Za-z_][\w.]*)\s*[=:]\s*({NUMBER})", r'"\1": "\2"', body)
+    body = re.sub(r"([A-Za-z_][\w.]*)\s*[=:]\s*", r'"\1": ', body)
     try:
         found: dict[str, Any] = json.loads(body if body[0] == "{" else f"{{{body}}}", object_pairs_hook=_unrepeated)
     except ValueError:
@@ -245,24 +200,11 @@ def _members(text: str) -> dict[str, Any] | None:
     return found
 
 
-def _member(found: re.Match[str]) -> str:
-    return f'"{found[1]}": ' + (f'"{found[2]}"' if found[2] else "")
-
-
 def _unrepeated(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """Return the members of an object; raises ValueError if two have one name."""
     if len({name for name, _ in pairs}) < len(pairs):
         raise ValueError
     return dict(pairs)
-
-
-def _euler(text: str) -> dict[str, Any] | None:
-    """Read Blender's angles: about x, y, z each, applied about the fixed axes in the order of the letters."""
-    found = re.fullmatch(_EULER, text)
-    if found is None:
-        return None
-    *about, order = [each for each in found.groups() if each is not None]
-    return {"euler": {"axes": f"s{order.lower()}", "angles": [about["XYZ".index(letter)] for letter in order]}}
 
 
 def _parts(text: str) -> dict[str, Any] | None:
@@ -289,22 +231,19 @@ def _origins(text: str) -> list[Any] | None:
     found = re.findall(r"<origin\b([^<>]*?)/?>", plain)
     if not found or re.match(r"\s*<(?!origin\b|joint\b)", plain):
         return None
-    values = [_origin(attributes) for attributes in found]
+    values: list[dict[str, Any]] = []
+    for attributes in found:
+        value: dict[str, Any] = {"xyz": ["0"] * 3, "rpy": ["0"] * 3}
+        for name, _, numbers in re.findall(r"(?<![\w:])([\w:]++)\s*+=\s*+([\"'])(.*?)\2", attributes):
+            if name not in value:
+                raise ValueInvalid(f"unknown attribute {shown(name)} of an origin; it has xyz and rpy")
+            value[name] = numbers.split()
+        values.append(value)
     if len(values) == 1:
         for key, tag in (("name", "child"), ("parent", "parent")):
             if names := re.findall(rf"<{tag}\s+link\s*=\s*[\"']([^\"'<>]+)[\"']", plain):
                 values[0][key] = names[0]
     return values
-
-
-def _origin(attributes: str) -> dict[str, Any]:
-    """Read the attributes of one origin."""
-    value: dict[str, Any] = {"xyz": ["0"] * 3, "rpy": ["0"] * 3}
-    for name, _, numbers in re.findall(r"(?<![\w:])([\w:]++)\s*+=\s*+([\"'])(.*?)\2", attributes):
-        if name not in value:
-            raise ValueInvalid(f"unknown attribute {shown(name)} of an origin; it has xyz and rpy")
-        value[name] = numbers.split()
-    return value
 
 
 def pasted_poses(text: str, default: Notation | None = None) -> list[Any] | None:
@@ -313,14 +252,25 @@ def pasted_poses(text: str, default: Notation | None = None) -> list[Any] | None
     default: the notation of numbers that do not state theirs.
     Raises ValueInvalid for a known print that cannot be read.
     """
-    if (found := named_values(text, default)) is not None:
+    robots = [_robot(line, default) for line in text.strip().splitlines() if line.strip()]
+    if robots and None not in robots:
+        return [*robots]
+    if stated := re.match(r"\s*\((x,\s*y,\s*z,\s*w)\)\s*=\s*", text):
+        rows = number_rows(text[stated.end() :])
+        if rows and len(rows) == 1 and len(rows[0]) == 4:
+            return [{"xyzw": rows[0]}]
+    if euler := re.fullmatch(_EULER, text):  # Blender: about the fixed axes, in the order of the letters
+        *about, order = [each for each in euler.groups() if each is not None]
+        angles = [about["XYZ".index(letter)] for letter in order]
+        return [{"euler": {"axes": f"s{order.lower()}", "angles": angles}}]
+    for read in (_algebra, _members, _parts):
+        if (value := read(text)) is not None:
+            return [value]
+    if re.match(r"\s*<(?!Matrix\b)", text) and (found := _origins(text)) is not None:
         return found
     rows = number_rows(text, any_text=default is not None)
-    return None if rows is None else _meant(rows, default)
-
-
-def _meant(rows: Rows, default: Notation | None) -> list[Any]:
-    """Convert rows to values; bare lists if nothing states their notation."""
+    if rows is None:
+        return None
     rep = default or notation("matrix")
     if rep.representation.whole:
         if (value := matrix_pose(rows, rep, stated=default is not None)) is not None:
@@ -371,31 +321,25 @@ def is_rotation(rows: Rows) -> bool:
 
 def _spelled_rows(rows: Rows, rep: Notation) -> list[Any] | None:
     """Return the poses of rows in a notation: one per row, or one column, or a position and a rotation."""
-    size = len(rep.columns)
-    lengths = [len(row) for row in rows]
-    if len(rows) > 1 and set(lengths) == {1}:
+    row, size = rep.representation, len(rep.columns)
+    if len(rows) > 1 and all(len(cells) == 1 for cells in rows):
         rows = [[cell for (cell,) in rows]]
-        lengths = [len(rows[0])]
-    if lengths == [3, size]:
+    if [*map(len, rows)] == [3, size]:
         if size == 3:
-            hint = f"write {{xyz: [..], {rep.representation.name}: ..}}"
+            hint = f"write {{xyz: [..], {row.name}: ..}}"
             raise ValueInvalid(f"two rows of 3 may be a pose or two rotations; {hint}")
-        rows, lengths = [[*rows[0], *rows[1]]], [3 + size]
-    if not set(lengths) <= {size, size + 3}:
+        rows = [[*rows[0], *rows[1]]]
+    if not {*map(len, rows)} <= {size, size + 3}:
         return None
-    return [_entry(row, rep) for row in rows]
-
-
-def _entry(cells: Sequence[str], rep: Notation) -> dict[str, Any]:
-    """Return the mapping of a rotation, after x y z if there are enough numbers."""
-    row = rep.representation
-    size = len(row.columns)
-    for index, cell in enumerate(cells[-size:]):
-        (parse_angle if index in row.angles else parse_number)(cell)
     unit = "" if rep.degrees is None else "_deg" if rep.degrees else "_rad"
-    rep.bound_axes()
-    entry = {f"{row.name}{unit}": rep.spelled(cells[-size:])}
-    return {"xyz": list(cells[:-size]), **entry} if len(cells) > size else entry
+    found: list[Any] = []
+    for cells in rows:
+        for index, cell in enumerate(cells[-size:]):
+            (parse_angle if index in row.angles else parse_number)(cell)
+        rep.bound_axes()
+        position = {"xyz": list(cells[:-size])} if len(cells) > size else {}
+        found.append({**position, f"{row.name}{unit}": rep.spelled(cells[-size:])})
+    return found
 
 
 def begins_freely(head: str, default: Notation | None, *, moves: bool, alone: bool) -> bool | None:
@@ -407,7 +351,10 @@ def begins_freely(head: str, default: Notation | None, *, moves: bool, alone: bo
     lines = [line.strip() for line in head.splitlines() if line.strip()]
     first = lines[0]
     if first[0] in "[({" and re.match(r"[\[\s]*[-+.\d]\S*\s*,", first):
-        return not moves and (default is not None or _is_long(head) or bool(re.search(_NO_JSON, head)))
+        listed = re.match(r"\s*\[([^\[\]]*)\]", head)
+        is_pose = listed is not None and listed[1].count(",") in (8, 11, 15)  # 9, 12 or 16 numbers
+        is_pose = is_pose or re.match(rf"{_LISTED_ROWS}|\s*{ABB}", head) is not None
+        return not moves and (default is not None or is_pose or re.search(_NO_JSON, head) is not None)
     cells = first.split()
     if not all(re.fullmatch(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?", cell) for cell in cells):
         return True
@@ -419,10 +366,3 @@ def begins_freely(head: str, default: Notation | None, *, moves: bool, alone: bo
     if matrix:
         return (len(cells), len(lines)) in ((4, 3), (4, 4))  # a line of twelve is a KITTI file with one pose
     return len(cells) == 1 and len(lines) > 1
-
-
-def _is_long(head: str) -> bool:
-    """Return True for a list of 9, 12 or 16 numbers, three rows of four, and rows on separate lines."""
-    found = re.match(r"\s*\[([^\[\]]*)\]", head)
-    is_long = found is not None and found[1].count(",") in (8, 11, 15)
-    return is_long or re.match(rf"{_LISTED_ROWS}|\s*{ABB}", head) is not None

@@ -111,7 +111,13 @@ def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
     elif "easting" in own:
         found.append(_utm({key: own[key] for key in own if key in UTM_KEYS or SAME.get(key) == "alt"}, reading))
     if any(key in own for key in ("lat", "latitude", "lat_rad")):
-        found.append(_lla(own, reading))
+        named = _by_field(own)
+        latitude, longitude = ([each for each in (name, f"{name}_rad") if each in named] for name in ("lat", "lon"))
+        if len(latitude) != 1 or len(longitude) != 1:
+            raise Misfit(_incomplete(own), (next(iter(own)),), key=True)
+        fields = *latitude, *longitude, *_heights(named, reading, named[latitude[0]])
+        keys = [(named[each], each) for each in fields]
+        found.append(Spot(Place(LLA, fields), tuple(within((key,), coordinate, own[key], each) for key, each in keys)))
     for name, fields in FLAT.items():
         if {*fields} <= own.keys():
             axes, origin = (name, reading.earth and reading.earth.origin) if name in LOCAL else ("", None)
@@ -166,18 +172,6 @@ def _heights(named: dict[str, str], reading: Reading, *path: str) -> tuple[str, 
     return found
 
 
-def _lla(own: dict[str, Any], reading: Reading) -> Spot:
-    """Read latitude, longitude and height."""
-    named = _by_field(own)
-    latitude, longitude = ([each for each in (name, f"{name}_rad") if each in named] for name in ("lat", "lon"))
-    if len(latitude) != 1 or len(longitude) != 1:
-        raise Misfit(_incomplete(own), (next(iter(own)),), key=True)
-    fields = *latitude, *longitude, *_heights(named, reading, named[latitude[0]])
-    keys = [named[each] for each in fields]
-    numbers = [within((key,), coordinate, own[key], field) for key, field in zip(keys, fields, strict=True)]
-    return Spot(Place(LLA, fields), tuple(numbers))
-
-
 def coordinate(value: Any, field: str) -> float:
     """Read a number, for latitude and longitude also with marks: 48°08'14.5"N, 48.1N."""
     if type(value) is not str:
@@ -213,7 +207,7 @@ def _utm(value: Any, reading: Reading) -> Spot:
         what = f"unknown key {shown(unknown[0])} of utm; it has zone, easting, northing, alt"
         raise Misfit(what, (unknown[0],), key=True)
     default = reading.earth.zone if reading.earth else None
-    zone = within((named[ZONE],), _zone, value[named[ZONE]]) if ZONE in named else default
+    zone = within((named[ZONE],), zone_number, value[named[ZONE]]) if ZONE in named else default
     if zone is None:
         raise Misfit("utm needs its zone: 32N, or 32S south of the equator")
     if missing := [key for key in ("easting", "northing") if key not in value]:
@@ -229,13 +223,6 @@ def band_s(zone: float, northing: float) -> str:
     """Return a warning that a zone's S may be the latitude band, which is in the north."""
     name = f"zone {ZONES[int(zone)]} with northing {northing:g}"
     return f"{name}: S is south of the equator; the band S lies north, write N"
-
-
-def _zone(value: Any) -> float:
-    """Read the name of a zone."""
-    if type(value) is not str:
-        raise Misfit(f"expected a zone like 32N, found {kind(value)}")
-    return zone_number(value)
 
 
 def _position(spot: Spot) -> tuple[float, float, float]:

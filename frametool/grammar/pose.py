@@ -21,7 +21,7 @@ from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, place
 from frametool.text.numbers import half_unit, parse_angle, parse_length, parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Sequence
+    from collections.abc import Collection, Sequence
 
     from frametool.geometry.place import Spot
     from frametool.geometry.representations import Notation
@@ -138,22 +138,25 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
     position: Vector | None = None
     rotation: Quaternion | None = None
     outer_degrees = reading.degrees
-    if SCALE in mapping:
-        from frametool.grammar.covariance import refuse_scale
-
-        refuse_scale(mapping[SCALE])
     if "angles" in mapping:
         reading.degrees = read_angle_unit(mapping["angles"])
     key, uncertain = "", None
     try:
-        if not COVARIANCE_KEYS.isdisjoint(mapping):
-            from frametool.grammar.covariance import read_covariance
+        if not COVARIANCE_KEYS.isdisjoint(mapping) or SCALE in mapping:
+            from frametool.grammar.covariance import read_covariance, refuse_scale
 
+            refuse_scale(mapping.get(SCALE, "1"))
             uncertain = read_covariance(mapping, reading)
         for key, value in mapping.items():
             if key in POSITION_KEYS and is_position(key, value):
-                found = read_position(value, POSITION_KEYS[key], bare=reading.bare_numbers)
-                position = found if position is None else _agreeing_position(position, found)
+                parts = round(1.0 / POSITION_KEYS[key])  # of a metre: dividing rounds once, 0.1 from 100
+                x, y, z = read_numbers(value, XYZ, partial=True, metres=parts == 1 and not reading.bare_numbers)
+                found = x / parts, y / parts, z / parts
+                if position is not None:
+                    apart = max(abs(a - b) for a, b in zip(position, found, strict=True))
+                    if apart > AGREEMENT * (1.0 + max(map(abs, position))):
+                        raise NotARotation(f"two positions in one entry disagree by {apart:.6g} m; keep one")
+                position = position or found
             elif key in LISTED_WORDS and not is_rotation(key, value):
                 raise Misfit(f"expected the numbers of {'a position' if key in POSITION_WORDS else 'a rotation'}")
             elif key in ROTATION_KEYS or key == readers.AXES_KEY:
@@ -220,30 +223,6 @@ def _read_choice(key: str, value: Any, yes: str, no: str) -> bool:
     return bool(value == yes)
 
 
-def read_position(value: Any, unit: float, *, bare: bool = False) -> Vector:
-    """Read [x, y, z] or {x, y, z}, in metres or in the unit, such as 0.001; bare: numbers without units only."""
-    parts = round(1.0 / unit)  # dividing rounds once: 0.1 from 100
-    x, y, z = read_numbers(value, XYZ, partial=True, each=readers.read_number if bare else length_reader(parts))
-    return (x, y, z) if parts == 1 else (x / parts, y / parts, z / parts)
-
-
-def length_reader(parts: float) -> Callable[[Any], float]:
-    """Return a reader of lengths in a unit (parts per metre); lengths in metres may carry another unit, 10cm."""
-
-    def read(text: Any) -> float:
-        return parse_length(text) if type(text) is str and parts == 1.0 else readers.read_number(text)
-
-    return read
-
-
-def _agreeing_position(first: Vector, second: Vector) -> Vector:
-    """Accept a second notation of the position if both agree."""
-    apart = max(abs(a - b) for a, b in zip(first, second, strict=True))
-    if apart > AGREEMENT * (1.0 + max(map(abs, first))):
-        raise NotARotation(f"two positions in one entry disagree by {apart:.6g} m; keep one")
-    return first
-
-
 def unknown_keys(hints: Sequence[tuple[str, str]], count: int) -> str:
     """Return unknown keys, each with its hint, as long as they fit; and the number of the others."""
     named: list[str] = []
@@ -279,7 +258,7 @@ def pose_of_numbers(texts: Sequence[str], default: Notation | None, reading: Rea
 
     Raises NotARotation for an invalid rotation, ValueInvalid for a list that is not such numbers.
     """
-    rep = notation_of(texts, default)
+    rep = default or notation_of(texts)
     whole, size = rep.representation.whole, len(rep.representation.columns)
     if whole and len(texts) == _ROWS_OF_A_POSE:
         from frametool.grammar.pasted import matrix_pose
@@ -290,13 +269,12 @@ def pose_of_numbers(texts: Sequence[str], default: Notation | None, reading: Rea
     if len(texts) not in rep.counts:
         raise ValueInvalid(f"{rep.counted}; found {len(texts)}")
     x, y, z = map(parse_length, texts[:-size] or ("0", "0", "0"))
-    return Pose((x, y, z) if len(texts) > size else None, rotation_of(rep, texts[-size:], readers.INDICES, reading))
+    _, rotation = read_spelled(rep, texts[-size:], readers.INDICES, reading)
+    return Pose((x, y, z) if len(texts) > size else None, rotation)
 
 
-def notation_of(texts: Sequence[str], default: Notation | None) -> Notation:
-    """Return the notation of bare numbers; only a matrix is known by their number."""
-    if default is not None:
-        return default
+def notation_of(texts: Sequence[str]) -> Notation:
+    """Return the notation of bare numbers without --from; only a matrix is known by their number."""
     if len(texts) in (9, _ROWS_OF_A_POSE, 16):
         return parse_notation("matrix")
     choices = ", ".join(REPRESENTATIONS)
@@ -351,8 +329,6 @@ def read_rotation(key: str, value: Any, reading: Reading) -> tuple[Vector | None
 
     Raises Misfit or ValueInvalid: wrong shape, not a number, not a rotation, or several that do not agree.
     """
-    if key == readers.AXES_KEY:
-        return None, _read_axes(value)
     if not _is_several(key, value):
         return read_spelled(*shape_of(key, value), reading)
     read = [within((index,), read_rotation, key, each, reading) for index, each in enumerate(value)]
@@ -371,8 +347,9 @@ def agreeing_rotation(first: Quaternion, second: Quaternion) -> Quaternion:
 
 def _is_several(key: str, value: Any) -> bool:
     """Return True for a list of Euler angles about different axes, False for a single rotation."""
-    row = ROTATION_KEYS[key].representation
-    return row.axes == NAMED_AXES and type(value) is list and bool(value) and all(type(each) is dict for each in value)
+    if type(value) is not list or key == readers.AXES_KEY or ROTATION_KEYS[key].representation.axes != NAMED_AXES:
+        return False
+    return bool(value) and all(type(each) is dict for each in value)
 
 
 def shape_of(key: str, value: Any) -> Spelled:
@@ -380,57 +357,50 @@ def shape_of(key: str, value: Any) -> Spelled:
 
     For several rotations under one key it returns the first; its numbers have no paths, so that they are not replaced.
     """
-    if key == readers.AXES_KEY:
-        return parse_notation("quaternion"), [repr(part) for part in _read_axes(value)], [(name,) for name in "xyzw"]
+    if key == readers.AXES_KEY:  # the name of a change of axes: optical, ned_from_enu
+        from frametool.geometry.conventions import named_rotation
+
+        if type(value) is not str:
+            raise Misfit(f"expected the name of axes like optical or ned_from_enu, found {kind(value)}")
+        parts = named_rotation(value).components
+        return parse_notation("quaternion"), [*map(repr, parts)], [(name,) for name in "xyzw"]
     if _is_several(key, value):
         bound, texts, places = shape_of(key, value[0])
         return bound, texts, [("", *place) for place in places]
     notation = ROTATION_KEYS[own_key(key, value)]
-    shape = notation.representation.shape
-    if shape == NAMED and type(value) is list:
-        raise _without_order(key, notation, value)
-    if isinstance(shape, tuple):
-        return _take_parts(notation, value, dict(shape))
-    return _take_rows(notation, value) if shape == ROWS else _list_or_map(notation, value)
-
-
-def _read_axes(value: Any) -> Quaternion:
-    """Read the name of a change of axes: `optical`, `ned_from_enu`."""
-    from frametool.geometry.conventions import named_rotation
-
-    if type(value) is not str:
-        raise Misfit(f"expected the name of axes like optical or ned_from_enu, found {kind(value)}")
-    rotation: Quaternion = named_rotation(value).components
-    return rotation
+    row, is_list = notation.representation, type(value) is list
+    if isinstance(row.shape, tuple):
+        return _take_parts(notation, value, dict(row.shape))
+    if row.shape == ROWS:
+        return _take_rows(notation, value)
+    if row.shape == NAMED and is_list:  # only names could state the order
+        others = [name for name, each in ROTATIONS.items() if each.shape == LIST and {*each.columns} == {*row.columns}]
+        choices = ", ".join(f"{name}: [..]" for name in others)
+        numbers, named = bare(", ".join(map(str, value))), ", ".join(f"{name}:" for name in notation.names)
+        raise Misfit(f"{key} [{numbers}] has no order; write {choices} or {{{named}}}")
+    columns = row.whole.columns if row.whole and is_list and len(value) == len(row.whole.columns) else row.columns
+    if row.shape == NAMED or (type(value) is dict and value.keys() == {*row.names}):
+        columns = row.names
+    texts = read_texts(value, columns, partial=bool(row.angles))  # missing angles of a mapping count as 0
+    return notation, texts, places_in(value) if is_list else [(name,) for name in columns]
 
 
 def read_spelled(
     notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading
 ) -> tuple[Vector | None, Quaternion]:
-    """Read one text per component: a rotation, or the numbers of a whole pose."""
-    whole = notation.representation.whole
-    if whole is None or len(texts) != len(whole.columns):
-        return None, rotation_of(notation, texts, places, reading)
+    """Read one text per component: a rotation, or the numbers of a whole pose; the rotation is checked."""
+    row, whole = notation.representation, notation.representation.whole
+    position: Vector | None = None
     numbers, degrees = read_components(notation, texts, places, reading)
-    end = len(numbers) - len(whole.tail)
-    if tuple(numbers[end:]) != whole.tail:
-        found = " ".join(f"{number:g}" for number in numbers[end:])
-        tail = " ".join(f"{number:g}" for number in whole.tail)
-        raise NotARotation(f"the last row of a 4x4 pose is {tail}, found {found}", rule="denormalized")
-    position, rotation = whole.split(numbers)
-    return position, _checked(notation, rotation, reading, degrees=degrees)
-
-
-def rotation_of(notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading) -> Quaternion:
-    """Convert one text per component into x, y, z, w, in the unit that applies, checked to be a rotation."""
-    numbers, degrees = read_components(notation, texts, places, reading)
-    if notation.representation.complaint is None:
-        return notation.to_quaternion(tuple(numbers), floats, degrees=degrees)
-    return _checked(notation, numbers, reading, degrees=degrees)
-
-
-def _checked(notation: Notation, numbers: Sequence[float], reading: Reading, *, degrees: bool = False) -> Quaternion:
-    """Return the quaternion of numbers that are a rotation; record warnings."""
+    if whole is not None and len(texts) == len(whole.columns):
+        end = len(numbers) - len(whole.tail)
+        if tuple(numbers[end:]) != whole.tail:
+            found = " ".join(f"{number:g}" for number in numbers[end:])
+            tail = " ".join(f"{number:g}" for number in whole.tail)
+            raise NotARotation(f"the last row of a 4x4 pose is {tail}, found {found}", rule="denormalized")
+        position, numbers = whole.split(numbers)
+    if row.complaint is None:
+        return position, notation.to_quaternion(tuple(numbers), floats, degrees=degrees)
     try:
         rotation, warnings = overheard(
             notation.checked_quaternion, numbers, floats, degrees=degrees, normalize=reading.normalize
@@ -439,7 +409,7 @@ def _checked(notation: Notation, numbers: Sequence[float], reading: Reading, *, 
         raise NotARotation(str(error), rule=error.rule) from None
     for rule, message in warnings:
         reading.note(message, rule=rule)
-    return rotation
+    return position, rotation
 
 
 def read_components(
@@ -452,7 +422,11 @@ def read_components(
     except (ValueInvalid, TypeError):
         return _read_one_by_one(notation, texts, places, degrees=degrees, bare=reading.bare_numbers)
     if notation.degrees is None and not degrees and notation.representation.angles:
-        _note_degrees(notation, numbers, places, reading)
+        index = max(notation.representation.angles, key=lambda index: abs(numbers[index]))
+        if abs(numbers[index]) > TURN:
+            name = notation.representation.name
+            message = f"{name} {numbers[index]:g} is more than a full turn in radians; degrees? write {name}_deg"
+            reading.note(message, notation.spec, *places[index], rule="degrees")
     return as_meant(notation, numbers, texts, reading), degrees
 
 
@@ -510,36 +484,6 @@ def _with_unit(text: Any, notation: Notation | None) -> tuple[float, str | None]
     if unit and own != other:
         raise ValueInvalid(f"{shown(text)} is in {own}, but {notation.spec} is in {other}")
     return number, unit
-
-
-def _note_degrees(notation: Notation, numbers: Sequence[float], places: Sequence[Path], reading: Reading) -> None:
-    """Warn about bare angles beyond a full turn."""
-    index = max(notation.representation.angles, key=lambda index: abs(numbers[index]))
-    if abs(numbers[index]) > TURN:
-        name = notation.representation.name
-        message = f"{name} {numbers[index]:g} is more than a full turn in radians; degrees? write {name}_deg"
-        reading.note(message, notation.spec, *places[index], rule="degrees")
-
-
-def _list_or_map(notation: Notation, value: Any) -> Spelled:
-    """Read a list in column order, or a mapping by column names in which missing angles count as 0."""
-    row = notation.representation
-    is_whole = row.whole is not None and type(value) is list and len(value) == len(row.whole.columns)
-    columns = row.whole.columns if row.whole and is_whole else row.columns
-    if row.shape == NAMED or (type(value) is dict and value.keys() == {*row.names}):
-        columns = row.names
-    texts = read_texts(value, columns, partial=bool(row.angles))
-    return notation, texts, places_in(value) if type(value) is list else [(name,) for name in columns]
-
-
-def _without_order(key: str, notation: Notation, value: list[Any]) -> Misfit:
-    """Return the error for a list whose order only names could state."""
-    others = [
-        f"{name}: [..]" for name, row in ROTATIONS.items()
-        if row.shape == LIST and set(row.columns) == set(notation.representation.columns)
-    ]  # fmt: skip
-    numbers, named = bare(", ".join(map(str, value))), ", ".join(f"{name}:" for name in notation.names)
-    return Misfit(f"{key} [{numbers}] has no order; write {', '.join(others)} or {{{named}}}")
 
 
 def _take_parts(notation: Notation, value: Any, parts: dict[str, int]) -> Spelled:

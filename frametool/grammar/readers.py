@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import Finding, FormatError, Unanswered, ValueInvalid, shown, warn
-from frametool.text.numbers import parse_number
+from frametool.text.numbers import parse_length, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -218,15 +218,18 @@ def read_texts(value: Any, names: Sequence[str], *, partial: bool = False) -> li
 
 
 def read_numbers(
-    value: Any, names: Sequence[str], *, partial: bool = False, each: Callable[[Any], float] = read_number
+    value: Any, names: Sequence[str], *, partial: bool = False, metres: bool = False
 ) -> tuple[float, ...]:
     """Read a list of fixed length, or a mapping with these names, as floats.
 
-    each: reads a value that is not a plain number
+    metres: lengths in metres, which may have another unit: 10cm
     """
     texts = read_texts(value, names, partial=partial)
     try:
         return tuple(map(parse_number, texts))
     except (ValueInvalid, TypeError):
         places: Sequence[Path] = [(name,) for name in names] if type(value) is dict else places_in(value)
-        return tuple(within(place, each, text) for place, text in zip(places, texts, strict=True))
+        return tuple(
+            within(place, parse_length if metres and type(text) is str else read_number, text)
+            for place, text in zip(places, texts, strict=True)
+        )

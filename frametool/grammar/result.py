@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from frametool.frames.lookups import Frames
-    from frametool.frames.track import MovingTrack
     from frametool.geometry.place import Place
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Rigid, Three
@@ -97,17 +96,11 @@ class Style:
         """Format a finite number: the shortest text that reads back to the same bits, or fixed decimals; never -0."""
         if not -INFINITE < value < INFINITE:
             raise ValueInvalid(f"a result is {value}: too large for a double, or not finite to begin with")
-        bits = _nine_digits(value) if self.screen and self.format in SEEN and not self.full else value + 0.0
-        return repr(bits) if self.precision is None else f"{value:z.{self.precision}f}"
-
-    def in_degrees(self, notation: Notation) -> bool:
-        """Return True if a notation's angles are written in degrees: its own suffix has priority."""
-        return notation.in_degrees(self.degrees)
-
-
-def _nine_digits(value: float) -> float:
-    """Round as a screen shows numbers: what rounding errors leave of a zero is zero."""
-    return float(f"{value:.9g}") if abs(value) >= ROUNDED_TO_ZERO else 0.0
+        if self.precision is not None:
+            return f"{value:z.{self.precision}f}"
+        if self.screen and self.format in SEEN and not self.full:  # what rounding errors leave of a zero is zero
+            value = float(f"{value:.9g}") if abs(value) >= ROUNDED_TO_ZERO else 0.0
+        return repr(value + 0.0)
 
 
 class Result:
@@ -125,19 +118,22 @@ class Result:
         pose = self.pose
         entry: dict[str, Any] = {key: name for key, name in (("name", pose.name), ("parent", pose.parent)) if name}
         extras = self.said(style)
+        is_within = any(each.representation.whole for each in style.notations)  # the position, in a matrix
         if style.place is not None:
             from frametool.grammar.place import placed_entry
 
             written, pose = placed_entry(pose, style.place)
             entry = without_frame(entry, style.place) | written
-        elif pose.rotation is None:
-            return entry | placed(pose.position or (0.0, 0.0, 0.0), style) | extras
-        elif pose.position is not None and not any(each.representation.whole for each in style.notations):
-            entry |= placed(pose.position, style)
+        elif pose.rotation is None or (pose.position is not None and not is_within):
+            entry |= placed(pose.position or (0.0, 0.0, 0.0), style)
         for each in style.notations if pose.rotation is not None else ():
             key, value = rotation_entry(pose, each, style)
-            _add(entry, key, value)
-            if each.euler_axes and is_locked(pose, each):
+            if key in entry:  # Euler angles about different axes share a key and become a list
+                known = entry[key]
+                several = known if type(known) is list and type(value) is dict else [known]
+                value = known if value in several else [*several, value]
+            entry[key] = value
+            if is_locked(pose, each):
                 extras = {"gimbal_lock": True} | extras
         return entry | extras
 
@@ -176,9 +172,9 @@ def without_frame(entry: dict[str, Any], place: Place) -> dict[str, Any]:
 
 def with_entries(extras: dict[str, Any]) -> dict[str, Any]:
     """Return numbers by name with those of a covariance, c11 .. c33 or c66, as a single list for mappings."""
-    if not any(name.endswith("c11") for name in extras):
+    first = next((name for name in extras if name.endswith("c11")), None)
+    if first is None:
         return extras
-    first = next(name for name in extras if name.endswith("c11"))
     prefix = first.removesuffix("c11")
     axes = "123456" if f"{prefix}c66" in extras else "123"
     names = [f"{prefix}c{i}{j}" for i in axes for j in axes]
@@ -200,16 +196,6 @@ def in_columns(extras: Mapping[str, Any]) -> Mapping[str, Any]:
     return found | dict(zip(columns(len(entries)), entries, strict=True))
 
 
-def _add(entry: dict[str, Any], key: str, value: Any) -> None:
-    """Add a rotation; Euler angles about different axes share a key and become a list."""
-    if key not in entry:
-        entry[key] = value
-        return
-    several = entry[key] if type(entry[key]) is list and type(value) is dict else [entry[key]]
-    if value not in several:
-        entry[key] = [*several, value]
-
-
 def tree_entries(tree: Frames, style: Style) -> Iterator[dict[str, Any]]:
     """Yield the entries of a tree in list form: roots, then edges; moving ones with their samples."""
     cameras = {name: {"camera": camera.mapping()} for name, camera in tree.cameras.items()}
@@ -222,8 +208,11 @@ def tree_entries(tree: Frames, style: Style) -> Iterator[dict[str, Any]]:
             continue
         if covariance and style.place is not None and track.parent in EARTH_FRAMES:
             warn(f"frame {shown(track.child)} is written by xyz: its one covariance is along the axes of ecef")
-        samples = {"samples": list(_samples(track, style.changed(place=None) if covariance else style))}
-        yield {"name": track.child, "parent": track.parent} | uncertain(covariance) | samples | camera
+        written, samples = style.changed(place=None) if covariance else style, []
+        for stamp_ns, parent, components in track.walk():  # a sample under another parent than the newest names it
+            pose = Pose.of(components, None, None if parent == track.parent else parent)
+            samples.append({"stamp_ns": stamp_ns} | _edge(pose, written, parent))
+        yield {"name": track.child, "parent": track.parent} | uncertain(covariance) | {"samples": samples} | camera
 
 
 def _edge(pose: Pose, style: Style, above: str | None = None) -> dict[str, Any]:
@@ -247,13 +236,6 @@ def uncertain(entries: Iterable[float] | None) -> dict[str, Any]:
     from frametool.grammar.covariance import COVARIANCE, Unrounded
 
     return {COVARIANCE: [Unrounded(entry + 0.0) for entry in entries]}
-
-
-def _samples(track: MovingTrack, style: Style) -> Iterator[dict[str, Any]]:
-    """Yield the samples of a moving frame; a sample under another parent than the newest names it."""
-    for stamp_ns, parent, components in track.walk():
-        pose = Pose.of(components, None, None if parent == track.parent else parent)
-        yield {"stamp_ns": stamp_ns} | _edge(pose, style, parent)
 
 
 def sample_results(tree: Frames) -> Iterator[Result]:
@@ -283,8 +265,8 @@ def is_locked(pose: Pose, notation: Notation) -> bool:
 def rotation_numbers(pose: Pose, notation: Notation, style: Style) -> Sequence[float]:
     """Return a pose's rotation as the numbers of a notation, in column order."""
     unit = quaternion.unit(*pose.components[3:], floats)
-    numbers = notation.from_quaternion(*unit, floats, degrees=style.in_degrees(notation), keep_sign=style.keep_sign)
-    scale = pose.scale if holds_scale(style.notations) else 1.0
+    numbers = notation.from_quaternion(*unit, floats, degrees=style.degrees, keep_sign=style.keep_sign)
+    scale = pose.scale if pose.scale != 1.0 and holds_scale(style.notations) else 1.0
     return [number * scale + 0.0 for number in numbers]  # avoids -0.0
 
 
@@ -299,7 +281,7 @@ def pose_numbers(pose: Pose, notation: Notation, style: Style) -> tuple[Sequence
 def rotation_entry(pose: Pose, notation: Notation, style: Style) -> tuple[str, Any]:
     """Return the key and the value of a notation, in the shape that the grammar reads."""
     row = notation.representation
-    key = f"{row.name}_deg" if row.angles and style.in_degrees(notation) else row.name
+    key = f"{row.name}_deg" if row.angles and notation.in_degrees(style.degrees) else row.name
     return key, notation.spelled(pose_numbers(pose, notation, style)[1])
 
 
@@ -308,7 +290,7 @@ def mapping_of_numbers(texts: Sequence[str], default: Notation | None) -> str:
     from frametool.documents.json import dump
     from frametool.documents.source import Verbatim
 
-    rep = notation_of(texts, default)
+    rep = default or notation_of(texts)
     whole = rep.representation.whole
     size = len(texts) if whole and len(texts) == len(whole.columns) else len(rep.representation.columns)
     unit = "" if rep.degrees is None else "_deg" if rep.degrees else "_rad"
@@ -342,7 +324,7 @@ def edge_label(transform: Transform, style: Style, parent: str) -> tuple[str, st
             for key, each in members.items()
         )
     chosen = style.notations[0] if style.notations else notation("rpy_deg")
-    degrees = bool(chosen.representation.angles) and style.in_degrees(chosen)
+    degrees = bool(chosen.representation.angles) and chosen.in_degrees(style.degrees)
     position = _short(pose.components[:3], style.precision if style.precision is not None else METRES)
     decimals = style.precision if style.precision is not None else DEGREES if degrees else METRES
     return at or f"xyz {position}", f"{axes}{chosen.spec} {_short(rotation_numbers(pose, chosen, style), decimals)}"

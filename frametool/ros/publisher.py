@@ -19,7 +19,7 @@ from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.frames.topology import own_parent
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge, Options
-from frametool.grammar.pose import ROTATION_KEYS, Pose, rotation_of
+from frametool.grammar.pose import ROTATION_KEYS, Pose, read_spelled
 from frametool.grammar.readers import INDICES, Reading, read_number
 from frametool.grammar.result import Result, Style, edge_results, rotation_numbers
 
@@ -168,7 +168,7 @@ def read_flags(flags: dict[str, str], reading: Reading) -> Pose:
     flags = {"qw": "1", **flags}  # the tool's default, also with other components: refused below unless they are 0
     x, y, z = (read_number(flags.get(name, "0")) for name in XYZ)
     key, names = ("rpy", RPY) if angles else ("quaternion", QUATERNION)
-    turned = rotation_of(ROTATION_KEYS[key], [flags.get(name, "0") for name in names], INDICES, reading)
+    _, turned = read_spelled(ROTATION_KEYS[key], [flags.get(name, "0") for name in names], INDICES, reading)
     parent, child = (flags[name] for name in FRAMES)
     if parent == child:
         error = own_parent(child)

@@ -39,7 +39,6 @@ from frametool.grammar.pose import (
     inverted,
     is_position,
     is_rotation,
-    length_reader,
     read_angle_unit,
     read_components,
     read_pose,
@@ -732,7 +731,7 @@ def _three(
 
     parts: how many of a length's make a metre, 0 for what is no length
     """
-    numbers = read_numbers(value, XYZ, partial=partial, each=length_reader(parts))
+    numbers = read_numbers(value, XYZ, partial=partial, metres=parts == 1.0)
     if type(value) is list:
         return tuple((*below, *step) for step in places_in(value)), numbers
     return tuple((*below, axis) if axis in value else None for axis in XYZ), numbers

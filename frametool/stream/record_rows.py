@@ -174,7 +174,7 @@ class RecordRows:
         if not own.notations:
             return Target(1.0, ())
         placed = own.unit is not None or own.whole
-        target = tuple((each, self.style.in_degrees(each)) for each in self.style.notations)
+        target = tuple((each, each.in_degrees(self.style.degrees)) for each in self.style.notations)
         if self.style.format not in SPELLED or not target:
             return Target(1.0, QUATERNIONS, keep_sign=True)
         whole = placed and any(each.representation.whole for each, _ in target)

@@ -70,7 +70,7 @@ def target_in(style: Style, kind: str, *, placed: bool) -> Target:
     place: Any = style.place
     if kind != POSE:
         return Target(None, (), plain=True) if kind in SIX else Target(place or 1.0, (), three=True)
-    notations = tuple((each, style.in_degrees(each)) for each in style.notations or (notation("quaternion"),))
+    notations = tuple((each, each.in_degrees(style.degrees)) for each in style.notations or (notation("quaternion"),))
     whole = placed and len(notations) == 1 and notations[0][0].representation.whole is not None
     return Target(None if whole or not placed else place or 1.0, notations, style.keep_sign, whole)
 

@@ -136,7 +136,7 @@ def _rotation_lines(pose: Pose, notation: Notation, style: Style) -> Iterator[Nu
             names = ["[" * style.screen, *[""] * len(each)]
             yield NumberLine("" if at else notation.label, list(zip(names, each, strict=False)), "]" * style.screen)
         return
-    unit = ("deg" if style.in_degrees(notation) else "rad") if row.angles else ""
+    unit = ("deg" if notation.in_degrees(style.degrees) else "rad") if row.angles else ""
     yield NumberLine(notation.label, list(zip(notation.names, numbers, strict=True)), unit)
     if is_locked(pose, notation):
         yield NumberLine("", [], "gimbal lock: not unique, third angle set to 0")

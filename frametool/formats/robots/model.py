@@ -28,7 +28,7 @@ from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import notation
 from frametool.geometry.transform import Transform
 from frametool.geometry.validation import as_numbers, scalars, single
-from frametool.grammar.pose import read_pose, rotation_of
+from frametool.grammar.pose import read_pose, read_spelled
 from frametool.grammar.readers import INDICES, Misfit, Quaternion, Reading, Vector, as_mapping, kind
 from frametool.text.numbers import parse_angle, parse_length
 
@@ -52,7 +52,7 @@ def read_quaternion(element: Element, texts: Sequence[str], options: Options, at
     """Read x, y, z, w of an element by the rules of the grammar; warnings are recorded.  Raises FormatError."""
     reading = Reading(element.source, normalize=options.normalize)
     try:
-        rotation = rotation_of(notation("xyzw"), texts, INDICES, reading)
+        _, rotation = read_spelled(notation("xyzw"), texts, INDICES, reading)
     except ValueInvalid as error:
         raise element.error(str(error), attribute, rule=error.rule) from None
     options.tally.note_all(reading.notes, element.line)

@@ -22,7 +22,7 @@ from frametool.frames.lookups import FrameTree
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Answers, Edge
-from frametool.grammar.pose import AGREEMENT, rotation_of
+from frametool.grammar.pose import AGREEMENT, read_spelled
 from frametool.grammar.readers import Misfit, Path, Quaternion, Reading, Unclear, kind, read_numbers
 
 if TYPE_CHECKING:
@@ -217,10 +217,10 @@ def whole_pose(grid: Grid | None, *, twelve: bool) -> Grid | None:
 def read_turn(grid: Grid, reading: Reading) -> Quaternion:
     """Read a 3x3 matrix, or a rotation vector of three numbers in radians; raises Misfit."""
     if grid.holds(3):
-        return rotation_of(ROTVEC, grid.texts, grid.places, reading)
+        return read_spelled(ROTVEC, grid.texts, grid.places, reading)[1]
     if (grid.rows, grid.columns) != (3, 3) and not grid.holds(9):
         raise Misfit(f"expected a 3 x 3 matrix or a rotation vector, found {grid.size}")
-    return rotation_of(MATRIX, grid.texts, grid.places, reading)
+    return read_spelled(MATRIX, grid.texts, grid.places, reading)[1]
 
 
 def read_shift(grid: Grid) -> tuple[float, float, float]:

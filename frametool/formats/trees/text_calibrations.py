@@ -35,7 +35,7 @@ from frametool.formats.trees.tree_reader import line_error
 from frametool.geometry import quaternion, rigid
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge, Options
-from frametool.grammar.pose import read_spelled, rotation_of
+from frametool.grammar.pose import read_spelled
 from frametool.grammar.readers import INDICES, Misfit, Reading, read_numbers
 from frametool.text.numbers import parse_number
 
@@ -148,7 +148,7 @@ class Calibration:
         turn = [text for at, text in enumerate(texts) if len(texts) == 9 or at % 4 < 3]
         reading = Reading(self.file.source, normalize=self.options.normalize)
         try:
-            rotation = rotation_of(MATRIX, turn, [()] * 9, reading)
+            _, rotation = read_spelled(MATRIX, turn, [()] * 9, reading)
         except ValueInvalid as error:
             raise line_error(self.file, line, 1, f"{name}: {error}") from None
         for note in reading.notes:
@@ -241,7 +241,8 @@ def _baseline(text: str, head: re.Match[str], reading: Reading) -> Rigid:
     if len(words := turn[1].split()) != 4:
         raise Misfit(f"q: expected 4 numbers, found {len(words)}")
     x, y, z = read_numbers(shift[1].split(), ("x", "y", "z"))
-    return x, y, z, *quaternion.conjugate(*rotation_of(notation("xyzw"), words, INDICES, reading))
+    _, rotation = read_spelled(notation("xyzw"), words, INDICES, reading)
+    return x, y, z, *quaternion.conjugate(*rotation)
 
 
 def _matrix(text: str, head: re.Match[str], reading: Reading) -> Rigid:
