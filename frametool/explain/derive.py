@@ -18,7 +18,7 @@ from frametool.explain.run import DIGITS, Row, Sheet
 from frametool.frames.lookups import Frames
 from frametool.geometry import floats, quaternion, representations
 from frametool.grammar import pose_algebra
-from frametool.grammar.pose_algebra import looked_up, looked_up_across
+from frametool.grammar.pose_algebra import Lookups, looked_up_across
 from frametool.grammar.result import Result, Style, pose_numbers
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ def _rows(label: str, numbers: Sequence[float], size: int) -> list[Row]:
 
 def _rotation_rows(own: Result, notation: Notation, style: Style) -> list[Row]:
     """Return the lines of one notation; a matrix has several, and so has an axis with its angle."""
-    _, numbers = pose_numbers(own.pose, notation, style)
+    numbers = pose_numbers(own.pose, notation, style)
     if notation.representation.whole is not None:
         return _rows(notation.spec, numbers, math.isqrt(len(numbers)))
     angles = notation.representation.angles
@@ -244,7 +244,7 @@ def lookup(
     if not isinstance(tree, Frames):
         raise ValueInvalid(f"expected a tree as frametool.load returns it, found {shown(tree)}")
     if fixed is None:
-        own = looked_up(tree, target, source, at_ns)
+        own = Lookups(tree, carried=False).result(target, source, at_ns)
     else:
         own = looked_up_across(tree, target, at_ns, source, source_at_ns, fixed)
 

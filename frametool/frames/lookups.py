@@ -111,7 +111,7 @@ class Frames:
 
     def track(self, frame: str) -> Track | None:
         """Return the pose or samples of a frame; None for a root."""
-        return self._tracks.get(frame) or self._tracks.get(self.resolve_name(frame))
+        return self._tracks.get(frame) or self._tracks.get(topology.resolve_name(frame, self._frames))
 
     def tracks(self) -> Iterator[Track]:
         """Iterate over the tracks of all frames that have a parent, in the order of first mention."""
@@ -146,8 +146,7 @@ class Frames:
         size: of the image, if a file does not state it, or to resize
         Raises UnknownFrame, ValueInvalid if there are no intrinsics, FormatError if they cannot be read.
         """
-        self.require(frame)
-        frame = self.resolve_name(frame)
+        (frame,) = self.require(frame)
         found = self.cameras.get(frame)
         if found is None:
             known = self.read_cameras()
@@ -364,8 +363,7 @@ class Frames:
 
     def between(self, target: str, source: str, at_ns: int | None) -> tuple[list[str], list[str]]:
         """Return the edges between two existing frames, as `edges_between` does."""
-        self.require(target, source)
-        target, source = self.resolve_name(target), self.resolve_name(source)
+        target, source = self.require(target, source)
         try:
             return edges_between(target, source, partial(self.parent, at_ns=at_ns) if self._varies else self.parent)
         except NotConnected as error:
@@ -374,29 +372,28 @@ class Frames:
             self._loops = self._varies = True
             if at_ns is None:
                 raise error from None
-            return edges_between(target, source, partial(self._parent_exactly, at_ns=at_ns))
+            return edges_between(  # of the edges that have data then
+                target, source,
+                lambda frame: each.parent_at(at_ns) if (each := self.track(frame)) and each.covers(at_ns) else None,
+            )  # fmt: skip
 
-    def _parent_exactly(self, frame: str, at_ns: int) -> str | None:
-        """Return a frame's parent only if it has data at a time."""
-        track = self.track(frame)
-        return track.parent_at(at_ns) if track is not None and track.covers(at_ns) else None
-
-    def require(self, *frames: str) -> None:
-        """Raise UnknownFrame unless all frames exist."""
-        for frame in frames:
-            if self.resolve_name(frame) not in self._frames:
+    def require(self, *frames: str) -> list[str]:
+        """Return the names of frames in this tree; raise UnknownFrame unless all exist."""
+        names = [topology.resolve_name(frame, self._frames) for frame in frames]
+        for frame, name in zip(frames, names, strict=True):
+            if name not in self._frames:
                 raise UnknownFrame(frame, known=self.frames, where=self.name)
+        return names
 
     def _unconnected(self, error: NotConnected, target: str, source: str, at_ns: int | None) -> LookupFailed:
         """Return the error for two frames without a path: two trees, or a changing parent not known at that time."""
         if at_ns is None or not self._varies:
             return error
-
-        def parent_near(frame: str) -> str | None:
-            return track.parent_near(at_ns) if (track := self._tracks.get(frame)) else None
-
         with suppress(NotConnected):
-            return no_data(target, source, at_ns, self._along(*edges_between(target, source, parent_near)))
+            edges = edges_between(
+                target, source, lambda frame: each.parent_near(at_ns) if (each := self._tracks.get(frame)) else None
+            )
+            return no_data(target, source, at_ns, self._along(*edges))
         return error
 
 

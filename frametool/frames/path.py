@@ -37,26 +37,22 @@ def compose_path(
     sample: returns parent_from_child of an edge, or None.
     far: the common ancestor is far away: subtracting before rotating halves the rounding of positions.
     """
-    top_from_target, top_from_source = _product(to_target, sample), _product(to_source, sample)
-    if top_from_target is None or top_from_source is None:
-        return None
-    if not to_target:
-        return top_from_source
-    if not to_source:
+    ends: list[Rigid | None] = []  # the product of each branch, topmost edge first; None if it is empty
+    for edges in (to_target, to_source):
+        product: Rigid | None = None
+        for here in map(sample, edges):
+            if here is None:
+                return None
+            product = here if product is None else rigid.compose(*product, *here)
+        ends.append(product)
+    top_from_target, top_from_source = ends
+    if top_from_target is None:
+        return top_from_source or rigid.IDENTITY
+    if top_from_source is None:
         return rigid.inverse(*top_from_target)
     if far:
         return rigid.relative(*top_from_target, *top_from_source)
     return rigid.compose(*rigid.inverse(*top_from_target), *top_from_source)
-
-
-def _product(edges: Sequence[Edge], sample: Callable[[Edge], Rigid | None]) -> Rigid | None:
-    """Compose the edges of one branch, topmost first."""
-    product = None
-    for here in map(sample, edges):
-        if here is None:
-            return None
-        product = here if product is None else rigid.compose(*product, *here)
-    return rigid.IDENTITY if product is None else product
 
 
 class Query:
@@ -129,19 +125,28 @@ def no_data(target: str, source: str, at_ns: int, path: Sequence[Track]) -> NoDa
     worst = max(moving, key=lambda track: gap(track, at_ns))
     first, last = worst.span
     short = gap(worst, at_ns)
-    early = at_ns < first
+    is_early = at_ns < first
     begin, end = max(track.first_ns for track in moving), min(track.last_ns for track in moving)
     parent = worst.parent_near(at_ns)
-    off = f"{seconds(short)} s too {'early' if early else 'late'}"
+    off = f"{seconds(short)} s too {'early' if is_early else 'late'}"
     cover = f"samples cover {format_stamp(first)} .. {format_stamp(last)}"
     if first == last:
         cover = f"its only sample is at {format_stamp(first)}"
+    whole = f"; the whole path has data from {format_stamp(begin)} until {format_stamp(end)}" * (len(moving) > 1)
+    if begin > end:
+        early, late = min(moving, key=attrgetter("last_ns")), max(moving, key=attrgetter("first_ns"))
+        ended, begun = (f"{bare(track.parent)} -> {bare(track.child)}" for track in (early, late))
+        when = f"ends at {format_stamp(end)} before {begun} begins at {format_stamp(begin)}"
+        whole = f"; {ended} {when}: they never overlap"
     clocks = "; that is years: one of the clocks counts from 1970, the other does not" if short >= OTHER_CLOCK else ""
+    frames = list(map(bare, frames_on(target, source, path)))
+    if len(frames) > 13:
+        frames = [*frames[:6], f"({len(frames) - 12} more)", *frames[-6:]]
     message = (
         f"no data for {bare(parent)} -> {bare(worst.child)} at {format_stamp(at_ns)}; {cover} ({off}), "
-        f"{_way(target, source, path)}{_whole(moving, begin, end)}{clocks}"
+        f"on the path {' <- '.join(frames)}{whole}{clocks}"
     )
-    return (TooEarly if early else TooLate)(
+    return (TooEarly if is_early else TooLate)(
         message, parent=parent, child=worst.child, at_ns=at_ns, first_ns=first, last_ns=last, short_ns=short,
         short_s=short / BILLION, target=target, source=source, path=frames_on(target, source, path),
         available_from_ns=begin if begin <= end else None, available_until_ns=end if begin <= end else None,
@@ -168,29 +173,9 @@ def seconds(duration_ns: int) -> str:
     return format_stamp(duration_ns).rstrip("0").rstrip(".")
 
 
-def _way(target: str, source: str, path: Sequence[Track]) -> str:
-    """Format the path with arrows from source to target, shortened in the middle if it is long."""
-    frames = list(map(bare, frames_on(target, source, path)))
-    if len(frames) > 13:
-        frames = [*frames[:6], f"({len(frames) - 12} more)", *frames[-6:]]
-    return f"on the path {' <- '.join(frames)}"
-
-
 def frames_on(target: str, source: str, path: Sequence[Track | EdgeLog]) -> list[str]:
     """Return the frames on a path of edges from target to source, both included."""
     frames = [target]
     for track in path:
         frames.append(track.parent if track.child == frames[-1] else track.child)
     return frames if frames[-1] == source else [*frames, source]
-
-
-def _whole(moving: Sequence[MovingTrack], begin: int, end: int) -> str:
-    """Return the clause that states when all edges have data, or which two never do."""
-    if len(moving) == 1:
-        return ""
-    if begin <= end:
-        return f"; the whole path has data from {format_stamp(begin)} until {format_stamp(end)}"
-    late = max(moving, key=lambda track: track.first_ns)
-    early = min(moving, key=lambda track: track.last_ns)
-    ended, begun = (f"{bare(track.parent)} -> {bare(track.child)}" for track in (early, late))
-    return f"; {ended} ends at {format_stamp(end)} before {begun} begins at {format_stamp(begin)}: they never overlap"

@@ -66,16 +66,14 @@ def to_root(frame: str, parent_of: Callable[[str], str | None]) -> list[str]:
 
     Raises BadTopology if the ancestors form a cycle.
     """
-    line = [frame]
+    line = {frame: None}
     parent = parent_of(frame)
-    seen = {frame}
     while parent is not None:
-        if parent in seen:
-            raise cycle([*line[line.index(parent) :], parent])
-        line.append(parent)
-        seen.add(parent)
+        if parent in line:
+            raise cycle([*[*line][[*line].index(parent) :], parent])
+        line[parent] = None
         parent = parent_of(parent)
-    return line
+    return [*line]
 
 
 def edges_between(target: str, source: str, parent_of: Callable[[str], str | None]) -> tuple[list[str], list[str]]:

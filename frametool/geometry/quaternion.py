@@ -87,14 +87,9 @@ def largest_of(values: Sequence[N], xp: Functions[N]) -> N:
     return found
 
 
-def canonical(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
-    """Choose q or -q such that w > 0, or w == 0 and the first non-zero of x, y, z is positive."""
-    return xp.canonical_sign(x, y, z, w)
-
-
 def from_quaternion(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
     """Return the quaternion for output: unit, with the canonical sign."""
-    return canonical(*unit(x, y, z, w, xp), xp)
+    return xp.canonical_sign(*unit(x, y, z, w, xp))
 
 
 def angle(x: N, y: N, z: N, w: N, xp: Functions[N]) -> N:
@@ -389,7 +384,7 @@ def as_axis_angle(x: N, y: N, z: N, w: N, xp: Functions[N], *, degrees: bool = F
 
     At 180 degrees, where both directions are correct, the first non-zero component of the axis is positive.
     """
-    x, y, z, w = canonical(x, y, z, w, xp)
+    x, y, z, w = xp.canonical_sign(x, y, z, w)
     ux, uy, uz, sine = direction(x, y, z, xp)
     angle = 2.0 * incline(sine, abs(w), xp)
     return ux, uy, uz, angle * RADIAN if degrees else angle

@@ -134,7 +134,8 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
 
             if not EARTH_KEYS.isdisjoint(mapping):
                 return placed_by(mapping, read_pose(without_place(mapping), reading, also), reading)
-        _refuse_unknown_keys(mapping, also)
+        if unknown := [key for key in mapping if key not in POSE_KEYS and key not in also]:
+            raise _unknown_keys(unknown, mapping, also)
     position: Vector | None = None
     rotation: Quaternion | None = None
     outer_degrees = reading.degrees
@@ -236,18 +237,15 @@ def unknown_keys(hints: Sequence[tuple[str, str]], count: int) -> str:
     return "; ".join([*named, *last])
 
 
-def _refuse_unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> None:
-    """Report all unknown keys of an entry, each with its nearest known one."""
-    known = POSE_KEYS.union(also)
-    unknown = [key for key in mapping if key not in known]
-    known -= LISTED_WORDS
-    if unknown and "children" in also and type(mapping[unknown[0]]) is dict:
+def _unknown_keys(unknown: Sequence[str], mapping: dict[str, Any], also: Collection[str]) -> Misfit:
+    """Return the error for the unknown keys of an entry, each with its nearest known one."""
+    if "children" in also and type(mapping[unknown[0]]) is dict:
         below = f"children: {{{unknown[0]}: ..}}"
-        raise Misfit(f"frames below one with a pose are under {below}", (unknown[0],), key=True)
-    if unknown:
-        named = unknown_keys([(key, did_you_mean(key, known)) for key in unknown[: MOST_NAMED + 1]], len(unknown))
-        choices = ", ".join([*ROTATIONS][:MOST_CHOICES])
-        raise Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (unknown[0],), key=True)
+        return Misfit(f"frames below one with a pose are under {below}", (unknown[0],), key=True)
+    known = POSE_KEYS.union(also) - LISTED_WORDS
+    named = unknown_keys([(key, did_you_mean(key, known)) for key in unknown[: MOST_NAMED + 1]], len(unknown))
+    choices = ", ".join([*ROTATIONS][:MOST_CHOICES])
+    return Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (unknown[0],), key=True)
 
 
 _ROWS_OF_A_POSE = 12  # numbers of a 3x4 matrix
@@ -373,16 +371,21 @@ def shape_of(key: str, value: Any) -> Spelled:
         return _take_parts(notation, value, dict(row.shape))
     if row.shape == ROWS:
         return _take_rows(notation, value)
-    if row.shape == NAMED and is_list:  # only names could state the order
-        others = [name for name, each in ROTATIONS.items() if each.shape == LIST and {*each.columns} == {*row.columns}]
-        choices = ", ".join(f"{name}: [..]" for name in others)
-        numbers, named = bare(", ".join(map(str, value))), ", ".join(f"{name}:" for name in notation.names)
-        raise Misfit(f"{key} [{numbers}] has no order; write {choices} or {{{named}}}")
+    if row.shape == NAMED and is_list:
+        raise _without_order(key, notation, value)
     columns = row.whole.columns if row.whole and is_list and len(value) == len(row.whole.columns) else row.columns
     if row.shape == NAMED or (type(value) is dict and value.keys() == {*row.names}):
         columns = row.names
     texts = read_texts(value, columns, partial=bool(row.angles))  # missing angles of a mapping count as 0
     return notation, texts, places_in(value) if is_list else [(name,) for name in columns]
+
+
+def _without_order(key: str, notation: Notation, value: Any) -> Misfit:
+    """Return the error for a list whose order only names could state."""
+    columns = {*notation.representation.columns}
+    others = [name for name, row in ROTATIONS.items() if row.shape == LIST and {*row.columns} == columns]
+    choices, names = ", ".join(f"{name}: [..]" for name in others), ", ".join(f"{name}:" for name in notation.names)
+    return Misfit(f"{key} [{bare(', '.join(map(str, value)))}] has no order; write {choices} or {{{names}}}")
 
 
 def read_spelled(
@@ -427,6 +430,8 @@ def read_components(
             name = notation.representation.name
             message = f"{name} {numbers[index]:g} is more than a full turn in radians; degrees? write {name}_deg"
             reading.note(message, notation.spec, *places[index], rule="degrees")
+    if notation.representation.batch is None:
+        return numbers, degrees
     return as_meant(notation, numbers, texts, reading), degrees
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from frametool.frames.lookups import Frames
-    from frametool.geometry.types import Components, Rigid
+    from frametool.geometry.types import Components
     from frametool.grammar.readers import Vector
 
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
@@ -107,20 +107,12 @@ BLOCK = 1 << 14  # times
 
 
 def result_at(
-    components: Rigid, target: str | None, source: str | None, at_ns: int | None, entries: Iterable[float] | None = None
-) -> Result:
+    components: Sequence[float], target: str | None, source: str | None, at_ns: int | None,
+    entries: Iterable[float] | None = None,
+) -> Result:  # fmt: skip
     """Return target_from_source as a result; a time of None has no effect.  entries: of its covariance."""
     stamp = {} if at_ns is None else {"stamp_ns": at_ns}
     return Result(Pose.of(components, source, target), {**stamp, **uncertain(entries)})
-
-
-def looked_up(
-    frames: Frames, target: str, source: str, at_ns: int | None = None, *, covariance: bool = False
-) -> Result:
-    """Look up at one time; None is the latest, and the result states it."""
-    at_ns = frames.latest(target, source) if at_ns is None else at_ns
-    found = frames.lookup_components(target, source, at_ns)
-    return result_at(found, target, source, at_ns, frames.carried(target, source, at_ns) if covariance else None)
 
 
 def looked_up_across(
@@ -132,30 +124,6 @@ def looked_up_across(
     source_at_ns = frames.latest(fixed, source) if source_at_ns is None else source_at_ns
     stamps = {key: at for key, at in (("stamp_ns", at_ns), ("source_stamp_ns", source_at_ns)) if at is not None}
     return Result(Pose.of(found.components, source, target), {**stamps, "fixed": fixed})
-
-
-def looked_up_many(
-    frames: Frames, target: str, source: str, times: Sequence[int], *,
-    miss: Callable[[int], None] | None = None, covariance: bool = False,
-) -> Iterator[Result]:  # fmt: skip
-    """Look up at many times, in their order, block by block.
-
-    miss: receives each time without data, which has no result; without it the first one raises an error.
-    """
-    for begin in range(0, len(times), BLOCK):
-        block = times[begin : begin + BLOCK]
-        found = frames.lookup_many(target, source, block, missing="nan" if miss else "raise")
-        rows = zip(*(column.tolist() for column in found.components), strict=True)
-        entries: Iterable[list[float] | None] = repeat(None)
-        if covariance:
-            from frametool.frames.lookup_many import carried_many
-
-            entries = carried_many(frames, target, source, block, found.components).tolist()
-        for at_ns, row, each in zip(block, rows, entries, strict=False):
-            if isfinite(row[6]):
-                yield result_at(row, target, source, at_ns, each)
-            elif miss:
-                miss(at_ns)
 
 
 def why_missing(frames: Frames, target: str, source: str, at_ns: int) -> LookupFailed | None:
@@ -195,8 +163,34 @@ class Lookups:
         self.widest: Sequence[float] = ()
 
     def result(self, target: str, source: str, at_ns: int | None) -> Result:
-        """Return the pose of a frame in another, as a result."""
-        return self.noted(looked_up(self.tree, target, source, at_ns, covariance=self.carried))
+        """Look up at one time; None is the latest, and the result states it."""
+        at_ns = self.tree.latest(target, source) if at_ns is None else at_ns
+        found = self.tree.lookup_components(target, source, at_ns)
+        if not self.carried:
+            return result_at(found, target, source, at_ns)
+        return self._noted(result_at(found, target, source, at_ns, self.tree.carried(target, source, at_ns)))
+
+    def results(
+        self, target: str, source: str, times: Sequence[int], miss: Callable[[int], None] | None = None
+    ) -> Iterator[Result]:
+        """Look up at many times, in their order, block by block.
+
+        miss: receives each time without data, which has no result; without it the first one raises an error.
+        """
+        for begin in range(0, len(times), BLOCK):
+            block = times[begin : begin + BLOCK]
+            found = self.tree.lookup_many(target, source, block, missing="nan" if miss else "raise").components
+            entries: Iterable[list[float] | None] = repeat(None)
+            if self.carried:
+                from frametool.frames.lookup_many import carried_many
+
+                entries = carried_many(self.tree, target, source, block, found).tolist()
+            for at_ns, *row, each in zip(block, *(column.tolist() for column in found), entries, strict=False):
+                if isfinite(row[6]):
+                    result = result_at(row, target, source, at_ns, each)
+                    yield self._noted(result) if self.carried else result
+                elif miss:
+                    miss(at_ns)
 
     def one(self, target: str, source: str, at_ns: int | None) -> Components:
         """Return the components of a pose, with those of its covariance."""
@@ -216,10 +210,8 @@ class Lookups:
             self.edges |= {track.child for track in self.tree.way(target, source, int(at_ns))}
         return *poses, *carried_many(self.tree, target, source, times_ns, poses).T
 
-    def noted(self, result: Result) -> Result:
-        """Record a result of a lookup."""
-        if not self.carried:
-            return result
+    def _noted(self, result: Result) -> Result:
+        """Record a result with its covariance."""
         from frametool.geometry.uncertainty import widest_turn
 
         target, source, found = result.pose.parent or "", result.pose.name or "", result.extras["covariance"]

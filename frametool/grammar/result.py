@@ -139,7 +139,7 @@ class Result:
 
     def said(self, style: Style) -> dict[str, Any]:
         """Return the extras of a pose, and its scale unless the only matrix that is written contains it."""
-        extras = with_entries(self.extras)
+        extras = with_entries(self.extras) if self.extras else {}
         return extras if self.pose.scale == 1.0 or holds_scale(style.notations) else {SCALE: self.pose.scale} | extras
 
 
@@ -270,19 +270,17 @@ def rotation_numbers(pose: Pose, notation: Notation, style: Style) -> Sequence[f
     return [number * scale + 0.0 for number in numbers]  # avoids -0.0
 
 
-def pose_numbers(pose: Pose, notation: Notation, style: Style) -> tuple[Sequence[str], Sequence[float]]:
-    """Return the columns and the numbers of a notation: of the whole pose if it includes the position."""
+def pose_numbers(pose: Pose, notation: Notation, style: Style) -> Sequence[float]:
+    """Return the numbers of a notation: of the whole pose if it includes the position."""
     numbers, whole = rotation_numbers(pose, notation, style), notation.representation.whole
-    if whole is None or pose.position is None:
-        return notation.columns_in(degrees=style.degrees), numbers
-    return whole.columns, whole.join(pose.position, numbers)
+    return numbers if whole is None or pose.position is None else whole.join(pose.position, numbers)
 
 
 def rotation_entry(pose: Pose, notation: Notation, style: Style) -> tuple[str, Any]:
     """Return the key and the value of a notation, in the shape that the grammar reads."""
     row = notation.representation
     key = f"{row.name}_deg" if row.angles and notation.in_degrees(style.degrees) else row.name
-    return key, notation.spelled(pose_numbers(pose, notation, style)[1])
+    return key, notation.spelled(pose_numbers(pose, notation, style))
 
 
 def mapping_of_numbers(texts: Sequence[str], default: Notation | None) -> str:
@@ -355,14 +353,13 @@ def _rounded(value: float, decimals: int) -> str:
 
 def write_poses(results: Iterable[Result | dict[str, Any]], style: Style) -> str:
     """Return one line per result in JSON, else the results as documents separated by `---`."""
-    records = (each.mapping(style) if isinstance(each, Result) else each for each in results)
-    if style.format == "json":
+    is_json = style.format == "json"
+    if is_json:
         from frametool.documents.json import dump
-
-        return "".join(f"{dump(record, style.number)}\n" for record in records)
-    from frametool.documents.yaml_writer import dump
-
-    return "---\n".join(dump(record, style.number) for record in records)
+    else:
+        from frametool.documents.yaml_writer import dump
+    records = [each.mapping(style) if isinstance(each, Result) else each for each in results]
+    return ("" if is_json else "---\n").join([dump(each, style.number) + "\n" * is_json for each in records])
 
 
 write_points = write_poses
@@ -418,7 +415,7 @@ def angles_of(rotation: Quaternion) -> Three[float]:
 def of_angles(angles: Iterable[float]) -> Quaternion:
     """Return the rotation that roll, pitch and yaw are read as."""
     roll, pitch, yaw = angles
-    return quaternion.canonical(*euler.to_quaternion(roll, pitch, yaw, "sxyz", floats), floats)
+    return floats.canonical_sign(*euler.to_quaternion(roll, pitch, yaw, "sxyz", floats))
 
 
 def rows_of(pose: Rigid) -> list[list[float]]:

@@ -139,7 +139,7 @@ POSITIONS = [
 ]
 KERNELS: dict[str, tuple[Callable[..., Any], Sequence[Row]]] = {
     "angle": (quaternion.angle, QUATERNIONS),
-    "canonical": (quaternion.canonical, [*QUATERNIONS, *(tuple(-part for part in row) for row in QUATERNIONS)]),
+    "canonical": (quaternion.from_quaternion, [*QUATERNIONS, *(tuple(-part for part in row) for row in QUATERNIONS)]),
     "unit": (quaternion.unit, [row[4:] for row in NEAR]),
     "normalized": (quaternion.normalized, [[size * part for part in row] for row in OTHERS for size in LENGTHS[3:]]),
     "repaired": (quaternion.repaired, [[size * part for part in row] for row in OTHERS for size in (1.0, 1.0005, 2.0)]),

@@ -166,8 +166,8 @@ def _many(task: PoseTask, lookups: algebra.Lookups, target: str, source: str) ->
         is_full = len(skipped.errors) == MOST_REPORTED  # to say why takes longest
         skipped.add(None if is_full else algebra.why_missing(tree, target, source, at_ns))
 
-    found = algebra.looked_up_many(tree, target, source, asked, miss=miss if skip else None, covariance=lookups.carried)
-    task.output.poses_as_they_come(skipped.counted(map(lookups.noted, found)))
+    found = lookups.results(target, source, asked, miss if skip else None)
+    task.output.poses_as_they_come(skipped.counted(found))
     return skipped.finish()
 
 

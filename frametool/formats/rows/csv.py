@@ -81,8 +81,9 @@ def _pose_cells(result: Result, style: Style) -> dict[str, Any]:
     elif pose.position is not None and not any(each.representation.whole for each in style.notations):
         cells |= zip("xyz", pose.position, strict=True)
     for notation in style.notations if pose.rotation is not None else ():
-        columns, numbers = pose_numbers(pose, notation, style)
-        rotation = dict(zip(columns, numbers, strict=True))
+        whole = notation.representation.whole if pose.position is not None else None
+        columns = whole.columns if whole else notation.columns_in(degrees=style.degrees)
+        rotation = dict(zip(columns, pose_numbers(pose, notation, style), strict=True))
         if twice := [name for name in rotation if cells.get(name, rotation[name]) != rotation[name]]:
             raise ValueInvalid(f"columns {', '.join(twice)} would appear twice; write json or yaml, or a single --to")
         cells |= rotation
