@@ -108,24 +108,18 @@ def _handeye(value: Any, reading: Reading) -> Iterator[Edge]:
     inner = "parameters" in calibration  # the first easy_handeye had none around them
     path: Path = ("parameters",) if inner else ()
     parameters = within(path, as_mapping, calibration["parameters"] if inner else calibration, "the parameters")
-    parent = within(path, named, parameters, within(path, _mount, parameters))
-    child = within(path, named, parameters, CHILD)
+    mount = next((key for key in MOUNTS if key in parameters), None)
+    if mount is None:
+        raise Misfit("missing eye_on_hand (easy_handeye) or calibration_type (easy_handeye2)", path)
+    if str(said := parameters[mount]) not in MOUNTS[mount]:
+        raise Misfit(f"{mount} must be {' or '.join(MOUNTS[mount])}, found {kind(said)}", (*path, mount))
+    parent, child = (within(path, named, parameters, key) for key in (MOUNTS[mount][said], CHILD))
     key = next((key for key in POSES if key in calibration), None)
     if key is None:
         raise Misfit("missing transformation (easy_handeye) or transform (easy_handeye2)")
     reading.here = (key,)
     pose = within((key,), _pose, calibration[key], POSES[key], "the pose of the camera", reading)
     yield Edge(parent, child, pose, path=(key,))
-
-
-def _mount(parameters: dict[str, Any]) -> str:
-    """Return the key of the reference frame of the camera."""
-    key = next((key for key in MOUNTS if key in parameters), None)
-    if key is None:
-        raise Misfit("missing eye_on_hand (easy_handeye) or calibration_type (easy_handeye2)")
-    if str(found := parameters[key]) not in MOUNTS[key]:
-        raise Misfit(f"{key} must be {' or '.join(MOUNTS[key])}, found {kind(found)}", (key,))
-    return MOUNTS[key][found]
 
 
 def _nuscenes(file: InputFile, options: Options, value: Any, reading: Reading) -> Iterator[Edge]:
@@ -256,18 +250,26 @@ def _entry(
     """Read one pose and its meaning, not `said` if only its own name is known; raises Misfit."""
     if type(entry) is list:
         entry = {"value": entry}
-    fields = dict(as_mapping(entry, "a pose as {x: .., y: .., z: .., roll: .., pitch: .., yaw: ..}"))
-    parent, child = (_frame(fields, keys) for keys in (PARENTS, CHILDREN))
-    child = child or (None if type(name) is int else str(name))
-    if child is None:
+    fields = as_mapping(entry, "a pose as {x: .., y: .., z: .., roll: .., pitch: .., yaw: ..}")
+    frames = []
+    for keys in (PARENTS, CHILDREN):
+        there = [key for key in keys if key in fields]
+        if len(there) > 1:
+            raise Misfit(f"{' and '.join(there)} in one entry; keep one", (there[1],), key=True)
+        frames.append(named(fields, there[0]) if there else "")
+        fields = {key: value for key, value in fields.items() if key not in there}
+    parent, child = frames
+    child = child or ("" if type(name) is int else str(name))
+    if not child:
         accepted = f"{', '.join(CHILDREN)}; of its parent: {', '.join(PARENTS)}"
         raise Misfit(f"missing child; in a list an entry names its frame; keys: {accepted}")
-    for key in [key for key, value in fields.items() if _is_remark(key, value)]:
-        left[key] = fields.pop(key)
+    for key, value in [*fields.items()]:  # texts, such as a topic or a model, but no misspelt number
+        if key not in WORDS and type(value) is str and re.match(r"[-+.]*\d", value) is None:
+            left[key] = fields.pop(key)
     read = read_loose_pose(fields, reading, order=options.answers.order)
     if read.position is None and read.rotation is None:
         raise Misfit("neither position nor rotation; a pose has x, y, z, or a key like translation, and a rotation")
-    if parent is not None:
+    if parent:
         return read.components, Meaning(parent, child, child)
     meaning = meaning_of(child, dict.fromkeys(("before", "sensor"), "") | _SELF, options.answers.frames)
     if isinstance(meaning, Unclear):
@@ -281,27 +283,16 @@ def _entry(
     return read.components, meaning
 
 
-def _frame(fields: dict[str, Any], keys: tuple[str, ...]) -> str | None:
-    """Remove the name of a frame from an entry; raises Misfit for two of them."""
-    there = [key for key in keys if key in fields]
-    if len(there) > 1:
-        raise Misfit(f"{' and '.join(there)} in one entry; keep one", (there[1],), key=True)
-    found = named(fields, there[0]) if there else None
-    for key in there:
-        del fields[key]
-    return found
-
-
-def _is_remark(key: str, value: Any) -> bool:
-    """Return True for a text of an entry, such as a topic or a model; False for what may be a misspelt number."""
-    return key not in WORDS and type(value) is str and re.match(r"[-+.]*\d", value) is None
-
-
 def write_tree(tree: Frames, style: Style) -> str:
     """Return the tree as Autoware or easy_handeye has it, or by names; raises ValueInvalid for what cannot be held."""
     edges = static_edges(tree, style.format)
     if style.format == "named":
-        return "".join(_line_of(*edge, style) for edge in edges)
+        text = ""
+        for parent, child, pose in edges:
+            rotation = dict(zip("xyzw", quaternion.from_quaternion(*pose[3:], floats), strict=True))
+            entry = {"parent": parent, "xyz": [*pose[:3]], "quaternion": rotation}
+            text += f"{quoted(child)}: {flow(entry, style.number)}\n"
+        return text
     if style.format == "handeye":
         if len(edges) != 1:
             children = listing(child for _, child, _ in edges)
@@ -316,12 +307,6 @@ def write_tree(tree: Frames, style: Style) -> str:
     if len(texts) > 1:
         warn(f"Autoware has a file for each frame that holds others; here in one: {listing(texts)}")
     return "".join(f"{quoted(parent)}:\n{children}" for parent, children in texts.items())
-
-
-def _line_of(parent: str, child: str, pose: Rigid, style: Style) -> str:
-    """Return a name and its pose on one line."""
-    rotation = dict(zip("xyzw", quaternion.from_quaternion(*pose[3:], floats), strict=True))
-    return f"{quoted(child)}: {flow({'parent': parent, 'xyz': [*pose[:3]], 'quaternion': rotation}, style.number)}\n"
 
 
 def write_mount(parent: str, child: str, pose: Rigid, style: Style, *, on_hand: bool) -> str:

@@ -18,7 +18,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from frametool.frames.edge_log import CacheEntry, cache_entries, listed_motion
+from frametool.frames.edge_log import cache_entries, listed_motion
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.result import Style, edge_label, graphviz
@@ -37,9 +37,17 @@ _FACTS = (r"Average rate:\s*([\d.]+)", r"Buffer length:\s*([\d.]+)", r"Most rece
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the frames and edges of a digraph or a listing; their labels are recorded in the tally."""
+    """Yield the frames and edges of a digraph or a listing; their rates, or labels, are recorded in the tally."""
     if file.format == "tf2":
-        yield from _read_listing(file, options)
+        for entry, line in _with_lines(r"(?m)^(\S.*?):[ \t]*\r?\n((?:[ \t]+\S.*(?:\n|\Z))+)", file.text):
+            listed = dict(re.findall(r"(?m)^\s*(\w+):[ \t]*(.*?)\s*$", entry[2]))
+            ends = (entry[1], listed.get("parent", ""))
+            child, parent = (options.tally.names.bare(each.strip("'\"")) for each in ends)
+            if parent:
+                numbers = (listed.get(name, "") for name in _LISTED_FACTS)
+                numbers = (float(each) if re.fullmatch(r"\d+(?:\.\d*)?", each) else 0.0 for each in numbers)
+                options.tally.drawn[child] = listed_motion(*numbers)
+                yield Edge(parent, child, IDENTITY, line=line)
         return
     text = re.sub(r"(?m)^[^\S\n]*//.*$", "", file.text)
     if not text.rstrip().endswith("}"):
@@ -49,19 +57,11 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
             yield Edge(None, options.tally.names.bare(name), IDENTITY, line=line)
     for arrow, line in _with_lines(_ARROW, text):
         parent, child = (options.tally.names.bare(_unquoted(word)) for word in arrow.groups()[:2])
-        options.tally.drawn[child] = _about(arrow[3] or "")
+        facts = [float(found[1]) for pattern in _FACTS if (found := re.search(pattern, arrow[3] or ""))]
+        label = re.search(r"""label\s*=\s*("(?:[^"\\]|\\.)*+")""", arrow[3] or "")
+        about = " ".join(re.sub(r"\\[nlr]", " ", label[1][1:-1]).split()) if label else ""
+        options.tally.drawn[child] = listed_motion(*facts) if len(facts) == len(_FACTS) else about
         yield Edge(parent, child, IDENTITY, line=line)
-
-
-def _read_listing(file: InputFile, options: Options) -> Iterator[Edge]:
-    for entry, line in _with_lines(r"(?m)^(\S.*?):[ \t]*\r?\n((?:[ \t]+\S.*(?:\n|\Z))+)", file.text):
-        facts = dict(re.findall(r"(?m)^\s*(\w+):[ \t]*(.*?)\s*$", entry[2]))
-        child, parent = (options.tally.names.bare(each.strip("'\"")) for each in (entry[1], facts.get("parent", "")))
-        if parent:
-            numbers = (facts.get(name, "") for name in _LISTED_FACTS)
-            numbers = (float(each) if re.fullmatch(r"\d+(?:\.\d*)?", each) else 0.0 for each in numbers)
-            options.tally.drawn[child] = listed_motion(*numbers)
-            yield Edge(parent, child, IDENTITY, line=line)
 
 
 def _with_lines(pattern: str, text: str) -> Iterator[tuple[re.Match[str], int]]:
@@ -77,21 +77,27 @@ def _unquoted(word: str) -> str:
     return re.sub(r"\\(.)", r"\1", word[1:-1]) if word[0] == '"' else word
 
 
-def _about(attributes: str) -> str:
-    """Return the label of an arrow: the rate of its edge, for view_frames; else its text."""
-    numbers = [float(found[1]) for pattern in _FACTS if (found := re.search(pattern, attributes))]
-    if len(numbers) == len(_FACTS):
-        return listed_motion(*numbers)
-    label = re.search(r"""label\s*=\s*("(?:[^"\\]|\\.)*+")""", attributes)
-    return " ".join(re.sub(r"\\[nlr]", " ", label[1][1:-1]).split()) if label else ""
-
-
 def write_tree(tree: Frames, style: Style) -> str:
     """Return a flowchart of mermaid, a digraph of graphviz, or tf2's listing, `{}` for no frames."""
     if style.format == "tf2":
-        return "".join(map(_listed, cache_entries(tree))) or "{}\n"
-    if style.format == "mermaid":
-        return _flowchart(tree, style)
+        return "".join(
+            f"{each.child}: \n"
+            f"  parent: '{each.parent}'\n"
+            "  broadcaster: 'default_authority'\n"
+            f"  rate: {each.rate:.3f}\n"
+            f"  most_recent_transform: {each.newest:.3f}\n"
+            f"  oldest_transform: {each.oldest:.3f}\n"
+            f"  buffer_length: {each.length:.3f}\n"
+            for each in cache_entries(tree)
+        ) or "{}\n"
+    if style.format == "mermaid":  # nodes are numbered, because its ids allow few characters
+        ids = {frame: f"n{index}" for index, frame in enumerate(tree.frames)}
+        lines = ["flowchart TD"]
+        lines += [f'  {ids[frame]}["{_escaped(frame)}"]' for frame in tree.frames]
+        for parent, child, transform in tree.edges():
+            label = "<br>".join(map(_escaped, edge_label(transform, style, parent)))
+            lines.append(f'  {ids[parent]} -->|"{label}"| {ids[child]}')
+        return "\n".join([*lines, ""])
     if tree.moves:
         return _view_frames(tree)
     lines = ["digraph frames {", "  node [shape=ellipse];"]
@@ -100,17 +106,6 @@ def write_tree(tree: Frames, style: Style) -> str:
         label = "\\n".join(map(graphviz, edge_label(transform, style, parent)))
         lines.append(f'  "{graphviz(parent)}" -> "{graphviz(child)}" [label="{label}"];')
     return "\n".join([*lines, "}", ""])
-
-
-def _flowchart(tree: Frames, style: Style) -> str:
-    """Return a flowchart; nodes are numbered, because mermaid's ids allow few characters."""
-    ids = {frame: f"n{index}" for index, frame in enumerate(tree.frames)}
-    lines = ["flowchart TD"]
-    lines += [f'  {ids[frame]}["{_escaped(frame)}"]' for frame in tree.frames]
-    for parent, child, transform in tree.edges():
-        label = "<br>".join(map(_escaped, edge_label(transform, style, parent)))
-        lines.append(f'  {ids[parent]} -->|"{label}"| {ids[child]}')
-    return "\n".join([*lines, ""])
 
 
 def _escaped(text: str) -> str:
@@ -123,33 +118,17 @@ def _escaped(text: str) -> str:
 def _view_frames(tree: Frames) -> str:
     """Return the digraph; the legend, which graphviz must attach to something, is above the first root."""
     edges = cache_entries(tree)
+    lines = ["digraph G {"]
+    for each in edges:
+        label = (
+            f"Broadcaster: default_authority\\nAverage rate: {round(each.rate, 3)}\\n"
+            f"Buffer length: {round(each.length, 3)}\\nMost recent transform: {round(each.newest, 3)}\\n"
+            f"Oldest transform: {round(each.oldest, 3)}\\n"
+        )
+        lines.append(f'"{graphviz(each.parent)}" -> "{graphviz(each.child)}"[label=" {label}"];')
     newest = max((each.newest for each in edges), default=0.0)
-    lines = ["digraph G {", *map(_edge, edges), "edge [style=invis];"]
+    lines += ["edge [style=invis];"]
     lines += [' subgraph cluster_legend { style=bold; color=black; label ="view_frames Result";']
     lines += [f'"Recorded at time: {newest:.6f}"[ shape=plaintext ] ;']
     lines += [f'}}->"{graphviz(root)}";' for root in tree.roots[:1]] or ["}"]
     return "\n".join([*lines, "}", ""])
-
-
-def _edge(each: CacheEntry) -> str:
-    facts = {
-        "Broadcaster": "default_authority",
-        "Average rate": round(each.rate, 3),
-        "Buffer length": round(each.length, 3),
-        "Most recent transform": round(each.newest, 3),
-        "Oldest transform": round(each.oldest, 3),
-    }
-    label = "\\n".join(f"{name}: {value}" for name, value in facts.items())
-    return f'"{graphviz(each.parent)}" -> "{graphviz(each.child)}"[label=" {label}\\n"];'
-
-
-def _listed(each: CacheEntry) -> str:
-    return (
-        f"{each.child}: \n"
-        f"  parent: '{each.parent}'\n"
-        "  broadcaster: 'default_authority'\n"
-        f"  rate: {each.rate:.3f}\n"
-        f"  most_recent_transform: {each.newest:.3f}\n"
-        f"  oldest_transform: {each.oldest:.3f}\n"
-        f"  buffer_length: {each.length:.3f}\n"
-    )

@@ -30,7 +30,7 @@ from frametool.grammar.result import Style, refuse_motion
 from frametool.ros import publisher
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from frametool.documents.source import InputFile, Source
     from frametool.frames.lookups import Frames
@@ -65,9 +65,17 @@ class Action(NamedTuple):
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the edge of each call, and record what could not be read."""
-    for action in filter(_is_reported, _actions(file)):
+    begin = Beginning(file.head())
+    actions: Iterable[Action]
+    if begin.xml:
+        actions = _of_xml(file)
+    elif file.path.endswith(".py") or _PYTHON.search(begin.text):
+        actions = _of_python(file.source)
+    else:
+        actions = _of_yaml(file.source)
+    for action in filter(_is_reported, actions):
         try:
-            arguments, conditions = _arguments(action), _open_conditions(action)
+            arguments, conditions = _call(action)
         except Misfit as reason:
             options.tally.note_each(str(reason), action.line)
             continue
@@ -76,16 +84,6 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
                 message = f"frame {shown(edge.child)} is published under a condition: {' and '.join(conditions)}"
                 options.tally.note_each(message, action.line)
             yield edge
-
-
-def _actions(file: InputFile) -> Iterator[Action]:
-    """Yield the calls and included files, in the order of the text, by the reader of the language."""
-    begin = Beginning(file.head())
-    if begin.xml:
-        return _of_xml(file)
-    if file.path.endswith(".py") or _PYTHON.search(begin.text):
-        return _of_python(file.source)
-    return _of_yaml(file.source)
 
 
 def _key(action: Action) -> str:
@@ -106,8 +104,11 @@ def _is_reported(action: Action) -> bool:
     return action.kind == "include" or (action.kind == "node" and is_call)
 
 
-def _arguments(action: Action) -> str | Sequence[str]:
-    """Return the arguments of a call, as one text for a shell or as words; raises Misfit."""
+def _call(action: Action) -> tuple[str | Sequence[str], list[str]]:
+    """Return the arguments of a call, as one text for a shell or as words, and the conditions that are left open.
+
+    Raises Misfit, also for a condition that is never met.
+    """
     if action.kind == "include":
         raise Misfit(f"include {shown(action.fields.get('file', ''))} is not followed; read that file too: --with FILE")
     key = _key(action)
@@ -123,11 +124,6 @@ def _arguments(action: Action) -> str | Sequence[str]:
         problem = f"its arguments have {shown(substitution[0])}"
     if problem:
         raise Misfit(f"{publisher.CALL} not read: {problem}")
-    return arguments if isinstance(arguments, str) else [str(word) for word in arguments or ()]
-
-
-def _open_conditions(action: Action) -> list[str]:
-    """Return the conditions that the file does not decide, each once; raises Misfit for one that is never met."""
     found = []
     for condition in dict.fromkeys(action.conditions):
         word, _, value = condition[:-1].lower().partition('="')
@@ -135,7 +131,7 @@ def _open_conditions(action: Action) -> list[str]:
             raise Misfit(f"{publisher.CALL} not read: it never starts ({condition})")
         if value not in (*_NO, *_YES):
             found.append(condition)
-    return found
+    return arguments if isinstance(arguments, str) else [str(word) for word in arguments or ()], found
 
 
 def _of_xml(file: InputFile) -> Iterator[Action]:
@@ -190,41 +186,37 @@ def _entries(entries: Any, path: Path, conditions: list[str]) -> Iterator[tuple[
                 yield here, Action(tag, fields, under)
 
 
-def _of_python(source: Source) -> Iterator[Action]:
-    """Yield the calls in Python, in the order of the text."""
+def _of_python(source: Source) -> list[Action]:
+    """Return the calls in Python, each with the conditions around it, in the order of the text."""
+    found = []
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about unknown escapes in the user's code
-            tree = ast.parse(source.text)
-        yield from sorted(_calls(tree), key=lambda action: (action.line, action.column))
+            pending: list[tuple[ast.AST, tuple[str, ...]]] = [(ast.parse(source.text), ())]
+        while pending:
+            node, conditions = pending.pop()
+            if isinstance(node, ast.Call):
+                conditions += tuple(_written(each.value) for each in node.keywords if each.arg == "condition")
+                fields = {FIELDS[each.arg]: _literal(each.value) for each in node.keywords if each.arg in FIELDS}
+                tag = next((tag for field, tag in KINDS.items() if field in fields), "")
+                if getattr(node.func, "attr", getattr(node.func, "id", "")) == "IncludeLaunchDescription":
+                    named = [*node.args, *(each.value for each in node.keywords), node.func]
+                    tag, fields["file"] = "include", _written(named[0])
+                if tag and (tag != "executable" or publisher.CALL in _written(node)):
+                    found.append(Action(tag, fields, conditions, node.lineno, node.col_offset + 1))
+            for name, held in ast.iter_fields(node):
+                under = conditions
+                if isinstance(node, ast.If | ast.IfExp) and name != "test":
+                    test = _written(node.test)
+                    under += (f"if {test}" if name == "body" else f"if not ({test})",)
+                children = held if isinstance(held, list) else [held]
+                pending += [(each, under) for each in children if isinstance(each, ast.AST)]
     except SyntaxError as error:
         line, column = error.lineno or 1, error.offset or 1
         raise FormatError(f"not Python 3: {error.msg}", source=source.name, line=line, column=column) from None
     except (ValueError, MemoryError, RecursionError) as error:
         raise FormatError(f"not Python 3: {error or 'nested too deeply'}", source=source.name) from None
-
-
-def _calls(tree: ast.Module) -> Iterator[Action]:
-    """Yield the calls, each with the conditions around it."""
-    pending: list[tuple[ast.AST, tuple[str, ...]]] = [(tree, ())]
-    while pending:
-        node, conditions = pending.pop()
-        if isinstance(node, ast.Call):
-            conditions += tuple(_written(each.value) for each in node.keywords if each.arg == "condition")
-            fields = {FIELDS[each.arg]: _literal(each.value) for each in node.keywords if each.arg in FIELDS}
-            tag = next((tag for field, tag in KINDS.items() if field in fields), "")
-            if getattr(node.func, "attr", getattr(node.func, "id", "")) == "IncludeLaunchDescription":
-                named = [*node.args, *(each.value for each in node.keywords), node.func]
-                tag, fields["file"] = "include", _written(named[0])
-            if tag and (tag != "executable" or publisher.CALL in _written(node)):
-                yield Action(tag, fields, conditions, node.lineno, node.col_offset + 1)
-        for name, held in ast.iter_fields(node):
-            under = conditions
-            if isinstance(node, ast.If | ast.IfExp) and name != "test":
-                test = _written(node.test)
-                under += (f"if {test}" if name == "body" else f"if not ({test})",)
-            children = held if isinstance(held, list) else [held]
-            pending += [(each, under) for each in children if isinstance(each, ast.AST)]
+    return sorted(found, key=lambda action: (action.line, action.column))
 
 
 def _literal(node: ast.expr) -> Any:

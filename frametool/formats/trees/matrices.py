@@ -169,34 +169,28 @@ def grid_of(value: Any) -> Grid | None:
 
     Raises Misfit if its data do not have the stated size.
     """
-    if type(value) is dict:
-        return _stored(value) if {"rows", "cols", "data"} <= value.keys() else None
+    if type(value) is dict:  # OpenCV's map
+        if not {"rows", "cols", "data"} <= value.keys():
+            return None
+        for key in ("rows", "cols"):
+            if not re.fullmatch(r"[0-9]{1,9}", str(value[key])):
+                raise Misfit(f"expected a whole number, found {kind(value[key])}", (key,))
+        per_element = re.match(r"[1-9][0-9]?", str(value.get("dt")))  # as in 3f
+        height, width, data = int(value["rows"]), int(value["cols"]), value["data"]
+        width *= int(per_element[0]) if per_element else 1
+        if type(data) is not list or len(data) != height * width:
+            found = f"{len(data)} numbers" if type(data) is list else kind(data)
+            raise Misfit(f"expected {height} x {width} = {height * width} numbers, found {found}", ("data",))
+        return Grid(height, width, data, [("data", index) for index in range(len(data))])
     if type(value) is not list or not value:
         return None
     if not any(type(row) is list for row in value):
-        return None if any(type(each) is dict for each in value) else _flat(1, len(value), value, ())
+        is_list_of_maps = any(type(each) is dict for each in value)
+        return None if is_list_of_maps else Grid(1, len(value), value, [(index,) for index in range(len(value))])
     rows = [row if type(row) is list else [row] for row in value]
     widths = {len(row) for row in rows}
     places: list[Path] = [(at, column) for at, row in enumerate(rows) for column in range(len(row))]
     return Grid(len(rows), widths.pop() if len(widths) == 1 else 0, [text for row in rows for text in row], places)
-
-
-def _flat(rows: int, columns: int, texts: list[Any], path: Path) -> Grid:
-    return Grid(rows, columns, texts, [(*path, index) for index in range(len(texts))])
-
-
-def _stored(value: dict[str, Any]) -> Grid:
-    """Parse OpenCV's map; its dt may have the number of values per element, as in 3f."""
-    for key in ("rows", "cols"):
-        if not re.fullmatch(r"[0-9]{1,9}", str(value[key])):
-            raise Misfit(f"expected a whole number, found {kind(value[key])}", (key,))
-    values = re.match(r"[1-9][0-9]?", str(value.get("dt")))
-    rows, columns = int(value["rows"]), int(value["cols"]) * int(values[0] if values else 1)
-    data = value["data"]
-    if type(data) is not list or len(data) != rows * columns:
-        found = f"{len(data)} numbers" if type(data) is list else kind(data)
-        raise Misfit(f"expected {rows} x {columns} = {rows * columns} numbers, found {found}", ("data",))
-    return _flat(rows, columns, data, ("data",))
 
 
 def whole_pose(grid: Grid | None, *, twelve: bool) -> Grid | None:
@@ -266,11 +260,6 @@ class Stated(NamedTuple):
     path: Path
     chained: bool = False
 
-    @property
-    def parent(self) -> str:
-        """Return the frame that is not the child."""
-        return self.target if self.child == self.source else self.source
-
 
 def edges_of(statements: Iterable[Stated], reading: Reading) -> list[Edge]:
     """Return the edges, and check duplicates against them.
@@ -284,32 +273,28 @@ def edges_of(statements: Iterable[Stated], reading: Reading) -> list[Edge]:
             error = topology.own_parent(each.source)
             raise Misfit(error.message, each.path, key=True)
         ends = frozenset((each.target, each.source))
-        parent, child, components = each.parent, each.child, each.components
+        parent, child, components = each.target, each.child, each.components
         if child != each.source:
-            components = rigid.inverse(*components)
+            parent, components = each.source, rigid.inverse(*components)
         if tree.track(child) is not None and tree.track(parent) is None:
             parent, child, components = child, parent, rigid.inverse(*components)
         if tree.hang(parent, child, components):
             first[ends] = each
-        else:
-            _compare(tree.near(each.target, each.source), each, first.get(ends), reading)
+            continue
+        metres, radians = rigid.distance(*tree.near(each.target, each.source), *each.components, floats)
+        if metres <= AGREEMENT and radians <= AGREEMENT:
+            continue
+        same = first.get(ends)
+        other = bare(dotted(same.path)) if same else "the others"
+        message = f"differs from {other} by {metres * 1000.0:.6g} mm and {degrees(radians):.6g} degrees"
+        if same and (metres > TOLERATED or radians > TOLERATED):
+            raise Misfit(f"{bare(dotted(each.path))} {message}; keep one", each.path, key=True)
+        reading.here = ()
+        reading.note(f"{message}; {other} {'is' if same else 'are'} used", *each.path)
     return [
         Edge(track.parent, track.child, track.components, path=first[frozenset((track.parent, track.child))].path)
         for track in tree.tracks()
     ]
-
-
-def _compare(known: Rigid, each: Stated, first: Stated | None, reading: Reading) -> None:
-    """Check a duplicate pose."""
-    metres, radians = rigid.distance(*known, *each.components, floats)
-    if metres <= AGREEMENT and radians <= AGREEMENT:
-        return
-    other = bare(dotted(first.path)) if first else "the others"
-    message = f"differs from {other} by {metres * 1000.0:.6g} mm and {degrees(radians):.6g} degrees"
-    if first and (metres > TOLERATED or radians > TOLERATED):
-        raise Misfit(f"{bare(dotted(each.path))} {message}; keep one", each.path, key=True)
-    reading.here = ()
-    reading.note(f"{message}; {other} {'is' if first else 'are'} used", *each.path)
 
 
 def directed(what: str, path: Path, parent: str, child: str, answers: Answers) -> Meaning:

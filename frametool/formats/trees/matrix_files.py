@@ -53,8 +53,10 @@ _NO_NAMES = dict.fromkeys(("me", "before", "imu", "body", "sensor"), "")
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield one edge per pose, and check duplicates."""
     frames, alone = options.answers.frames, "cam"
-    if file.format == "euroc-sensor":
-        frames = options.answers.names("body", sensor_name(file.path))
+    if file.format == "euroc-sensor":  # named after the folder of a sensor.yaml, else after the file
+        folder, name = os.path.split("" if file.path == "-" else os.path.abspath(file.path))
+        stem = name.partition(".")[0]
+        frames = options.answers.names("body", (os.path.basename(folder) if stem == "sensor" else stem) or "sensor")
         alone = frames[1]
 
     def take(value: Any, reading: Reading) -> list[Edge]:
@@ -70,15 +72,6 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         yield from _read_xml(file, options, take)
     else:
         yield from document_edges(matrices.made_ordinary(file), options, take, matrices.TAGS)
-
-
-def sensor_name(path: str) -> str:
-    """Return the name of a sensor from its file: the folder of a sensor.yaml, else the name of the file."""
-    if path == "-":
-        return "sensor"
-    folder, name = os.path.split(os.path.abspath(path))
-    stem = name.partition(".")[0]
-    return (os.path.basename(folder) if stem == "sensor" else stem) or "sensor"
 
 
 class MatrixBlock(NamedTuple):
@@ -103,10 +96,19 @@ class Matrices:
         self.base = frames[0] if frames else ""
         self.left: list[str] = []
         self.asked = 0
-        self.blocks = _renamed([*_blocks(document, "", ())], frames[1:])
-        self.names = {block.path: block.name for block in self.blocks}
-        self.bodies = [each for each in self.blocks if "T_BS" in each.entries][:2]
-        self.poses = [pose for block in self.blocks for pose in self._of_block(block)]
+        blocks = [*_blocks(document, "", ())]
+        cameras = [
+            block
+            for block in blocks  # the first in a chain has no pose
+            if block.name[:3] not in ("", "imu")
+            and (block.name[:3] == "cam" or any(key.startswith("T_") for key in block.entries))
+        ]
+        cameras.sort(key=lambda block: [int(number) for number in re.findall(r"[0-9]{1,9}", block.name)])
+        chosen = {block.path: name for block, name in zip(cameras, frames[1:], strict=False)}
+        blocks = [block._replace(name=chosen.get(block.path, block.name)) for block in blocks]
+        self.names = {block.path: block.name for block in blocks}
+        self.bodies = [each for each in blocks if "T_BS" in each.entries][:2]
+        self.poses = [pose for block in blocks for pose in self._of_block(block)]
 
     def _of_block(self, block: MatrixBlock) -> Iterator[Stated]:
         """Yield the poses of one map."""
@@ -138,8 +140,15 @@ class Matrices:
             return None
         if isinstance(meaning, Unclear):
             raise meaning.below(*path)
-        if meaning is None or not meaning.said:
-            meaning = self._named(block, path) or self._directed(block, key, path, meaning)
+        if not says and (beside := self._named(block, path)) is not None:
+            meaning = beside
+        elif meaning is None:
+            parent = self.base or ("imu" if block.name else "body")
+            child = block.name or next(iter(self.frames[1 + self.asked :]), key.rpartition(".")[2])
+            self.asked += 1
+            meaning = directed(dotted(path), path, parent, child, self.answers)
+        elif not says:
+            meaning = directed(dotted(path), path, meaning.target, meaning.source, self.answers)
         if "" in (meaning.target, meaning.source):
             raise Misfit(f"{bare(key)}: there is no camera before {bare(block.name)}", path, key=True)
         position, rotation = within(path, read_spelled, matrices.MATRIX, whole.texts, whole.places, self.reading)
@@ -175,15 +184,6 @@ class Matrices:
                 raise Misfit(f"{key} without {other}, so nothing says what the matrix is between", (*block.path, key))
         return None
 
-    def _directed(self, block: MatrixBlock, key: str, path: Path, ends: Meaning | None) -> Meaning:
-        """Return the meaning of a key without a direction, as set by options; raises Unclear if they do not."""
-        if ends is not None:
-            return directed(dotted(path), path, ends.target, ends.source, self.answers)
-        parent = self.base or ("imu" if block.name else "body")
-        child = block.name or next(iter(self.frames[1 + self.asked :]), key.rpartition(".")[2])
-        self.asked += 1
-        return directed(dotted(path), path, parent, child, self.answers)
-
     def _pair(self, block: MatrixBlock, key: str, turn: Grid, translation: str, target: str, source: str) -> Stated:
         """Read a rotation and its translation."""
         path, place = (*block.path, key), (*block.path, translation)
@@ -202,19 +202,6 @@ class Matrices:
             meaning = directed(f"{key} and {translation}", path, parent, child, self.answers)
         rotation = within(path, matrices.read_turn, turn, self.reading)
         return Stated(*meaning[:3], (*within(place, matrices.read_shift, shift), *rotation), path)
-
-
-def _renamed(blocks: list[MatrixBlock], chosen: tuple[str, ...]) -> list[MatrixBlock]:
-    """Return the blocks, with the names chosen for cameras: cam0 has the first of them."""
-    cameras = [
-        block
-        for block in blocks  # the first in a chain has no pose
-        if block.name[:3] not in ("", "imu")
-        and (block.name[:3] == "cam" or any(key.startswith("T_") for key in block.entries))
-    ]
-    cameras.sort(key=lambda block: [int(number) for number in re.findall(r"[0-9]{1,9}", block.name)])
-    names = {block.path: name for block, name in zip(cameras, chosen, strict=False)}
-    return [block._replace(name=names.get(block.path, block.name)) for block in blocks]
 
 
 def _blocks(entries: dict[str, Any], name: str, path: Path) -> Iterator[MatrixBlock]:
@@ -277,12 +264,12 @@ class StoredXml:
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Return a camera chain, or OpenCV's YAML; raises ValueInvalid for what either cannot hold."""
-    return _chain(tree, style) if style.format == "camchain" else _stored(tree, style)
+    """Return a camera chain; or OpenCV's YAML, one matrix per edge, named `parent_T_child`.
 
-
-def _stored(tree: Frames, style: Style) -> str:
-    """Return one matrix per edge, named `parent_T_child`; raises ValueInvalid for names that OpenCV does not accept."""
+    Raises ValueInvalid for what either cannot hold, as names that OpenCV does not accept.
+    """
+    if style.format == "camchain":
+        return _chain(tree, style)
     text = "%YAML:1.0\n---\n"
     for parent, child, pose in static_edges(tree, style.format):
         key = f"{parent}_T_{child}"

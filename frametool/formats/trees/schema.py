@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.formats.trees.tree_reader import CAMERA_KEYS, STAMP_KEYS, TREE_KEYS
 from frametool.geometry.camera import CAMERA_MODELS
-from frametool.geometry.representations import MAP, NAMED, POSITIONS, Notation
+from frametool.geometry.representations import MAP, NAMED, POSITIONS
 from frametool.grammar.loose import WORDS
 from frametool.grammar.place import EARTH_KEYS
 from frametool.grammar.pose import LISTED_WORDS, NAMES, POSITION_KEYS, ROTATION_KEYS, ROTATION_WORDS
@@ -104,18 +104,14 @@ def _of_key(key: str) -> Schema:
         about = f"position of the frame in its parent, {unit}"
         return _numbers(("x", "y", "z"), about) | {"additionalProperties": False}
     if key in ROTATION_KEYS and key not in ROTATION_WORDS:
-        return _rotation(ROTATION_KEYS[key])
+        row = ROTATION_KEYS[key].representation
+        about = row.summary + (UNIT[ROTATION_KEYS[key].degrees] if row.angles else "")
+        if isinstance(row.shape, tuple) or row.shape == NAMED:
+            return {"type": ["object", "array"], "description": about}
+        return _numbers(row.names if row.shape == MAP else (), about)
     if key in POSITIONS:
         return {"description": POSITIONS[key].summary}
     return MEANINGS.get(key, {})
-
-
-def _rotation(notation: Notation) -> Schema:
-    row = notation.representation
-    about = row.summary + (UNIT[notation.degrees] if row.angles else "")
-    if isinstance(row.shape, tuple) or row.shape == NAMED:
-        return {"type": ["object", "array"], "description": about}
-    return _numbers(row.names if row.shape == MAP else (), about)
 
 
 def _numbers(names: Collection[str], about: str) -> Schema:

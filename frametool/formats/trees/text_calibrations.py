@@ -113,9 +113,18 @@ class Calibration:
             if turn in self.fields and (not shift or shift in self.fields):
                 pose, found = self._pose(turn, shift), True
                 yield parent, child, rigid.inverse(*pose) if inverse else pose, self.fields[turn].line
-        for edge in self._baselines() if poses is POSES else ():
+        rect = "_rect" if any(name in self.fields for name in RECTIFICATIONS) else ""
+        # the cameras of projections have the axes of the rectified first one: the centre is -K^-1 p
+        for index in (1, 2, 3) if poses is POSES else ():
+            if (field := self.fields.get(f"P{index}")) is None:
+                continue
+            fx, _, cx, px, _, fy, cy, py, _, _, _, pz = field.numbers
+            for focal in (fx, fy):
+                if not focal > 0.0:
+                    raise line_error(self.file, field.line, 1, f"P{index}: the focal length {focal:g} is not positive")
+            centre = 0.0 - (px - cx * pz) / fx, 0.0 - (py - cy * pz) / fy, 0.0 - pz
             found = True
-            yield edge
+            yield f"cam0{rect}", f"cam{index}{rect}", (*centre, *rigid.IDENTITY[3:]), field.line
         if not found:
             raise self.file.error("no pose in it: expected P0: to P3:, Tr:, R: and T:, or R_01: and T_01:")
 
@@ -175,19 +184,6 @@ class Calibration:
         message = f"R: and T: do not say between which frames; {ways}"
         raise Unanswered(message, source=self.file.name, line=self.fields["R"].line)
 
-    def _baselines(self) -> Iterator[tuple[str, str, Rigid, int]]:
-        """Yield the cameras of projections, with the axes of the rectified first one: the centre -K^-1 p."""
-        rect = "_rect" if any(name in self.fields for name in RECTIFICATIONS) else ""
-        for index in (1, 2, 3):
-            if (field := self.fields.get(f"P{index}")) is None:
-                continue
-            fx, _, cx, px, _, fy, cy, py, _, _, _, pz = field.numbers
-            for focal in (fx, fy):
-                if not focal > 0.0:
-                    raise line_error(self.file, field.line, 1, f"P{index}: the focal length {focal:g} is not positive")
-            centre = 0.0 - (px - cx * pz) / fx, 0.0 - (py - cy * pz) / fy, 0.0 - pz
-            yield f"cam0{rect}", f"cam{index}{rect}", (*centre, *rigid.IDENTITY[3:]), field.line
-
 
 # --- Kalibr ---
 
@@ -230,7 +226,15 @@ def _read_kalibr(file: InputFile, options: Options) -> Iterator[Edge]:
         raise file.error(str(misfit), lines.get(str(misfit.path[0]), 0)) from None
     for note in reading.notes:
         options.tally.note_each(f"{note.path[0]}: {note.message}", lines[str(note.path[0])], note.rule)
-    yield from _named(edges, options, lines)
+    # --frames names the IMUs, then the cameras, by their numbers
+    found = {name for each in edges for name in (each.parent or "", each.child)}
+    frames = sorted(found, key=lambda name: (name[:3] == "cam", len(name), name))
+    if len(chosen := options.answers.frames) > len(frames):
+        raise BadAnswer(f"--frames names {len(chosen)} frames, there are {len(frames)}: {', '.join(frames)}")
+    names = dict(zip(frames, options.answers.names(*frames), strict=True))
+    for each in edges:
+        line = lines[str(each.path[0])]
+        yield each._replace(parent=names[each.parent or ""], child=names[each.child], line=line, path=())
 
 
 def _baseline(text: str, head: re.Match[str], reading: Reading) -> Rigid:
@@ -253,15 +257,3 @@ def _matrix(text: str, head: re.Match[str], reading: Reading) -> Rigid:
         raise Misfit(f"expected a 4 x 4 matrix below it, found {f'{len(words)} numbers' if words else 'none'}")
     position, rotation = read_spelled(MATRIX, words, INDICES, reading)
     return *(position or (0.0, 0.0, 0.0)), *rotation
-
-
-def _named(edges: list[Edge], options: Options, lines: dict[str, int]) -> Iterator[Edge]:
-    """Yield edges with the names of --frames: of the IMUs, then of the cameras, by their numbers."""
-    found = {name: None for each in edges for name in (each.parent or "", each.child)}
-    frames = sorted(found, key=lambda name: (name[:3] == "cam", len(name), name))
-    if len(chosen := options.answers.frames) > len(frames):
-        raise BadAnswer(f"--frames names {len(chosen)} frames, there are {len(frames)}: {', '.join(frames)}")
-    names = dict(zip(frames, options.answers.names(*frames), strict=True))
-    for each in edges:
-        line = lines[str(each.path[0])]
-        yield each._replace(parent=names[each.parent or ""], child=names[each.child], line=line, path=())

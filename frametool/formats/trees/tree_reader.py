@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import Document, locate_many, parse_documents
 from frametool.documents.source import InputFile, Source, pointer
-from frametool.errors import Finding, FormatError, ValueInvalid, alternatives, bare, first_of, shown
+from frametool.errors import Finding, FormatError, alternatives, bare, first_of, shown
 from frametool.frames.stamps import parse_stamp
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Diagnostics, Edge, Options
@@ -29,8 +29,6 @@ from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-
-    from frametool.geometry.place import Earth
 
     Take = Callable[[Any, Reading], Iterable[Edge]]
 
@@ -67,7 +65,12 @@ def edges_of(
         reading.faults, reading.bare_numbers = None if faults is None else [], bare_numbers
         try:
             for edge in take(document.value, reading):
-                yield without_slashes(edge, reading)._replace(path=(document.index, *edge.path))
+                found = edge
+                if edge.child[0] == "/" or (edge.parent or "")[:1] == "/":  # one is left out, as by tf2
+                    reading.here = edge.path
+                    child = reading.bare(edge.child)
+                    found = edge._replace(child=child, parent=edge.parent and reading.bare(edge.parent))
+                yield found._replace(path=(document.index, *edge.path))
         except Misfit as misfit:
             if reading.faults is None:
                 raise misfit.placed(document.source, document.index) from None
@@ -75,14 +78,6 @@ def edges_of(
         if faults is not None:
             faults += [fault.below(document.index) for fault in reading.faults or ()]
         notes += [note._replace(path=(document.index, *note.path)) for note in reading.notes]
-
-
-def without_slashes(edge: Edge, reading: Reading) -> Edge:
-    """Remove one leading `/` from the names, as tf2 does, and note it."""
-    if edge.child[0] != "/" and (edge.parent or "")[:1] != "/":
-        return edge
-    reading.here = edge.path
-    return edge._replace(child=reading.bare(edge.child), parent=edge.parent and reading.bare(edge.parent))
 
 
 def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
@@ -96,7 +91,20 @@ def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
     elif type(value) is not dict:
         as_mapping(value, "a frame tree")
     elif "frames" in value:
-        yield from _tree(value, reading)
+        if unknown := [key for key in value if key not in TREE_KEYS]:
+            raise Misfit(f"unknown key {shown(unknown[0])} next to frames; expected angles", (unknown[0],), key=True)
+        if "angles" in value:
+            reading.degrees = read_angle_unit(value["angles"])
+        frames = value["frames"]
+        if type(frames) is list:
+            yield from _entries(frames, ("frames",), reading)
+        elif frames is not None:
+            for name, entry in as_mapping(frames, "a mapping of root frames or a list of entries").items():
+                if type(entry) is dict and type(entry.get("parent")) is str:
+                    yield from _below(entry.pop("parent"), {name: entry}, ("frames",), reading)
+                else:
+                    yield Edge(None, name, IDENTITY, path=("frames", name))
+                    yield from _below(name, entry, ("frames", name), reading)
     elif messages.is_message(value):
         yield from _messages(value, (), reading)
     elif not NAMES.isdisjoint(value):
@@ -109,57 +117,32 @@ def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
         )
 
 
-def _tree(document: dict[str, Any], reading: Reading) -> Iterator[Edge]:
-    if unknown := [key for key in document if key not in TREE_KEYS]:
-        raise Misfit(f"unknown key {shown(unknown[0])} next to frames; expected angles", (unknown[0],), key=True)
-    if "angles" in document:
-        reading.degrees = read_angle_unit(document["angles"])
-    frames = document["frames"]
-    if type(frames) is list:
-        yield from _entries(frames, ("frames",), reading)
-    elif frames is not None:
-        for name, entry in as_mapping(frames, "a mapping of root frames or a list of entries").items():
-            if type(entry) is dict and type(entry.get("parent")) is str:
-                yield from _below(entry.pop("parent"), {name: entry}, ("frames",), reading)
-            else:
-                yield Edge(None, name, IDENTITY, path=("frames", name))
-                yield from _below(name, entry, ("frames", name), reading)
-
-
 def _below(root: str, children: Any, path: Path, reading: Reading) -> Iterator[Edge]:
     """Iterate over one nested tree, parents before children; with a stack, so that any depth works."""
     pending = [(root, children, path)]
     while pending:
         parent, entries, path = pending.pop()
         deeper = []
-        for child, entry in _children({} if entries is None else entries, path, reading).items():
-            yield from _nested(parent, child, entry, (*path, child), reading)
+        try:
+            entries = as_mapping({} if entries is None else entries, "the children as a mapping by name")
+        except Misfit as misfit:
+            reading.refuse(misfit.below(*path))
+            continue
+        for child, entry in entries.items():
+            here = reading.here = (*path, child)
+            try:
+                said = {} if entry is None else entry
+                if child in POSE_KEYS and type(said) is not dict:
+                    raise Misfit(f"{shown(child)} {NO_NAME}", key=True)
+                if names := NAMES.intersection(as_mapping(said, f"the pose of frame {shown(child)}")):
+                    raise Misfit(f"{min(names)} is defined by the nesting; remove it", (min(names),), key=True)
+                pose = _pose(said, reading, CHILDREN)
+                yield from _edges(said, pose, _above(pose, parent, said), child, here, reading)
+            except Misfit as misfit:
+                reading.refuse(misfit.below(*here))
             if type(entry) is dict and "children" in entry:
-                deeper.append((child, entry["children"], (*path, child, "children")))
+                deeper.append((child, entry["children"], (*here, "children")))
         pending.extend(reversed(deeper))
-
-
-def _children(entries: Any, path: Path, reading: Reading) -> dict[str, Any]:
-    try:
-        return as_mapping(entries, "the children as a mapping by name")
-    except Misfit as misfit:
-        reading.refuse(misfit.below(*path))
-        return {}
-
-
-def _nested(parent: str, child: str, entry: Any, path: Path, reading: Reading) -> Iterator[Edge]:
-    """Yield the edge of a nested entry, or its samples."""
-    reading.here = path
-    try:
-        entry = {} if entry is None else entry
-        if child in POSE_KEYS and type(entry) is not dict:
-            raise Misfit(f"{shown(child)} {NO_NAME}", key=True)
-        if names := NAMES.intersection(as_mapping(entry, f"the pose of frame {shown(child)}")):
-            raise Misfit(f"{min(names)} is defined by the nesting; remove it", (min(names),), key=True)
-        pose = _pose(entry, reading, CHILDREN)
-        yield from _edges(entry, pose, _above(pose, parent, entry), child, path, reading)
-    except Misfit as misfit:
-        reading.refuse(misfit.below(*path))
 
 
 def _entries(entries: list[Any], path: Path, reading: Reading) -> Iterator[Edge]:
@@ -193,21 +176,14 @@ def _pose(entry: dict[str, Any], reading: Reading, also: Collection[str]) -> Pos
     if AXES_KEY in entry and "samples" in entry:
         entry = {key: value for key, value in entry.items() if key != AXES_KEY}
     if "camera" in entry:
-        within(("camera",), _check_camera, entry["camera"])
+        from frametool.geometry.camera import Camera
+
+        within(("camera",), Camera, **{"model": None, **within(("camera",), camera_fields, entry["camera"])})
     if not (POSE_KEYS.issuperset(entry) or LOOSE.isdisjoint(entry)):
         from frametool.grammar.loose import read_loose_pose
 
         return read_loose_pose(entry, reading, also)
     return read_pose(entry, reading, also)
-
-
-def _check_camera(value: Any) -> None:
-    from frametool.geometry.camera import Camera
-
-    try:
-        Camera(**{"model": None, **camera_fields(value)})
-    except ValueInvalid as error:
-        raise error if isinstance(error, Misfit) else Misfit(str(error)) from None
 
 
 def camera_fields(value: Any) -> dict[str, Any]:
@@ -242,14 +218,14 @@ def _above(pose: Pose, parent: str | None, entry: dict[str, Any]) -> str | None:
 
 
 def _edges(
-    entry: dict[str, Any] | None, pose: Pose, parent: str | None, child: str, path: Path, reading: Reading
+    entry: dict[str, Any], pose: Pose, parent: str | None, child: str, path: Path, reading: Reading
 ) -> list[Edge]:
     """Return the edges of one entry: a static edge or one with a stamp, or the samples of a moving frame."""
-    if entry is not None and "samples" in entry:
-        return read_samples(entry, pose, parent, child, path, reading)
+    if "samples" in entry:
+        return _samples(entry, pose, parent, child, path, reading)
     if parent is not None and pose.position is None and pose.rotation is None:
         reading.note(f"frame {shown(child)} has neither position nor rotation: taken as the identity", rule="identity")
-    return [Edge(parent, child, pose.components, stamp_of(entry or {}), path=path, covariance=pose.covariance)]
+    return [Edge(parent, child, pose.components, stamp_of(entry), path=path, covariance=pose.covariance)]
 
 
 def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[Edge]:
@@ -264,7 +240,7 @@ def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[E
         message.clear()  # frees the memory of a million messages
 
 
-def read_samples(
+def _samples(
     entry: dict[str, Any], pose: Pose, parent: str | None, child: str, path: Path, reading: Reading
 ) -> list[Edge]:
     """Read `samples: [{stamp: 0.0, xyz: [..]}, ..]`; a sample may name another parent."""
@@ -281,7 +257,13 @@ def read_samples(
     try:
         reading.degrees = read_angle_unit(entry["angles"]) if "angles" in entry else outer
         if AXES_KEY in entry:
-            reading.earth = _given_in(entry, reading)
+            from frametool.geometry.place import Earth
+            from frametool.grammar.place import take_axes
+
+            if not any(may_be_on_earth(key) for sample in samples if type(sample) is dict for key in sample):
+                what = "axes next to samples are for positions on the Earth; none of these has one"
+                raise Misfit(what, (AXES_KEY,), key=True)
+            reading.earth = Earth(axes=take_axes({AXES_KEY: entry[AXES_KEY]}, reading))
         for index, sample in enumerate(samples):
             reading.here = (*path, "samples", index)
             moved, stamp_ns = within(("samples", index), _sample, sample, reading, uncertain=bool(pose.covariance))
@@ -292,17 +274,6 @@ def read_samples(
     finally:
         reading.degrees, reading.earth = outer, earth
     return edges
-
-
-def _given_in(entry: dict[str, Any], reading: Reading) -> Earth:
-    """Return the options for all positions among samples: the axes next to them."""
-    from frametool.geometry.place import Earth
-    from frametool.grammar.place import take_axes
-
-    if not any(may_be_on_earth(key) for sample in entry["samples"] if type(sample) is dict for key in sample):
-        what = "axes next to samples are for positions on the Earth; none of these has one"
-        raise Misfit(what, (AXES_KEY,), key=True)
-    return Earth(axes=take_axes({AXES_KEY: entry[AXES_KEY]}, reading))
 
 
 def _sample(sample: Any, reading: Reading, *, uncertain: bool) -> tuple[Pose, int]:
