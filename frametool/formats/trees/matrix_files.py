@@ -140,8 +140,8 @@ class Matrices:
             return None
         if isinstance(meaning, Unclear):
             raise meaning.below(*path)
-        if not says and (beside := self._named(block, path)) is not None:
-            meaning = beside
+        if not says and (named_there := self._named(block, path)) is not None:
+            meaning = named_there
         elif meaning is None:
             parent = self.base or ("imu" if block.name else "body")
             child = block.name or next(iter(self.frames[1 + self.asked :]), key.rpartition(".")[2])
