@@ -19,7 +19,7 @@ from frametool.geometry.transform import Transform
 from frametool.stream.samples import HandEyeSamples
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from frametool.fit.comparison import Delta
     from frametool.geometry.types import Array, Indices
@@ -66,10 +66,23 @@ def fitted(
         if ref.xyzw is None or est.xyzw is None:
             raise Unaligned("origin needs rotations of both; --align se3, yaw or none")
         return Fit(ref.poses[0] @ est.poses[0].inverse())  # the first poses coincide
-    if kind == "yaw":
-        return _yaw(ref.xyz, est.xyz, up, names, tied=tied)
-    for name, each in zip(names, (ref, est), strict=True):
-        _require_plane(kind, each.xyz, name)
+    if kind == "yaw":  # the same least squares as for se3, over rotations about `up` only
+        ref_mean, est_mean = (each.xyz[0] if tied else centre(each.xyz) for each in (ref, est))
+        across = [each - np.outer(each @ up, up) for each in (ref.xyz - ref_mean, est.xyz - est_mean)]
+        for name, each, whole in zip(names, across, (ref.xyz, est.xyz), strict=True):
+            if np.sqrt((each**2).sum() / len(each)) < STILL * (1 + np.abs(whole).max()):
+                raise Unaligned(f"{name} has no motion across up: yaw is free; --align origin or none")
+        sine, cosine = (np.cross(across[1], across[0]) @ up).sum(), (across[1] * across[0]).sum()
+        rotation = Rotation.from_axis_angle(up, atan2(sine, cosine))
+        return Fit(Transform(rotation, ref_mean - rotation.apply(est_mean)))
+    for name, xyz in zip(names, (ref.xyz, est.xyz), strict=True):
+        if len(xyz) < FEWEST:
+            raise Unaligned(f"{len(xyz)} pairs; {kind} needs {FEWEST}; --align origin or none")
+        first, second, _ = principal_axes(xyz)
+        if first < STILL * (1 + np.abs(xyz).max()):
+            raise Unaligned(f"{name} does not move; --align none")
+        if second < THIN * first:
+            raise Unaligned(f"{name} lies on a line: the turn about it is free; --align yaw, origin or none")
     found = umeyama(ref.xyz, est.xyz, with_scale=kind in SCALED, tied=tied)
     if kind == "origin+scale":
         return fitted("origin", ref, est._replace(xyz=found.scale * est.xyz), up)._replace(scale=found.scale)
@@ -80,16 +93,6 @@ def principal_axes(xyz: Array) -> Array:
     """Return the rms of positions along their principal axes, in descending order."""
     spread: Array = np.linalg.svd(xyz - centre(xyz), compute_uv=False) / np.sqrt(len(xyz))
     return spread
-
-
-def _require_plane(kind: str, xyz: Array, name: str) -> None:
-    if len(xyz) < FEWEST:
-        raise Unaligned(f"{len(xyz)} pairs; {kind} needs {FEWEST}; --align origin or none")
-    first, second, _ = principal_axes(xyz)
-    if first < STILL * (1 + np.abs(xyz).max()):
-        raise Unaligned(f"{name} does not move; --align none")
-    if second < THIN * first:
-        raise Unaligned(f"{name} lies on a line: the turn about it is free; --align yaw, origin or none")
 
 
 def umeyama(ref: Array, est: Array, weights: Array | None = None, *, with_scale: bool, tied: bool = False) -> Fit:
@@ -107,19 +110,6 @@ def centre(xyz: Array, mass: Array | None = None) -> Array:
     """Return the weighted mean of positions."""
     found: Array = xyz.mean(0) if mass is None else mass @ xyz / mass.sum()
     return found
-
-
-def _yaw(ref: Array, est: Array, up: Array, names: tuple[str, str], *, tied: bool) -> Fit:
-    """Minimise the same over rotations about `up` only."""
-    ref_mean, est_mean = (each[0] if tied else centre(each) for each in (ref, est))
-    r, e = ref - ref_mean, est - est_mean
-    across = [each - np.outer(each @ up, up) for each in (r, e)]
-    for name, each, whole in zip(names, across, (ref, est), strict=True):
-        if np.sqrt((each**2).sum() / len(each)) < STILL * (1 + np.abs(whole).max()):
-            raise Unaligned(f"{name} has no motion across up: yaw is free; --align origin or none")
-    sine, cosine = (np.cross(across[1], across[0]) @ up).sum(), (across[1] * across[0]).sum()
-    rotation = Rotation.from_axis_angle(up, atan2(sine, cosine))
-    return Fit(Transform(rotation, ref_mean - rotation.apply(est_mean)))
 
 
 ARM_STEPS = 50
@@ -142,10 +132,15 @@ def lever_arm(kind: str, ref: Trajectory, est: Trajectory, up: Array) -> Array:
         fit = fitted(kind, ref, shifted, up)
         placed = fit.moved(shifted)
         turns = fit.scale * (fit.transform.rotation @ est.rotation).as_matrix()  # the effect of a step of the arm
-        own = _tangents(kind, placed.xyz, up)
         free = turns.reshape(-1, 3)
         residual = (ref.xyz - placed.xyz).reshape(-1)
-        if own is not None:
+        if not kind.startswith(("none", "origin")):
+            # the derivatives of positions by alignment parameters: shifts, rotations about x, y, z or up, scale
+            centred = placed.xyz - centre(placed.xyz)
+            parts = [np.broadcast_to(axis, centred.shape) for axis in np.eye(3)]
+            parts += [np.cross(axis, centred) for axis in (up[None] if kind == "yaw" else np.eye(3))]
+            parts += [centred] * (kind == "sim3")
+            own = np.stack([part.reshape(-1) for part in parts], -1)
             free = free - own @ solve_normal(own.T @ own, own.T @ free)
         squares, axes = np.linalg.eigh(free.T @ free)
         seen = squares > (SEEN * fit.scale) ** 2 * len(turns)
@@ -154,18 +149,6 @@ def lever_arm(kind: str, ref: Trajectory, est: Trajectory, up: Array) -> Array:
         if np.abs(step).max() <= DONE * (1 + np.abs(arm).max()):
             break
     return arm
-
-
-def _tangents(kind: str, xyz: Array, up: Array) -> Array | None:
-    """Return the derivatives of positions by alignment parameters: shifts, rotations about x, y, z or up, scale."""
-    if kind.startswith(("none", "origin")):
-        return None
-    centred = xyz - centre(xyz)
-    axes = up[None] if kind == "yaw" else np.eye(3)
-    parts = [*(np.broadcast_to(axis, xyz.shape) for axis in np.eye(3)), *(np.cross(axis, centred) for axis in axes)]
-    if kind == "sim3":
-        parts.append(centred)
-    return np.stack([part.reshape(-1) for part in parts], -1)
 
 
 GAP = 3  # median intervals between two neighbours that may be interpolated
@@ -192,26 +175,36 @@ class Pairs(NamedTuple):
         return self._replace(ref=self.ref.at(index), est=self.est.at(index))
 
 
-def by_number(ref: Trajectory, est: Trajectory) -> Pairs:
-    """Pair two trajectories without stamps by index."""
-    count = min(ref.size, est.size)
-    return Pairs(ref.at(slice(count)), est.at(slice(count)), est.size)
-
-
-def interpolated(ref: Trajectory, est: Trajectory, max_gap_ns: float | None = None) -> Pairs:
-    """Pair the stamps of one with interpolated poses of the other, the denser one: linear and slerp.
+def paired(
+    ref: Trajectory, est: Trajectory, max_gap_ns: float | None = None, max_diff_ns: float | None = None
+) -> Pairs:
+    """Pair the stamps of one trajectory with interpolated poses of the other, the denser one: linear and slerp.
 
     Never beyond its ends, nor in gaps longer than the maximum; equal stamps need no interpolation.
+    max_diff_ns: pair each pose of the shorter one with the nearest stamp of the other instead, the earlier one of a tie
+    Poses without stamps are paired by index.
     """
-    walks_est = interval(ref.stamps_ns) <= interval(est.stamps_ns)
-    walked, dense = (est, ref) if walks_est else (ref, est)
-    gap_ns = GAP * interval(dense.stamps_ns) if max_gap_ns is None else max_gap_ns
-    made, has_partner = between(dense, walked.stamps_ns, gap_ns)
-    kept = walked if has_partner.all() else walked.at(has_partner)
-    sides = (made, kept) if walks_est else (kept, made)
-    possible = est.size if walks_est else _inside(ref.stamps_ns, est.stamps_ns)
-    name = "ref" if walks_est else "est"
-    return Pairs(*sides, possible, 0, name, gap_ns / 1e9 if isfinite(gap_ns) else None)
+    if ref.stamps_ns is None or est.stamps_ns is None:
+        count = slice(min(ref.size, est.size))
+        return Pairs(ref.at(count), est.at(count), est.size)
+    walks_est = est.size <= ref.size
+    if max_diff_ns is None:
+        walks_est = interval(ref.stamps_ns) <= interval(est.stamps_ns)
+    walked, other = (est, ref) if walks_est else (ref, est)
+    shared, name, gap_s = 0, None, None
+    if max_diff_ns is None:
+        gap_ns = GAP * interval(other.stamps_ns) if max_gap_ns is None else max_gap_ns
+        made, has_partner = between(other, walked.stamps_ns, gap_ns)
+        kept = walked if has_partner.all() else walked.at(has_partner)
+        name, gap_s = "ref" if walks_est else "est", gap_ns / 1e9 if isfinite(gap_ns) else None
+    else:
+        other = other.at(np.argsort(other.stamps_ns, kind="stable"))
+        index, off = _nearest(other.stamps_ns, walked.stamps_ns)
+        index, kept = index[off <= max_diff_ns], walked.at(off <= max_diff_ns)
+        made, shared = other.at(index), len(index) - len(np.unique(index))
+    is_inside = (est.stamps_ns.min() <= ref.stamps_ns) & (ref.stamps_ns <= est.stamps_ns.max())
+    possible = est.size if walks_est else int(np.count_nonzero(is_inside))
+    return Pairs(*((made, kept) if walks_est else (kept, made)), possible, shared, name, gap_s)
 
 
 def between(dense: Trajectory, stamps_ns: Array, max_gap_ns: float) -> tuple[Trajectory, Array]:
@@ -230,19 +223,6 @@ def between(dense: Trajectory, stamps_ns: Array, max_gap_ns: float) -> tuple[Tra
     return start.with_poses(start.poses.interpolate(end.poses, fraction))._replace(stamps_ns=at), found
 
 
-def nearest(ref: Trajectory, est: Trajectory, max_diff_ns: float) -> Pairs:
-    """Pair each pose of the shorter one with the nearest stamp of the other, the earlier one of a tie."""
-    walks_est = est.size <= ref.size
-    walked, other = (est, ref) if walks_est else (ref, est)
-    other = other.at(np.argsort(other.stamps_ns, kind="stable"))
-    index, off = _nearest(other.stamps_ns, walked.stamps_ns)
-    close = off <= max_diff_ns
-    index = index[close]
-    sides = (other.at(index), walked.at(close)) if walks_est else (walked.at(close), other.at(index))
-    possible = est.size if walks_est else _inside(ref.stamps_ns, est.stamps_ns)
-    return Pairs(*sides, possible, len(index) - len(np.unique(index)))
-
-
 def _nearest(own: Array, stamps_ns: Array) -> tuple[Indices, Array]:
     """Return the index of the nearest of some sorted stamps, the earlier one of a tie, and how far off it is."""
     after = np.searchsorted(own, stamps_ns).clip(0, len(own) - 1)
@@ -254,10 +234,6 @@ def _nearest(own: Array, stamps_ns: Array) -> tuple[Indices, Array]:
 def interval(stamps_ns: Array) -> float:
     """Return the median interval between stamps; infinite for a single one."""
     return float(np.median(np.diff(stamps_ns))) if len(stamps_ns) > 1 else float("inf")
-
-
-def _inside(stamps_ns: Array, span: Array) -> int:
-    return int(np.count_nonzero((span.min() <= stamps_ns) & (stamps_ns <= span.max())))
 
 
 def paired_samples(
@@ -277,29 +253,24 @@ def paired_samples(
         if gripper.size != target.size:
             counts = f"{files[0]} has {gripper.size} poses, {files[1]} {target.size}"
             raise ValueInvalid(f"{counts}, and no stamps to pair them")
-        places = _places(files[1], target, range(target.size))
-        return HandEyeSamples(gripper.poses, target.poses, places, tuple(names), files)
-    gap_ns, dense = NEAR_NS if max_gap_ns is None else max_gap_ns, gripper.in_order()
-    made, is_between = between(dense, target.stamps_ns, gap_ns)
-    index, off = _nearest(dense.stamps_ns, target.stamps_ns)
-    chosen = dense.at(index)
-    chosen.xyz[is_between], chosen.xyzw[is_between] = made.xyz, made.xyzw
-    kept = np.flatnonzero(np.logical_or(is_between, off <= gap_ns))
-    gap = f"{gap_ns / 1e6:g} ms"
-    if not len(kept):
-        apart = f"their stamps are {float(off.min()) / 1e9:.3f} s apart at least; one clock? --max-gap"
-        raise ValueInvalid(f"no pose of {files[0]} is within {gap} of one of {files[1]}: {apart}")
-    if alone := target.size - len(kept):
-        warn(f"{files[1]}: {alone} of {target.size} poses have none of {files[0]} within {gap}: unpaired")
-    sides = chosen.at(kept).poses, target.at(kept).poses
-    return HandEyeSamples(*sides, _places(files[1], target.at(kept), kept.tolist()), tuple(names), files)
-
-
-def _places(file: str, each: Trajectory, rows: Sequence[int]) -> list[str]:
-    """Return the places of poses: by line, or by row if there are none."""
-    if each.lines is None:
-        return [f"{file} row {row + 1}" for row in rows]
-    return [f"{file}:{line}" for line in each.lines.tolist()]
+        kept: Indices = np.arange(target.size)
+    else:
+        gap_ns, dense = NEAR_NS if max_gap_ns is None else max_gap_ns, gripper.in_order()
+        made, is_between = between(dense, target.stamps_ns, gap_ns)
+        index, off = _nearest(dense.stamps_ns, target.stamps_ns)
+        gripper = dense.at(index)
+        gripper.xyz[is_between], gripper.xyzw[is_between] = made.xyz, made.xyzw
+        kept = np.flatnonzero(np.logical_or(is_between, off <= gap_ns))
+        gap = f"{gap_ns / 1e6:g} ms"
+        if not len(kept):
+            apart = f"their stamps are {float(off.min()) / 1e9:.3f} s apart at least; one clock? --max-gap"
+            raise ValueInvalid(f"no pose of {files[0]} is within {gap} of one of {files[1]}: {apart}")
+        if alone := target.size - len(kept):
+            warn(f"{files[1]}: {alone} of {target.size} poses have none of {files[0]} within {gap}: unpaired")
+    places = [f"{files[1]} row {row + 1}" for row in kept.tolist()]
+    if target.lines is not None:
+        places = [f"{files[1]}:{line}" for line in target.lines[kept].tolist()]
+    return HandEyeSamples(gripper.at(kept).poses, target.at(kept).poses, places, tuple(names), files)
 
 
 LIMIT_S = 10.0
@@ -341,9 +312,16 @@ def clock_offset(
     step = min(float(np.median(np.diff(each))) for each in times) / 2
     best = ClockOffset(0.0, -1.0)
     for turning in (True, False):
-        speeds = [_speeds(each, at, turning=turning) for each, at in zip((ref, est), times, strict=True)]
-        courses = [each for each in speeds if each is not None]
-        if len(courses) < len(speeds):
+        courses: list[tuple[Array, Array]] = []  # the intervals between poses, and the angular speed or speed there
+        for each, at in zip((ref, est), times, strict=True):
+            rotation = each.rotation if turning else None
+            if turning and rotation is None:
+                continue
+            moved = length(np.diff(each.xyz, axis=0)) if rotation is None else rotation[:-1].distance(rotation[1:])
+            speed = moved / np.diff(at)
+            if not np.std(speed) < 1e-6 * max(TINY, np.max(speed)):  # a constant speed shows no lag
+                courses.append(((at[1:] + at[:-1]) / 2, speed))
+        if len(courses) < len(times):
             continue
         best = max(best, _best_lag(courses[0], courses[1], step, limit_s), key=lambda found: found.score)
         if by_turning and turning and best.score > 0:
@@ -352,16 +330,6 @@ def clock_offset(
     else:
         seconds = _refined(ref, est, shift, best.seconds, step, kind) if best.score > 0 else 0.0
     return ClockOffset(seconds + shift / 1e9, best.score, None if best.rival is None else best.rival + shift / 1e9)
-
-
-def _speeds(each: Trajectory, times: Array, *, turning: bool) -> tuple[Array, Array] | None:
-    """Return the intervals between poses and the angular speed or speed there; None if there is none."""
-    if turning and each.rotation is None:
-        return None
-    rotation = each.rotation if turning else None
-    moved = length(np.diff(each.xyz, axis=0)) if rotation is None else rotation[:-1].distance(rotation[1:])
-    speed = moved / np.diff(times)
-    return None if np.std(speed) < 1e-6 * max(TINY, np.max(speed)) else ((times[1:] + times[:-1]) / 2, speed)
 
 
 def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit_s: float) -> ClockOffset:
@@ -395,28 +363,28 @@ def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit
     before, here, after = score[at - 1], score[at], score[(at + 1) % size]
     bend = before - 2 * here + after
     part = 0.5 * (before - after) / bend if bend < 0 and min(before, after) > -1 else 0.0
-    other = _rival(np.fft.fftshift(score), (at + size // 2) % size)
-    rival = None if other is None else round(float((other - size // 2) * step), DIGITS)
+    score, middle, rival = np.fft.fftshift(score), size // 2, None
+    near = score >= AS_GOOD * here
+    valleys = np.flatnonzero(~near)
+    edge = np.searchsorted(valleys, (at + middle) % size)
+    near[valleys[edge - 1] if edge else 0 : valleys[edge] if edge < len(valleys) else size] = False  # the best peak
+    if near.any() and here > 0:  # another one is as good
+        rival = round(float((np.argmax(np.where(near, score, -np.inf)) - middle) * step), DIGITS)
     return ClockOffset(round(float((lags[at] + part) * step), DIGITS), float(here), rival)
 
 
-def _rival(score: Array, best: int) -> int | None:
-    """Return the index of another peak that is within one per cent of the best, or None."""
-    near = score >= AS_GOOD * score[best]
-    valleys = np.flatnonzero(~near)
-    at = np.searchsorted(valleys, best)
-    near[valleys[at - 1] if at else 0 : valleys[at] if at < len(valleys) else len(near)] = False  # the same peak
-    return int(np.argmax(np.where(near, score, -np.inf))) if near.any() and score[best] > 0 else None
+def _newton(start: float, step: float, change_of: Callable[[float], float]) -> float:
+    """Refine a lag until it does not change: Gauss-Newton on one number, at most a step of the grid at a time.
 
-
-def _newton(seconds: float, step: float, change_of: Callable[[float], float]) -> float:
-    """Refine a lag until it does not change: Gauss-Newton on one number, at most a step of the grid at a time."""
+    A lag that leaves the neighbourhood of the start is not believed: the start is returned.
+    """
+    seconds = start
     for _ in range(STEPS):
         change = change_of(seconds)
         seconds += min(max(change, -step), step)
         if abs(change) < REFINED_S:
             break
-    return seconds
+    return seconds if abs(seconds - start) < NEARBY * step else start
 
 
 def _refined_speeds(a: tuple[Array, Array], b: tuple[Array, Array], seconds: float, step: float) -> float:
@@ -429,8 +397,7 @@ def _refined_speeds(a: tuple[Array, Array], b: tuple[Array, Array], seconds: flo
         slope = (later - sooner) / (2.0 * step)
         return float(slope @ (b[1][inside] - here)) / max(float(slope @ slope), TINY)
 
-    found = _newton(seconds, step, change_of)
-    return found if abs(found - seconds) < NEARBY * step else seconds
+    return _newton(seconds, step, change_of)
 
 
 def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step: float, kind: str) -> float:
@@ -462,7 +429,7 @@ def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step:
         found = _newton(seconds, step, change_of)
     except Unaligned:
         return seconds
-    return found if doubt < DOUBT * step and abs(found - seconds) < NEARBY * step else seconds
+    return found if doubt < DOUBT * step else seconds
 
 
 MOST = 100_000_000  # poses

@@ -9,8 +9,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from frametool.errors import ValueInvalid, shown
-from frametool.fit import alignment as pairing
-from frametool.fit.alignment import ALIGNMENTS, Fit, Pairs, Unaligned, clock_offset, fitted, lever_arm, principal_axes
+from frametool.fit.alignment import (
+    ALIGNMENTS,
+    LIMIT_S,
+    SCALED,
+    Fit,
+    Pairs,
+    Unaligned,
+    clock_offset,
+    fitted,
+    interval,
+    lever_arm,
+    paired,
+    principal_axes,
+)
 from frametool.fit.least_squares import require_near
 from frametool.fit.numbers import ROUNDING, absolute_errors, all_pairs, chained, relative_errors, segment_errors
 from frametool.frames.stamps import format_stamp
@@ -36,7 +48,6 @@ APART = radians(2.0)  # a rotation between bodies that is reported, if it is als
 STEADY = 5.0  # this many times as large as its spread
 NEAR_A_LINE = 3.0  # residuals that the second axis of positions must exceed
 SLENDER = 0.1  # of the first axis: what is wider is not a line
-SEGMENTS = (100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0)
 
 
 class Delta(NamedTuple):
@@ -71,18 +82,12 @@ def parse_delta(text: str, units: Sequence[str] = ("m", "s", "deg", "frames")) -
     return Delta(float(found[1]), found[2])
 
 
-class Settings(NamedTuple):
-    """The settings of a comparison.
+class Pairing(NamedTuple):
+    """How poses are paired.
 
     match: "interpolate" or "nearest"; max_gap_ns, max_diff_ns, min_match (a share): conditions for a pair
     offset: nanoseconds by which EST's clock lags, or "auto" within offset_limit_s; None: none, but one may be reported
-    align, up: one of ALIGNMENTS or origin+scale, and the axis of yaw; align_first: the fit uses only the first pairs;
-        tie_first: it aligns the first positions exactly
-    mount: pose of REF's body in EST's, or "auto"
-    deltas: None for 1m, 10m and 100m up to the length of the path; all_pairs, tolerance, pairs_from: which poses
-    segments: of KITTI, in metres, from every segment_step-th pair
     start, stop: (True, nanoseconds) after the first pair, or (False, a stamp on REF's clock)
-    evo: evo's defaults, and its two additional numbers
     """
 
     match: str = "interpolate"
@@ -90,24 +95,61 @@ class Settings(NamedTuple):
     max_diff_ns: float = 10_000_000
     min_match: float = 0.1
     offset: int | str | None = None
-    offset_limit_s: float = pairing.LIMIT_S
+    offset_limit_s: float = LIMIT_S
+    start: tuple[bool, int] | None = None
+    stop: tuple[bool, int] | None = None
+
+
+class Fitting(NamedTuple):
+    """How pairs are aligned.
+
+    align, up: one of ALIGNMENTS or origin+scale, and the axis of yaw; align_first: the fit uses only the first pairs;
+        tie_first: it aligns the first positions exactly
+    mount: pose of REF's body in EST's, or "auto"
+    """
+
     align: str = "se3"
     align_first: Delta | None = None
     tie_first: bool = False
     mount: Transform | str | None = None
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+
+
+class Reporting(NamedTuple):
+    """Which errors are computed.
+
+    deltas: None for 1m, 10m and 100m up to the length of the path; all_pairs, tolerance, pairs_from: which poses
+    segments: of KITTI, in metres, from every segment_step-th pair
+    evo: evo's defaults, and its two additional numbers
+    """
+
     deltas: tuple[Delta, ...] | None = None
     all_pairs: bool = False
     tolerance: float = 0.1
     pairs_from: str = "reference"
-    segments: tuple[float, ...] = SEGMENTS
+    segments: tuple[float, ...] = (100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0)
     segment_step: int = 10
-    start: tuple[bool, int] | None = None
-    stop: tuple[bool, int] | None = None
     evo: bool = False
 
 
-EVO = Settings(match="nearest", align="none", deltas=(Delta(1.0, "frames"),), pairs_from="estimate", offset=0, evo=True)
+class Settings(NamedTuple):
+    """The settings of a comparison."""
+
+    pairing: Pairing = Pairing()
+    fitting: Fitting = Fitting()
+    reporting: Reporting = Reporting()
+
+    def changed(self, **values: Any) -> Settings:
+        """Return settings with other values of some fields of the three groups."""
+        groups: tuple[Any, ...] = self
+        own = [{name: values[name] for name in each._fields if name in values} for each in groups]
+        return Settings(*(each._replace(**new) for each, new in zip(groups, own, strict=True)))
+
+
+SETTINGS = tuple(name for group in Settings() for name in group._fields)
+EVO = Settings().changed(
+    match="nearest", align="none", deltas=(Delta(1.0, "frames"),), pairs_from="estimate", offset=0, evo=True
+)
 DELTAS = (Delta(1.0, "m"), Delta(10.0, "m"), Delta(100.0, "m"))
 
 
@@ -160,40 +202,54 @@ def compare(
     Raises ValueInvalid if they have no stamps in common, or a requested quantity is not determined.
     """
     hints: list[str] = []
-    sizes = (ref.size, est.size)
+    sizes, (pairing, fitting, reporting) = (ref.size, est.size), settings
     for each, name in zip((ref, est), names, strict=True):
         require_near(each.xyz, name)
-    on_earth = [each.world in EARTH_FRAMES and each.size > 0 for each in (ref, est)]
-    if any(on_earth):
-        ref, est = _on_the_ground((ref, est), names, on_earth, hints)
-    if not settings.evo:
+    ref, est = _on_the_ground((ref, est), names, hints)
+    if not reporting.evo:
         hints += [*ref.disorder(names[0]), *est.disorder(names[1])]
         ref, est = ref.in_order(), est.in_order()
     pairs, offset_ns, score = _paired(ref, est, settings, names, hints)
-    pairs, mount = _mounted(_cut(pairs, settings), settings)
-    up = np.array(settings.up)
-    first = pairs.at(slice(_first(pairs, settings.align_first)))
-    fit = fitted(settings.align, first.ref, first.est, up, names, tied=settings.tie_first)
+    pairs, mount = _mounted(_cut(pairs, pairing), fitting)
+    up, first = np.array(fitting.up), pairs
+    if (limit := fitting.align_first) is not None:
+        along = limit.along(pairs.ref)
+        if along is None:
+            raise ValueInvalid(f"poses without stamps have no times; the first {limit} is not known")
+        is_first = along < limit.amount if limit.unit == "frames" else along <= limit.amount
+        first = pairs.at(slice(int(np.count_nonzero(is_first))))
+    fit = fitted(fitting.align, first.ref, first.est, up, names, tied=fitting.tie_first)
     moved = fit.moved(pairs.est)
     ate = absolute_errors(pairs.ref, moved, up)
-    if settings.mount is None and not settings.evo:
-        _warn_of_bodies(pairs.ref, moved, settings, hints)
-    by_alignment = _by_alignment(pairs, first, up)
-    if settings.align in ("se3", "sim3") and _is_nearly_line(first.ref.xyz, by_alignment["sim3"]):
+    if fitting.mount is None and not reporting.evo:
+        _warn_of_bodies(pairs.ref, moved, fitting, hints)
+    by_alignment: dict[str, float | None] = {}
+    for kind in ALIGNMENTS:
+        try:
+            gap = fitted(kind, first.ref, first.est, up).moved(pairs.est._replace(xyzw=None)).xyz - pairs.ref.xyz
+            by_alignment[kind] = sqrt((gap**2).sum() / len(gap))
+        except Unaligned:
+            by_alignment[kind] = None
+    long, second, _ = principal_axes(first.ref.xyz)
+    noise = by_alignment["sim3"]  # what is not significant is not, even for a fit with a scale
+    if fitting.align in ("se3", "sim3") and noise is not None and second < min(NEAR_A_LINE * noise, SLENDER * long):
         hints.append("positions lie nearly on a line: the turn about it rests on noise")
-    walked = pairs.ref if settings.pairs_from == "reference" else moved
+    walked = pairs.ref if reporting.pairs_from == "reference" else moved
     return Comparison(
         names, sizes, 0 if ref.stamps_ns is None else int(np.ptp(ref.stamps_ns)), settings, est, pairs, moved,
         offset_ns, score, mount, fit, by_alignment, ate,
-        list(_relative(pairs.ref, moved, walked, settings, hints)),
-        segment_errors(pairs.ref, moved, settings.segments, settings.segment_step), hints,
+        list(_relative(pairs.ref, moved, walked, reporting, hints)),
+        segment_errors(pairs.ref, moved, reporting.segments, reporting.segment_step), hints,
     )  # fmt: skip
 
 
 def _on_the_ground(
-    both: tuple[Trajectory, Trajectory], names: tuple[str, str], on_earth: list[bool], hints: list[str]
-) -> list[Trajectory]:
+    both: tuple[Trajectory, Trajectory], names: tuple[str, str], hints: list[str]
+) -> tuple[Trajectory, Trajectory]:
     """Return trajectories of the Earth's frame along east, north, up of the first position, so that z is up."""
+    on_earth = [each.world in EARTH_FRAMES and each.size > 0 for each in both]
+    if not any(on_earth):
+        return both
     first = on_earth.index(True)
     origin = Origin()
     origin.settle(*both[first].xyz.T)
@@ -208,48 +264,46 @@ def _on_the_ground(
             xyz = np.stack(earth.seen_from(*pose, *each.xyz.T), -1)
             xyzw = None if each.rotation is None else np.stack((turn @ each.rotation).components, -1)
             found[at] = each._replace(xyz=xyz, xyzw=xyzw, world=ENU)
-    return found
+    return found[0], found[1]
 
 
 def _paired(
     ref: Trajectory, est: Trajectory, settings: Settings, names: tuple[str, str], hints: list[str]
 ) -> tuple[Pairs, int, float | None]:
     """Return the pairs, and the offset of the clocks with its score if it was estimated."""
+    pairing, is_nearest = settings.pairing, settings.pairing.match == "nearest"
     if ref.stamps_ns is None or est.stamps_ns is None:
         if (ref.stamps_ns is None) != (est.stamps_ns is None):
             raise ValueInvalid(f"{names[ref.stamps_ns is not None]} has no stamps; give them with --stamps FILE")
-        if settings.offset:
+        if pairing.offset:
             raise ValueInvalid("poses that are counted have no clock; leave the offset out")
-        return pairing.by_number(ref, est), 0, None
+        return paired(ref, est), 0, None
     offset_ns, score = 0, None
-    if settings.offset == AUTO:
-        kind = "sim3" if settings.align in pairing.SCALED else "se3"
-        by_turning = settings.mount == AUTO
-        found = clock_offset(ref, est, limit_s=settings.offset_limit_s, kind=kind, by_turning=by_turning)
+    if pairing.offset == AUTO:
+        kind = "sim3" if settings.fitting.align in SCALED else "se3"
+        by_turning = settings.fitting.mount == AUTO
+        found = clock_offset(ref, est, limit_s=pairing.offset_limit_s, kind=kind, by_turning=by_turning)
         if found.score < CLEAR:
             raise ValueInvalid(f"no clear clock offset (score {found.score:.2f}); give one: --offset T")
         offset_ns, score = round(found.seconds * 1e9), found.score
         if found.rival is not None:
             both = f"{found.seconds:.3f} s and {found.rival:.3f} s"
             hints.append(f"the motion repeats: clock offsets of {both} fit about as well; --offset auto:LIMIT or T")
-    elif settings.offset is not None:
-        offset_ns = int(settings.offset)
+    elif pairing.offset is not None:
+        offset_ns = int(pairing.offset)
     shifted = est._replace(stamps_ns=est.stamps_ns + offset_ns)
-    if settings.match == "nearest":
-        pairs = pairing.nearest(ref, shifted, settings.max_diff_ns)
-    else:
-        pairs = pairing.interpolated(ref, shifted, settings.max_gap_ns)
+    pairs = paired(ref, shifted, pairing.max_gap_ns, pairing.max_diff_ns if is_nearest else None)
     share = pairs.ref.size / max(pairs.possible, 1)
     counted = f"{pairs.ref.size} of {pairs.possible} poses have a partner in {names[0]}"
-    if not pairs.ref.size or share < settings.min_match:
+    if not pairs.ref.size or share < pairing.min_match:
         spans = ", ".join(_span(each, name) for each, name in zip((ref, shifted), names, strict=True))
-        more = f"try --offset auto, {'--max-diff' if settings.match == 'nearest' else '--max-gap'}, --min-match 0"
+        more = f"try --offset auto, {'--max-diff' if is_nearest else '--max-gap'}, --min-match 0"
         raise ValueInvalid(f"{names[1]}: {counted} ({100 * share:.1f} %): {spans}; {more}")
     if share < FEW:
         hints.append(f"{names[1]}: only {counted} ({100 * share:.1f} %)")
     if pairs.shared:
         hints.append(f"{pairs.shared} poses have more than one partner")
-    if settings.offset is None:
+    if pairing.offset is None:
         _warn_of_clock(ref, est, names[1], hints)
     return pairs, offset_ns, score
 
@@ -261,7 +315,7 @@ def _span(each: Trajectory, name: str) -> str:
 
 def _warn_of_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]) -> None:
     """Warn about an offset that is clearly larger than half an interval, if estimating it is cheap."""
-    intervals = [pairing.interval(each.stamps_ns) for each in (ref, est)]
+    intervals = [interval(each.stamps_ns) for each in (ref, est)]
     span = max(ref.stamps_ns[-1], est.stamps_ns[-1]) - min(ref.stamps_ns[0], est.stamps_ns[0])
     if span > MOST_TRIED * min(intervals) / 2:
         return
@@ -272,16 +326,16 @@ def _warn_of_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]
         hints.append(f"the clock of {name} seems {by}; --offset auto")
 
 
-def _cut(pairs: Pairs, settings: Settings) -> Pairs:
+def _cut(pairs: Pairs, pairing: Pairing) -> Pairs:
     """Keep the pairs from the start to the end, both inclusive."""
-    if settings.start is settings.stop is None:
+    if pairing.start is pairing.stop is None:
         return pairs
     stamps = pairs.ref.stamps_ns
     if stamps is None:
         raise ValueInvalid("poses that are counted have no times; leave --start and --stop out")
     begin, end = (
         default if limit is None else limit[1] + limit[0] * int(stamps[0])
-        for limit, default in ((settings.start, stamps[0]), (settings.stop, stamps[-1]))
+        for limit, default in ((pairing.start, stamps[0]), (pairing.stop, stamps[-1]))
     )
     found = pairs.at((begin <= stamps) & (stamps <= end))
     if not found.ref.size:
@@ -290,53 +344,22 @@ def _cut(pairs: Pairs, settings: Settings) -> Pairs:
     return found
 
 
-def _mounted(pairs: Pairs, settings: Settings) -> tuple[Pairs, Transform | None]:
+def _mounted(pairs: Pairs, fitting: Fitting) -> tuple[Pairs, Transform | None]:
     """Replace EST's body by REF's body: est_i X."""
-    mount = settings.mount
+    ref, est, mount = pairs.ref, pairs.est, fitting.mount
     if mount is None:
         return pairs, None
-    est = pairs.est
     if est.rotation is None:
         raise ValueInvalid("a mount needs rotations of the estimate")
-    if isinstance(mount, str):
-        mount = _found_mount(pairs.ref, est, settings)
+    if isinstance(mount, str):  # the lever arm from the fit, and a rotation common to all pairs
+        up, shared = np.array(fitting.up), None
+        arm = lever_arm(fitting.align, ref, est, up)
+        shifted = est.with_poses(est.poses @ Transform(Rotation.identity(), arm))
+        placed = fitted(fitting.align, ref, shifted, up).moved(shifted)
+        if ref.rotation is not None and placed.rotation is not None:
+            shared = _shared(placed.rotation.inverse() @ ref.rotation)
+        mount = Transform(Rotation.identity() if shared is None else shared, arm)
     return pairs._replace(est=est.with_poses(est.poses @ mount)), mount
-
-
-def _found_mount(ref: Trajectory, est: Trajectory, settings: Settings) -> Transform:
-    """Return REF's body in EST's: the lever arm from the fit, and a rotation common to all pairs."""
-    up = np.array(settings.up)
-    arm = lever_arm(settings.align, ref, est, up)
-    shifted = est.with_poses(est.poses @ Transform(Rotation.identity(), arm))
-    placed, rotation = fitted(settings.align, ref, shifted, up).moved(shifted), None
-    if ref.rotation is not None and placed.rotation is not None:
-        rotation = _shared(placed.rotation.inverse() @ ref.rotation)
-    return Transform(Rotation.identity() if rotation is None else rotation, arm)
-
-
-def _first(pairs: Pairs, limit: Delta | None) -> int | None:
-    """Count the first pairs that are within a limit."""
-    if limit is None:
-        return None
-    if limit.unit == "frames":
-        return int(limit.amount)
-    along = limit.along(pairs.ref)
-    if along is None:
-        raise ValueInvalid(f"poses without stamps have no times; the first {limit} is not known")
-    return int(np.searchsorted(along, limit.amount, "right"))
-
-
-def _by_alignment(pairs: Pairs, first: Pairs, up: Array) -> dict[str, float | None]:
-    """Return the rmse of positions under every alignment."""
-    found: dict[str, float | None] = {}
-    positions = pairs.est._replace(xyzw=None)
-    for kind in ALIGNMENTS:
-        try:
-            gap = fitted(kind, first.ref, first.est, up).moved(positions).xyz - pairs.ref.xyz
-            found[kind] = sqrt((gap**2).sum() / len(gap))
-        except Unaligned:
-            found[kind] = None
-    return found
 
 
 def _spread(rotations: Rotation) -> float:
@@ -344,18 +367,12 @@ def _spread(rotations: Rotation) -> float:
     return sqrt((rotations.distance(rotations.mean()) ** 2).mean())
 
 
-def _is_nearly_line(xyz: Array, noise: float | None) -> bool:
-    """Return True if the second axis of positions is short and not significant, even for a fit with a scale."""
-    long, second, _ = principal_axes(xyz)
-    return noise is not None and second < min(NEAR_A_LINE * noise, SLENDER * long)
-
-
-def _warn_of_bodies(ref: Trajectory, moved: Trajectory, settings: Settings, hints: list[str]) -> None:
+def _warn_of_bodies(ref: Trajectory, moved: Trajectory, fitting: Fitting, hints: list[str]) -> None:
     """Warn about a constant rotation between the two bodies, or between worlds that were not aligned."""
     if ref.rotation is None or moved.rotation is None:
         return
     of_bodies, of_worlds = moved.rotation.inverse() @ ref.rotation, moved.rotation @ ref.rotation.inverse()
-    is_of_worlds = settings.align == "none" and _spread(of_worlds) < _spread(of_bodies)
+    is_of_worlds = fitting.align == "none" and _spread(of_worlds) < _spread(of_bodies)
     shared = _shared(of_worlds if is_of_worlds else of_bodies)
     if shared is None:
         return
@@ -374,22 +391,22 @@ def _shared(rotations: Rotation) -> Rotation | None:
 
 
 def _relative(
-    ref: Trajectory, est: Trajectory, walked: Trajectory, settings: Settings, hints: list[str]
+    ref: Trajectory, est: Trajectory, walked: Trajectory, reporting: Reporting, hints: list[str]
 ) -> Iterator[tuple[Delta, RelativeErrors]]:
     """Yield the relative errors for every delta that the path is long enough for."""
-    for delta in settings.deltas or DELTAS:
+    for delta in reporting.deltas or DELTAS:
         along = delta.along(walked)
         if along is None:
             why = "there are no rotations" if delta.unit == "deg" else "there are no stamps"
         elif along[-1] + delta.amount * (1 - ROUNDING) == along[-1]:
             why = f"the delta is lost in rounding: the path is {along[-1]:g} {delta.unit} long"
-            if settings.deltas:
+            if reporting.deltas:
                 raise ValueInvalid(f"rpe {delta}: {why}")
         else:
-            of_all = settings.all_pairs
-            ends = all_pairs(along, delta.amount, settings.tolerance) if of_all else chained(along, delta.amount)
+            of_all = reporting.all_pairs
+            ends = all_pairs(along, delta.amount, reporting.tolerance) if of_all else chained(along, delta.amount)
             why = "" if len(ends[0]) else "no two poses are so far apart"
         if not why:
             yield delta, relative_errors(ref, est, *ends)
-        elif settings.deltas:
+        elif reporting.deltas:
             hints.append(f"rpe {delta} is left out: {why}")

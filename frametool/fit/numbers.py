@@ -22,13 +22,14 @@ from frametool.geometry.floats import half_sincos
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.fit.comparison import Comparison, Delta
+    from frametool.fit.comparison import Comparison
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Array, Indices
 
 
 CHORD = 0.1  # metres of path before and after a pose that define its direction
 ROUNDING = 1e-9  # of a delta
+X = np.array([1.0, 0.0, 0.0])
 
 
 def statistics(values: Array | None) -> Any:
@@ -58,35 +59,23 @@ class AbsoluteErrors(NamedTuple):
 
 def absolute_errors(ref: Trajectory, est: Trajectory, up: Array) -> AbsoluteErrors:
     """Compare an aligned estimate with its reference pose by pose."""
-    gap = est.xyz - ref.xyz
-    along, above = _path_axes(ref.xyz, up)
-    across = np.cross(above, along)
-    turned = ref.rotation, est.rotation
-    rad = None if turned[0] is None or turned[1] is None else turned[0].distance(turned[1])
-    return AbsoluteErrors(length(gap), rad, *((gap * axis).sum(-1) for axis in (along, across, above)))
-
-
-def _path_axes(xyz: Array, up: Array) -> tuple[Array, Array]:
-    """Return the direction of the path at each position, and the orthogonal up; if these are parallel, x."""
-    path = way(xyz)
+    path = way(ref.xyz)
     behind = (np.searchsorted(path, path - CHORD, "right") - 1).clip(0)
     ahead = np.searchsorted(path, path + CHORD).clip(0, len(path) - 1)
-    chord = xyz[ahead] - xyz[behind]
+    chord = ref.xyz[ahead] - ref.xyz[behind]
     size = length(chord)
     moving = np.flatnonzero(size > 0.0)
-    if not len(moving):
-        along = np.tile([1.0, 0.0, 0.0], (len(xyz), 1))
-    else:
-        last = moving[(np.searchsorted(moving, np.arange(len(xyz)), "right") - 1).clip(0)]
+    along = np.tile(X, (len(path), 1))
+    if len(moving):
+        last = moving[(np.searchsorted(moving, np.arange(len(path)), "right") - 1).clip(0)]
         along = chord[last] / size[last, None]
-    above = up - (along @ up)[:, None] * along
-    size = length(above)
-    parallel = size < ROUNDING
-    if parallel.any():
-        x = np.array([1.0, 0.0, 0.0])
-        above[parallel] = x - along[parallel, :1] * along[parallel]
-        size = length(above)
-    return along, above / size[:, None]
+    above = up - (along @ up)[:, None] * along  # normal to the path; if up is parallel to it, x is made so
+    parallel = length(above) < ROUNDING
+    above[parallel] = X - along[parallel, :1] * along[parallel]
+    above /= length(above)[:, None]
+    gap, turned = est.xyz - ref.xyz, (ref.rotation, est.rotation)
+    rad = None if turned[0] is None or turned[1] is None else turned[0].distance(turned[1])
+    return AbsoluteErrors(length(gap), rad, *((gap * axis).sum(-1) for axis in (along, np.cross(above, along), above)))
 
 
 class RelativeErrors(NamedTuple):
@@ -169,8 +158,15 @@ SQRT8 = 8**0.5
 
 def numbers(found: Comparison) -> dict[str, Any]:
     """Return every setting and number of a comparison; inapplicable ones are None."""
-    pairs, ate = found.pairs, found.ate
-    stamps = pairs.ref.stamps_ns
+    pairs, ate, (_, fitting, reporting) = found.pairs, found.ate, found.settings
+    stamps, (parent, name) = pairs.ref.stamps_ns, worlds(found)
+    scale = {"scale": found.fit.scale} if fitting.align in SCALED else {}  # only if one was estimated
+    relative = []
+    for delta, errors in found.relative:
+        summed = _errors(errors.m, errors.rad, evo=reporting.evo)
+        share = 100 * summed["m"]["rmse"] / delta.amount if summed["m"] and delta.unit == "m" else None
+        counted = {"delta": str(delta), "pairs": len(errors.start)}
+        relative.append(counted | summed | {"percent": share, "distance_m": statistics(errors.distance)})
     return {
         "ref": found.names[0],
         "est": found.names[1],
@@ -184,16 +180,16 @@ def numbers(found: Comparison) -> dict[str, Any]:
         "path_m": {"ref": float(way(pairs.ref.xyz)[-1]), "est": float(way(found.moved.xyz)[-1])},
         "offset_s": found.offset_ns / 1e9,
         "offset_score": found.offset_score,
-        "transform": transform_entry(found),
+        "transform": {"name": name, "parent": parent, **_pose(found.fit.transform), **scale},
         "ate_by_alignment": found.ate_by_alignment,
         "ate": {
-            **_errors(ate.m, ate.rad, evo=found.settings.evo), "along_m": statistics(ate.along),
+            **_errors(ate.m, ate.rad, evo=reporting.evo), "along_m": statistics(ate.along),
             "across_m": statistics(ate.across), "up_m": statistics(ate.up), "end_m": float(ate.m[-1]),
         },
-        "rpe": [_relative(*each, evo=found.settings.evo) for each in found.relative],
+        "rpe": relative,
         "kitti": _kitti(found),
         "hints": found.hints,
-    }
+    }  # fmt: skip
 
 
 def worlds(found: Comparison) -> tuple[str, str]:
@@ -210,37 +206,27 @@ def whole_estimate(found: Comparison) -> Trajectory:
     return found.fit.moved(est if found.mount is None else est.with_poses(est.poses @ found.mount))
 
 
-def transform_entry(found: Comparison) -> dict[str, Any]:
-    """Return the alignment as an entry of a tree, EST's world in REF's; its scale only if one was estimated."""
-    parent, name = worlds(found)
-    entry = _pose(found.fit.transform) | ({"scale": found.fit.scale} if found.settings.align in SCALED else {})
-    return {"name": name, "parent": parent, **entry}
-
-
 def _pose(pose: Transform) -> dict[str, Any]:
     return {"xyz": pose.xyz.tolist(), "quaternion": dict(zip("xyzw", pose.xyzw.tolist(), strict=True))}
 
 
 def _settings(found: Comparison) -> dict[str, Any]:
-    settings, pairs = found.settings, found.pairs
-    is_nearest = settings.match == "nearest"
+    (pairing, fitting, reporting), pairs = found.settings, found.pairs
+    is_nearest = pairing.match == "nearest"
     has_stamps = pairs.ref.stamps_ns is not None
+    limits = ("+" * limit[0] + f"{limit[1] / 1e9:.9f}" if limit else None for limit in (pairing.start, pairing.stop))
     return {
-        "match": settings.match if has_stamps else "number", "interpolated": pairs.interpolated,
-        "max_gap_s": pairs.max_gap_s, "max_diff_s": settings.max_diff_ns / 1e9 if is_nearest and has_stamps else None,
-        "min_match": settings.min_match,
-        "offset": settings.offset if settings.offset == "auto" else found.offset_ns / 1e9, "align": settings.align,
-        "align_first": settings.align_first and str(settings.align_first), "tie_first": settings.tie_first,
-        "mount": None if found.mount is None else _pose(found.mount), "up": list(settings.up),
-        "delta": [str(delta) for delta, _ in found.relative], "all_pairs": settings.all_pairs,
-        "tolerance": settings.tolerance if settings.all_pairs else None, "pairs_from": settings.pairs_from,
-        "segments_m": list(settings.segments), "segment_step": settings.segment_step, "start_s": _limit(settings.start),
-        "end_s": _limit(settings.stop), "as": "evo" if settings.evo else None,
+        "match": pairing.match if has_stamps else "number", "interpolated": pairs.interpolated,
+        "max_gap_s": pairs.max_gap_s, "max_diff_s": pairing.max_diff_ns / 1e9 if is_nearest and has_stamps else None,
+        "min_match": pairing.min_match,
+        "offset": pairing.offset if pairing.offset == "auto" else found.offset_ns / 1e9, "align": fitting.align,
+        "align_first": fitting.align_first and str(fitting.align_first), "tie_first": fitting.tie_first,
+        "mount": None if found.mount is None else _pose(found.mount), "up": list(fitting.up),
+        "delta": [str(delta) for delta, _ in found.relative], "all_pairs": reporting.all_pairs,
+        "tolerance": reporting.tolerance if reporting.all_pairs else None, "pairs_from": reporting.pairs_from,
+        "segments_m": list(reporting.segments), "segment_step": reporting.segment_step,
+        **dict(zip(("start_s", "end_s"), limits, strict=True)), "as": "evo" if reporting.evo else None,
     }  # fmt: skip
-
-
-def _limit(limit: tuple[bool, int] | None) -> str | None:
-    return None if limit is None else "+" * limit[0] + f"{limit[1] / 1e9:.9f}"
 
 
 def _errors(m: Array | None, rad: Array | None, *, evo: bool) -> dict[str, Any]:
@@ -250,13 +236,6 @@ def _errors(m: Array | None, rad: Array | None, *, evo: bool) -> dict[str, Any]:
         rot = SQRT8 * half_sincos(rad, arrays)[0]
         found |= {"rot": statistics(rot), "full": statistics(np.sqrt(m * m + rot * rot))}
     return found
-
-
-def _relative(delta: Delta, errors: RelativeErrors, *, evo: bool) -> dict[str, Any]:
-    summed = _errors(errors.m, errors.rad, evo=evo)
-    share = 100 * summed["m"]["rmse"] / delta.amount if summed["m"] and delta.unit == "m" else None
-    counted = {"delta": str(delta), "pairs": len(errors.start)}
-    return counted | summed | {"percent": share, "distance_m": statistics(errors.distance)}
 
 
 def _kitti(found: Comparison) -> dict[str, Any] | None:
@@ -273,7 +252,7 @@ def _kitti(found: Comparison) -> dict[str, Any] | None:
 
     lengths = [
         {"length_m": length, **mean(chosen)}
-        for length in found.settings.segments
+        for length in found.settings.reporting.segments
         if (chosen := segments.length == length).any()
     ]
     return {**mean(np.ones(len(segments.start), bool)), "lengths": lengths}
@@ -281,34 +260,31 @@ def _kitti(found: Comparison) -> dict[str, Any] | None:
 
 def rows(found: Comparison, which: str = "ate") -> Iterator[dict[str, Any]]:
     """Yield one row per pair (`ate`), two poses of a delta (`rpe`) or path segment (`kitti`)."""
-    ref, est, ate = found.pairs.ref, found.moved, found.ate
+    ref, est, ate, segments = found.pairs.ref, found.moved, found.ate, found.segments
     counted: Any = np.arange(ref.size) if ref.stamps_ns is None else ref.stamps_ns
+    tables: list[dict[str, Any]] = []
     if which == "ate":
-        yield from _rows({
+        tables = [{
             "stamp_ns": counted, **dict(zip(("ref_x", "ref_y", "ref_z"), ref.xyz.T, strict=True)),
             **dict(zip("xyz", est.xyz.T, strict=True)), "path_m": way(ref.xyz), "ate_m": ate.m,
             "ate_deg": None if ate.rad is None else np.degrees(ate.rad),
             "along_m": ate.along, "across_m": ate.across, "up_m": ate.up,
-        })  # fmt: skip
+        }]  # fmt: skip
     elif which == "rpe":
-        for delta, errors in found.relative:
-            yield from _rows({
-                "stamp_ns": counted[errors.start], "end_ns": counted[errors.end],
-                "delta": [str(delta)] * len(errors.start), "m": errors.m,
-                "deg": None if errors.rad is None else np.degrees(errors.rad), "distance_m": errors.distance,
-            })  # fmt: skip
-    elif found.segments is not None:
-        segments = found.segments
-        yield from _rows({
+        tables = [{
+            "stamp_ns": counted[errors.start], "end_ns": counted[errors.end],
+            "delta": [str(delta)] * len(errors.start), "m": errors.m,
+            "deg": None if errors.rad is None else np.degrees(errors.rad), "distance_m": errors.distance,
+        } for delta, errors in found.relative]  # fmt: skip
+    elif segments is not None:
+        tables = [{
             "stamp_ns": counted[segments.start], "end_ns": counted[segments.end], "length_m": segments.length,
             "percent": 100 * segments.share, "deg_per_m": np.degrees(segments.rad_per_m),
-        })  # fmt: skip
-
-
-def _rows(columns: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    size = len(columns["stamp_ns"])
-    cells = [[None] * size if column is None else np.asarray(column).tolist() for column in columns.values()]
-    return (dict(zip(columns, row, strict=True)) for row in zip(*cells, strict=True))
+        }]  # fmt: skip
+    for columns in tables:
+        absent = [None] * len(columns["stamp_ns"])
+        cells = [absent if column is None else np.asarray(column).tolist() for column in columns.values()]
+        yield from (dict(zip(columns, row, strict=True)) for row in zip(*cells, strict=True))
 
 
 SHORT = {

@@ -9,15 +9,16 @@ import numpy as np
 
 from frametool.errors import ValueInvalid, alternatives, warn
 from frametool.fit.alignment import resampled, stamps_at_rate, stamps_every
-from frametool.fit.comparison import AUTO, EVO, Comparison, Settings, parse_delta
+from frametool.fit.comparison import AUTO, EVO, SETTINGS, Comparison, Settings, parse_delta
 from frametool.fit.comparison import compare as compared
 from frametool.fit.measured_tree import TreeSolution, solve_tree
 from frametool.fit.numbers import whole_estimate
+from frametool.formats.load import FrameFile, load
 from frametool.frames.lookups import FrameTree, taken
 from frametool.frames.trajectory import Trajectory
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
-from frametool.stream.measurements import Measurement
+from frametool.stream.measurements import Measurement, read_measurements
 from frametool.stream.trajectories import load_trajectory
 
 if TYPE_CHECKING:
@@ -48,14 +49,14 @@ def compare(
     ref, est: a Trajectory, or the path of a file as for `load_trajectory`
     offset: seconds by which est's clock lags, or "auto"; align: se3, sim3, yaw, origin or none
     mount: pose of the reference sensor in est's body, or "auto"; deltas: as "1m", "10frames", "1s", "5deg"; like: "evo"
-    more: other fields of `frametool.fit.comparison.Settings`; align_first as "10s", times in nanoseconds
+    more: other fields of the groups of `frametool.fit.comparison.Settings`; align_first as "10s", times in nanoseconds
     Raises ValueInvalid if the two have no stamps in common, or a fit is not determined; FormatError.
     """
     if like not in (None, "evo"):
         raise ValueInvalid(f"like {like!r}: only evo is known")
     argument = {"align": align, "mount": mount, **more}
-    if unknown := [name for name in argument if name not in Settings._fields]:
-        raise TypeError(f"compare has no {unknown[0]!r}{alternatives(unknown[0], Settings._fields, 'settings')}")
+    if unknown := [name for name in argument if name not in SETTINGS]:
+        raise TypeError(f"compare has no {unknown[0]!r}{alternatives(unknown[0], SETTINGS, 'settings')}")
     if offset is not None:
         argument["offset"] = AUTO if offset == AUTO else round(float(offset) * BILLION)
     if deltas is not None:
@@ -65,7 +66,7 @@ def compare(
     chosen = {name: value for name, value in argument.items() if value is not None}
     base = EVO if like else Settings()
     names = [name if isinstance(each, Trajectory) else fspath(each) for each, name in ((ref, "ref"), (est, "est"))]
-    return compared(_taken(ref, "ref"), _taken(est, "est"), base._replace(**chosen), (names[0], names[1]))
+    return compared(_taken(ref, "ref"), _taken(est, "est"), base.changed(**chosen), (names[0], names[1]))
 
 
 def align(ref: Given, est: Given, **settings: Any) -> Alignment:
@@ -109,8 +110,6 @@ def solve(
     Returns .tree, .covariance(target, source), .residuals (n, 6), .u, .used, .fits, .checked and more.
     Raises ValueInvalid if frames are not connected or an outlier cannot be identified; FormatError.
     """
-    from frametool.formats.load import load
-
     trees = [each if isinstance(each, FrameTree) else load(each) for each in fix]
     if moving := next((each for each in trees if each.moves), None):
         raise ValueInvalid(f"{moving.name} moves; fixed frames must be static")
@@ -119,16 +118,11 @@ def solve(
         for track in tree.tracks():
             own = Transform.of(*track.components), tree.covariances.get(track.child)
             fixed.add(track.parent, track.child, *own)
-    return solve_tree(_measurements(measurements), root=root, fixed=fixed, robust=robust)
-
-
-def _measurements(argument: Measured) -> list[Measurement]:
-    if isinstance(argument, str | PathLike):
-        from frametool.formats.load import FrameFile
-        from frametool.stream.measurements import read_measurements
-
-        return read_measurements([FrameFile(argument)])
-    return [_measurement(each, f"measurement {number}") for number, each in enumerate(argument, 1)]
+    if isinstance(measurements, str | PathLike):
+        rows = read_measurements([FrameFile(measurements)])
+    else:
+        rows = [_measurement(each, f"measurement {number}") for number, each in enumerate(measurements, 1)]
+    return solve_tree(rows, root=root, fixed=fixed, robust=robust)
 
 
 def _measurement(argument: Any, place: str) -> Measurement:

@@ -37,7 +37,7 @@ def late(each: Trajectory, seconds: float) -> Trajectory:
 
 
 def compared(ref: Trajectory, est: Trajectory, **settings: Any) -> Comparison:
-    return compare(ref, est, Settings(**settings))
+    return compare(ref, est, Settings().changed(**settings))
 
 
 # few loops

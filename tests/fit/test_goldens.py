@@ -13,12 +13,10 @@ from frametool.fit.alignment import (
     ALIGNMENTS,
     Pairs,
     Unaligned,
-    by_number,
     clock_offset,
     fitted,
-    interpolated,
     lever_arm,
-    nearest,
+    paired,
 )
 from frametool.fit.comparison import Delta, parse_delta
 from frametool.fit.numbers import absolute_errors, all_pairs, chained, relative_errors, segment_errors, statistics
@@ -50,9 +48,9 @@ def read(name: str) -> Trajectory:
 
 def pairs_of(case: dict[str, Any]) -> Pairs:
     ref, est = read(case["ref"]).in_order(), read(case["est"]).in_order()
-    if ref.stamps_ns is None:
-        return by_number(ref, est)
-    return interpolated(ref, est._replace(stamps_ns=est.stamps_ns + round(1e9 * case.get("offset", 0))))
+    if ref.stamps_ns is None or est.stamps_ns is None:
+        return paired(ref, est)
+    return paired(ref, est._replace(stamps_ns=est.stamps_ns + round(1e9 * case.get("offset", 0))))
 
 
 def close(found: Any, wanted: Any, tolerance: float = 1e-9) -> None:
@@ -125,7 +123,7 @@ def test_evo_gives_the_same_numbers() -> None:
             continue
         exact = 1e-5 if name == "kitti" else 1e-9
         ref, est = read(case["ref"]), read(case["est"])
-        pairs = by_number(ref, est) if ref.stamps_ns is None else nearest(ref, est, 1e7)
+        pairs = paired(ref, est, max_diff_ns=1e7)
         assert pairs.ref.size == case["evo"]["pairs"], name
         for row in case["evo"]["ape"]:
             if name == "line" and row["align"] in ("se3", "sim3"):  # evo fits what the pairs do not determine

@@ -337,18 +337,18 @@ def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Com
 
 def _settings(inputs: Inputs) -> Settings:
     """Take what the options say; those not passed are as evo has them, or as we do."""
-    from frametool.fit.comparison import EVO, Settings
+    from frametool.fit.comparison import EVO, SETTINGS, Settings
 
     base = EVO if inputs.like else Settings()
-    of_other_match = "max_gap_ns" if (inputs.match or base.match) == "nearest" else "max_diff_ns"
-    asked = (name for name in Settings._fields if name != of_other_match)
+    of_other_match = "max_gap_ns" if (inputs.match or base.pairing.match) == "nearest" else "max_diff_ns"
+    asked = (name for name in SETTINGS if name != of_other_match)
     passed = {name: value for name in asked if (value := getattr(inputs, name)) is not None}
     if "offset" in passed:
         passed["offset"], limit = passed["offset"]
         passed |= {} if limit is None else {"offset_limit_s": limit}
     if "mount" in passed:
         passed["mount"] = _mount(passed["mount"])
-    return base._replace(**passed)
+    return base.changed(**passed)
 
 
 def _mount(text: str) -> Any:
