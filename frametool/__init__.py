@@ -104,9 +104,9 @@ def __getattr__(name: str) -> object:
 
 def html_of(value: object) -> str | None:
     """Return what a notebook shows of a value; the rooms below call it, which do not know how."""
-    from frametool.view import stills
+    from frametool.view import exports
 
-    return stills.html_of(value)
+    return exports.html_of(value)
 
 
 def __dir__() -> list[str]:

@@ -27,7 +27,7 @@ from frametool.view.pose_text import WIDTH
 from frametool.view.reports import columns, fixed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from frametool.fit.comparison import Comparison
 
@@ -126,7 +126,10 @@ def write_explanation(found: dict[str, Any]) -> str:
 
 def write_table(found: Sequence[dict[str, Any]], fmt: str = "text") -> str:
     """Write one row per comparison: `csv`, or `text`, `markdown`, `latex` with the best value of each column marked."""
-    rows = [_table_row(each) for each in found]
+    rows: list[list[Any]] = []
+    for each in found:
+        own = {"est": each["est"], "rpe": each["rpe"][-1]["percent"] if each["rpe"] else None}
+        rows.append([own[title] if title in own else number_at(each, SHORT[title]) for title in TITLES])
     if fmt == "csv":
         return write_points([dict(zip(TITLES.values(), row, strict=True)) for row in rows], Style("csv"))
     known = ([cell for cell in column if isinstance(cell, float)] for column in zip(*rows, strict=True))
@@ -144,12 +147,6 @@ def write_table(found: Sequence[dict[str, Any]], fmt: str = "text") -> str:
         body = "".join(f"{' & '.join(line)} \\\\\n" for line in shown)
         return f"\\begin{{tabular}}{{l{'r' * (len(TITLES) - 1)}}}\n{body}\\end{{tabular}}\n"
     return columns(shown, [True, *[False] * (len(TITLES) - 1)])
-
-
-def _table_row(found: dict[str, Any]) -> list[Any]:
-    """Return the table row of a comparison: the name of the estimate and its errors."""
-    own = {"est": found["est"], "rpe": found["rpe"][-1]["percent"] if found["rpe"] else None}
-    return [own[title] if title in own else number_at(found, SHORT[title]) for title in TITLES]
 
 
 WIDE, HIGH = 412.0, 112.0  # pixels of a chart
@@ -188,7 +185,7 @@ def write_report(found: Sequence[Comparison], fmt: str, command: str) -> str:
     left = {"path": _path(curves, paths, seen)}
     right = {"errors": _figure(charts[-1].area[1] + HIGH - TOP, [shape for each in charts for shape in each.drawn()])}
     is_one = len(curves) == 1
-    (left if is_one else right)["distribution"] = _histogram(curves[0]) if is_one else _boxes(curves)
+    (left if is_one else right)["distribution"] = _distribution(curves)
     if lengths := _by_length(curves, numbers):
         (right if is_one else left)["lengths"] = lengths
     title = f"{curves[0].name if is_one else f'{len(curves)} estimates'} against {printable(found[0].names[0])}"
@@ -211,23 +208,19 @@ def write_report(found: Sequence[Comparison], fmt: str, command: str) -> str:
 
 
 def _curve(found: Comparison, at: int, count: int) -> Curve:
+    """Choose what is drawn of a comparison: the minimum and maximum of each stretch, and both ends."""
     ate, stamps = found.ate, found.pairs.ref.stamps_ns
-    times = np.arange(found.pairs.ref.size) if stamps is None else (stamps - stamps[0]) / 1e9
-    every = [ate.m, ate.rad, *((ate.along, ate.across, ate.up) if count == 1 else ())]
+    chosen = np.arange(found.pairs.ref.size)
+    times = chosen if stamps is None else (stamps - stamps[0]) / 1e9
     stretches = max(STRETCHES // count, FEWEST)
-    chosen = np.unique(np.concatenate([_extremes(each, stretches) for each in every if each is not None]))
+    if len(chosen) > 2 * stretches:
+        every = [ate.m, ate.rad, *((ate.along, ate.across, ate.up) if count == 1 else ())]
+        edges = [*pairwise(np.linspace(0, len(chosen), stretches + 1).astype(int))]
+        picked = {begin + pick(values[begin:end]) for values in every if values is not None
+                  for begin, end in edges for pick in (np.argmin, np.argmax)}  # fmt: skip
+        chosen = np.array(sorted({0, len(chosen) - 1, *picked}))
     colour = "trail" if count == 1 else [*pictures.SERIES][at % len(pictures.SERIES)]
     return Curve(found, printable(found.names[1]), colour, chosen, times[chosen].tolist())
-
-
-def _extremes(values: Any, stretches: int) -> Any:
-    """Return the indices to draw: the minimum and maximum of each stretch, and both ends."""
-    count = len(values)
-    if count <= 2 * stretches:
-        return np.arange(count)
-    edges = pairwise(np.linspace(0, count, stretches + 1).astype(int))
-    found = ((begin + values[begin:end].argmin(), begin + values[begin:end].argmax()) for begin, end in edges)
-    return np.array([0, count - 1, *np.ravel([*found])])
 
 
 def _figure(high: float, shapes: Sequence[SvgElement]) -> Picture:
@@ -257,7 +250,13 @@ def _path(curves: Sequence[Curve], chart: Chart, seen: Any) -> Picture:
     lines = [ChartLine("reference", "soft", seen(first.found.pairs.ref.xyz[first.chosen]), 2.0, (5.0, 4.0))]
     shapes = [pictures.dot(*chart.place(*seen(first.found.moved.xyz[:1])[0]), 4.0, "ink", "start")]
     if len(curves) == 1:
-        lines += [ChartLine("estimate, by error", SHADES[LEVELS // 2], []), *_coloured(first, seen)]
+        lines.append(ChartLine("estimate, by error", SHADES[LEVELS // 2], []))
+        points, errors, begin = seen(first.found.moved.xyz[first.chosen]), first.found.ate.m, 0
+        levels = (errors[first.chosen] / (errors.max() or 1.0) * LEVELS).astype(int)
+        for level, run in groupby(np.minimum(levels, LEVELS - 1).tolist()[:-1]):
+            end = begin + len([*run])
+            lines.append(ChartLine("", SHADES[level], points[begin : end + 1], 2.0))
+            begin = end
         low, text = chart.area[1] + chart.area[3] + 25.0, f"error 0 .. {first.found.ate.m.max():.3g} m"
         shapes += (pictures.box(LEFT + at * 7.0, low, 7.5, 9.0, shade) for at, shade in enumerate(SHADES))
         shapes.append(pictures.words(LEFT + LEVELS * 7.0 + 8.0, low + 4.5, text, "soft", size=11.0))
@@ -265,17 +264,6 @@ def _path(curves: Sequence[Curve], chart: Chart, seen: Any) -> Picture:
         lines += [ChartLine(each.name, each.colour, seen(each.found.moved.xyz[each.chosen])) for each in curves]
     chart.lines = lines
     return _figure(chart.area[3], [*chart.drawn(), *shapes])
-
-
-def _coloured(curve: Curve, seen: Any) -> Iterator[ChartLine]:
-    """Yield the parts of a path, each in the colour of its error."""
-    points, errors = seen(curve.found.moved.xyz[curve.chosen]), curve.found.ate.m
-    levels = np.minimum((errors[curve.chosen] / (errors.max() or 1.0) * LEVELS).astype(int), LEVELS - 1).tolist()
-    begin = 0
-    for level, run in groupby(levels[:-1]):
-        end = begin + len([*run])
-        yield ChartLine("", SHADES[level], points[begin : end + 1], 2.0)
-        begin = end
 
 
 def _over_time(curves: Sequence[Curve], along: str) -> list[Chart]:
@@ -293,16 +281,14 @@ def _over_time(curves: Sequence[Curve], along: str) -> list[Chart]:
     return stacked((LEFT, TOP, WIDE, HIGH), TOP + BOTTOM - 14.0, along, kinds)
 
 
-def _histogram(curve: Curve) -> Picture:
-    """Draw the distribution of the error of one estimate."""
-    counts, edges = np.histogram(curve.found.ate.m, BINS, (0.0, curve.found.ate.m.max() or 1.0))
-    steps = [*zip(np.repeat(edges, 2)[1:-1].tolist(), np.repeat(counts, 2).tolist(), strict=True)]
-    lines = [ChartLine("", curve.colour, steps)]
-    return _figure(HIGH, [*Chart((LEFT, TOP, WIDE, HIGH), ("error in position (m)", "poses"), lines).drawn()])
-
-
-def _boxes(curves: Sequence[Curve]) -> Picture:
-    """Draw the distribution of the error of several estimates."""
+def _distribution(curves: Sequence[Curve]) -> Picture:
+    """Draw the distribution of the error: of one estimate as a histogram, of several as boxes."""
+    if len(curves) == 1:
+        errors = curves[0].found.ate.m
+        counts, edges = np.histogram(errors, BINS, (0.0, errors.max() or 1.0))
+        steps = [*zip(np.repeat(edges, 2)[1:-1].tolist(), np.repeat(counts, 2).tolist(), strict=True)]
+        lines, names = [ChartLine("", curves[0].colour, steps)], ("error in position (m)", "poses")
+        return _figure(HIGH, [*Chart((LEFT, TOP, WIDE, HIGH), names, lines).drawn()])
     worst = max(float(each.found.ate.m.max()) for each in curves)
     names = ("error in position (m)", "boxes: half of the poses; lines: 5 to 95 %; dots: median, maximum")
     chart = Chart((LEFT, TOP, WIDE, ROW * len(curves)), names, ends=((0.0, worst or 1.0), (0.0, 1.0)))

@@ -1,4 +1,4 @@
-"""Frames as files for other programs: an interactive HTML page, and binary glTF 2.0 (.glb).
+"""Frames and runs of turtles as files and for notebooks: still pictures, an interactive HTML page, glTF 2.0 (.glb).
 
 The page is self-contained and makes no network requests.  Its script and style are the files in the folder `page`,
 joined in the order of SCRIPTS and EXTRAS; its policy lets nothing else run.  Poses are stored as doubles, stamps as
@@ -17,25 +17,205 @@ from base64 import b64encode
 from itertools import chain, product
 from json import dumps
 from operator import mul
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+from xml.sax.saxutils import escape
 from zlib import compress
 
 from frametool import __version__
 from frametool.formats.robots.model import JointValue, Solid
 from frametool.frames.buffer import TransformBuffer
+from frametool.frames.lookups import Frames
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry.rigid import IDENTITY
+from frametool.sim.turtle import SIZE as WORLD
 from frametool.sim.turtle import single
-from frametool.view.pictures import PALETTE, page_file, write_html
-from frametool.view.scene import EYES, FrameScene, Projection, can_be_drawn
-from frametool.view.stills import SIZE
+from frametool.view import pictures
+from frametool.view.pictures import PALETTE, ChartLine, Picture, box, dot, line, shade_of, stacked, words
+from frametool.view.scene import EYES, SLANTED, FrameScene, Labels, Projection, Size, can_be_drawn, nice, text_width
+from frametool.view.terminal import BACKGROUND, ON_WHITE, colours_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from frametool.frames.track import MovingTrack
     from frametool.geometry.types import Rigid
+    from frametool.sim.scene import Scene
     from frametool.sim.simulate import SimulationStep
+    from frametool.sim.turtle import Pen, TurtleState
+    from frametool.view.pictures import Point, SvgElement
+
+PIECES, LAST_SHADE = 24, 0.85  # of a trail, from dark when it begins to a green that white paper still shows
+WIDTH, HEIGHT = 1000.0, 700.0
+SIZE = Size(WIDTH, HEIGHT, margin=70.0, axes=(14.0, 46.0), cell=(4, 4), line=16.0, measure=text_width)
+CORNER = 46.0  # pixels from the corner to the little axes
+
+
+def still_picture(
+    scene: FrameScene, eye: tuple[float, float] = SLANTED, title: str = "", other: FrameScene | None = None,
+) -> Picture:  # fmt: skip
+    """Draw a scene from a direction, azimuth and elevation in radians; its notes say what it does not show.
+
+    other: another tree in the same frame; its frames with the same names are drawn faintly, with a line to them.
+    """
+    flat = Projection(scene, SIZE, eye)
+    blocked = [(0.0, HEIGHT - 92.0, 100.0, HEIGHT), (WIDTH - 330.0, HEIGHT - 58.0, WIDTH, HEIGHT)]
+    labels = Labels(flat, blocked)
+    labels.place_all()
+    step, ground = flat.ground()
+    shapes = [line([flat.at(a)[:2], flat.at(b)[:2]], "zero" if zero else "faint") for a, b, zero in ground]
+    for link in flat.links:
+        points = [flat.origins[name][:2] for name in link]
+        shapes.append(line(points, "soft", alpha=0.7, dashes=(4.0, 3.0)))
+    for frame, stretches in flat.trails.items():  # in pieces coloured by time
+        trail = [[flat.at(point)[:2] for point in stretch] for stretch in stretches]
+        size = -(-sum(map(len, trail)) // PIECES)
+        pieces = [each[at : at + size + 1] for each in trail for at in range(0, max(len(each) - 1, 1), size)]
+        for number, piece in enumerate(pieces):
+            shapes.append(line(piece, shade_of(LAST_SHADE * number / len(pieces)), 1.5, 0.8, title=frame))
+    for name, pose in other.poses().items() if other else ():
+        if name in flat.poses:
+            there = flat.at(pose[:3])[:2]
+            tips = zip("xyz", flat.tips(pose), strict=True)
+            shapes += (line([there, tip[:2]], axis, 2.0, 0.4, title=name) for axis, tip in tips)
+            shapes.append(line([flat.origins[name][:2], there], "trail", 1.5))
+    for name in flat.nearest_last():
+        x, y, _ = flat.origins[name]
+        shapes += (line([(x, y), tip[:2]], "xyz"[axis], 2.0, title=name) for axis, tip in flat.axes(name))
+        shapes.append(dot(x, y, 2.2, "ink", name))
+    for text, point, (left, top, right, bottom), away in labels.placed:
+        if away > 1.1:  # with a leader line
+            end = min(max(point.x, left), right), top if top > point.y else bottom
+            shapes.append(line([point[:2], end], "soft", 0.7))
+        shapes.append(words(left + 2.0, (top + bottom) / 2.0, text))
+    shapes += _legend(flat, step)
+    near, hidden = len(flat.cluster()), labels.hidden
+    crowded = f"{near} of {len(scene.names)} frames lie in a small spot; --below FRAME shows a part"
+    notes = [crowded] * (near < len(flat.poses)) + [f"{hidden} names found no place"] * bool(hidden)
+    return Picture(WIDTH, HEIGHT, shapes, title, notes=notes)
+
+
+def _legend(flat: Projection, step: float) -> Iterator[SvgElement]:
+    """Draw the directions of the axes of the fixed frame, the scale bar, and the frame's name."""
+    x, y = CORNER, HEIGHT - CORNER
+    right, up, toward = flat.view
+    for axis in sorted(range(3), key=lambda axis: toward[axis]):
+        dx, dy = right[axis], -up[axis]
+        yield line([(x, y), (x + 28.0 * dx, y + 28.0 * dy)], "xyz"[axis], 2.0)
+        yield words(x + 38.0 * dx, y + 38.0 * dy, "xyz"[axis], "xyz"[axis], "middle", weight="bold")
+    metres = nice(110.0 / flat.scale)
+    begin, end, base = WIDTH - 20.0 - metres * flat.scale, WIDTH - 20.0, HEIGHT - 20.0
+    yield line([(begin, base - 6.0), (begin, base), (end, base), (end, base - 6.0)], "soft")
+    yield words((begin + end) / 2.0, base - 10.0, f"{metres:g} m", "soft", "middle", 11.0)
+    yield words(end, HEIGHT - 46.0, f"in {flat.scene.fixed[:40]}, grid {step:g} m", "soft", "end", 11.0)
+
+
+SHORT = 0.05  # metres: two pixels
+
+
+class Stroke(NamedTuple):
+    """A line drawn with one pen; points in metres, y up."""
+
+    turtle: str
+    pen: Pen
+    points: list[Point]
+
+
+class Drawing:
+    """Collect what a plot shows of a run; turtles that do not move take no memory."""
+
+    def __init__(self, scene: Scene) -> None:
+        """Create an empty drawing."""
+        self.strokes: list[Stroke] = []
+        self.turtles: dict[str, TurtleState] = {}
+        # of each follower, for each control step: seconds, metres, m/s, rad/s
+        self.curves: dict[str, list[tuple[float, ...]]] = {name: [] for name in scene.followers}
+        self._current: dict[str, Stroke] = {}
+        self._clears = 0
+
+    def watch(self, step: SimulationStep) -> None:
+        """Add a step to the drawing: extend the strokes of the turtles, or begin one with a new pen."""
+        if step.is_tick:
+            if step.clears != self._clears:
+                self._clears = step.clears
+                self.strokes.clear()
+                self._current.clear()
+            self.turtles = step.states
+            for name, (x, y, _) in step.states.items():
+                pen, stroke = step.pens[name], self._current.get(name)
+                if stroke is None or stroke.pen != pen:
+                    begin = [stroke.points[-1]] if stroke is not None else []
+                    stroke = self._current[name] = Stroke(name, pen, begin)
+                    if not pen.off:
+                        self.strokes.append(stroke)
+                if not stroke.points or math.dist(stroke.points[-1], (x, y)) > SHORT:
+                    stroke.points.append((x, y))
+        for command in step.commands:
+            ahead, turning, _ = command.twist
+            self.curves[command.turtle].append((step.t_ns / BILLION, command.distance or 0.0, ahead, turning))
+
+WINDOW, METRE = 500.0, 45.0  # pixels, as turtlesim's
+MARGIN = 30.0
+LEFT = WINDOW + 110.0  # where the curves begin
+PANEL_WIDTH, PANEL_GAP = 420.0, 50.0
+SIDE = WINDOW + 2.0 * MARGIN
+PANELS = ("distance (m)", "linear.x (m/s)", "angular.z (rad/s)")  # as the numbers of curves after the times
+# circles of a turtle: pixels ahead and to the left, radius: feet, head, shell
+BODY = (*((x, y, 4.0) for x in (-9.0, 9.0) for y in (-11.0, 11.0)), (17.0, 0.0, 5.0), (0.0, 0.0, 13.0))
+
+
+def run_picture(drawing: Drawing) -> Picture:
+    """Draw the run: the world with trails and the turtles at the end; charts if there are followers."""
+
+    def place(x: float, y: float) -> Point:
+        return MARGIN + x * METRE, MARGIN + (WORLD - y) * METRE
+
+    colours = colours_of({*drawing.turtles, *drawing.curves})
+    shapes = [box(MARGIN, MARGIN, WINDOW, WINDOW, f"#{bytes(BACKGROUND).hex()}")]
+    for stroke in drawing.strokes:
+        *colour, width, _ = stroke.pen
+        points = [place(*point) for point in stroke.points]
+        shapes.append(line(points, f"#{bytes(colour).hex()}", width, title=stroke.turtle))
+    for name, (*position, theta) in drawing.turtles.items():
+        x, y = place(*position)
+        cosine, sine = math.cos(theta), math.sin(theta)
+        for ahead, left, radius in BODY:
+            across, down = x + cosine * ahead - sine * left, y - sine * ahead - cosine * left
+            shapes += dot(across, down, radius + 1.0, "#333333"), dot(across, down, radius, colours[name])
+        shapes.append(words(x, y - 24.0, name, "#ffffff", "middle"))
+    followed = {name: rows for name, rows in drawing.curves.items() if rows}
+    panels = {
+        title: [ChartLine(name, ON_WHITE[colours[name]], [(row[0], row[at]) for row in rows])
+                for name, rows in followed.items()]
+        for at, title in enumerate(PANELS if followed else (), 1)
+    }  # fmt: skip
+    area = LEFT, MARGIN, PANEL_WIDTH, (WINDOW - 2.0 * PANEL_GAP) / len(PANELS)
+    shapes += (shape for chart in stacked(area, PANEL_GAP, "time (s)", panels) for shape in chart.drawn())
+    return Picture(LEFT + PANEL_WIDTH + MARGIN if followed else SIDE, SIDE, shapes, "turtles")
+
+
+def html_of(value: Any) -> str | None:
+    """Return the HTML of a transform, rotation, tree, trajectory or comparison; None if its repr is all there is."""
+    if isinstance(value, Frames) and value.frames:
+        # a picture of its own, for the style of an SVG element would count in the whole notebook
+        svg = b64encode(pictures.write_svg(still_picture(FrameScene(value), title=value.name)).encode()).decode()
+        return f'<img alt="frames of {escape(value.name)}" src="data:image/svg+xml;base64,{svg}">'
+    if hasattr(value, "as_dict"):
+        from frametool.view.comparison_report import write_comparison
+
+        return f"<pre>{escape(write_comparison(value.as_dict()))}</pre>"
+    if hasattr(value, "stamps_ns"):
+        from frametool.frames.trajectory import way
+
+        path = f"{way(value.xyz)[-1]:.3f} m of path" if value.size else "empty"
+        return f"<pre>{value.size} poses of {escape(value.body)} in {escape(value.world)}, {path}</pre>"
+    if isinstance(value, Frames) or value.shape:
+        return None
+    from frametool.grammar.pose import Pose
+    from frametool.grammar.result import Result, Style
+    from frametool.view.pose_text import write_poses
+
+    parts = value.components
+    pose = Pose.of(parts) if len(parts) > len("xyzw") else Pose(rotation=parts)
+    return f"<pre>{escape(write_poses([Result(pose)], Style('text')))}</pre>"
 
 
 THICK = 0.02  # half the width of a bar, where its length is 1
@@ -71,33 +251,15 @@ class BinaryPart:
 def write_glb(scene: FrameScene) -> bytes:
     """Return the scene as the bytes of a .glb."""
     flat, part = Projection(scene, SIZE), BinaryPart()
-    index = {name: 1 + 2 * number for number, name in enumerate(flat.poses)}
-    _add_axes(part)
-    animation = _animation(scene, index, part)
-    document: dict[str, Any] = {
-        "asset": {"version": "2.0", "generator": f"frametool {__version__}"}, "extensionsUsed": ["KHR_materials_unlit"],
-        "scene": 0, "scenes": [{"nodes": [0]}], "nodes": _nodes(scene, flat, index), "meshes": [MESH],
-        "materials": [MATERIAL], **({"animations": [animation]} if animation else {}), "accessors": part.accessors,
-        "bufferViews": part.views, "buffers": [{"byteLength": len(part.data)}],
-    }  # fmt: skip
-    text = dumps(document, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)
-    head = struct.pack("<4sIII4s", b"glTF", 2, 28 + len(text) + len(part.data), len(text), b"JSON")
-    return head + text + struct.pack("<I4s", len(part.data), b"BIN\0") + part.data
-
-
-def _add_axes(part: BinaryPart) -> None:
-    """Add three bars of length 1 along x, y, z: positions, colours, triangles."""
+    # three bars of length 1 along x, y, z: positions, colours, triangles
     bars = [[(-THICK, 1.0 if side == axis else THICK) for side in range(3)] for axis in range(3)]
     corners = [(8 * bar + corner,) for bar in range(3) for a, b, c, d in SIDES for corner in (a, b, c, a, c, d)]
     places = [place for bar in bars for place in product(*bar)]
     part.add("f", places, target=VERTICES, min=[single(-THICK)] * 3, max=[1.0] * 3)
     part.add("B", [colour for colour in COLOURS for _ in range(8)], target=VERTICES, normalized=True)
     part.add("H", corners, target=INDICES)
-
-
-def _nodes(scene: FrameScene, flat: Projection, index: dict[str, int]) -> list[dict[str, Any]]:
-    """Return the nodes: of each frame and its axes; a frame without a drawn parent is placed in `fixed`."""
+    # a node of each frame and one of its axes; a frame without a drawn parent is placed in `fixed`
+    index = {name: 1 + 2 * number for number, name in enumerate(flat.poses)}
     nodes: list[dict[str, Any]] = [{"name": "z up", "rotation": Z_UP, "children": []}]
     for name, node in index.items():
         nodes.append({"name": name, "children": [node + 1]})
@@ -108,36 +270,39 @@ def _nodes(scene: FrameScene, flat: Projection, index: dict[str, int]) -> list[d
         above, place = (index[parent], edge) if parent in index and edge is not None else (0, pose)
         nodes[above]["children"].append(index[name])
         nodes[index[name]] |= {"translation": place[:3], "rotation": place[3:]}
-    return nodes
+    animation = _animation(scene, index, part)
+    document: dict[str, Any] = {
+        "asset": {"version": "2.0", "generator": f"frametool {__version__}"}, "extensionsUsed": ["KHR_materials_unlit"],
+        "scene": 0, "scenes": [{"nodes": [0]}], "nodes": nodes, "meshes": [MESH], "materials": [MATERIAL],
+        **({"animations": [animation]} if animation else {}), "accessors": part.accessors, "bufferViews": part.views,
+        "buffers": [{"byteLength": len(part.data)}],
+    }  # fmt: skip
+    text = dumps(document, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    head = struct.pack("<4sIII4s", b"glTF", 2, 28 + len(text) + len(part.data), len(text), b"JSON")
+    return head + text + struct.pack("<I4s", len(part.data), b"BIN\0") + part.data
 
 
 def _animation(scene: FrameScene, index: dict[str, int], part: BinaryPart) -> dict[str, Any] | None:
     """Return the animation of the frames that move below one drawn parent."""
     channels: list[dict[str, Any]] = []
     samplers: list[dict[str, Any]] = []
-    first_ns, _ = scene.span_ns
     for name, track in scene.tracks.items():
         drawn = name in index and track.parent in index and not track.varies
         if not drawn or not all(can_be_drawn(sample[:3]) for _, _, sample in track.walk()):
             continue
-        seconds, places, rotations = _keys(track, first_ns)
-        times = part.add("f", [*zip(seconds, strict=True)], min=[seconds[0]], max=[seconds[-1]])
-        for path, rows in (("translation", places), ("rotation", rotations)):
+        keys: dict[float, Rigid] = {}  # by seconds of float32, which must increase
+        for stamp_ns, _, sample in track.walk():
+            keys.setdefault(single((stamp_ns - scene.span_ns[0]) / BILLION), sample)
+        rotations: list[Sequence[float]] = []  # with continuous signs
+        for *_, x, y, z, w in keys.values():
+            sign = -1.0 if rotations and sum(map(mul, (x, y, z, w), rotations[-1])) < 0.0 else 1.0
+            rotations.append((sign * x, sign * y, sign * z, sign * w))
+        times = part.add("f", [(second,) for second in keys], min=[min(keys)], max=[max(keys)])
+        for path, rows in (("translation", [sample[:3] for sample in keys.values()]), ("rotation", rotations)):
             channels.append({"sampler": len(samplers), "target": {"node": index[name], "path": path}})
             samplers.append({"input": times, "output": part.add("f", rows), "interpolation": "LINEAR"})
     return {"name": "samples", "channels": channels, "samplers": samplers} if channels else None
-
-
-def _keys(track: MovingTrack, first_ns: int) -> tuple[list[float], list[Sequence[float]], list[Sequence[float]]]:
-    """Return increasing float32 seconds, positions, and quaternions with continuous signs."""
-    keys: dict[float, Rigid] = {}
-    for stamp_ns, _, sample in track.walk():
-        keys.setdefault(single((stamp_ns - first_ns) / BILLION), sample)
-    rotations: list[Sequence[float]] = []
-    for *_, x, y, z, w in keys.values():
-        sign = -1.0 if rotations and sum(map(mul, (x, y, z, w), rotations[-1])) < 0.0 else 1.0
-        rotations.append((sign * x, sign * y, sign * z, sign * w))
-    return [*keys], [sample[:3] for sample in keys.values()], rotations
 
 
 SCRIPTS = ("begin", "kernels", "frames", "state", "camera", "picture", "labels", "panel", "hands")
@@ -158,7 +323,12 @@ def write_page(
     """
     head, blob = _data(scene)
     head |= {"title": title, "file": file or title, "made": f"frametool {__version__}"}
-    head["show"] = _shown(scene, eye)
+    is_part = not scene.path_only and len(scene.chosen) < len(scene.names)
+    head["show"] = {
+        "fixed": scene.fixed, "path": scene.path_only, "target": scene.target, "source": scene.source,
+        "t": None if scene.at_ns is None else format_stamp(scene.at_ns),
+        "only": [name for name in scene.names if name in scene.chosen] if is_part else None, "view": eye,
+    }  # fmt: skip
     if sliders and (joints := joint_sliders(scene))["joints"]:
         head |= joints
     if solids:
@@ -170,16 +340,7 @@ def write_page(
         blob, head["packed"] = compress(blob), True
     scripts = " ".join(f"{name}.js" for name in (*SCRIPTS, *(each for each in EXTRAS if each in head), "main"))
     held = {"head-data": dumps(head, separators=(",", ":")), "blob": dumps(b64encode(blob).decode())}
-    return write_html(title, page_file("page.html"), style="page.css", script=scripts, data=held)
-
-
-def _shown(scene: FrameScene, eye: tuple[float, float] | None) -> dict[str, Any]:
-    """Return the initial view of the page."""
-    is_part = not scene.path_only and len(scene.chosen) < len(scene.names)
-    only = [name for name in scene.names if name in scene.chosen] if is_part else None
-    time = None if scene.at_ns is None else format_stamp(scene.at_ns)
-    shown = {"fixed": scene.fixed, "path": scene.path_only, "target": scene.target, "source": scene.source}
-    return shown | {"t": time, "only": only, "view": eye}
+    return pictures.write_html(title, pictures.page_file("page.html"), style="page.css", script=scripts, data=held)
 
 
 def _data(scene: FrameScene) -> tuple[dict[str, Any], bytes]:
@@ -216,9 +377,6 @@ def run_page() -> tuple[Callable[[SimulationStep], None], Callable[[], str]]:
 
 
 SLIDER_KEYS = ("name", "kind", "axis", "anchor", "rest", "lower", "upper", "mimic")
-LINK_KEYS = ("origin", "after", "inverted")
-
-
 def joint_sliders(scene: FrameScene) -> dict[str, list[dict[str, Any]]]:
     """Return the revolute and prismatic joints with a constant value, and the links that they move, for the page."""
     sliders: list[dict[str, Any]] = []
@@ -230,19 +388,16 @@ def joint_sliders(scene: FrameScene) -> dict[str, list[dict[str, Any]]]:
             if {*map(type, known)} != {JointValue} or link.child not in scene.index:
                 continue
             numbers = [*range(len(sliders), len(sliders) + len(known))]
-            moved.append({"frame": scene.index[link.child], "joints": numbers} | _picked(link, LINK_KEYS))
-            places |= {joint.name: number for joint, number in zip(link.joints, numbers, strict=True)}
-            sliders += ({"value": float(value.plain)} | _picked(joint, SLIDER_KEYS)
-                        for joint, value in zip(link.joints, known, strict=True))  # fmt: skip
+            own = {key: getattr(link, key) for key in ("origin", "after", "inverted")}
+            moved.append({"frame": scene.index[link.child], "joints": numbers} | own)
+            for joint, value, number in zip(link.joints, known, numbers, strict=True):
+                places[joint.name] = number
+                sliders.append({"value": float(value.plain)} | {key: getattr(joint, key) for key in SLIDER_KEYS})
     for slider in sliders:
         mimic = slider.pop("mimic")
         if mimic is not None and mimic.joint in places:
             slider["mimic"] = [places[mimic.joint], mimic.multiplier, mimic.offset]
     return {"joints": sliders, "links": moved}
-
-
-def _picked(value: Any, keys: Iterable[str]) -> dict[str, Any]:
-    return {key: getattr(value, key) for key in keys}
 
 
 MESH_PART = 0.35  # of the usual distance between frames is the least edge of a box

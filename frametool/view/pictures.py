@@ -273,10 +273,10 @@ class Chart:
         return across, top + height * (self.y[1] - inside) / (self.y[1] - self.y[0])
 
     def drawn(self) -> Iterator[SvgElement]:
-        """Draw axes, lines and the legend."""
+        """Draw axes, lines and the legend: each name after its line; a long one has only the dashed lines."""
         left, top, width, height = self.area
-        right, bottom = left + width, top + height
-        yield words(left, top - 14.0, self.names[1], "soft")
+        right, bottom, above = left + width, top + height, top - 14.0
+        yield words(left, above, self.names[1], "soft")
         if self.names[0]:
             yield words(right, bottom + 30.0, self.names[0], "soft", "end")
         for tick in self.ticks[0]:
@@ -292,7 +292,14 @@ class Chart:
             if points:
                 yield line(points, each.colour, each.width, dashes=each.dashes, title=each.name)
             yield from (dot(x, y, 3.0, each.colour) for x, y in points if each.dots)
-        yield from _legend(self.lines, left + text_width(self.names[1]), right, top - 14.0)
+        named = [each for each in self.lines if each.name]
+        if sum(text_width(each.name) + 33.0 for each in named) > width - text_width(self.names[1]):
+            named = [each for each in named if each.dashes]
+        for each in reversed(named):
+            yield words(right, above, each.name, "ink", "end", 11.0)
+            right -= text_width(each.name) + 5.0
+            yield line([(right - 16.0, above), (right, above)], each.colour, max(each.width, 2.0), dashes=each.dashes)
+            right -= 28.0
 
 
 def stacked(area: Box, gap: float, along: str, kinds: Mapping[str, Sequence[ChartLine]]) -> list[Chart]:
@@ -305,18 +312,6 @@ def stacked(area: Box, gap: float, along: str, kinds: Mapping[str, Sequence[Char
         Chart((left, top + at * (height + gap), width, height), (along * (at == len(kinds) - 1), name), lines)
         for at, (name, lines) in enumerate(kinds.items())
     ]
-
-
-def _legend(lines: Sequence[ChartLine], left: float, right: float, y: float) -> Iterator[SvgElement]:
-    """Draw a right-aligned legend on one line, each name after its line; of a long one only dashed lines."""
-    named = [each for each in lines if each.name]
-    if sum(text_width(each.name) + 33.0 for each in named) > right - left:
-        named = [each for each in named if each.dashes]
-    for each in reversed(named):
-        yield words(right, y, each.name, "ink", "end", 11.0)
-        right -= text_width(each.name) + 5.0
-        yield line([(right - 16.0, y), (right, y)], each.colour, max(each.width, 2.0), dashes=each.dashes)
-        right -= 28.0
 
 
 def ticks(low: float, high: float) -> list[float]:
@@ -357,8 +352,10 @@ def write_png(picture: Picture) -> bytes:
     axes: Any = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.axis("off")
     for order, (kind, run) in enumerate(groupby(picture.shapes, key=attrgetter("kind"))):
-        if kind == "circle":
-            _paint_dots(axes, [*run], order)
+        if kind == "circle":  # at once, for there may be many
+            xs, ys, radii, colours = zip(*((*each.look.values(), _plain(each)) for each in run), strict=True)
+            sizes = [(2.0 * radius * POINTS) ** 2 for radius in radii]
+            axes.scatter(xs, ys, s=sizes, c=colours, linewidths=0.0, zorder=order)
         else:
             for shape in run:
                 _paint(axes, shape, order)
@@ -369,13 +366,6 @@ def write_png(picture: Picture) -> bytes:
         warnings.simplefilter("ignore", UserWarning)  # of letters that matplotlib's font lacks: it draws boxes
         figure.savefig(stream, format="png", metadata={"Software": None})
     return stream.getvalue()
-
-
-def _paint_dots(axes: Any, dots: Sequence[SvgElement], order: int) -> None:
-    """Paint a run of dots at once, for there may be many."""
-    xs, ys, radii = zip(*(each.look.values() for each in dots), strict=True)
-    sizes = [(2.0 * radius * POINTS) ** 2 for radius in radii]
-    axes.scatter(xs, ys, s=sizes, c=[*map(_plain, dots)], linewidths=0.0, zorder=order)
 
 
 def _paint(axes: Any, shape: SvgElement, order: int) -> None:
@@ -421,24 +411,20 @@ FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}  # the markers of JPEG that a
 
 
 def read_shot(path: str) -> SvgElement:
-    """Read a PNG or a JPEG; raises FormatError for anything else, FileProblem."""
+    """Read a PNG or a JPEG, and embed it unchanged; raises FormatError for anything else, FileProblem."""
     with opened(path) as file:
         data = file.read()
+    kind, width, height = "", 0, 0
     if data.startswith(PNG) and len(data) > 24:
-        width, height = struct.unpack_from(">II", data, 16)
-        return _image(width, height, "png", data)
+        kind, (width, height) = "png", struct.unpack_from(">II", data, 16)
     at = 2 if data.startswith(JPEG) else len(data)
-    while at + 9 < len(data) and data[at] == 0xFF:
+    while not kind and at + 9 < len(data) and data[at] == 0xFF:
         if data[at + 1] in FRAMES:
-            height, width = struct.unpack_from(">HH", data, at + 5)
-            return _image(width, height, "jpeg", data)
+            kind, (height, width) = "jpeg", struct.unpack_from(">HH", data, at + 5)
         is_filled = data[at + 1] == 0xFF  # before a marker there may be more of its first byte
         at += 1 if is_filled else 2 + int.from_bytes(data[at + 2 : at + 4], "big")
-    raise FormatError("neither a PNG nor a JPEG; an overlay is drawn over one of these", source=path)
-
-
-def _image(width: int, height: int, kind: str, data: bytes) -> SvgElement:
-    """Return an image whose file is embedded unchanged."""
+    if not kind:
+        raise FormatError("neither a PNG nor a JPEG; an overlay is drawn over one of these", source=path)
     href = f"data:image/{kind};base64,{b64encode(data).decode()}"
     return SvgElement("image", "", {"x": CORNER[0], "y": CORNER[1], "width": width, "height": height, "href": href})
 

@@ -208,7 +208,17 @@ def _layout(lines: Sequence[NumberLine], style: Style, label: int = 0) -> str:
     label: width of the labels, at least
     """
     label, width = max([label, *(len(line.label) for line in lines)]), get_terminal_size((WIDTH, 0)).columns
-    texts = _columns(lines, label, style)
+    numbers = _aligned([[_number(value, style) for _, value in line.cells] for line in lines])
+    columns = zip_longest(*(line.cells for line in lines), fillvalue=("", 0.0))
+    sizes = [max(len(name) for name, _ in column) for column in columns]
+    texts = []
+    for line, row in zip(lines, numbers, strict=True):
+        named = [  # GLUE for blanks at which they must not be wrapped
+            f"{name:>{size}} {text}".replace(" ", GLUE) if size else text
+            for (name, _), text, size in zip(line.cells, row, sizes, strict=False)
+        ]
+        text = f"  {line.label:<{label}}  ".replace(" ", GLUE) + " ".join(named)
+        texts.append(f"{text}  {line.unit}".rstrip(f" {GLUE}").replace("  ]", " ]"))
     begins = [at for at, line in enumerate(lines) if at and line.label]
     if begins and max(map(len, texts)) > width:
         parts = pairwise([0, *begins, len(lines)])
@@ -217,22 +227,6 @@ def _layout(lines: Sequence[NumberLine], style: Style, label: int = 0) -> str:
     wrapped = (fill(text, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
                if len(text) > width else text for text in texts)  # fmt: skip
     return "".join(f"{text.replace(GLUE, ' ')}\n" for text in wrapped)
-
-
-def _columns(lines: Sequence[NumberLine], label: int, style: Style) -> list[str]:
-    """Write lines with their names and numbers in columns, GLUE for blanks at which they must not be wrapped."""
-    numbers = _aligned([[_number(value, style) for _, value in line.cells] for line in lines])
-    columns = zip_longest(*(line.cells for line in lines), fillvalue=("", 0.0))
-    sizes = [max(len(name) for name, _ in column) for column in columns]
-    texts = []
-    for line, row in zip(lines, numbers, strict=True):
-        named = [
-            f"{name:>{size}} {text}".replace(" ", GLUE) if size else text
-            for (name, _), text, size in zip(line.cells, row, sizes, strict=False)
-        ]
-        text = f"  {line.label:<{label}}  ".replace(" ", GLUE) + " ".join(named)
-        texts.append(f"{text}  {line.unit}".rstrip(f" {GLUE}").replace("  ]", " ]"))
-    return texts
 
 
 def _number(value: float, style: Style) -> str:
@@ -262,25 +256,20 @@ ECHOED = (("quaternion", "Quaternion"), ("rpy_rad", "RPY (radian)"), ("rpy_deg",
 def write_blocks(results: Iterable[Result], target: str, source: str, style: Style) -> Iterator[str]:
     """Yield the blocks as they come; the first begins by saying in words which frame is seen from which."""
     heading = in_width(f"{source} seen from {target}", f"(maps points in {source} to points in {target})")
-    for result in results:
-        yield heading + _block(result, style)
-        heading = ""
-
-
-def _block(result: Result, style: Style) -> str:
-    """Return one block; a static path has no time."""
     decimals = ECHO_DECIMALS if style.precision is None else style.precision
-    stamp_ns, components = result.extras.get("stamp_ns"), result.pose.components
 
     def fixed(values: Sequence[float]) -> list[str]:
         return [f"{value:z.{decimals}f}" for value in values]
 
-    lines = ["At any time: the frames stand still" if stamp_ns is None else f"At time {format_stamp(stamp_ns)}"]
-    lines.append(f"- Translation: [{', '.join(fixed(components[:3]))}]")
-    for spec, name in ECHOED:
-        numbers = fixed(rotation_numbers(result.pose, notation(spec), style))
-        lines.append(f"- Rotation: in {name} [{', '.join(numbers)}]")
-    lines.append("- Matrix:")
-    cells = [f" {cell:>{decimals + 3}}" for cell in fixed(rigid.to_homogeneous(*components, floats))]
-    lines += ["".join(cells[at : at + 4]) for at in range(0, 16, 4)]
-    return "\n".join(lines) + "\n"
+    for result in results:
+        stamp_ns, components = result.extras.get("stamp_ns"), result.pose.components
+        time = "At any time: the frames stand still" if stamp_ns is None else f"At time {format_stamp(stamp_ns)}"
+        lines = [f"{heading}{time}", f"- Translation: [{', '.join(fixed(components[:3]))}]"]
+        for spec, name in ECHOED:
+            numbers = fixed(rotation_numbers(result.pose, notation(spec), style))
+            lines.append(f"- Rotation: in {name} [{', '.join(numbers)}]")
+        lines.append("- Matrix:")
+        entries = [f" {entry:>{decimals + 3}}" for entry in fixed(rigid.to_homogeneous(*components, floats))]
+        lines += ["".join(entries[at : at + 4]) for at in range(0, 16, 4)]
+        yield "\n".join(lines) + "\n"
+        heading = ""

@@ -40,19 +40,16 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
             return
         with suppress(OSError):
             if self._bar is None:
-                self._bar = _bar(self.total, self._counted)
+                from rich import progress
+
+                text = f"{{task.fields[rows]}} {self._counted}  {{task.fields[rate]}} {self._counted}/s"
+                columns: list[Any] = [progress.TextColumn(text)]
+                if self.total:
+                    columns += [progress.BarColumn(), progress.TaskProgressColumn(), progress.TimeRemainingColumn()]
+                self._bar = progress.Progress(*columns, console=coloured_console(stderr=True), transient=True)
                 self._bar.start()
                 self._task = self._bar.add_task("", total=self.total, rows="0", rate="")
             self._bar.update(self._task, completed=self.size, rows=f"{self.rows:,}", rate=f"{self.rows / seconds:,.0f}")
-
-
-def _bar(total: int | None, counted: str) -> Any:
-    from rich import progress
-
-    columns: list[Any] = [progress.TextColumn(f"{{task.fields[rows]}} {counted}  {{task.fields[rate]}} {counted}/s")]
-    if total:
-        columns += [progress.BarColumn(), progress.TaskProgressColumn(), progress.TimeRemainingColumn()]
-    return progress.Progress(*columns, console=coloured_console(stderr=True), transient=True)
 
 
 def coloured_console(color: str = "auto", *, stderr: bool = False) -> Console:

@@ -90,35 +90,31 @@ TREE_MARKS = (r"(?m)^(?P<green>[^│├└ \n].*)", r"(?m)^(?P<dim>[│├└─
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Draw a tree: each frame below its parent, with its pose there, how uncertain that is, and how it moves."""
-    return columns([*_drawn(tree, style)], (True, True, True, True))
+    """Draw a tree: each frame below its parent, with its newest pose there, how uncertain that is, and how it moves.
 
-
-def _drawn(tree: Frames, style: Style) -> Iterator[tuple[str, ...]]:
-    """Walk the tree from its roots, children in the order they were added; a stack, so that no tree is too deep."""
+    Children are in the order they were added; a stack, so that no tree is too deep for Python.
+    """
     children: dict[str, list[Track]] = {}
     for each in tree.tracks():
         children.setdefault(each.parent, []).append(each)
+    rows: list[tuple[str, ...]] = []
     pending: list[tuple[str, Track | None, str, str]] = [(root, None, "", "") for root in reversed(tree.roots)]
     while pending:
         frame, track, branch, below = pending.pop()
         if len(branch) > 2 * DEEPEST:
             raise ValueInvalid(f"the tree is more than {DEEPEST} frames deep, too deep to draw; use --format json")
-        yield branch + printable(frame), *(("", "", "") if track is None else _label(tree, track, style))
+        label = ("", "", tree.drawn.get(frame, ""))
+        if track is not None and frame not in tree.drawn:
+            covariance = tree.covariances.get(frame)
+            remarks = [] if covariance is None else [largest_sigmas(covariance)]
+            remarks += [] if track.is_static else [motion(track)]
+            label = *edge_label(Transform.of(*track.components), style, track.parent), "  ".join(remarks)
+        rows.append((branch + printable(frame), *label))
         line, further = "└ ", "  "
         for each in reversed(children.get(frame, ())):
             pending.append((each.child, each, below + line, below + further))
             line, further = "├ ", "│ "
-
-
-def _label(tree: Frames, track: Track, style: Style) -> tuple[str, str, str]:
-    """Return position, rotation and remarks of an edge, its newest pose if it moves."""
-    if (drawn := tree.drawn.get(track.child)) is not None:
-        return "", "", drawn
-    covariance = tree.covariances.get(track.child)
-    remarks = [] if covariance is None else [largest_sigmas(covariance)]
-    remarks += [] if track.is_static else [motion(track)]
-    return *edge_label(Transform.of(*track.components), style, track.parent), "  ".join(remarks)
+    return columns(rows, (True, True, True, True))
 
 
 HEADINGS = {
@@ -131,14 +127,29 @@ RARE = ("parent_changes",)  # left out where all are 0
 
 
 def write_report(entries: Sequence[dict[str, Any]]) -> str:
-    """Return the edges as an aligned table without empty columns."""
+    """Return the edges as a table without empty columns, then sentences on those that move and on the chain."""
     edges = [entry for entry in entries if entry["kind"] != "chain"]
     keys = [key for key in entries[0] if key not in HIDDEN]
     shown = [key for key in keys if any(entry[key] or (entry[key] == 0 and key not in RARE) for entry in edges)]
     rows = [[HEADINGS.get(key, key) for key in shown], *([_cell(key, entry) for key in shown] for entry in edges)]
-    sentences = [_motion(entry) for entry in edges if entry["length_m"]]
-    chains = [_chain(entry) for entry in entries if entry["kind"] == "chain"]
-    return "".join([columns(rows, [key in ("parent", "topics") for key in shown]), *sentences, *chains])
+    sentences = []
+    for entry in entries:
+        first, last = entry["first_ns"], entry["last_ns"]
+        if entry["kind"] != "chain":
+            if entry["length_m"]:
+                speed = f"{entry['speed_mean']:.3f} m/s (at most {entry['speed_max']:.3f})"
+                gaps = f"{entry['gaps']} gap{'s' * (entry['gaps'] != 1)}"
+                far = f"{entry['length_m']:.3f} m in {entry['duration_s']:.3f} s, {speed}, {gaps}"
+                sentences.append(in_width(f"{short(_edge(entry), WIDTH - 1)}:", far))
+            continue
+        text = "stands still: any time will do"
+        if first is not None:
+            begin, end = format_stamp(first), format_stamp(last)
+            text = f"all edges have data from {begin} to {end} ({(last - first) / 1e9:.3f} s)"
+            if first > last:
+                text = f"its edges share no time: one begins at {begin}, one ends at {end}"
+        sentences.append(in_width(f"{entry['parents']}:", text))
+    return "".join([columns(rows, [key in ("parent", "topics") for key in shown]), *sentences])
 
 
 def trouble(entries: Sequence[dict[str, Any]]) -> tuple[str, ...]:
@@ -152,14 +163,6 @@ def _edge(entry: dict[str, Any]) -> str:
     return f"{printable(entry['parent'])} <- {printable(entry['child'])}"
 
 
-def _motion(entry: dict[str, Any]) -> str:
-    """Return the sentence on a moving edge: length, duration, speed, gaps."""
-    speed = f"{entry['speed_mean']:.3f} m/s (at most {entry['speed_max']:.3f})"
-    gaps = f"{entry['gaps']} gap{'s' * (entry['gaps'] != 1)}"
-    begin = f"{short(_edge(entry), WIDTH - 1)}:"
-    return in_width(begin, f"{entry['length_m']:.3f} m in {entry['duration_s']:.3f} s, {speed}, {gaps}")
-
-
 def _cell(key: str, entry: dict[str, Any]) -> str:
     """Write a value; its key ends with its unit."""
     if key == "parent":
@@ -170,19 +173,6 @@ def _cell(key: str, entry: dict[str, Any]) -> str:
     if key.endswith("_ns"):
         return format_stamp(value)[:-6]
     return f"{value:.2f}" if key == "rate_hz" else f"{value:.3f}" if key.endswith("_s") else str(value)
-
-
-def _chain(entry: dict[str, Any]) -> str:
-    """Return the sentence on the interval in which the whole chain has data."""
-    first, last = entry["first_ns"], entry["last_ns"]
-    if first is None:
-        sentence = "stands still: any time will do"
-    elif first > last:
-        sentence = f"its edges share no time: one begins at {format_stamp(first)}, one ends at {format_stamp(last)}"
-    else:
-        seconds = (last - first) / 1e9
-        sentence = f"all edges have data from {format_stamp(first)} to {format_stamp(last)} ({seconds:.3f} s)"
-    return in_width(f"{entry['parents']}:", sentence)
 
 
 LONGEST = 22  # characters of a heading over two columns
@@ -240,10 +230,13 @@ def write_formats(entries: Sequence[dict[str, Any]]) -> str:
 
 
 def write_format(entry: dict[str, Any]) -> str:
-    """Describe one format, with the example of its module if there is one."""
-    signs = ", ".join(_signs(entry["name"]))
+    """Describe one format: also what it is recognised by, of a regular expression only the kind, and an example."""
+    signs = []
+    for kind, what in FORMATS[entry["name"]].magic:
+        words = what if isinstance(what, str) and re.fullmatch(r"[\w./*|-]+", what) else ""
+        signs.append(f"{kind} {words}".rstrip())
     example = "".join(f"    {line}\n" for line in example_of(entry["name"]))
-    return _described(entry, f"known by {signs}" if signs else "") + (f"  example\n{example}" if example else "")
+    return _described(entry, f"known by {', '.join(signs)}" * bool(signs)) + f"  example\n{example}" * bool(example)
 
 
 def _described(entry: dict[str, Any], more: str = "") -> str:
@@ -275,13 +268,6 @@ def example_of(name: str) -> list[str]:
     return []
 
 
-def _signs(name: str) -> Iterator[str]:
-    """Yield what a format is recognised by; of a regular expression only the kind."""
-    for kind, what in FORMATS[name].magic:
-        words = what if isinstance(what, str) and re.fullmatch(r"[\w./*|-]+", what) else ""
-        yield f"{kind} {words}".rstrip()
-
-
 MOST = 50  # frames
 
 
@@ -309,7 +295,7 @@ def sigma_entry(pose: Pose) -> dict[str, list[float]] | None:
 
 
 def write_solution(found: Solution) -> str:
-    """Write the summary, the frames and the rejected measurements."""
+    """Write the summary, the frames in their parents, which are named unless they are the root, and the rejected."""
     numbers, last = found.numbers, found.poses[-1]
     count = f"{numbers['used']} of {numbers['count']}"
     rms = f"rms {_off(numbers['rms_distance'], numbers['rms_angle'])}"
@@ -327,18 +313,8 @@ def write_solution(found: Solution) -> str:
         lines.append(f"turns seen: {first:.1f} deg rms about the main axis, {second:.1f} deg about the second")
     if numbers["scale_sigma"] is not None:
         lines.append(f"scale {last.scale:.9g} sigma {numbers['scale_sigma']:.2g}")
-    return "".join(f"{line}\n" for line in lines) + _solved_frames(found) + write_left_out(found)
-
-
-def _off(metres: float, radians: float | None) -> str:
-    turn = "" if radians is None else f" {fixed(math.degrees(radians), 2)} deg"
-    return f"{fixed(1e3 * metres, 1)} mm{turn}"
-
-
-def _solved_frames(found: Solution) -> str:
-    """Return the table of the frames: each in its parent, which is named unless it is the root of a tree."""
-    root = found.numbers["root"] if found.numbers["shape"] == "tree" else None
-    pairs = zip(found.poses, found.numbers["frames"], strict=True)
+    root = numbers["root"] if numbers["shape"] == "tree" else None
+    pairs = zip(found.poses, numbers["frames"], strict=True)
     shown = [each for each in pairs if each[0].parent is not None or each[0].name == root][:MOST]
     rows = [["  frame", *"xyz", "sigma mm", "deg", "rows", ""]]
     for pose, entry in shown:
@@ -353,7 +329,13 @@ def _solved_frames(found: Solution) -> str:
         rows.append([name, *place, fixed(largest[0], 1), fixed(largest[1], 2), str(entry["rows"]), remark])
     more = len(found.poses) - len(shown) if root else 0
     rest = f"  .. and {more} more; --report FILE.json has all\n" if more else ""
-    return columns(rows, [True, *[False] * 6, True]) + rest
+    table = columns(rows, [True, *[False] * 6, True])
+    return "".join(f"{line}\n" for line in lines) + table + rest + write_left_out(found)
+
+
+def _off(metres: float, radians: float | None) -> str:
+    turn = "" if radians is None else f" {fixed(math.degrees(radians), 2)} deg"
+    return f"{fixed(1e3 * metres, 1)} mm{turn}"
 
 
 def write_left_out(found: Solution) -> str:

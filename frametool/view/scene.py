@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from collections import Counter
 from functools import cached_property
 from itertools import pairwise, product
@@ -41,39 +42,29 @@ STILL = 1e-9  # metres: a frame that stays within has no trail
 MOST_STAMPS = 4000  # of a trail; of more, every second, third, .. is taken
 
 
-def _expression(text: str) -> re.Pattern[str]:
-    """Compile a regular expression without Python's warnings."""
-    import warnings
+def _on_ground(tree: Frames, ground: Ground | None) -> tuple[Ground | None, Frames]:
+    """Return the ground and the tree with it instead of the Earth's frame.
 
-    try:
-        with warnings.catch_warnings(action="ignore", category=FutureWarning):
-            return re.compile(text)
-    except (re.error, OverflowError, RecursionError) as error:
-        raise ValueInvalid(f"{shown(text)} is not a regular expression: {error}") from None
-
-
-def _ground(tree: Frames) -> Ground | None:
-    """Return the ground at the first frame on the Earth, a static one if there is any."""
-    earth = tree.resolve_name(EARTH)
-    there = sorted((track for track in tree.tracks() if track.parent == earth), key=lambda track: not track.is_static)
-    if not there or earth not in tree.roots:
-        return None
-    place = there[0].components[:3]
-    lat, lon, alt = wgs84.lla(*place, floats)
-    axes = wgs84.ecef_from_axes(lat, lon, ENU, floats) if isfinite(alt) else None
-    return axes and (f"enu at {there[0].child}", (*place, *axes))
-
-
-def _on(tree: Frames, ground: Ground) -> Frames:
-    """Return the tree with the ground instead of the Earth's frame."""
-    earth, found, (name, pose) = tree.resolve_name(EARTH), TransformBuffer(name=tree.name), ground
+    ground: by default at the first frame on the Earth, a static one if there is any
+    """
+    earth, found = tree.resolve_name(EARTH), TransformBuffer(name=tree.name)
+    if ground is None:
+        tracks = sorted(tree.tracks(), key=lambda track: not track.is_static)
+        there = next((track for track in tracks if track.parent == earth), None)
+        if there is None or earth not in tree.roots:
+            return None, tree
+        lat, lon, alt = wgs84.lla(*there.components[:3], floats)
+        if not isfinite(alt):
+            return None, tree
+        ground = f"enu at {there.child}", (*there.components[:3], *wgs84.ecef_from_axes(lat, lon, ENU, floats))
+    name, pose = ground
     for frame in tree.frames:
         found.add_root(name if frame == earth else frame)
     for track in tree.tracks():
         for stamp_ns, parent, seen in track.walk():
             above, moved = (name, rigid.relative(*pose, *seen)) if parent == earth else (parent, seen)
             found.insert_components(above, track.child, moved, stamp_ns)
-    return found
+    return ground, found
 
 
 class FrameScene:
@@ -104,9 +95,10 @@ class FrameScene:
         """
         if not tree.frames:
             raise ValueInvalid("no frames in it: nothing to draw")
-        self.ground = None if tree.resolve_name(EARTH) in (fixed, below, target, source) else ground or _ground(tree)
-        if self.ground is not None:  # the Earth's centre is no place to look from
-            tree = _on(tree, self.ground)
+        self.ground: Ground | None = None
+        if tree.resolve_name(EARTH) not in (fixed, below, target, source):
+            # nothing is seen from the Earth's centre
+            self.ground, tree = _on_ground(tree, ground)
         tree.require(*filter(None, (fixed, below, target, source)))
         self.tree = tree
         self.tracks: dict[str, MovingTrack] = {track.child: track for track in tree.tracks() if not track.is_static}
@@ -117,21 +109,20 @@ class FrameScene:
         self.span_ns = min(first, default=0), max((track.last_ns for track in self.tracks.values()), default=0)
         self.at_ns = (max(first) if at_ns is None else at_ns) if first else None
         self.fixed = fixed or target or below or Counter(Snapshot(tree).roots.values()).most_common(1)[0][0]
-        self.chosen = self._choice(below, only)
-
-    def _choice(self, below: str | None, only: str | None) -> set[str]:
-        """Return the names to draw."""
-        chosen = {name for name in self.names if self.ground is None or name != self.ground[0]}
+        self.chosen = {name for name in self.names if self.ground is None or name != self.ground[0]}
         if below is not None:
-            chosen &= {*Snapshot(self.tree, self.at_ns).below(below)}
-        if self.path_only and self.target and self.source:
-            chosen &= set(self.tree.path(self.target, self.source, self.at_ns))
+            self.chosen &= {*Snapshot(tree, self.at_ns).below(below)}
+        if path_only and target and source:
+            self.chosen &= set(tree.path(target, source, self.at_ns))
         if only is not None:
-            matches = _expression(only)
-            chosen = {name for name in chosen if matches.search(name)}
-        if not chosen:
+            try:
+                with warnings.catch_warnings(action="ignore", category=FutureWarning):
+                    matches = re.compile(only)
+            except (re.error, OverflowError, RecursionError) as error:
+                raise ValueInvalid(f"{shown(only)} is not a regular expression: {error}") from None
+            self.chosen = {name for name in self.chosen if matches.search(name)}
+        if not self.chosen:
             raise ValueInvalid(f"no frame is left to draw: nothing matches{f' {shown(only)}' * (only is not None)}")
-        return chosen
 
     def poses(self) -> dict[str, Rigid]:
         """Return the pose in `fixed` of every chosen frame that is connected to it at the time."""
@@ -404,13 +395,20 @@ class Labels:
 
     def place_all(self) -> None:
         """Place a name next to each group of frames on one point inside the picture, nearest first."""
-        spots: dict[tuple[int, int], tuple[Flat, list[str]]] = {}
+        groups: dict[tuple[int, int], tuple[Flat, list[str]]] = {}
         for name in reversed(self._flat.nearest_last()):
             point = self._flat.origins[name]
             if self._flat.holds(point):
-                spots.setdefault((round(point.x / SAME), round(point.y / SAME)), (point, []))[1].append(name)
-        for point, names in spots.values():
-            if not self.place(self._around(words_of(names), point)):
+                groups.setdefault((round(point.x / SAME), round(point.y / SAME)), (point, []))[1].append(name)
+        for point, names in groups.values():
+            words, line = words_of(names), self._size.line
+            wide, (x, y, _) = self._size.measure(words), point
+            spots = (
+                label for away in DISTANCES for dx, dy in SIDES  # best first; at a side the name begins or ends there
+                for label in self.at(words, wide, point, x + dx * away * line - (1.0 - dx) / 2.0 * wide,
+                                     y + dy * away * line, away)
+            )  # fmt: skip
+            if not self.place(spots):
                 self.hidden += len(names)
 
     def place(self, spots: Iterable[Label]) -> bool:
@@ -432,14 +430,6 @@ class Labels:
         right, bottom = left + wide * math.ceil(length / wide), top + self._size.line
         if left >= 0.0 and right <= self._size.width and top >= 0.0 and bottom <= self._size.height:
             yield Label(words, point, (left - MARGIN, top, right + MARGIN, bottom), away)
-
-    def _around(self, words: str, point: Flat) -> Iterator[Label]:
-        """Yield the candidate positions of a name, best first."""
-        wide, line = self._size.measure(words), self._size.line
-        for away in DISTANCES:
-            for dx, dy in SIDES:
-                left = point.x + dx * away * line - (wide if dx < 0.0 else wide / 2.0 if dx == 0.0 else 0.0)
-                yield from self.at(words, wide, point, left, point.y + dy * away * line, away)
 
     def _cells(self, box: Box) -> Iterator[tuple[int, int]]:
         """Return the cells that a box covers; a point covers one."""

@@ -50,13 +50,11 @@ class Canvas:
 
     def runs(self, line: int, over: Mapping[Spot, Run]) -> list[Run]:
         """Return a line as runs of one colour; over: letters that replace cells."""
-        drawn = (over.get((line, column)) or self._character((line, column)) for column in range(self.columns))
+        drawn = []
+        for column in range(self.columns):
+            dots, colour = self.cells.get((line, column), (0, ""))
+            drawn.append(over.get((line, column)) or (chr(BRAILLE + dots) if dots else " ", colour))
         return [("".join(map(itemgetter(0), run)), colour) for colour, run in groupby(drawn, key=itemgetter(1))]
-
-    def _character(self, cell: Spot) -> Run:
-        dots, colour = self.cells.get(cell, (0, ""))
-        return chr(BRAILLE + dots) if dots else " ", colour
-
 
 COLOURS = ("red", "green", "blue")  # of axes
 ARROWS = "→↗↑↖←↙↓↘"
@@ -71,7 +69,14 @@ def terminal_lines(scene: FrameScene, columns: int, lines: int, eye: tuple[float
     margin = min(14.0, wide / 8.0, high / 8.0)
     size = Size(wide, high, margin, (6.0, 14.0), cell=(2, 4), line=4.0, measure=lambda words: 2.0 * cells(words))
     flat = Projection(scene, size, eye, most=True)
-    _draw(canvas, flat)
+    for parent, name in flat.links:
+        _mark_line(canvas, flat, flat.origins[parent], flat.origins[name], "bright_black", 3)
+    for stretch in (stretch for stretches in flat.trails.values() for stretch in stretches):
+        for begin, end in pairwise(map(flat.at, stretch)):
+            _mark_line(canvas, flat, begin, end, "magenta", 2)
+    for name in flat.nearest_last():
+        for axis, tip in flat.axes(name):
+            _mark_line(canvas, flat, flat.origins[name], tip, COLOURS[axis])
     labels = Labels(flat)
     outside = [name for name, point in flat.origins.items() if not flat.holds(point)]
     pointed = sum(labels.place(_at_edge(labels, flat, name)) for name in outside[:MOST_OUTSIDE])
@@ -81,7 +86,8 @@ def terminal_lines(scene: FrameScene, columns: int, lines: int, eye: tuple[float
     for number, label in enumerate(labels.placed):
         row, column = int(label.box[1]) // 4, int(label.box[0]) // 2 + 1
         style = "dim" if number < arrows else "bold"
-        letters |= {(row, column + at): (letter, style) for at, letter in enumerate(_letters(label.words))}
+        drawn = (each for letter in label.words for each in (letter, *[""] * (cells(letter) - 1)))  # wide ones take two
+        letters |= {(row, column + at): (letter, style) for at, letter in enumerate(drawn)}
     scale = _scale_line(flat, canvas.columns, eye, len(outside) - pointed + labels.hidden)
     return [*(canvas.runs(row, letters) for row in range(canvas.lines)), scale]
 
@@ -99,18 +105,6 @@ def print_terminal(scene: FrameScene, eye: tuple[float, float] = SLANTED, color:
     columns, lines = get_terminal_size()
     drawn = terminal_lines(scene, columns, lines - 1, eye)
     coloured_console(color).print(Text("\n").join(Text.assemble(*runs) for runs in drawn))
-
-
-def _draw(canvas: Canvas, flat: Projection) -> None:
-    """Draw the links, the trails and the axes."""
-    for parent, name in flat.links:
-        _mark_line(canvas, flat, flat.origins[parent], flat.origins[name], "bright_black", 3)
-    for stretch in (stretch for stretches in flat.trails.values() for stretch in stretches):
-        for begin, end in pairwise(map(flat.at, stretch)):
-            _mark_line(canvas, flat, begin, end, "magenta", 2)
-    for name in flat.nearest_last():
-        for axis, tip in flat.axes(name):
-            _mark_line(canvas, flat, flat.origins[name], tip, COLOURS[axis])
 
 
 def _mark_line(canvas: Canvas, flat: Projection, begin: Flat, end: Flat, colour: str, gap: int = 1) -> None:
@@ -156,13 +150,6 @@ def _scale_line(flat: Projection, columns: int, eye: tuple[float, float], hidden
     seen = f"in {printable(flat.scene.fixed)[:40]}{time}, from {azimuth}, {elevation} deg{more}"
     text = f"├{bar}┤ {metres:g} m  {seen}  axes "[: columns - 6]
     return [(text, ""), ("x", COLOURS[0]), (" ", ""), ("y", COLOURS[1]), (" ", ""), ("z", COLOURS[2])]
-
-
-def _letters(text: str) -> Iterator[str]:
-    """Yield the content of each cell of a text; a wide letter takes two, the second one empty."""
-    for letter in text:
-        yield letter
-        yield from [""] * (cells(letter) - 1)
 
 
 # where pens have all one colour, curves and turtles still differ: one colour a turtle, in the order of their names;

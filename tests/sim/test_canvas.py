@@ -9,8 +9,8 @@ from rich.console import Console
 
 from frametool.sim.scene import tutorial
 from frametool.sim.simulate import simulate
+from frametool.view.exports import Drawing, run_picture
 from frametool.view.pictures import ticks, write_svg
-from frametool.view.stills import Drawing, run_picture
 from frametool.view.terminal import Canvas, Screen
 
 

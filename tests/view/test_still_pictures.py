@@ -17,9 +17,9 @@ import frametool
 from frametool.errors import FileProblem
 from frametool.frames.lookups import FrameTree
 from frametool.geometry.transform import Transform
+from frametool.view.exports import HEIGHT, SIZE, WIDTH, still_picture
 from frametool.view.pictures import write_png, write_svg
 from frametool.view.scene import EYES, FrameScene, Labels, Projection, nice
-from frametool.view.stills import HEIGHT, SIZE, WIDTH, still_picture
 from frametool.view.terminal import Canvas, terminal_lines, terminal_text
 
 if TYPE_CHECKING:

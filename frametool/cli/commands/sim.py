@@ -136,8 +136,8 @@ class SimOutput:
         """Return what is written after the run, by file: what watches the steps, and what then makes the content."""
         pictures: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
         if self.plot:
+            from frametool.view.exports import Drawing, run_picture
             from frametool.view.pictures import write_picture
-            from frametool.view.stills import Drawing, run_picture
 
             run, suffix = Drawing(scene), suffix_of(self.plot)
             pictures[self.plot] = run.watch, lambda: write_picture(run_picture(run), suffix)

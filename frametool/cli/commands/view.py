@@ -146,8 +146,8 @@ def _content(
         from frametool.view.terminal import terminal_text
 
         return terminal_text(scene, *get_terminal_size(PIPE_SIZE), eye)
+    from frametool.view.exports import still_picture
     from frametool.view.pictures import write_picture
-    from frametool.view.stills import still_picture
 
     still = still_picture(scene, eye, title, before)
     for note in still.notes:
