@@ -9,9 +9,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Self
 
 from frametool.calc.evaluate import Scope, evaluate_line, read_line
-from frametool.calc.functions import in_radians
+from frametool.calc.functions import ANGLES, LIST, NUMBER, POINT, POSE, TREE, TWIST, VECTOR, Term, Type, in_radians
 from frametool.calc.parser import RADIAN, frame_text
-from frametool.calc.values import ANGLES, LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TREE, TWIST, VECTOR, Term, Type
 from frametool.errors import ValueInvalid, printable, shown
 from frametool.formats.table import FORMATS, is_trajectory
 from frametool.frames.lookups import Frames
@@ -87,23 +86,23 @@ class Framed:
     @property
     def xyz(self) -> Array:
         """The position of a pose or point, or the vector, shape (..., 3)."""
-        return self._stacked(self.components[:3])
+        return _stacked(self.components[:3])
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:  # noqa: FBT001 - numpy's signature
         """Return its numbers, shape (..., n); of a pose the 4x4 matrix."""
-        found = self.transform.as_matrix() if self.kind == POSE else self._stacked(self.components)
+        found = self.transform.as_matrix() if self.kind == POSE else _stacked(self.components)
         return found if dtype is None else found.astype(dtype, copy=bool(copy))
-
-    @staticmethod
-    def _stacked(parts: Components) -> Array:
-        import numpy as np
-
-        return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
     def __repr__(self) -> str:
         """Show kind, frames and numbers."""
         frames = str(self._term.type) if self.kind == POSE else f"in {frame_text(self.target)}"
         return f"<{self.kind} {frames} {self.components}>"
+
+
+def _stacked(parts: Components) -> Array:
+    import numpy as np
+
+    return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
 
 def calc(
@@ -137,7 +136,7 @@ def _result(term: Term) -> Any:
 
 
 def _term(name: str, value: Any) -> Term:
-    """Convert a Python value."""
+    """Convert a Python value; of arrays (..., 3) is points, (..., 6) twists, others numbers."""
     if isinstance(value, Framed):
         found = value._term  # noqa: SLF001 - its own module
     elif isinstance(value, Frames):
@@ -149,29 +148,22 @@ def _term(name: str, value: Any) -> Term:
     elif isinstance(value, Measure):
         found = Term(Type(NUMBER, unit=value.unit), (float(value),))
     elif isinstance(value, (int, float)) and not isinstance(value, bool):
-        found = Term(PLAIN_NUMBER, (parse_number(repr(float(value))),))  # refuses values that are not finite
+        found = Term(Type(NUMBER), (parse_number(repr(float(value))),))  # refuses values that are not finite
     elif isinstance(value, (list, tuple)) and value and isinstance(value[0], (Transform, Framed)):
         found = Term(Type(LIST), (), items=tuple(_term(name, each) for each in value))
     else:
-        found = _of_numbers(name, value)
+        import numpy as np
+
+        try:
+            array = np.asarray(None if isinstance(value, bool) else value, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ValueInvalid(f"{name}: an expression knows nothing of {shown(type(value).__name__)}") from None
+        if not np.isfinite(array).all():
+            raise ValueInvalid(f"{name}: the numbers are not finite")
+        kind = {3: POINT, 6: TWIST}.get(array.shape[-1] if array.ndim else 1, NUMBER)
+        columns = (array,) if kind == NUMBER else np.moveaxis(array, -1, 0)
+        found = Term(Type(kind), tuple(float(part) if part.ndim == 0 else part for part in columns))
     return found._replace(text=name)
-
-
-def _of_numbers(name: str, value: Any) -> Term:
-    """Convert an array: (..., 3) is points, (..., 6) twists, others numbers."""
-    import numpy as np
-
-    try:
-        array = np.asarray(None if isinstance(value, bool) else value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueInvalid(f"{name}: an expression knows nothing of {shown(type(value).__name__)}") from None
-    if not np.isfinite(array).all():
-        raise ValueInvalid(f"{name}: the numbers are not finite")
-    if array.ndim and array.shape[-1] in (3, 6):
-        kind = POINT if array.shape[-1] == 3 else TWIST
-        parts = tuple(float(part) if part.ndim == 0 else part for part in np.moveaxis(array, -1, 0))
-        return Term(Type(kind), parts)
-    return Term(PLAIN_NUMBER, (float(array) if array.ndim == 0 else array,))
 
 
 def plain_result(term: Term, style: Style) -> Any:

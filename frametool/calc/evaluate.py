@@ -4,7 +4,7 @@ A scope holds the names of an expression; a literal in braces is a pose in the g
 vector or a twist in the notation of results.
 
     scope = Scope(tree=frametool.load("robot.yaml"))
-    evaluate("inv(map<-base_link) * (map<-tool)", scope).type      # base_link<-tool
+    evaluate_line(read_line("inv(map<-base_link) * (map<-tool)"), scope).type      # base_link<-tool
     {xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}    {name: tool, parent: wrist, xyz: [0, 0, 0.1]}
     {frame: map, point: [1, 2, 3]}           {twist: [1, 0, 0, 0, 0, 0.5]}
 """
@@ -13,13 +13,11 @@ from __future__ import annotations
 
 import re
 from contextlib import contextmanager
-from copy import copy
 from typing import TYPE_CHECKING, Any
 
 from frametool.calc import functions
-from frametool.calc.functions import FUNCTIONS
+from frametool.calc.functions import FUNCTIONS, LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TWIST, VECTOR, Term, Type
 from frametool.calc.parser import PLAIN, RESERVED, UNITS, Branch, CalcError, Line, NoTree, frame_text, parse_line
-from frametool.calc.values import LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TWIST, VECTOR, RowValues, Term, Type, wanted
 from frametool.documents.document import parse_documents
 from frametool.documents.source import Source, error_at
 from frametool.errors import FormatError, FrametoolError, did_you_mean, shown, warn
@@ -29,8 +27,9 @@ from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose, read_pose
 from frametool.grammar.readers import Misfit, Reading, kind, read_numbers, slash_note, within
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
+    from frametool.calc.functions import RowValues
     from frametool.frames.lookups import Frames
     from frametool.geometry.place import Earth
     from frametool.geometry.types import Components
@@ -97,12 +96,6 @@ class Scope:
             self.warned.add(message)
             warn(message)
 
-    def with_row(self, row: Type) -> Scope:
-        """Return a copy of the scope for rows of a type."""
-        scope = copy(self)
-        scope.names, scope.row, scope.seen = dict(self.names), row, {None}
-        return scope
-
     def reading(self, source: Source) -> Reading:
         """Return how the literals of a text are read."""
         return Reading(source, degrees=self.degrees, normalize=self.normalize, earth=self.earth)
@@ -135,11 +128,6 @@ def located(at: int) -> Iterator[None]:
         raise
 
 
-def evaluate(text: str, scope: Scope) -> Term:
-    """Return the value of a line, assign it to its name, if any, and to `ans`; errors point into the line."""
-    return evaluate_line(read_line(text), scope)
-
-
 def read_line(text: str) -> Line:
     """Parse a line; errors point into it."""
     try:
@@ -149,7 +137,7 @@ def read_line(text: str) -> Line:
 
 
 def evaluate_line(line: Line, scope: Scope) -> Term:
-    """Return the value of a parsed line; otherwise as `evaluate`."""
+    """Return the value of a parsed line, assign it to its name, if any, and to `ans`; errors point into the line."""
     try:
         term = _Walk(line.text, scope).term(line.tree)
     except FrametoolError as error:
@@ -177,7 +165,7 @@ class _Walk:
     def _value(self, branch: Branch) -> Term:
         """Return the value of a part that is neither a tree nor a list."""
         with located(branch.at):
-            return wanted(self.term(branch))
+            return functions.wanted(self.term(branch))
 
     def _number(self, branch: Branch) -> Term:
         text, unit = branch.value
@@ -267,14 +255,35 @@ class _Walk:
         return functions.operated("negate", below) if branch.value == "-" else below
 
     def _power(self, branch: Branch) -> Term:
-        return functions.power(*map(self._value, branch.parts))
+        """Raise a number to a power, or scale a pose's screw motion: exp(f log); -1 is the inverse."""
+        base, exponent = map(self._value, branch.parts)
+        known = exponent.parts[0] if exponent.parts and exponent.type == PLAIN_NUMBER else None
+        if base.type.kind == POSE and type(known) is float and abs(known) == 1.0:
+            return base if known == 1.0 else functions.called("inv", [base])
+        return functions.operated("^", base, exponent)
 
     def _as(self, branch: Branch) -> Term:
+        """Name both frames of a pose."""
         target, source = map(self._bare, branch.value)
-        return functions.as_frames(self._value(branch.parts[0]), target, source)
+        term = self._value(branch.parts[0])
+        type_ = term.type
+        if type_.kind != POSE:
+            raise CalcError(f"only a pose has two frames; found {type_.named}")
+        if not (functions.meet(type_.target, target) and functions.meet(type_.source, source)):
+            raise CalcError(f"this is {type_} already")
+        return term._replace(type=type_._replace(target=target, source=source))
 
     def _in(self, branch: Branch) -> Term:
-        return functions.in_frame(self._value(branch.parts[0]), self._bare(branch.value.strip('"')))
+        """Name the frame of a point, a vector, a twist or angles."""
+        term, frame = self._value(branch.parts[0]), self._bare(branch.value.strip('"'))
+        type_ = term.type
+        if type_.kind not in functions.FRAMED:
+            hint = "; a pose has two: .. as TARGET<-SOURCE" if type_.kind == POSE else ""
+            raise CalcError(f"in names the frame of a point or vector; found {type_.named}{hint}")
+        if not functions.meet(type_.target, frame):
+            moved = f"({frame_text(frame)}<-{frame_text(type_.target)}) * .."
+            raise CalcError(f"this is in {shown(type_.target)} already; to move it: {moved}")
+        return term._replace(type=type_._replace(target=frame))
 
     def _bare(self, name: str, tree: Frames | None = None) -> str:
         """Remove one leading `/` from a frame's name, as tf2 does, unless a frame has this name.
@@ -294,11 +303,20 @@ class _Walk:
         tree = self._tree(named)
         target, source = (self._bare(each, tree) for each in frames)
         type_ = Type(POSE, target, source)
-        if when == "row":
-            self._row("@ row")
-            tree.latest(target, source)  # raises errors that do not depend on the time
-            return Term(type_, None, _at_row(tree, target, source))
-        return Term(type_, tree.lookup_components(target, source, None if when == "latest" else when))
+        if when != "row":
+            return Term(type_, tree.lookup_components(target, source, None if when == "latest" else when))
+        self._row("@ row")
+        tree.latest(target, source)  # raises errors that do not depend on the time
+
+        def at_row(row: RowValues) -> Components:
+            """Look up at the times of rows; rows without data are nan."""
+            if row.xp is not floats:
+                return tree.lookup_many(target, source, row.times_ns, missing="nan").components
+            found = tree.lookup_many(target, source, [row.times_ns], missing="nan").components  # the bits of many
+            single = tuple(float(column[0]) for column in found)
+            return single if single[6] == single[6] else tree.lookup_components(target, source, row.times_ns)
+
+        return Term(type_, None, at_row)
 
     def _tree(self, name: str) -> Frames:
         """Find the tree of a look-up."""
@@ -318,33 +336,6 @@ class _Walk:
             raise CalcError(f"{name} is not a tree but {scope.names[name].type.named}")
         scope.leave_out(tree.covariances)
         return tree
-
-
-def _at_row(tree: Frames, target: str, source: str) -> Callable[[RowValues], Components]:
-    """Return a function that looks up at the times of rows; rows without data are nan."""
-
-    def compute(row: RowValues) -> Components:
-        if row.xp is not floats:
-            return tree.lookup_many(target, source, row.times_ns, missing="nan").components
-        found = tree.lookup_many(target, source, [row.times_ns], missing="nan").components  # the bits of many
-        single = tuple(float(column[0]) for column in found)
-        return single if single[6] == single[6] else tree.lookup_components(target, source, row.times_ns)
-
-    return compute
-
-
-def once_a_block(term: Term) -> Term:
-    """Return the same value, computed once per block however often it is used."""
-    compute = term.compute
-    if term.parts is not None or compute is None:
-        return term
-
-    def once(row: RowValues) -> Components:
-        if id(compute) not in row.bound:
-            row.bound[id(compute)] = compute(row)
-        return row.bound[id(compute)]
-
-    return term._replace(compute=once)
 
 
 BETWEEN_WORDS = " \t()[]{},*^@+="

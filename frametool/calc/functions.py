@@ -1,24 +1,171 @@
-"""What operators and functions do with values: a table of what each takes, how frames and units meet, and the kernel.
+"""The values of expressions, and what operators and functions do with them.
 
-An angle in degrees stays in degrees where that is exact: in sums, and in sine and cosine.
+A value has a kind, frames, a unit, and its numbers, or the function that computes them.  An unknown frame is None,
+shown as `?`, and matches any.  Numbers are components, floats or arrays of one shape.  Operators and functions are
+tables of what each takes, how frames and units meet, and the kernel.  An angle in degrees stays in degrees where that
+is exact: in sums, and in sine and cosine.
 """
 
 from __future__ import annotations
 
 import operator
-from math import inf, nan
+from math import inf, isfinite, nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.calc.parser import METRE, PLAIN, RADIAN, CalcError, frame_text
-from frametool.calc.values import ANGLES, NUMBER, PLAIN_NUMBER, POINT, POSE, TWIST, VECTOR, Term, Type, made, meet
-from frametool.errors import first_of, shown
+from frametool.errors import ValueInvalid, first_of, shown
 from frametool.geometry import euler, floats, quaternion, rigid, validation
+from frametool.geometry.representations import EARTH_FRAMES
+from frametool.geometry.validation import single
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
-    from frametool.calc.values import Check, Kernel
+    from frametool.frames.lookups import Frames
     from frametool.geometry.types import Components, Namespace, Number, Rigid
+
+    Kernel = Callable[..., Components]
+    Check = Callable[..., str | None]
+
+POSE, POINT, VECTOR, NUMBER = "pose", "point", "vector", "number"
+TWIST, ANGLES, LIST, TREE = "twist", "angles", "list", "tree"
+FRAMED = (POINT, VECTOR, TWIST, ANGLES)  # kinds with one frame
+
+
+class Type(NamedTuple):
+    """What is known of a value without its numbers.
+
+    target, source: the frames of a pose; a point, vector, twist or angles are in `target`
+    unit: that of a number: m, rad, s or none
+    degrees: of an angle whose number is in degrees, so that right angles are exact
+    """
+
+    kind: str
+    target: str | None = None
+    source: str | None = None
+    unit: str = PLAIN
+    degrees: bool = False
+
+    def __str__(self) -> str:
+        """Format the frames of a pose, target<-source."""
+        return f"{frame_text(self.target)}<-{frame_text(self.source)}"
+
+    @property
+    def named(self) -> str:
+        """Return a description for messages."""
+        if self.kind == POSE:
+            return f"the pose {self}"
+        if self.kind == NUMBER:
+            return "a number" if self.unit == PLAIN else f"a number in {self.unit}"
+        if self.kind == LIST:
+            return "a list"
+        what = "angles" if self.kind == ANGLES else f"a {self.kind}"
+        return what if self.target is None else f"{what} in {shown(self.target)}"
+
+
+PLAIN_NUMBER = Type(NUMBER)
+
+
+class RowValues(NamedTuple):
+    """One row, or a block of rows: its pose, point or vector, the used columns, its time, and the functions.
+
+    bound: the values of names by the id of the function that computes them, so that each is computed once
+    """
+
+    parts: Components
+    cells: Mapping[str, Any]
+    times_ns: Any
+    xp: Namespace
+    bound: dict[int, Components]
+
+
+class Term(NamedTuple):
+    """An evaluated part of an expression: its type, and its numbers, or the function that computes them from a row.
+
+    parts: None if they depend on a row; items: those of a list; tree: for look-ups
+    text: as written
+    """
+
+    type: Type
+    parts: Components | None = None
+    compute: Callable[[RowValues], Components] | None = None
+    items: tuple[Term, ...] = ()
+    tree: Frames | None = None
+    text: str = ""
+
+    def at(self, row: RowValues | None) -> Components:
+        """Return the numbers, computed from a row if necessary."""
+        if self.parts is not None:
+            return self.parts
+        if row is None or self.compute is None:
+            raise CalcError("row is known in streams only: -i FILE, or standard input")
+        return self.compute(row)
+
+
+def made(type_: Type, kernel: Kernel, *operands: Term, check: Check | None = None) -> Term:
+    """Return the result of a kernel for the numbers of all operands: at once if they are known, else for each row.
+
+    kernel: takes the numbers, then the namespace with their functions
+    check: returns the reason why floats have no result, if there is one, or raises it
+    """
+
+    def computed(row: RowValues | None) -> Components:
+        numbers = tuple(part for each in operands for part in each.at(row))
+        if single(numbers):
+            return _of_floats(kernel, numbers, check)
+        return kernel(*numbers, row.xp) if row is not None else _of_arrays(kernel, numbers, check)
+
+    if all(each.parts is not None for each in operands):
+        return Term(type_, computed(None))
+    return Term(type_, None, computed)
+
+
+def _of_floats(kernel: Kernel, numbers: Components, check: Check | None) -> Components:
+    """Run a kernel on floats; a result that is not finite is an error."""
+    if check is not None and (reason := check(*numbers)):
+        raise CalcError(reason)
+    try:
+        result = kernel(*numbers, floats)
+    except ValueInvalid as error:
+        raise CalcError(str(error)) from None
+    except (ZeroDivisionError, OverflowError, ValueError):
+        result = (inf,)
+    if not all(map(isfinite, result)):
+        raise CalcError("the result is not finite")
+    return result
+
+
+def _of_arrays(kernel: Kernel, numbers: Components, check: Check | None) -> Components:
+    """Run a kernel on arrays of one shape; the first element without a finite result is an error."""
+    import numpy as np
+
+    from frametool.geometry import arrays
+
+    with np.errstate(all="ignore"):
+        result = kernel(*numbers, arrays)
+    bad = np.flatnonzero(~np.logical_and.reduce([np.isfinite(np.asarray(part)) for part in result]))
+    if bad.size:
+        full = np.broadcast_arrays(*numbers)
+        try:
+            _of_floats(kernel, tuple(float(part.reshape(-1)[bad[0]]) for part in full), check)
+        except CalcError as error:
+            raise CalcError(f"{error} (element {bad[0]})") from None
+    return result
+
+
+def meet(a: str | None, b: str | None) -> bool:
+    """Return True if two frames may be the same."""
+    return a is None or b is None or a == b or (a in EARTH_FRAMES and b in EARTH_FRAMES)
+
+
+def wanted(term: Term) -> Term:
+    """Refuse a tree or a list where one value is expected."""
+    if term.type.kind == TREE:
+        raise CalcError(f"{term.text} is a tree; ask it: {term.text}[TARGET<-SOURCE]")
+    if term.type.kind == LIST:
+        raise CalcError(f"{term.text} is a list of {len(term.items)}; only mean(..) takes one")
+    return term
+
 
 TO_RADIANS = 0.017453292519943295
 # the words of a rule that are no kinds
@@ -51,8 +198,12 @@ class Overload(NamedTuple):
         words = takes.split()
         words = words[:1] * len(terms) if words[-1] == ".." else words
         types = [term.type for term in terms]
-        if not types or len(words) != len(types) or not all(map(_fits, words, types)):
+        if not types or len(words) != len(types):
             return None
+        for word, type_ in zip(words, types, strict=True):
+            own, _, _ = word.partition(".")
+            if not (FITS[own](type_) if own in FITS else type_.kind == own):
+                return None
         if (known := _unified(sign, words, types)) is None:
             return None
         if "angle" in words or len({type_.degrees for type_ in types if type_.unit == RADIAN}) > 1:
@@ -65,11 +216,6 @@ class Overload(NamedTuple):
         else:
             type_ = Type(kind, known.get(letters[:1]), known.get(letters[1:]))
         return made(type_, self.kernel, *terms, check=self.check)
-
-
-def _fits(word: str, type_: Type) -> bool:
-    kind = word.partition(".")[0]
-    return FITS[kind](type_) if kind in FITS else type_.kind == kind
 
 
 def _unified(sign: str, words: Sequence[str], types: Sequence[Type]) -> dict[str, str | None] | None:
@@ -142,16 +288,6 @@ def _of_unit(kernel: Callable[..., Components]) -> Kernel:
     return lambda *pose: kernel(*unit_pose(*pose), pose[-1])
 
 
-def _roll_pitch_yaw(*pose: Number) -> Components:
-    *_, x, y, z, w = unit_pose(*pose)
-    return euler.from_quaternion(x, y, z, w, "sxyz", pose[-1])
-
-
-def _angle_between_poses(*both: Number) -> Components:
-    xp = both[-1]
-    return (rigid.distance(*unit_pose(*both[:7], xp), *unit_pose(*both[7:]), xp)[1],)
-
-
 def _angle_between_vectors(
     ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number, xp: Namespace
 ) -> Components:
@@ -189,29 +325,22 @@ def _part_of_motion(*numbers: Number) -> Components:
 
 
 def _power(base: Number, exponent: Number, xp: Namespace) -> Components:
-    if xp is floats:
-        return (_scalar_power(base, exponent),)
-    import numpy as np
-
-    powers: Any = np.frompyfunc(_scalar_power, 2, 1)  # numpy's own differs from that of floats
-    return (powers(base, exponent).astype(float),)
-
-
-def _scalar_power(base: float, exponent: float) -> float:
     """Return a power; nan if it is not real, infinite if it is too large."""
+    if xp is not floats:
+        import numpy as np
+
+        powers: Any = np.frompyfunc(lambda *pair: _power(*pair, floats)[0], 2, 1)  # numpy's own differs from floats'
+        return (powers(base, exponent).astype(float),)
     try:
         result = base**exponent
     except (OverflowError, ZeroDivisionError):
-        return inf
-    return nan if isinstance(result, complex) else float(result)
+        return (inf,)
+    return (nan if isinstance(result, complex) else float(result),)
 
 
-def _arcsine(value: Number, xp: Namespace) -> Components:
-    return (floats.bearing(value, xp.sqrt((1.0 - value) * (1.0 + value)), 1.0, xp),)
-
-
-def _arccosine(value: Number, xp: Namespace) -> Components:
-    return (floats.bearing(xp.sqrt((1.0 - value) * (1.0 + value)), value, 1.0, xp),)
+def _leg(value: Number, xp: Namespace) -> Number:
+    """Return the other leg of a right triangle with a hypotenuse of 1."""
+    return xp.sqrt((1.0 - value) * (1.0 + value))
 
 
 def _arctangent(value: Number, xp: Namespace) -> Components:
@@ -233,11 +362,6 @@ def _no_power(base: float, exponent: float) -> str:
     if base == 0.0 and exponent < 0.0:
         return "division by zero"
     return f"{base:g} has no power {exponent:g}" if base < 0.0 and exponent != int(exponent) else ""
-
-
-def _no_direction(*numbers: float) -> str:
-    is_known = any(numbers[:3]) and any(numbers[3:])
-    return "" if is_known else "vector 0 0 0 has no direction; the angle to it is not defined"
 
 
 def _within(name: str, least: float, most: float, words: str) -> Check:
@@ -310,14 +434,6 @@ def operated(sign: str, *terms: Term) -> Term:
     raise CalcError(f"cannot {refusal.format(*(term.type.named for term in terms), count=len(terms))}{remedy}")
 
 
-def power(base: Term, exponent: Term) -> Term:
-    """Raise a number to a power, or scale a pose's screw motion: exp(f log); -1 is the inverse."""
-    known = exponent.parts[0] if exponent.parts and exponent.type == PLAIN_NUMBER else None
-    if base.type.kind == POSE and type(known) is float and abs(known) == 1.0:
-        return base if known == 1.0 else called("inv", [base])
-    return operated("^", base, exponent)
-
-
 def _angular(pick: Callable[[Number, Number], Number]) -> list[Overload]:
     """Return the meanings of a function of an angle, from its sine and cosine; exact at quarter turns in degrees."""
     return [
@@ -332,7 +448,8 @@ FUNCTIONS: dict[str, tuple[str, Sequence[Overload]]] = {
     "trans": ("a pose", [Overload("pose.ab -> point.a", lambda *pose: pose[:3])]),
     "rot": ("a pose", [
         Overload("pose.ab -> pose.ab", lambda *pose: (*(0.0 * part for part in pose[:3]), *pose[3:7]))]),
-    "rpy": ("a pose", [Overload("pose.ab -> angles.a", _roll_pitch_yaw)]),
+    "rpy": ("a pose", [Overload("pose.ab -> angles.a", _of_unit(
+        lambda *pose: euler.from_quaternion(*pose[3:7], "sxyz", pose[7])))]),
     "log": ("a pose", [Overload("pose.ab -> twist.a", _of_unit(rigid.log))]),
     "exp": ("six numbers [vx, vy, vz, wx, wy, wz]", [Overload("twist.a -> pose.a", rigid.exp, rigid.check_twist)]),
     "dist": ("two poses or two points", [
@@ -342,8 +459,11 @@ FUNCTIONS: dict[str, tuple[str, Sequence[Overload]]] = {
     ]),
     "angle": ("a pose, two poses or two vectors", [
         Overload("pose.ab -> angle", _of_unit(lambda *pose: rigid.extent(*pose)[1:])),
-        Overload("pose.ab pose.ac -> angle", _angle_between_poses),
-        Overload("placed.a placed.a -> angle", _angle_between_vectors, _no_direction),
+        Overload("pose.ab pose.ac -> angle", lambda *both: rigid.distance(
+            *unit_pose(*both[:7], both[14]), *unit_pose(*both[7:]), both[14])[1:]),
+        Overload("placed.a placed.a -> angle", _angle_between_vectors, lambda *both: (
+            "" if any(both[:3]) and any(both[3:])
+            else "vector 0 0 0 has no direction; the angle to it is not defined")),
     ]),
     "interp": ("two poses, points or vectors and a fraction", [
         Overload("pose.ab pose.ab plain -> pose.ab", rigid.interpolate),
@@ -365,8 +485,10 @@ FUNCTIONS: dict[str, tuple[str, Sequence[Overload]]] = {
     "sin": ("an angle", _angular(lambda sine, _: sine)),
     "cos": ("an angle", _angular(lambda _, cosine: cosine)),
     "tan": ("an angle", _angular(lambda sine, cosine: sine / cosine)),
-    "asin": ("a plain number", [Overload("plain -> angle", _arcsine, _within("asin", -1.0, 1.0, "-1 .. 1"))]),
-    "acos": ("a plain number", [Overload("plain -> angle", _arccosine, _within("acos", -1.0, 1.0, "-1 .. 1"))]),
+    "asin": ("a plain number", [Overload("plain -> angle", lambda value, xp: (
+        floats.bearing(value, _leg(value, xp), 1.0, xp),), _within("asin", -1.0, 1.0, "-1 .. 1"))]),
+    "acos": ("a plain number", [Overload("plain -> angle", lambda value, xp: (
+        floats.bearing(_leg(value, xp), value, 1.0, xp),), _within("acos", -1.0, 1.0, "-1 .. 1"))]),
     "atan": ("a plain number", [Overload("plain -> angle", _arctangent)]),
     "sqrt": ("a plain number", [
         Overload("plain -> plain", lambda value, xp: (xp.sqrt(value),), _within(
@@ -381,28 +503,3 @@ def called(name: str, terms: Sequence[Term]) -> Term:
         return found
     what = first_of([term.type.named for term in terms], 3) or "nothing"
     raise CalcError(f"{name}() takes {takes}, found {what}")
-
-
-# --- frames of a value ---
-
-
-def as_frames(term: Term, target: str | None, source: str | None) -> Term:
-    """Return a pose with both its frames."""
-    type_ = term.type
-    if type_.kind != POSE:
-        raise CalcError(f"only a pose has two frames; found {type_.named}")
-    if not (meet(type_.target, target) and meet(type_.source, source)):
-        raise CalcError(f"this is {type_} already")
-    return term._replace(type=type_._replace(target=target, source=source))
-
-
-def in_frame(term: Term, frame: str) -> Term:
-    """Set the frame of a point, a vector, a twist or angles."""
-    type_ = term.type
-    if type_.kind not in (POINT, VECTOR, TWIST, ANGLES):
-        hint = "; a pose has two: .. as TARGET<-SOURCE" if type_.kind == POSE else ""
-        raise CalcError(f"in names the frame of a point or vector; found {type_.named}{hint}")
-    if not meet(type_.target, frame):
-        moved = f"({frame_text(frame)}<-{frame_text(type_.target)}) * .."
-        raise CalcError(f"this is in {shown(type_.target)} already; to move it: {moved}")
-    return term._replace(type=type_._replace(target=frame))

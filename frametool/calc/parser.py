@@ -91,28 +91,24 @@ def tokens_of(text: str) -> list[Token]:
     if len(text) > LONGEST:
         raise CalcError(f"an expression of {len(text)} characters; the most are {LONGEST}")
     tokens: list[Token] = []
-    blank, at, before = re.compile(r"\s*+"), 0, ""
+    blank, at = re.compile(r"\s*+"), 0
     while (at := blank.match(text, at).end()) < len(text):  # type: ignore[union-attr]
-        tokens.append(_token(text, at, before))
-        at, before = tokens[-1].end, tokens[-1].text
+        first = text[at]
+        if first == "{":
+            close = closing_brace(text, at)
+            token = Token("pose", text[at:close], at, close)
+        elif tokens and tokens[-1].text == "in" and (frame := re.compile(_FRAME).match(text, at)):
+            token = Token("frame", frame[0], at, frame.end())
+        elif found := _TOKEN.match(text, at):
+            kind, unit = found.lastgroup or "", found["unit"] or ""
+            frames = tuple(each.strip('"') for each in (found["target"], found["source"]) if each)
+            token = Token(kind, found["digits"] or found[0], at, found.end(), unit, frames)
+        else:
+            hint = f"; {HINTS[first]}" if first in HINTS else ""
+            raise CalcError(f"unexpected {odd_characters(first) or shown(first) + hint}", at)
+        tokens.append(token)
+        at = token.end
     return [*tokens, Token("end", "", at, at)]
-
-
-def _token(text: str, at: int, before: str) -> Token:
-    """Read the token at a position."""
-    first = text[at]
-    if first == "{":
-        close = closing_brace(text, at)
-        return Token("pose", text[at:close], at, close)
-    if before == "in" and (frame := re.compile(_FRAME).match(text, at)):
-        return Token("frame", frame[0], at, frame.end())
-    found = _TOKEN.match(text, at)
-    if found is None:
-        if strange := odd_characters(first):
-            raise CalcError(f"unexpected {strange}", at)
-        raise CalcError(f"unexpected {shown(first)}" + (f"; {HINTS[first]}" if first in HINTS else ""), at)
-    frames = tuple(each.strip('"') for each in (found["target"], found["source"]) if each)
-    return Token(found.lastgroup or "", found["digits"] or found[0], at, found.end(), found["unit"] or "", frames)
 
 
 def closing_brace(text: str, at: int) -> int:
@@ -315,8 +311,12 @@ class _Parser:
             self.take()
             parts, end = self._items(")", start)
             return Branch("call", start, start, end, text, parts)
-        if kind == "name" and self.has("["):
-            return self._asked(token)
+        if kind == "name" and self.has("["):  # a look-up in a named tree
+            self.take()
+            asked = self.take()
+            if asked.kind != "lookup":
+                raise CalcError(f"expected a look-up like {text}[TARGET<-SOURCE]", asked.start)
+            return self._lookup(asked, start, text)._replace(end=self.expect("]").end)
         if kind == "column":
             return Branch(kind, start, start, end, text.partition(".")[2].strip().strip('"'))
         if kind == "pose" or (kind == "name" and text not in ("as", "in")):
@@ -339,37 +339,24 @@ class _Parser:
         self.depth -= 1
         return tuple(items), end
 
-    def _asked(self, name: Token) -> Branch:
-        """Parse the look-up in a named tree: d[map<-base @ 2.5s]."""
-        self.take()
-        token = self.take()
-        if token.kind != "lookup":
-            raise CalcError(f"expected a look-up like {name.text}[TARGET<-SOURCE]", token.start)
-        branch = self._lookup(token, name.start, name.text)
-        end = self.expect("]").end
-        return branch._replace(end=end)
-
     def _lookup(self, token: Token, start: int, tree: str) -> Branch:
-        when: int | str | None = None
-        end = token.end
-        if self.has("@"):
-            self.take()
-            when, end = self._time()
-        return Branch("lookup", token.start, start, end, (token.frames, tree, when))
-
-    def _time(self) -> tuple[int | str, int]:
-        """Parse a time as nanoseconds, never through a float, or one of the words."""
+        """Parse the time of a look-up as nanoseconds, never through a float, or as one of the words."""
+        branch = Branch("lookup", token.start, start, token.end, (token.frames, tree, None))
+        if not self.has("@"):
+            return branch
+        self.take()
         sign = self.take().text if self.has("-", "+") else ""
-        token = self.take()
-        if token.kind == "name" and token.text in ("latest", "row") and not sign:
-            return token.text, token.end
-        if token.kind != "number" or not token.unit:
-            found = "" if token.kind == "end" else f", found {shown(token.text)}"
+        time = self.take()
+        if time.kind == "name" and time.text in ("latest", "row") and not sign:
+            return branch._replace(end=time.end, value=(token.frames, tree, time.text))
+        if time.kind != "number" or not time.unit:
+            found = "" if time.kind == "end" else f", found {shown(time.text)}"
             expected = "expected a time with its unit, 2.5s or 2500000000ns, or latest or row"
-            raise CalcError(f"{expected}{found}", token.start)
+            raise CalcError(f"{expected}{found}", time.start)
         from frametool.frames.stamps import parse_time
 
         try:
-            return parse_time(f"{sign}{token.text}{token.unit}"), token.end
+            when = parse_time(f"{sign}{time.text}{time.unit}")
         except ValueInvalid as error:
-            raise CalcError(str(error), token.start) from None
+            raise CalcError(str(error), time.start) from None
+        return branch._replace(end=time.end, value=(token.frames, tree, when))

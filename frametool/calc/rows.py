@@ -8,12 +8,12 @@ Also the poses of a table as one list, read like the rows of a stream.
 
 from __future__ import annotations
 
+from copy import copy
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.calc.evaluate import AXES, PLACED, Scope, evaluate_line, literal, once_a_block, term_of_pose
-from frametool.calc.functions import in_radians
+from frametool.calc.evaluate import AXES, PLACED, Scope, evaluate_line, literal, term_of_pose
+from frametool.calc.functions import ANGLES, LIST, NUMBER, POINT, POSE, TREE, VECTOR, RowValues, Term, Type, in_radians
 from frametool.calc.parser import RADIAN, CalcError, Line, needs_time, reads_row, walk
-from frametool.calc.values import ANGLES, LIST, NUMBER, POINT, POSE, TREE, VECTOR, RowValues, Term, Type
 from frametool.documents.source import Source, opened
 from frametool.errors import FormatError, FrametoolError
 from frametool.geometry.floats import RADIAN as DEGREES
@@ -129,7 +129,8 @@ class RowExpressions(Formula):
         return self._bound[type_]
 
     def _bind_all(self, type_: Type) -> Bound:
-        scope = self.scope.with_row(type_)
+        scope = copy(self.scope)
+        scope.names, scope.row, scope.seen = dict(self.scope.names), type_, {None}
         for line in self.bindings:
             self._bind(line, scope)
         terms = tuple((line.name, self._bind(line, scope)) for line in self.lines)
@@ -138,9 +139,20 @@ class RowExpressions(Formula):
         return Bound(terms, extras, frozenset(scope.seen))
 
     def _bind(self, line: Line, scope: Scope) -> Term:
+        """Evaluate a line; the value of a name is computed once per block however often it is used."""
         term = evaluate_line(line, scope)
-        if line.name:
-            term = scope.names[line.name] = once_a_block(scope.names[line.name])
+        compute = term.compute
+        if not line.name:
+            return term
+        if term.parts is None and compute is not None:
+
+            def once(row: RowValues) -> Components:
+                if id(compute) not in row.bound:
+                    row.bound[id(compute)] = compute(row)
+                return row.bound[id(compute)]
+
+            term = term._replace(compute=once)
+        scope.names[line.name] = term = term._replace(text=line.name)
         return term
 
     def _names(self, own: str, type_: Type) -> tuple[str, ...]:

@@ -11,9 +11,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import frametool
-from frametool.calc.evaluate import Scope, evaluate
-from frametool.calc.functions import FUNCTIONS
-from frametool.calc.values import TREE, Term, Type
+from frametool.calc.evaluate import Scope, evaluate_line, read_line
+from frametool.calc.functions import FUNCTIONS, TREE, Term, Type
 from frametool.errors import FrametoolError
 
 if TYPE_CHECKING:
@@ -114,7 +113,7 @@ WORTH: list[tuple[str, Any, str]] = [
 @pytest.mark.parametrize(("text", "expected", "what"), WORTH, ids=[row[0] for row in WORTH])
 def test_an_expression_is_worth_what_scipy_says_and_knows_its_frames(text: str, expected: Any, what: str) -> None:
     here = scope()
-    terms = [evaluate(line, here) for line in text.split(";")]
+    terms = [evaluate_line(read_line(line), here) for line in text.split(";")]
     found, expected = numbers(terms[-1]), np.asarray(expected, float).reshape(np.shape(numbers(terms[-1])))
     assert np.abs(found - expected).max() <= 1e-12 * max(1.0, np.abs(expected).max())
     assert terms[-1].type.named == what
@@ -266,7 +265,7 @@ TEXTS = [REFUSED[at : at + 3] for at in range(0, len(REFUSED), 3)]
 @pytest.mark.parametrize(("sentence", "text", "caret"), TEXTS, ids=[row[1].strip() for row in TEXTS])
 def test_what_does_not_fit_is_refused_with_its_place(sentence: str, text: str, caret: str) -> None:
     with pytest.raises(FrametoolError) as caught:
-        evaluate(text[2:], scope())
+        evaluate_line(read_line(text[2:]), scope())
     assert f"frametool: {caught.value}" == sentence
     assert getattr(caught.value, "snippet", "") == f"{text}\n{caret}"
 
@@ -287,9 +286,9 @@ def test_a_mistake_names_what_was_meant(text: str, hint: str) -> None:
     here = scope()
     *lines, wrong = text.split(";")
     for line in lines:
-        evaluate(line, here)
+        evaluate_line(read_line(line), here)
     with pytest.raises(FrametoolError) as caught:
-        evaluate(wrong, here)
+        evaluate_line(read_line(wrong), here)
     assert hint.replace("ROBOT", str(by.EXAMPLES / "robot.yaml")) in str(caught.value)
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from frametool.calc.evaluate import Scope, completions
-from frametool.calc.values import TREE, Term, Type
+from frametool.calc.functions import TREE, Term, Type
 from frametool.formats.load import load
 
 if TYPE_CHECKING:

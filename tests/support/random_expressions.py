@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import frametool
-from frametool.calc.evaluate import Scope, evaluate
-from frametool.calc.values import TREE, Term, Type
+from frametool.calc.evaluate import Scope, evaluate_line, read_line
+from frametool.calc.functions import TREE, Term, Type
 from frametool.errors import FrametoolError
 from frametool.geometry.transform import Transform
 
@@ -268,7 +268,7 @@ def check(seed: int) -> str:
     world = World(seed)
     node = world.anything()
     text, scope = text_of(node), Scope(tree=world.tree)
-    evaluate(f"goal = {text_of(world.goal)}", scope)
+    evaluate_line(read_line(f"goal = {text_of(world.goal)}"), scope)
     scope.names["t"] = Term(Type(TREE), (), tree=world.tree, text="t")
     try:
         expected = world.value(node)
@@ -278,7 +278,7 @@ def check(seed: int) -> str:
         return "undecided"
     if not expected:
         return check_refusal(text, scope)
-    found = evaluate(text, scope)
+    found = evaluate_line(read_line(text), scope)
     kind, first, second, numbers = expected
     assert found.type.kind == kind, text
     parts = found.at(None)
@@ -295,7 +295,7 @@ def check(seed: int) -> str:
 def check_refusal(text: str, scope: Scope) -> str:
     """See that an expression is refused with a caret."""
     with pytest.raises(FrametoolError) as caught:
-        evaluate(text, scope)
+        evaluate_line(read_line(text), scope)
     error = caught.value
     assert getattr(error, "snippet", "").count("\n") == 1, text
     return "refused"

@@ -12,9 +12,8 @@ import click
 
 from frametool.calc.api import line_of_value, machine_table, machine_text, plain_result
 from frametool.calc.evaluate import BETWEEN_WORDS, Scope, completions, evaluate_line, read_line
-from frametool.calc.functions import FUNCTIONS
+from frametool.calc.functions import FUNCTIONS, LIST, POINT, POSE, TREE, VECTOR, Term, Type, wanted
 from frametool.calc.parser import Line, mentions_row, walk
-from frametool.calc.values import LIST, POINT, POSE, TREE, VECTOR, Term, Type, wanted
 from frametool.cli.command import Command, Inputs, Text, argument, command_named, option, refuse
 from frametool.cli.commands.help import topic
 from frametool.cli.options import COLUMN, pose_result_options, reading_options
