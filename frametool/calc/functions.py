@@ -329,7 +329,7 @@ def _power(base: Number, exponent: Number, xp: Namespace) -> Components:
     if xp is not floats:
         import numpy as np
 
-        powers: Any = np.frompyfunc(lambda *pair: _power(*pair, floats)[0], 2, 1)  # numpy's own differs from floats'
+        powers: Any = np.frompyfunc(lambda a, b: _power(a, b, floats)[0], 2, 1)  # numpy's own differs from floats'
         return (powers(base, exponent).astype(float),)
     try:
         result = base**exponent
@@ -449,7 +449,7 @@ FUNCTIONS: dict[str, tuple[str, Sequence[Overload]]] = {
     "rot": ("a pose", [
         Overload("pose.ab -> pose.ab", lambda *pose: (*(0.0 * part for part in pose[:3]), *pose[3:7]))]),
     "rpy": ("a pose", [Overload("pose.ab -> angles.a", _of_unit(
-        lambda *pose: euler.from_quaternion(*pose[3:7], "sxyz", pose[7])))]),
+        lambda _x, _y, _z, x, y, z, w, xp: euler.from_quaternion(x, y, z, w, "sxyz", xp)))]),
     "log": ("a pose", [Overload("pose.ab -> twist.a", _of_unit(rigid.log))]),
     "exp": ("six numbers [vx, vy, vz, wx, wy, wz]", [Overload("twist.a -> pose.a", rigid.exp, rigid.check_twist)]),
     "dist": ("two poses or two points", [

@@ -74,39 +74,37 @@ def derived_pose(plan: DerivationStyle, title: str, own: Result, way: Callable[[
 
 
 def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationStyle) -> None:
-    """Continue from the quaternion to the requested notations, check both, and end with the command's own result."""
-    if own.pose.position is not None:
-        check_vector(sheet, derived[:3], own.pose.position)
-    for each in plan.notations:
-        degrees, keep_sign = each.in_degrees(plan.style.degrees), plan.style.keep_sign
-        found = operations.from_quaternion(sheet, derived[3:], each, degrees=degrees, keep_sign=keep_sign)
-        check_rotation(sheet, each, found, own, plan)
-    pose = own.pose
-    rows: list[Row] = []
-    if pose.position is not None and not any(each.representation.whole for each in plan.notations):
-        rows.append(row("xyz", "xyz", pose.position, METRES))
-    for each in plan.notations:
-        rows += _rotation_rows(own, each, plan.style)
-    rows += [row(key, [""], [own.extras[key]], unit) for key, unit in ANGLE_UNITS.items() if key in own.extras]
-    named = f"{printable(pose.parent)}_from_{printable(pose.name)}" if pose.parent and pose.name else ""
-    sheet.result(named, rows)
+    """Continue from the quaternion to the requested notations, check them, and end with the command's own result.
 
-
-def check_rotation(
-    sheet: Sheet, notation: Notation, numbers: Sequence[float], own: Result, plan: DerivationStyle
-) -> None:
-    """Compare numbers of a notation with the result as rotations, also near gimbal lock; explain the 4x4 of a pose.
-
-    Raises DerivationWrong.
+    Numbers of a notation are compared as rotations, also near gimbal lock.
     """
-    degrees = notation.in_degrees(plan.style.degrees)
-    target = quaternion.unit(*own.pose.components[3:], floats)
-    found = notation.to_quaternion(tuple(numbers), floats, degrees=degrees)
-    off = quaternion.distance(*quaternion.normalized(*found, floats), *target, floats) if any(found) else math.inf
-    if not off <= CLOSE * sheet.stretch:
-        raise DerivationWrong(f"the derivation in {notation.spec} is off by {off:.3g} rad from the result; {REPORT}")
-    if notation.representation.whole and own.pose.position is not None:
-        sheet.say("The 4x4 matrix of the pose: R on the left, the position as the fourth column, 0 0 0 1 below.")
+    pose, style = own.pose, plan.style
+    rows: list[Row] = []
+    if pose.position is not None:
+        check_vector(sheet, derived[:3], pose.position)
+        if not any(each.representation.whole for each in plan.notations):
+            rows.append(row("xyz", "xyz", pose.position, METRES))
+    target = quaternion.unit(*pose.components[3:], floats)
+    for each in plan.notations:
+        degrees, whole, angles = each.in_degrees(style.degrees), each.representation.whole, each.representation.angles
+        ends = operations.from_quaternion(sheet, derived[3:], each, degrees=degrees, keep_sign=style.keep_sign)
+        found = each.to_quaternion(tuple(ends), floats, degrees=degrees)
+        off = quaternion.distance(*quaternion.normalized(*found, floats), *target, floats) if any(found) else math.inf
+        if not off <= CLOSE * sheet.stretch:
+            raise DerivationWrong(f"the derivation in {each.spec} is off by {off:.3g} rad from the result; {REPORT}")
+        if whole and pose.position is not None:
+            sheet.say("The 4x4 matrix of the pose: R on the left, the position as the fourth column, 0 0 0 1 below.")
+        numbers = pose_numbers(pose, each, style)
+        if whole is not None:  # a matrix, a row a line
+            size = math.isqrt(len(numbers))
+            lines = [(("",) * size, numbers[at : at + size], "") for at in range(0, len(numbers), size)]
+        else:  # an axis and its angle are two lines
+            cut = angles[0] if angles else len(numbers)
+            angular = each.names[cut:], numbers[cut:], DEGREES if degrees else RADIANS
+            lines = [part for part in ((each.names[:cut], numbers[:cut], ""), angular) if part[1]]
+        rows += (row(each.spec * (not at), *line) for at, line in enumerate(lines))
+    rows += [row(key, [""], [own.extras[key]], unit) for key, unit in ANGLE_UNITS.items() if key in own.extras]
+    sheet.result(f"{printable(pose.parent)}_from_{printable(pose.name)}" if pose.parent and pose.name else "", rows)
 
 
 def check_vector(sheet: Sheet, derived: Sequence[float], own: Sequence[float]) -> None:
@@ -120,23 +118,6 @@ def check_vector(sheet: Sheet, derived: Sequence[float], own: Sequence[float]) -
 def row(label: str, names: Sequence[str], numbers: Sequence[float], unit: str = "") -> Row:
     """Return a line of the result, with all digits."""
     return Row(label, [(name, repr(number + 0.0)) for name, number in zip(names, numbers, strict=True)], unit)
-
-
-def _rows(label: str, numbers: Sequence[float], size: int) -> list[Row]:
-    """Return a matrix as rows of a size, with the label at the first."""
-    return [row(label * (not at), [""] * size, numbers[at : at + size]) for at in range(0, len(numbers), size)]
-
-
-def _rotation_rows(own: Result, notation: Notation, style: Style) -> list[Row]:
-    """Return the lines of one notation; a matrix has several, and so has an axis with its angle."""
-    numbers = pose_numbers(own.pose, notation, style)
-    if notation.representation.whole is not None:
-        return _rows(notation.spec, numbers, math.isqrt(len(numbers)))
-    angles = notation.representation.angles
-    first = angles[0] if angles else len(numbers)
-    unit = DEGREES if notation.in_degrees(style.degrees) else RADIANS
-    parts = [(notation.names[:first], numbers[:first], ""), (notation.names[first:], numbers[first:], unit)]
-    return [row(notation.spec * (at == 0), *part) for at, part in enumerate(each for each in parts if each[1])]
 
 
 def convert(

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from frametool.explain.run import Sheet, Values
     from frametool.frames.lookups import Frames
-    from frametool.frames.track import MovingTrack, Track
+    from frametool.frames.track import Track
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Rigid
     from frametool.grammar.pose import Pose
@@ -273,32 +273,30 @@ def _named(parent: str, child: str) -> str:
 
 
 def _edge(sheet: Sheet, track: Track, at_ns: int) -> Edge:
-    """Return an edge at a time, with its steps if it moves."""
-    child = printable(track.child)
+    """Return an edge at a time, with its steps if it moves.
+
+    It is between the last sample that is not after the time, else the first one, and the next one, if there is one.
+    """
+    parent, child = printable(track.parent), printable(track.child)
     if track.is_static:
-        return printable(track.parent), child, track.components
-    (begin_ns, parent, a), after = samples_around(track, at_ns)
+        return parent, child, track.components
+    samples = list(track.walk())
+    at = max(bisect_right(samples, at_ns, key=itemgetter(0)), 1)
+    begin_ns, seen_in, a = samples[at - 1]
+    end_ns, other, b = samples[at] if at < len(samples) else samples[at - 1]
     sheet.reached(a[:3])
-    edge, is_between = _named(parent, track.child), after is not None and begin_ns != at_ns
-    end_ns, other, b = after or (begin_ns, parent, a)
+    edge, is_between = _named(seen_in, track.child), end_ns != begin_ns != at_ns
     words = dict(zip(("begin", "end", "at"), map(format_stamp, (begin_ns, end_ns, at_ns)), strict=True))
-    if not is_between or other != parent:
+    if not is_between or other != seen_in:
         changes = {"changes": float(is_between)}
         sheet.play("sample", changes, edge=edge, pose=_line(sheet, a), other=printable(other), **words)
-        return printable(parent), child, a
+        return printable(seen_in), child, a
     sheet.reached(b[:3])
     with sheet.about(edge):
         values = sheet.play(
             "two samples", spans(begin_ns, end_ns, at_ns), a=_line(sheet, a), b=_line(sheet, b), **words
         )
-        return printable(parent), child, between(sheet, a, b, values["f"])
-
-
-def samples_around(track: MovingTrack, at_ns: int) -> tuple[Sample, Sample | None]:
-    """Return the last sample that is not after a time, else the first one; and the next one, if there is one."""
-    samples = list(track.walk())
-    at = max(bisect_right(samples, at_ns, key=itemgetter(0)), 1)
-    return samples[at - 1], samples[at] if at < len(samples) else None
+        return printable(seen_in), child, between(sheet, a, b, values["f"])
 
 
 def spans(begin_ns: int, end_ns: int, at_ns: int) -> Values:
@@ -307,19 +305,16 @@ def spans(begin_ns: int, end_ns: int, at_ns: int) -> Values:
 
 
 def _joined(sheet: Sheet, to_target: list[Edge], to_source: list[Edge]) -> Rigid:
-    """Multiply both branches and join them; if the branch to the target is empty nothing is inverted."""
-    products = [_product(sheet, edges) for edges in (to_target, to_source) if edges]
-    top, target, pose = products[0]
-    if not to_target:
-        return pose
-    back = inverse(sheet, pose, top, target)
-    return compose(sheet, back, products[1][2], (target, top, products[1][1])) if to_source else back
-
-
-def _product(sheet: Sheet, edges: Sequence[Edge]) -> Edge:
-    """Multiply the edges of a branch, topmost first."""
-    top, here, pose = edges[0]
-    for _, child, edge in edges[1:]:
-        pose = compose(sheet, pose, edge, (top, here, child))
-        here = child
-    return top, here, pose
+    """Multiply both branches, topmost edges first, and join them; without one to the target nothing is inverted."""
+    products = []
+    for edges in filter(None, (to_target, to_source)):
+        top, here, pose = edges[0]
+        for _, child, edge in edges[1:]:
+            pose, here = compose(sheet, pose, edge, (top, here, child)), child
+        products.append((top, here, pose))
+    top, end, pose = products[0]
+    if to_target:
+        pose = inverse(sheet, pose, top, end)
+    if len(products) > 1:
+        pose = compose(sheet, pose, products[1][2], (end, top, products[1][1]))
+    return pose

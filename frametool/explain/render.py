@@ -5,43 +5,42 @@ A line that begins with = + - or · continues the previous one.
 
 from __future__ import annotations
 
+import ast
 import re
+from functools import partial
 from itertools import groupby
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from frametool.errors import ValueInvalid, alternatives, shown
-from frametool.explain.formula_tree import as_latex, as_text, latex_number, parsed
-from frametool.explain.run import CAVEAT, HEADING, SENTENCE, Item, MatrixLine, Row, SheetResult, SheetStep, Words
+from frametool.explain.run import (
+    CAVEAT,
+    HEADING,
+    OPERATORS,
+    POWER,
+    PRODUCT,
+    SENTENCE,
+    SIGN,
+    SUM,
+    Item,
+    MatrixLine,
+    Row,
+    SheetResult,
+    SheetStep,
+    Words,
+    parsed,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
+
+    Leaf = Callable[[str], str]
 
 
 WIDTH = 80
 INDENT = "   "
 GLUE, CUT = "\u00a0", "\v"  # a non-breaking blank, and a place for a line break
 INDENTS = {HEADING: ("", INDENT), SENTENCE: (INDENT, INDENT), CAVEAT: (f"{INDENT}! ", f"{INDENT}  ")}
-
-
-def text_of(items: Sequence[Item]) -> str:
-    """Return a derivation as text."""
-    lines: list[str] = []
-    for is_step, group in groupby(items, lambda item: isinstance(item, SheetStep)):
-        if is_step:
-            lines += _steps([item for item in group if isinstance(item, SheetStep)])
-        else:
-            lines += [line for item in group for line in _lines(item)]
-    return "\n".join(lines).lstrip("\n") + "\n"
-
-
-def _lines(item: Item) -> list[str]:
-    """Return the lines of words, of matrices or of the result."""
-    if isinstance(item, Words):
-        return [""] * (item.kind == HEADING) + _wrapped(item.text, *INDENTS[item.kind])
-    if isinstance(item, SheetResult):
-        return ["", *_wrapped(f"Result: {item.text}" if item.text else "Result", "", INDENT), *result_lines(item.rows)]
-    return _grid(item) if isinstance(item, MatrixLine) else []
 
 
 def _wrapped(text: str, first: str, further: str) -> list[str]:
@@ -63,7 +62,10 @@ def equals(
 
 
 def _steps(steps: Sequence[SheetStep]) -> Iterator[str]:
-    """Write successive steps with their signs of equality below one another."""
+    """Write successive steps with their signs of equality below one another.
+
+    A long formula is broken before its plus and minus signs, or before a product.
+    """
     width = max(len(step.name) for step in steps)
     for step in steps:
         head = f"{INDENT}{step.name:<{width}} = "
@@ -76,16 +78,12 @@ def _steps(steps: Sequence[SheetStep]) -> Iterator[str]:
         elif len("".join(rest)) <= room:
             texts = [*first, *rest]
         for at, text in enumerate(texts):
-            yield from _broken(hang if at else head, text)
-
-
-def _broken(head: str, formula: str) -> list[str]:
-    """Write a formula; a long one is broken before its plus and minus signs, or before a product."""
-    lines = [head + formula]
-    for glued in (re.sub(r" (?![+-] )", GLUE, formula), formula.replace("·", f"{CUT}·")):
-        if max(map(len, lines)) > WIDTH:
-            lines = _wrapped(glued, head, " " * len(head))
-    return [line.replace(GLUE, " ").replace(CUT, "") for line in lines]
+            begin = hang if at else head
+            lines = [begin + text]
+            for glued in (re.sub(r" (?![+-] )", GLUE, text), text.replace("·", f"{CUT}·")):
+                if max(map(len, lines)) > WIDTH:
+                    lines = _wrapped(glued, begin, " " * len(begin))
+            yield from (line.replace(GLUE, " ").replace(CUT, "") for line in lines)
 
 
 def _grid(grid: MatrixLine) -> list[str]:
@@ -98,7 +96,9 @@ def _grid(grid: MatrixLine) -> list[str]:
         if isinstance(part, str):
             sign = f"{part} "
             continue
-        block = _side_by_side(sign, _block(part), f" {grid.unit}" if grid.unit and part is grid.parts[-1] else "")
+        widths = [max(map(len, column)) for column in zip(*part, strict=True)]
+        rows = [f"[{' '.join(cell.rjust(size) for cell, size in zip(row, widths, strict=True))}]" for row in part]
+        block = _side_by_side(sign, rows, f" {grid.unit}" if grid.unit and part is grid.parts[-1] else "")
         if groups and len(head) + len(groups[-1][0]) + 1 + max(map(len, block)) <= WIDTH:
             groups[-1] = [f"{left} {right}" for left, right in zip(groups[-1], block, strict=True)]
         else:
@@ -114,11 +114,6 @@ def _side_by_side(left: str, block: Sequence[str], right: str = "") -> list[str]
     """Add words to the left and to the right of the middle row of a block."""
     before, behind, middle = " " * len(left), " " * len(right), len(block) // 2
     return [left + row + right if at == middle else before + row + behind for at, row in enumerate(block)]
-
-
-def _block(rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(len(row[at]) for row in rows) for at in range(len(rows[0]))]
-    return [f"[{' '.join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))}]" for row in rows]
 
 
 def result_lines(rows: Sequence[Row]) -> list[str]:
@@ -137,6 +132,64 @@ def result_lines(rows: Sequence[Row]) -> list[str]:
                 texts = wrap("  ".join(cells), WIDTH - len(head), break_on_hyphens=False, break_long_words=False)
         lines += [(" " * len(head) if at else head) + text for at, text in enumerate(texts)]
     return lines
+
+
+CALLS = {"sqrt": r"\sqrt{%s}", "abs": r"\left\lvert %s \right\rvert"}
+CALLS |= {name: rf"\operatorname{{{name}}}\left(%s\right)" for name in ("atan2", "hypot")}
+EXPONENT = re.compile(r"e([+-]?)0*(\d+)$")
+
+
+def as_text(
+    node: ast.expr, leaf: Leaf, outer: int = 0, *, right: bool = False, latex: bool = False
+) -> str:  # fmt: skip
+    """Write a tree as arithmetic, with · for products and ^ for powers, or as LaTeX; `leaf` formats the names.
+
+    outer: the precedence of the enclosing operator; right: it is the right operand
+    """
+    write = partial(as_text, leaf=leaf, latex=latex)
+    if isinstance(node, ast.Constant):
+        return repr(node.value)
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+        name = node.func.id
+        call = CALLS.get(name, rf"\{name}\left(%s\right)") if latex else f"{name}(%s)"
+        return call % ", ".join(map(write, node.args))
+    if isinstance(node, ast.Name):
+        text = leaf(node.id)
+        loose = text.startswith("-") and (outer > SUM or right)
+        loose = loose or (r"\times" in text and outer > PRODUCT) or ("^" in text and outer >= POWER)
+    elif isinstance(node, ast.UnaryOp):
+        text = f"-{write(node.operand, outer=SIGN, right=True)}"
+        loose = outer > SUM or right
+    elif not isinstance(node, ast.BinOp):
+        raise TypeError(ast.dump(node))
+    elif latex and isinstance(node.op, ast.Div):
+        text = rf"\frac{{{write(node.left)}}}{{{write(node.right)}}}"
+        loose = outer > PRODUCT + 1
+    else:
+        binds, sign, _ = OPERATORS[type(node.op)]
+        first, second = write(node.left, outer=binds), write(node.right, outer=binds + 1, right=True)
+        text = first + sign + second
+        if latex and isinstance(node.op, ast.Pow):
+            text = f"{first}^{{{second}}}"
+        elif latex and isinstance(node.op, ast.Mult):
+            is_dot = first[-1].isdigit() or second[0].isdigit() or second.startswith(r"\left(-")  # next to a number
+            text = rf"{first} \cdot {second}" if is_dot else rf"{first} \, {second}"
+        loose = binds < outer
+    if not loose:
+        return text
+    return rf"\left({text}\right)" if latex else f"({text})"
+
+
+as_latex = partial(as_text, latex=True)
+
+
+def latex_number(text: str) -> str:
+    """Format a number's text as LaTeX: an exponent as a power of ten."""
+    found = EXPONENT.search(text)
+    if not found:
+        return text
+    sign = "-" if found[1] == "-" else ""
+    return rf"{text[: found.start()]} \times 10^{{{sign}{found[2]}}}"
 
 
 SYMBOLS = {
@@ -179,15 +232,40 @@ class Explanation:
 
     def __str__(self) -> str:
         """Return the text, of 80 columns if the numbers allow it."""
-        return text_of(self.items)
+        lines: list[str] = []
+        for is_step, group in groupby(self.items, lambda item: isinstance(item, SheetStep)):
+            if is_step:
+                lines += _steps([item for item in group if isinstance(item, SheetStep)])
+                continue
+            for item in group:
+                if isinstance(item, Words):
+                    lines += [""] * (item.kind == HEADING) + _wrapped(item.text, *INDENTS[item.kind])
+                elif isinstance(item, SheetResult):
+                    title = f"Result: {item.text}" if item.text else "Result"
+                    lines += ["", *_wrapped(title, "", INDENT), *result_lines(item.rows)]
+                elif isinstance(item, MatrixLine):
+                    lines += _grid(item)
+        return "\n".join(lines).lstrip("\n") + "\n"
 
     def __repr__(self) -> str:
         """Return a short description."""
         return f"<Explanation of {self.title}>"
 
     def markdown(self) -> str:
-        """Return Markdown with formulas between dollar signs, as GitHub and Jupyter show it."""
-        return "\n\n".join([f"## {_escaped(self.title)}", *_paragraphs(self.items)]) + "\n"
+        """Return Markdown with formulas between dollar signs, as GitHub and Jupyter show it; each run is one block."""
+        parts = [f"## {_escaped(self.title)}"]
+        for is_formula, group in groupby(self.items, lambda item: isinstance(item, (SheetStep, MatrixLine))):
+            if is_formula:
+                steps = [item for item in group if isinstance(item, (SheetStep, MatrixLine))]
+                parts.append(FORMULAS % " \\\\\n".join(line for item in steps for line in _aligned(item)))
+                continue
+            for item in group:
+                if isinstance(item, Words):
+                    parts.append(WORDS[item.kind] % _escaped(item.text))
+                elif isinstance(item, SheetResult):
+                    lines = [line.removeprefix(INDENT) for line in result_lines(item.rows)]
+                    parts.append(RESULT % (f": {_escaped(item.text)}" if item.text else "", "\n".join(lines)))
+        return "\n\n".join(parts) + "\n"
 
     _repr_markdown_ = markdown
 
@@ -199,21 +277,6 @@ class Explanation:
 
 
 FORMS: dict[str, Callable[[Explanation], str]] = {"text": Explanation.__str__, "markdown": Explanation.markdown}
-
-
-def _paragraphs(items: Sequence[Item]) -> Iterator[str]:
-    """Write the parts of a derivation in Markdown; successive formulas are one block."""
-    for is_formula, group in groupby(items, lambda item: isinstance(item, (SheetStep, MatrixLine))):
-        if is_formula:
-            lines = [line for item in group if not isinstance(item, (Words, SheetResult)) for line in _aligned(item)]
-            yield FORMULAS % " \\\\\n".join(lines)
-            continue
-        for item in group:
-            if isinstance(item, Words):
-                yield WORDS[item.kind] % _escaped(item.text)
-            elif isinstance(item, SheetResult):
-                lines = [line.removeprefix(INDENT) for line in result_lines(item.rows)]
-                yield RESULT % (f": {_escaped(item.text)}" if item.text else "", "\n".join(lines))
 
 
 def _aligned(item: SheetStep | MatrixLine) -> list[str]:

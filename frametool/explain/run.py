@@ -1,19 +1,22 @@
 """Evaluate the sheets in `sheets.txt`, the text of derivations: a `Sheet` fills in the numbers of a run.
 
-Also the steps that several sheets share, of angles and lengths.
+Also the steps that several sheets share, of angles and lengths.  A formula is one string in Python's arithmetic; its
+syntax tree gives the value, and in `render` the text and the LaTeX, so that the three cannot disagree.  The tree is
+interpreted; nothing is executed.
 """
 
 from __future__ import annotations
 
+import ast
 import math
+import operator
 import re
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from frametool.errors import ValueInvalid
-from frametool.explain.formula_tree import NOISE, cleaned, evaluated, holds, parsed
 from frametool.geometry import floats
 from frametool.geometry import matrix as kernel
 from frametool.geometry.quaternion import to_matrix
@@ -34,6 +37,64 @@ DIGITS = 6  # default of significant digits
 TOO_LARGE = "the numbers are too large or too small for a derivation: a step is not finite"
 MATRIX_STEP = re.compile(r"(-?)R(?:\((\w)\))?(\^T)? (\w+)(?: \+ (\w+))?")  # R(q) of qx .. qw, R of x y z w
 STEP = re.compile(r"(\S+) = (.*?)(?:  \[(.*)\])?")
+NOISE = 2e-15  # of the larger term: what the rounding of a few terms leaves where they cancel
+FAR = 16.0  # radians: a larger angle is as written, not a multiple of a rounded pi
+SUM, PRODUCT, SIGN, POWER = 1, 2, 3, 4  # precedence of operators
+# operator -> precedence, text, function
+OPERATORS: dict[type[ast.operator], tuple[int, str, Callable[[float, float], float]]] = {
+    ast.Add: (SUM, " + ", operator.add), ast.Sub: (SUM, " - ", operator.sub), ast.Mult: (PRODUCT, "·", operator.mul),
+    ast.Div: (PRODUCT, "/", operator.truediv), ast.Pow: (POWER, "^", lambda a, b: a ** int(b)),
+}  # fmt: skip
+# readers recompute a line with their own library: the values are those of `math`, not of the kernels
+FUNCTIONS: dict[str, Callable[..., float]] = {
+    "sin": math.sin, "cos": math.cos, "sqrt": math.sqrt, "atan2": math.atan2, "hypot": math.hypot, "abs": abs,
+    "min": min, "max": max,
+}  # fmt: skip
+COMPARISONS: dict[type[ast.cmpop], Callable[[float, float], bool]] = {
+    ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
+}  # fmt: skip
+@lru_cache(maxsize=1024)
+def parsed(formula: str) -> ast.expr:
+    """Return the syntax tree of a formula."""
+    return ast.parse(formula, mode="eval").body
+
+
+def evaluated(node: ast.expr, values: Mapping[str, float], noise: float = 0.0) -> float:
+    """Return the value of a tree; raises KeyError for a name without a value, ArithmeticError as `math` does.
+
+    noise: a sum of terms that cancel is 0 if it is no larger than this share of them; so are a sine and a cosine,
+        relative to their angle
+    """
+    match node:
+        case ast.Constant(value=int() | float() as number):
+            return float(number)
+        case ast.Name(id=name):
+            return math.pi if name == "pi" else values[name]
+        case ast.UnaryOp(operand=operand):
+            return -evaluated(operand, values, noise)
+        case ast.Call(func=ast.Name(id=name), args=nodes):
+            arguments = [evaluated(each, values, noise) for each in nodes]
+            number = float(FUNCTIONS[name](*arguments))
+            return cleaned(number, noise, min(abs(arguments[0]), FAR)) if name in ("sin", "cos") else number
+        case ast.BinOp(left=left, op=sign, right=right):
+            a, b = evaluated(left, values, noise), evaluated(right, values, noise)
+            number = OPERATORS[type(sign)][2](a, b)
+            return cleaned(number, noise, max(abs(a), abs(b))) if isinstance(sign, (ast.Add, ast.Sub)) else number
+    raise ValueError(ast.dump(node))
+
+
+def cleaned(number: float, noise: float, size: float) -> float:
+    """Return a number, or 0 if it is only the rounding error of numbers of a size."""
+    return 0.0 if abs(number) <= noise * size else number
+
+
+def holds(condition: str, values: Mapping[str, float]) -> bool:
+    """Return True if a comparison holds, or if a single number is not 0."""
+    node = parsed(condition)
+    if not isinstance(node, ast.Compare):
+        return evaluated(node, values) != 0.0
+    left, right = (evaluated(each, values) for each in (node.left, *node.comparators))
+    return COMPARISONS[type(node.ops[0])](left, right)
 
 
 class SheetLine(NamedTuple):

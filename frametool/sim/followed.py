@@ -15,21 +15,14 @@ from frametool.sim.drivers import ARRIVED, frame_of
 from frametool.sim.simulate import IssuedCommand, simulate
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from frametool.explain.render import Explanation
     from frametool.explain.run import Sheet, Values
     from frametool.sim.scene import Follow, Scene
 
     Sample = tuple[int, float, float, float]  # the pose of a frame in its parent: stamp in ns, x, y, theta
-
-
-class Sighting(NamedTuple):
-    """The position of a frame at a time, between two samples or at the first of them."""
-
-    at_ns: int
-    before: Sample
-    after: Sample | None = None
+    Sighting = tuple[int, Sample, Sample | None]  # a time, and the samples around it; only one if it is at that time
 
 
 class FollowStep(NamedTuple):
@@ -44,11 +37,6 @@ class FollowStep(NamedTuple):
     own: Sighting
     led: Sighting
     carrot: Sighting | None
-
-    @property
-    def target(self) -> str:
-        """Return the frame that is followed."""
-        return frame_of(self.follow.leader, self.follow.target)
 
 
 def follow_steps(scene: Scene, number: int) -> list[FollowStep]:
@@ -69,13 +57,22 @@ def follow_steps(scene: Scene, number: int) -> list[FollowStep]:
     samples: dict[str, list[Sample]] = {}  # turtles in the world, carrots relative to their leader
     reason, found = "", {}
     for step in simulate(scene):
-        for sent in step.broadcasts:
-            x, y, theta, *_ = step.poses.get(sent.child) or (*sent.transform.components[:2], 0.0)
-            samples.setdefault(sent.child, []).append((sent.stamp_ns, x, y, theta))
+        for stamp_ns, _, child, transform in step.broadcasts:
+            x, y, theta, *_ = step.poses.get(child) or (*transform.components[:2], 0.0)
+            samples.setdefault(child, []).append((stamp_ns, x, y, theta))
         reason = next((line for line in step.log if line.startswith("Could not transform")), reason)
         for command in step.commands:
-            if due.get(command.turtle) == step.t_ns:
-                found[command.turtle] = _step(number, command, followers[command.turtle], samples)
+            if due.get(command.turtle) != step.t_ns:
+                continue
+            follow = followers[command.turtle]
+            frames = command.turtle, follow.leader, frame_of(follow.leader, follow.target)
+            own, led, target = (samples[name] for name in frames)
+            own_ns = led_ns = min(own[-1][0], led[-1][0], target[-1][0])
+            if follow.delay_ns:
+                own_ns, led_ns = own[-1][0], command.t_ns - follow.delay_ns
+            carrot = None if target is led else _at(target, led_ns)
+            seen = _at(own, own_ns), _at(led, led_ns), carrot
+            found[command.turtle] = FollowStep(number, command, follow, *seen)
         if step.t_ns >= max(due.values()):
             break
     if missing := [name for name in followers if name not in found]:
@@ -84,21 +81,11 @@ def follow_steps(scene: Scene, number: int) -> list[FollowStep]:
     return [found[name] for name in followers]
 
 
-def _step(number: int, command: IssuedCommand, follow: Follow, samples: Mapping[str, Sequence[Sample]]) -> FollowStep:
-    frames = command.turtle, follow.leader, frame_of(follow.leader, follow.target)
-    own, led, target = (samples[name] for name in frames)
-    own_ns = led_ns = min(own[-1][0], led[-1][0], target[-1][0])
-    if follow.delay_ns:
-        own_ns, led_ns = own[-1][0], command.t_ns - follow.delay_ns
-    carrot = None if target is led else _at(target, led_ns)
-    return FollowStep(number, command, follow, _at(own, own_ns), _at(led, led_ns), carrot)
-
-
 def _at(samples: Sequence[Sample], at_ns: int) -> Sighting:
     """Return the samples around a time; only one if it is at that time, or the last."""
     after = bisect_right(samples, at_ns, key=itemgetter(0))
     before = samples[max(after - 1, 0)]
-    return Sighting(at_ns, before, None if before[0] == at_ns or after == len(samples) else samples[after])
+    return at_ns, before, None if before[0] == at_ns or after == len(samples) else samples[after]
 
 
 def derive_follow(plan: DerivationStyle, steps: Sequence[FollowStep]) -> Explanation:
@@ -107,7 +94,7 @@ def derive_follow(plan: DerivationStyle, steps: Sequence[FollowStep]) -> Explana
     def write(sheet: Sheet) -> None:
         rows = []
         for step in steps:
-            _add_law(sheet, step, _seen(sheet, step))
+            _derive(sheet, step)
             twist, name = step.command.twist, printable(step.command.turtle)
             label = f"{name} " if len(steps) > 1 else ""
             rows += [
@@ -120,9 +107,13 @@ def derive_follow(plan: DerivationStyle, steps: Sequence[FollowStep]) -> Explana
     return explained(plan, f"follow, step {steps[0].number}", write)
 
 
-def _seen(sheet: Sheet, step: FollowStep) -> Values:
-    """Add the position of the target in the follower's frame, as x and y."""
-    follower, leader, target = map(printable, (step.command.turtle, step.follow.leader, step.target))
+def _derive(sheet: Sheet, step: FollowStep) -> None:
+    """Add the position of the target in the follower's frame, as x and y, and the command for it.
+
+    Raises DerivationWrong if it is not the follower's.
+    """
+    frame = frame_of(step.follow.leader, step.follow.target)
+    follower, leader, target = map(printable, (step.command.turtle, step.follow.leader, frame))
     way = f"world_from_{leader}" + (f" @ {leader}_from_{target}" if step.carrot else "")
     words = {"follower": follower, "target": target, "way": way, "t": "t" if step.carrot else "1"}
     sheet.play("follow seen", {}, number=step.number, time=format_stamp(step.command.t_ns)[:-6], **words)
@@ -131,20 +122,7 @@ def _seen(sheet: Sheet, step: FollowStep) -> Values:
     _add_place(sheet, values, step.own, follower, "2", turns=True)
     if step.carrot:
         _add_place(sheet, values, step.carrot, f"{target} in {leader}", "c", turns=False)
-    return sheet.play("follow target", values, **words)
-
-
-def _add_place(sheet: Sheet, values: Values, seen: Sighting, name: str, index: str, *, turns: bool) -> None:
-    """Add the position of a frame: as published, or between two samples."""
-    (begin_ns, *before), (end_ns, *after) = seen.before, seen.after or seen.before
-    values |= dict(zip(("ax", "ay", "ah", "bx", "by", "bh"), (*before, *after), strict=True))
-    values |= spans(begin_ns, end_ns, seen.at_ns) | {"turns": float(turns), "between": float(seen.after is not None)}
-    at, begin, end = map(format_stamp, (seen.at_ns, begin_ns, end_ns))
-    sheet.play("follow place", values, name=name, i=index, at=at, begin=begin, end=end)
-
-
-def _add_law(sheet: Sheet, step: FollowStep, values: Values) -> None:
-    """Add the command for a target at x, y; raises DerivationWrong if it is not the follower's."""
+    sheet.play("follow target", values, **words)
     law, (linear, angular, _), distance = step.follow.controller, step.command.twist, step.command.distance or 0.0
     bearing = math.atan2(values["y"], values["x"])
     behind = bearing * angular * law.gain_angular < 0.0 and abs(abs(bearing) - math.pi) < 1e-9
@@ -155,9 +133,19 @@ def _add_law(sheet: Sheet, step: FollowStep, values: Values) -> None:
         "max_linear": law.max_linear, "max_angular": law.max_angular,
     }  # fmt: skip
     texts = {name: f"{each:g}" if float(f"{each:g}") == each else repr(each) for name, each in constants.items()}
-    sheet.play("follow law", values, follower=printable(step.command.turtle), **texts)
+    sheet.play("follow law", values, follower=follower, **texts)
     near = CLOSE * (1.0 + distance + 1.0 / max(distance, ARRIVED))  # largest for a small distance
     for name, own, gain in (("d", distance, 1.0), ("linear_x", linear, law.gain_linear),
                             ("angular_z", angular, law.gain_angular)):  # fmt: skip
         if not abs(values[name] - own) <= near * max(1.0, abs(gain)):
             raise DerivationWrong(f"the derived {name} is {values[name]!r}, not {own!r}; {REPORT}")
+
+
+def _add_place(sheet: Sheet, values: Values, seen: Sighting, name: str, index: str, *, turns: bool) -> None:
+    """Add the position of a frame: as published, or between two samples."""
+    at_ns, first, then = seen
+    (begin_ns, *before), (end_ns, *after) = first, then or first
+    values |= dict(zip(("ax", "ay", "ah", "bx", "by", "bh"), (*before, *after), strict=True))
+    values |= spans(begin_ns, end_ns, at_ns) | {"turns": float(turns), "between": float(then is not None)}
+    at, begin, end = map(format_stamp, (at_ns, begin_ns, end_ns))
+    sheet.play("follow place", values, name=name, i=index, at=at, begin=begin, end=end)

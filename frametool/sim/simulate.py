@@ -52,15 +52,6 @@ class IssuedCommand(NamedTuple):
     state: TurtleState
 
 
-class Broadcast(NamedTuple):
-    """A transform as published: the pose of `child` in `parent` at a time."""
-
-    stamp_ns: int
-    parent: str
-    child: str
-    transform: Transform
-
-
 class SimulationStep:
     """One instant with events; fields without events are empty.
 
@@ -72,7 +63,7 @@ class SimulationStep:
     commands: those of followers.
     led: those of leaders.
     walls: turtles that were moved back to the wall.
-    broadcasts: transforms that were published.
+    broadcasts: published transforms: stamp in nanoseconds, parent, child, the pose of the child in its parent.
     log: messages of turtlesim and the followers.
     clears: how often the drawing has been cleared so far.
     """
@@ -87,7 +78,7 @@ class SimulationStep:
         self.commands: list[IssuedCommand] = []
         self.led: list[IssuedCommand] = []
         self.walls: list[WallHit] = []
-        self.broadcasts: list[Broadcast] = []
+        self.broadcasts: list[tuple[int, str, str, Transform]] = []
         self.log: list[str] = []
         self.clears = 0
 
@@ -109,28 +100,30 @@ class Simulation:
     def broadcast(self, parent: str, child: str, transform: Transform) -> None:
         """Publish a transform: to the buffer, and to the step for observers."""
         self.buffer.insert(parent, child, transform, self.step.t_ns)
-        self.step.broadcasts.append(Broadcast(self.step.t_ns, parent, child, transform))
+        self.step.broadcasts.append((self.step.t_ns, parent, child, transform))
 
-    def tick(self) -> None:
-        """Advance turtlesim by one tick: service calls, motion, poses; at time 0 only poses."""
-        step, world = self.step, self.world
-        for call in self.calls:
-            try:
-                message = world.call(call.service, **call.arguments)
-            except ServiceRefused as refusal:
-                message = f"{call.place}: {refusal}" if call.place else str(refusal)
-            step.log += [message] if message else []
-        self.calls.clear()
-        step.is_tick = True
-        if step.t_ns:
-            step.walls = world.tick(step.t_ns)
-        step.clears = world.clears
-        for name, turtle in world.turtles.items():
-            pose = step.poses[name] = turtle.pose
-            step.states[name] = turtle.state
-            step.pens[name] = turtle.pen
-            self.broadcast(WORLD, name, planar(pose.x, pose.y, pose.theta))
-        self.states.update(step.states)
+    def ticks(self) -> Process:
+        """Fire turtlesim's timer: service calls, motion, poses; at time 0 only poses."""
+        for now_ns in count(0, TICK_NS):
+            yield now_ns
+            step, world = self.step, self.world
+            for call in self.calls:
+                try:
+                    message = world.call(call.service, **call.arguments)
+                except ServiceRefused as refusal:
+                    message = f"{call.place}: {refusal}" if call.place else str(refusal)
+                step.log += [message] if message else []
+            self.calls.clear()
+            step.is_tick = True
+            if now_ns:
+                step.walls = world.tick(now_ns)
+            step.clears = world.clears
+            for name, turtle in world.turtles.items():
+                pose = step.poses[name] = turtle.pose
+                step.states[name] = turtle.state
+                step.pens[name] = turtle.pen
+                self.broadcast(WORLD, name, planar(pose.x, pose.y, pose.theta))
+            self.states.update(step.states)
 
 
 def simulate(scene: Scene) -> Iterator[SimulationStep]:
@@ -144,7 +137,18 @@ def simulate(scene: Scene) -> Iterator[SimulationStep]:
     Raises ValueInvalid for an impossible scene.
     """
     simulation = Simulation(scene)
-    begun = ((next(process, None), rank, process) for rank, process in _processes(simulation, scene))
+    processes = [(TICKS, simulation.ticks())]
+    carrots = {(follow.leader, follow.target) for follow in scene.followers.values() if follow.target != "leader"}
+    processes += ((CARROTS, _carrot(simulation, leader, target)) for leader, target in sorted(carrots))
+    processes += ((CALLS, _service_call(simulation, call)) for call in scene.calls)
+    for name, _, driver in scene.turtles:
+        if isinstance(driver, Follow):
+            if driver.leader == name:
+                raise ValueInvalid(f"{name} cannot follow itself")
+            processes.append((CONTROLLERS, _controller(simulation, name, driver)))
+        elif driver is not None:
+            processes.append((LEADERS, _leader(simulation, name, driver)))
+    begun = ((next(process, None), rank, process) for rank, process in processes)
     queue = [(due_ns, rank, order, each) for order, (due_ns, rank, each) in enumerate(begun) if due_ns is not None]
     heapify(queue)
     while queue and (scene.duration_ns is None or queue[0][0] <= scene.duration_ns):
@@ -160,28 +164,6 @@ def simulate(scene: Scene) -> Iterator[SimulationStep]:
             else:
                 heapreplace(queue, (due_ns, rank, order, process))
         yield step
-
-
-def _processes(simulation: Simulation, scene: Scene) -> Iterator[tuple[int, Process]]:
-    """Yield all processes of a scene, each with its rank."""
-    yield TICKS, _ticks(simulation)
-    carrots = {(follow.leader, follow.target) for follow in scene.followers.values() if follow.target != "leader"}
-    yield from ((CARROTS, _carrot(simulation, leader, target)) for leader, target in sorted(carrots))
-    yield from ((CALLS, _service_call(simulation, call)) for call in scene.calls)
-    for turtle in scene.turtles:
-        if isinstance(turtle.driver, Follow):
-            if turtle.driver.leader == turtle.name:
-                raise ValueInvalid(f"{turtle.name} cannot follow itself")
-            yield CONTROLLERS, _controller(simulation, turtle.name, turtle.driver)
-        elif turtle.driver is not None:
-            yield LEADERS, _leader(simulation, turtle.name, turtle.driver)
-
-
-def _ticks(simulation: Simulation) -> Process:
-    """Fire turtlesim's timer."""
-    for now_ns in count(0, TICK_NS):
-        yield now_ns
-        simulation.tick()
 
 
 def _carrot(simulation: Simulation, turtle: str, target: str) -> Process:
@@ -232,7 +214,11 @@ def _controller(simulation: Simulation, name: str, follow: Follow) -> Process:
         if turtle is None:
             continue
         try:
-            x, y = _look(simulation.buffer, name, frame, step.t_ns, follow.delay_ns)
+            if follow.delay_ns:  # the turtle itself is taken to stand at its last pose (tf2's lookup across time)
+                then_ns = step.t_ns - follow.delay_ns
+                x, y, *_ = simulation.buffer.lookup_across(name, None, frame, then_ns, WORLD).components
+            else:
+                x, y, *_ = simulation.buffer.lookup(name, frame).components
         except LookupFailed as error:
             if type(error).__name__ != failing:
                 failing = type(error).__name__
@@ -246,16 +232,6 @@ def _controller(simulation: Simulation, name: str, follow: Follow) -> Process:
         turtle.command(twist)
         leader, state = simulation.states.get(follow.leader), simulation.states[name]
         step.commands.append(IssuedCommand(step.t_ns, name, twist, math.sqrt(x * x + y * y), leader, state))
-
-
-def _look(buffer: TransformBuffer, turtle: str, frame: str, now_ns: int, delay_ns: int) -> tuple[float, float]:
-    """Return a frame relative to the turtle: at the latest common time, or at `delay_ns` before now.
-
-    With a delay, the turtle itself is assumed static at its last pose in tf (tf2's lookup across time).
-    """
-    if not delay_ns:
-        return buffer.lookup(turtle, frame).components[:2]
-    return buffer.lookup_across(turtle, None, frame, now_ns - delay_ns, WORLD).components[:2]
 
 
 class RunSummary:
@@ -292,18 +268,16 @@ class RunSummary:
         if self.t_ns is None:
             yield "ended before the first step"
             return
-        yield from (printable(self._line(name, follow)) for name, follow in self._follows.items())
+        near = f"within {self.reach:g} m"
+        for name, follow in self._follows.items():
+            target = follow.leader if follow.target == "leader" else f"the {follow.target} of {follow.leader}"
+            soon = f"{near} after {_seconds(self.reached_ns[name])}" if name in self.reached_ns else f"never {near}"
+            distance = f"not in the world together with {follow.leader}"
+            if name in self.distances:
+                distance = f"final distance to {target} {self.distances[name]:.4f} m"
+            yield printable(f"{name}: {distance}; {soon}")
         hits = ", ".join(f"{printable(name)} {count}" for name, count in sorted(self.walls.items()))
         yield f"{_seconds(self.t_ns)} simulated; wall hits: {sum(self.walls.values())}" + (f" ({hits})" if hits else "")
-
-    def _line(self, name: str, follow: Follow) -> str:
-        target = follow.leader if follow.target == "leader" else f"the {follow.target} of {follow.leader}"
-        reached = self.reached_ns.get(name)
-        near = f"within {self.reach:g} m"
-        soon = f"never {near}" if reached is None else f"{near} after {_seconds(reached)}"
-        distance = f"final distance to {target} {self.distances[name]:.4f} m" if name in self.distances else ""
-        return f"{name}: {distance or f'not in the world together with {follow.leader}'}; {soon}"
-
 
 def goal(leader: TurtleState, follow: Follow, now_ns: int) -> TurtleState:
     """Return the position of a follower's target in the world."""

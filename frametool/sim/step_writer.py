@@ -70,13 +70,11 @@ class StepWriter:
         for emission in self._emissions(step, self._style):
             if not self._headed:
                 self._headed = True
-                yield self._header(emission)
+                if self._style.format == "text":
+                    yield _aligned({name: SHORT.get(name, name) for name in emission.cells})
+                elif self._style.format == "csv":
+                    yield row(emission.cells, self._style)
             yield self._record(emission)
-
-    def _header(self, emission: Emission) -> str:
-        if self._style.format == "text":
-            return _aligned({name: SHORT.get(name, name) for name in emission.cells})
-        return row(emission.cells, self._style) if self._style.format == "csv" else ""
 
     def _record(self, emission: Emission) -> str:
         labels, style = emission.labels, self._style
@@ -89,15 +87,11 @@ class StepWriter:
             case "csv":
                 return row(emission.cells.values(), style)
         digits = STEP_DECIMALS if style.precision is None else style.precision
-        texts = {name: _text_cell(cell, digits) for name, cell in emission.cells.items()}
+        texts = {}  # rounded for display; zero has no sign
+        for name, cell in emission.cells.items():
+            text = "-" if cell is None else printable(str(cell))
+            texts[name] = f"{round(cell, digits) + 0.0:.{digits}f}" if isinstance(cell, float) else text
         return _aligned(texts | {"t": f"{emission.cells['t']:.3f}"})
-
-
-def _text_cell(cell: Any, digits: int) -> str:
-    """Round for display; zero has no sign."""
-    if isinstance(cell, float):
-        return f"{round(cell, digits) + 0.0:.{digits}f}"
-    return "-" if cell is None else printable(str(cell))
 
 
 def _aligned(texts: Record) -> str:

@@ -173,11 +173,27 @@ class Turtle:
 
         Returns the pose outside the world from which the turtle was moved back to the wall, else None.
         """
-        self._take_command(now_ns)
-        for teleport in self._teleports:
-            self._teleport(*teleport)
+        if self._inbox is not None:
+            ahead, turning, aside = self._inbox
+            self._velocity = Twist(ahead, turning, aside if self.holonomic else 0.0)
+            self._commanded_ns = now_ns
+            self._inbox = self._heading = None
+        for is_relative, x, y, theta in self._teleports:
+            if is_relative:
+                self._theta += theta
+                self._x += math.cos(self._theta) * x
+                self._down -= math.sin(self._theta) * x
+            else:
+                self._x, self._down, self._theta = x, max(0.0, SIZE - y), theta
         self._teleports.clear()
-        self._turn_to_heading(now_ns)
+        if self._heading is not None:  # the goal of rotate_absolute
+            remaining = wrapped(self._heading - self._theta)
+            if abs(remaining) < TURN_NEAR:
+                self._heading = None
+                self._velocity = Twist(0.0, 0.0)
+            else:
+                self._velocity = Twist(0.0, math.copysign(TURN_SPEED, remaining))
+                self._commanded_ns = now_ns
         if now_ns - self._commanded_ns > TIMEOUT_NS:
             self._velocity = Twist(0.0, 0.0)
         ahead, turning, aside = self._velocity
@@ -185,44 +201,12 @@ class Turtle:
         cosine, sine = math.cos(self._theta), math.sin(self._theta)
         self._x += cosine * ahead * DT - sine * aside * DT
         self._down -= cosine * aside * DT + sine * ahead * DT
-        return self._stay_inside()
-
-    def _take_command(self, now_ns: int) -> None:
-        if self._inbox is None:
-            return
-        ahead, turning, aside = self._inbox
-        self._velocity = Twist(ahead, turning, aside if self.holonomic else 0.0)
-        self._commanded_ns = now_ns
-        self._inbox = self._heading = None
-
-    def _teleport(self, relative: bool, x: float, y: float, theta: float) -> None:  # noqa: FBT001 - a queued call
-        if relative:
-            self._theta += theta
-            self._x += math.cos(self._theta) * x
-            self._down -= math.sin(self._theta) * x
-        else:
-            self._x, self._down, self._theta = x, max(0.0, SIZE - y), theta
-
-    def _turn_to_heading(self, now_ns: int) -> None:
-        """Rotate towards the goal of rotate_absolute, if there is one."""
-        if self._heading is None:
-            return
-        remaining = wrapped(self._heading - self._theta)
-        if abs(remaining) < TURN_NEAR:
-            self._heading = None
-            self._velocity = Twist(0.0, 0.0)
-        else:
-            self._velocity = Twist(0.0, math.copysign(TURN_SPEED, remaining))
-            self._commanded_ns = now_ns
-
-    def _stay_inside(self) -> TurtleState | None:
         if 0.0 <= self._x <= SIZE and 0.0 <= self._down <= SIZE:
             return None
         outside = self.state
         self._x = min(max(self._x, 0.0), SIZE)
         self._down = min(max(self._down, 0.0), SIZE)
         return outside
-
 
 VARIANTS = ("ros1", "ros2")
 FAR = 1e9  # metres; beyond, a position is written with an exponent

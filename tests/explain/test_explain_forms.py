@@ -11,8 +11,8 @@ from written import HOSTILE, ROTATIONS, SPECS, pose, rotation, seeded
 import frametool
 from frametool import explain
 from frametool.cli import streaming
-from frametool.explain.formula_tree import as_latex, as_text, evaluated, parsed
-from frametool.explain.render import FORMS
+from frametool.explain.render import FORMS, as_latex, as_text
+from frametool.explain.run import evaluated, parsed
 
 if TYPE_CHECKING:
     from frametool.explain.render import Explanation

@@ -24,8 +24,7 @@ from frametool.documents.source import Source, read_text
 from frametool.errors import FileProblem, alternatives, shown
 from frametool.frames.stamps import BILLION
 from frametool.sim import drivers
-from frametool.sim.readers import lines_as_they_come, parse_spawn, read_commands, read_script
-from frametool.sim.scene import Scene, duration_ns, read_scene, tutorial
+from frametool.sim.scene import duration_ns, parse_spawn, read_scene, read_script, read_stream, tutorial
 from frametool.sim.simulate import RunSummary, event_log, simulate
 from frametool.sim.step_writer import EMITS, FORMS, StepWriter
 from frametool.sim.turtle import VARIANTS
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from frametool.sim.drivers import MakeLeader
+    from frametool.sim.scene import Scene
     from frametool.sim.simulate import Watch
 
 
@@ -189,9 +189,9 @@ def _from_stdin(*, paced: bool) -> MakeLeader:
         raise FileProblem("standard input is closed")
     say_if_typed()
     if not paced:
-        return drivers.scripted(read_commands(lines_as_they_come(sys.stdin.buffer, "stdin"), "stdin"))
+        return drivers.scripted(read_stream(sys.stdin.buffer, "stdin"))
     mailbox = drivers.Mailbox()
-    mailbox.fill_from(read_commands(lines_as_they_come(sys.stdin.buffer, "stdin"), "stdin", period_ns=0))
+    mailbox.fill_from(read_stream(sys.stdin.buffer, "stdin", period_ns=0))
     return mailbox
 
 
