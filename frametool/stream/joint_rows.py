@@ -18,7 +18,7 @@ from frametool.errors import (
     warn,
 )
 from frametool.formats.robots.joints import JointColumn, JointState, find_joint_columns
-from frametool.formats.robots.model import TURNING, Joint, JointValue, Robot
+from frametool.formats.robots.model import TURNING, JointValue, Robot
 from frametool.formats.table import FORMATS
 from frametool.ros import messages
 from frametool.stream.record_text import without_noise
@@ -75,7 +75,10 @@ class JointRows(Formula):
             raise Misused(f"{problem}; keep one", source=source)
         if missing := self.chain.missing(known):
             others = [name for place, name in enumerate(names) if place not in {column.place for column in found}]
-            raise Misused(_about_missing(missing, names, others), source=source, line=1)
+            near = did_you_mean(missing[0], others)
+            example = "or give it by --joint" if near else f"give --joint {missing[0]}=VALUE"
+            what = f"no column for joint{'s' * (len(missing) > 1)} {listing(missing)}{near or ';'} {example}"
+            raise Misused(f"{what}; columns: {first_of(names, 12, quote=bare)}", source=source, line=1)
         self.columns = tuple(names[column.place] for column in columns)
 
     def kind(self, row: str) -> str:  # noqa: ARG002 - whatever a row is
@@ -93,27 +96,15 @@ class JointRows(Formula):
         values = dict(self.constants)
         for column, cell in zip(self._read, cells, strict=True):
             values[column.joint] = value = JointValue(cell / column.per_metre, column.degrees)
-            self._look_at_limits(self.joints[column.joint], value, xp)
+            joint = self.joints[column.joint]
+            if joint.lower is None or joint.upper is None or joint.lower > joint.upper or joint.name in self._beyond:
+                continue
+            middle = 0.5 * (joint.lower + joint.upper)
+            if xp.furthest(value.plain - middle) > joint.upper - middle + SLACK:
+                self._beyond.add(joint.name)
+                unit = "rad" if joint.kind in TURNING else "m"
+                warn(f"joint {shown(joint.name)} goes beyond its limits {joint.lower:g} .. {joint.upper:g} {unit}")
         return self.chain.pose(values, xp)
-
-    def _look_at_limits(self, joint: Joint, value: Any, xp: Namespace) -> None:
-        """Warn once of a joint that goes beyond its limits."""
-        if joint.lower is None or joint.upper is None or joint.lower > joint.upper or joint.name in self._beyond:
-            return
-        middle = 0.5 * (joint.lower + joint.upper)
-        if xp.furthest(value.plain - middle) > joint.upper - middle + SLACK:
-            self._beyond.add(joint.name)
-            unit = "rad" if joint.kind in TURNING else "m"
-            warn(f"joint {shown(joint.name)} goes beyond its limits {joint.lower:g} .. {joint.upper:g} {unit}")
-
-
-def _about_missing(missing: Sequence[str], names: Sequence[str], others: Sequence[str]) -> str:
-    """Return which joints have no column; one of the others may be meant."""
-    near = did_you_mean(missing[0], others)
-    plural = "s" * (len(missing) > 1)
-    columns = first_of(names, 12, quote=bare)
-    example = f"give --joint {missing[0]}=VALUE" if not near else "or give it by --joint"
-    return f"no column for joint{plural} {listing(missing)}{near or ';'} {example}; columns: {columns}"
 
 
 def names_in(begin: bytes, fmt: str, source: str, wanted: str, *, header: bool = True) -> Sequence[str]:

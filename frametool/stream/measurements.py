@@ -111,7 +111,10 @@ def read_measurements(
         for file in files:
             first: dict[tuple[str, str], MeasuredRow] = {}
             rows: list[MeasuredRow] = []
-            for row in _reader(file)(file, request):
+            is_rows = file.format == "jsonl" and not re.search(WRAPPED, file.head())
+            read = _of_table if file.format in TABLES else _of_edges
+            read = _of_documents if is_rows or not file.holds_samples else read
+            for row in read(file, request):
                 if problem := _problem(row, first):
                     raise FormatError(problem, source=file.name, line=row.line)
                 rows.append(row)
@@ -144,13 +147,6 @@ def parted(place: str) -> tuple[str, int, int]:
     """Take a place apart: file, line, column; 0 where it does not say that."""
     file, line, column = re.fullmatch(r"(?s)(.*?)(?::(\d+))?(?::(\d+))?", place).groups("0")  # type: ignore[union-attr]
     return file, int(line), int(column)
-
-
-def _reader(file: FrameFile) -> Callable[[FrameFile, Request], Iterator[MeasuredRow]]:
-    is_rows = file.format == "jsonl" and not re.search(WRAPPED, file.head())
-    if is_rows or not file.holds_samples:
-        return _of_documents
-    return _of_table if file.format in TABLES else _of_edges
 
 
 def _problem(row: MeasuredRow, first: dict[tuple[str, str], MeasuredRow]) -> str:

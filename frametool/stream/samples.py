@@ -37,7 +37,7 @@ from frametool.stream.trajectories import TREE, gathered
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
 
     from frametool.geometry.types import Array
     from frametool.grammar.edges import Answers
@@ -87,9 +87,17 @@ def read_samples(
     reading = Reading(source, normalize=normalize)
     found: dict[Path, tuple[str, Pose, Pose]] = {}
     for document in parse_documents(source.text, source.name):
+        value, at = document.value, tuple[Any, ...]((document.index,))
+        is_one = type(value) is dict and not PARTNERS.keys().isdisjoint(value)
+        if type(value) is dict and "samples" in value and not is_one:
+            value, at = value["samples"], (*at, "samples")
+        if not is_one and type(value) is not list:
+            held = f"the keys {first_of([*value], MOST_KEYS, quote=shown)}" if type(value) is dict else kind(value)
+            what = f"expected samples {LIKE}, found {held}; two files of poses are GRIPPER TARGET"
+            raise Misfit(what, at).placed(source)
         try:
-            for path, value in _listed(document.value, (document.index,)):
-                found[path] = _sample(value, path, reading, eye_to_hand=eye_to_hand)
+            for path, sample in [(at, value)] if is_one else [((*at, row), each) for row, each in enumerate(value)]:
+                found[path] = _sample(sample, path, reading, eye_to_hand=eye_to_hand)
         except Misfit as misfit:
             raise misfit.placed(source) from None
     if not found:
@@ -97,9 +105,13 @@ def read_samples(
     tell(source, reading.notes)
     places = [f"{source.name}:{line}" for line, _ in locate_many(source.text, [*found])]
     keys, *sides = zip(*found.values(), strict=True)
-    names = [
-        _one_name(each, places) for side in sides for each in ([p.parent for p in side], [p.name for p in side])
-    ]  # fmt: skip
+    names: list[str | None] = []
+    for called in [[getattr(pose, role) for pose in side] for side in sides for role in ("parent", "name")]:
+        known = [*dict.fromkeys(filter(None, called))]
+        if len(known) > 1:
+            place = places[called.index(known[1])]
+            raise ValueInvalid(f"{place}: {shown(known[1])} is {shown(known[0])} in other samples")
+        names += known or [None]
     taken = ""
     if ROBOT in keys:
         ways = ("gripper<-base, inverted", "with") if eye_to_hand else ("base<-gripper", "without")
@@ -132,19 +144,6 @@ def _of_table(file: InputFile, fmt: str, columns: Sequence[str], *, normalize: b
     return HandEyeSamples(sides[0], sides[1], places, (None,) * 4, (file.name,), placed=placed)
 
 
-def _listed(value: Any, path: Path) -> Iterator[tuple[Path, Any]]:
-    """Yield the samples of a document with their paths."""
-    if type(value) is dict and not PARTNERS.keys().isdisjoint(value):
-        yield path, value
-        return
-    if type(value) is dict and "samples" in value:
-        value, path = value["samples"], (*path, "samples")
-    if type(value) is not list:
-        found = f"the keys {first_of([*value], MOST_KEYS, quote=shown)}" if type(value) is dict else kind(value)
-        raise Misfit(f"expected samples {LIKE}, found {found}; two files of poses are GRIPPER TARGET", path)
-    yield from (((*path, at), each) for at, each in enumerate(value))
-
-
 def _sample(value: Any, path: Path, reading: Reading, *, eye_to_hand: bool) -> tuple[str, Pose, Pose]:
     """Return the key of a sample's first pose, base_from_gripper, and camera_from_target."""
     sample = within(path, as_mapping, value, f"a sample {LIKE}")
@@ -174,14 +173,6 @@ def _pose(value: Any, path: Path, reading: Reading) -> Pose:
     if not {*COVARIANCE_KEYS}.isdisjoint(records[0].others) or records[0].shape.covariance:
         reading.note("the covariance of a sample is not used: all count alike", rule="left-out")
     return found
-
-
-def _one_name(names: Sequence[str | None], places: Sequence[str]) -> str | None:
-    """Return the one name that samples give a frame; raises ValueInvalid where they give several."""
-    known = [*dict.fromkeys(filter(None, names))]
-    if len(known) > 1:
-        raise ValueInvalid(f"{places[names.index(known[1])]}: {shown(known[1])} is {shown(known[0])} in other samples")
-    return known[0] if known else None
 
 
 class Points(NamedTuple):
@@ -220,11 +211,17 @@ def read_points(argument: str, *, fmt: str, answers: Answers, policy: Callable[[
             raise ValueInvalid(f"{place}: no {key}, the others have one")
         if (before := first.setdefault(str(label), place)) is not place:
             raise ValueInvalid(f"{place}: {key} {shown(str(label))} appears twice, first at {before}")
-    weights = extras.get(WEIGHT, ())
-    is_weighed = any(each is not None for each in weights)
-    read = [_weight(each, place) for each, place in zip(weights, places, strict=True)] if is_weighed else None
+    weights: list[float] = []
+    is_weighed = any(each is not None for each in extras.get(WEIGHT, ()))
+    for text, place in zip(extras[WEIGHT], places, strict=True) if is_weighed else ():
+        try:
+            weights.append(parse_number(str(text)))
+        except ValueInvalid as error:
+            raise ValueInvalid(f"{place}: weight: {error}") from None
+        if weights[-1] < 0.0:
+            raise ValueInvalid(f"{place}: weight is negative: {text}")
     frame = rows.parents[0] if len({*rows.parents}) == 1 else None
-    return Points(file.name, rows.numbers[:, :3], [*first] or None, read, places, frame)
+    return Points(file.name, rows.numbers[:, :3], [*first] or None, weights or None, places, frame)
 
 
 def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows) -> tuple[RowPoses, list[str]]:
@@ -249,34 +246,17 @@ def _of_documents(file: InputFile) -> tuple[RowPoses, list[str]]:
         pose = pose_of(record, request)
         if pose.position is None:
             raise Misfit("expected a point {id: .., xyz: [x, y, z]}", record.path).placed(source)
-        around = _around(known.values, record.path)
-        said = {key: around[key] for key in (*IDS, WEIGHT) if key in around}
+        said: dict[str, Any] = {}  # by the record and the mappings that hold it, up to the item of a list that it is
+        outermost = max((at for at, step in enumerate(record.path) if at and type(step) is int), default=0)
+        for depth in range(outermost, len(record.path)):
+            value = value_at(known.values, record.path[: depth + 1])
+            if type(value) is dict:
+                said |= {key: value[key] for key in (*IDS, WEIGHT) if type(value.get(key)) is str}
         results.append(Result(Pose(pose.position, IDENTITY, parent=record.parent.text), said))
     if not results:
         raise FormatError("no points in it; each is {id: .., xyz: [x, y, z]}", source=source.name)
     places = [f"{source.name}:{line}" for line, _ in locate_many(source.text, [each.path for each in known.records])]
     return block_of(results), places
-
-
-def _around(documents: dict[int, Any], path: Path) -> dict[str, Any]:
-    """Return the texts in a record and in the mappings that hold it, up to the item of a list that it is."""
-    first = max((at for at, step in enumerate(path) if at and type(step) is int), default=0)
-    found: dict[str, Any] = {}
-    for depth in range(first, len(path)):
-        value = value_at(documents, path[: depth + 1])
-        if type(value) is dict:
-            found |= {key: each for key, each in value.items() if type(each) is str}
-    return found
-
-
-def _weight(text: Any, place: str) -> float:
-    try:
-        weight = parse_number(str(text))
-    except ValueInvalid as error:
-        raise ValueInvalid(f"{place}: weight: {error}") from None
-    if weight < 0.0:
-        raise ValueInvalid(f"{place}: weight is negative: {text}")
-    return weight
 
 
 class Matched(NamedTuple):
