@@ -19,7 +19,7 @@ from frametool.errors import FormatError
 from frametool.text.numbers import odd_characters
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterator, Sequence
     from typing import BinaryIO
 
     from frametool.documents.source import Event, Path
@@ -37,9 +37,7 @@ class Document:
 
     def __init__(self, value: Any, index: int, source: Source) -> None:
         """Store the three."""
-        self.value = value
-        self.index = index
-        self.source = source
+        self.value, self.index, self.source = value, index, source
 
 
 def parse_documents(text: str, name: str, tags: Collection[str] = ()) -> list[Document]:
@@ -83,28 +81,23 @@ def locate_many(text: str, paths: Sequence[Path], *, key: bool = False) -> list[
 
 
 def _offsets(text: str, paths: Sequence[Path], *, key: bool) -> list[int]:
-    found = find_marks(events_of(text), paths) if paths else {}
-    return [mark_of(path, found, key=key) for path in paths]
+    """Iterate over the events of a text, and return the offset of the value, or of the key, at each path.
 
-
-def find_marks(events: Iterable[Event], paths: Sequence[Path]) -> dict[Path, tuple[int, int]]:
-    """Iterate over the events of a text and store the offsets of keys and values on the paths.
-
-    A path is (document, key or index, ...).  Returns (offset of the key, offset of the value) for each path and each
-    of its prefixes that the text has; in a list both are the value's.  The first of equal keys counts.
+    A path is (document, key or index, ...).  If the text does not have it, the offset is that of the nearest enclosing
+    value.  In a list the key is the value; the first of equal keys counts.
     """
     wanted = {path[:length] for path in paths for length in range(1, len(path) + 1)}
-    found: dict[Path, tuple[int, int]] = {}
+    found: dict[Path, tuple[int, int]] = {}  # the offsets of the key and of the value
     outer: list[tuple[Path, str | int | None]] = []
     path: Path = ()
     step: str | int | None = 0  # the next index or key; None when a key is expected
     key_start = 0
-    for kind, text, start, *_ in events:
+    for kind, word, start, *_ in events_of(text) if paths else ():
         if kind == END:
             path, step = outer.pop()
             continue
         if step is None:
-            step, key_start = text, start
+            step, key_start = word, start
             continue
         here = (*path, step)
         if here in wanted and here not in found:
@@ -115,15 +108,11 @@ def find_marks(events: Iterable[Event], paths: Sequence[Path]) -> dict[Path, tup
         if kind != LEAF:
             outer.append((path, step))
             path, step = here, 0 if kind == LIST else None
-    return found
-
-
-def mark_of(path: Path, found: dict[Path, tuple[int, int]], *, key: bool) -> int:
-    """Return the offset of the key or value at a path; if it is missing, that of the nearest enclosing value."""
-    for length in range(len(path), 0, -1):
-        if path[:length] in found:
-            return found[path[:length]][not (key and length == len(path))]
-    return 0
+    offsets = []
+    for each in paths:
+        length = next((length for length in range(len(each), 0, -1) if each[:length] in found), 0)
+        offsets.append(found[each[:length]][not (key and length == len(each))] if length else 0)
+    return offsets
 
 
 def format_error(

@@ -39,11 +39,17 @@ class _NoJson(FormatError):
 
 def looks_like_json(text: str) -> bool:
     """Return True if the first non-blank character opens an array, or an object with a quoted key or no key."""
-    first = _BLANKS.match(text).end()  # type: ignore[union-attr]
+    first = _end_of_blanks(text, 0)
     if not text.startswith("{", first):
         return text.startswith("[", first)
-    second = _BLANKS.match(text, first + 1).end()  # type: ignore[union-attr]
+    second = _end_of_blanks(text, first + 1)
     return second == len(text) or text[second] in '"}'
+
+
+def _end_of_blanks(text: str, begin: int) -> int:
+    """Return the offset of the next non-blank character."""
+    match = _BLANKS.match(text, begin)
+    return match.end() if match else begin
 
 
 def parse_json(source: Source) -> list[Any] | None:
@@ -60,56 +66,36 @@ def parse_json(source: Source) -> list[Any] | None:
 
 def strict_json(source: Source) -> list[Any]:
     """Return the values of a text that must be JSON; otherwise raises FormatError with the place."""
-    if source.text.count("[") + source.text.count("{") > sizes.MOST_CONTAINERS:
+    from json import JSONDecoder
+
+    text = source.text
+    if text.count("[") + text.count("{") > sizes.MOST_CONTAINERS:
         raise error_at(source, 0, too_much(0))
+    decode = JSONDecoder(object_pairs_hook=_distinct, parse_int=str, parse_float=str, parse_constant=str).raw_decode
+    values: list[Any] = []
+    end, limit = _end_of_blanks(text, 0), sys.getrecursionlimit()
+    sys.setrecursionlimit(limit + 4 * sizes.DEEPEST)  # the stack that json needs for deep nesting
     try:
-        values = _deeply_decoded(source)
+        while end < len(text):
+            value, end = decode(text, end)
+            values.append(value)
+            end = _end_of_blanks(text, end)
+    except RecursionError:
+        raise _too_deep(source) from None
     except _RepeatedKey:
-        raise repeated_key(source, json_events(source.text)) from None
-    except FormatError:
-        raise
+        raise repeated_key(source, json_events(text)) from None
     except ValueError as error:
         problem = getattr(error, "msg", str(error))
         message = f"not JSON: {problem[:1].lower()}{problem[1:]}"
         raise error_at(source, getattr(error, "pos", 0), message, _NoJson) from None
-    at = re.match(_WHOLE, source.text).end() if "\\u" in source.text else len(source.text)  # type: ignore[union-attr]
-    if at < len(source.text):
-        raise error_at(source, at, f"{source.text[at:at + 6]} is half a character; its other half is missing")
-    if not _settle(values, source.text):
-        raise _too_deep(source)
-    return values
-
-
-def _deeply_decoded(source: Source) -> list[Any]:
-    """Decode a text, with the stack that json needs for deep nesting within the limit."""
-    limit = sys.getrecursionlimit()
-    sys.setrecursionlimit(limit + 4 * sizes.DEEPEST)
-    try:
-        return _decoded(source.text)
-    except RecursionError:
-        raise _too_deep(source) from None
     finally:
         sys.setrecursionlimit(limit)
-
-
-def _decoded(text: str) -> list[Any]:
-    """Decode one value after another, up to the end."""
-    from json import JSONDecoder
-
-    decode = JSONDecoder(object_pairs_hook=_distinct, parse_int=str, parse_float=str, parse_constant=str).raw_decode
-    values = []
-    end = _end_of_blanks(text, 0)
-    while end < len(text):
-        value, end = decode(text, end)
-        values.append(value)
-        end = _end_of_blanks(text, end)
+    at = re.match(_WHOLE, text).end() if "\\u" in text else len(text)  # type: ignore[union-attr]
+    if at < len(text):
+        raise error_at(source, at, f"{text[at : at + 6]} is half a character; its other half is missing")
+    if not _settle(values, text):
+        raise _too_deep(source)
     return values
-
-
-def _end_of_blanks(text: str, begin: int) -> int:
-    """Return the offset of the next non-blank character."""
-    match = _BLANKS.match(text, begin)
-    return match.end() if match else begin
 
 
 def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -156,19 +142,14 @@ def json_events(text: str) -> Iterator[Event]:
             yield LEAF, word, token.start(), token.end(), "", 0
 
 
-def _depths(text: str) -> Iterator[tuple[int, int]]:
-    """Yield the depth and the offset of each list and map."""
-    depth = 0
-    for kind, _, start, *_ in json_events(text):
-        if kind != LEAF:
-            depth += -1 if kind == END else 1
-            yield depth, start
-
-
 def _too_deep(source: Source) -> FormatError:
     """Return the error for the bracket that exceeds the depth."""
-    at = next((start for depth, start in _depths(source.text) if depth > sizes.DEEPEST), 0)
-    return error_at(source, at, too_much(sizes.DEEPEST))
+    depth = 0
+    for kind, _, start, *_ in json_events(source.text):
+        depth += {LEAF: 0, END: -1}.get(kind, 1)
+        if depth > sizes.DEEPEST:
+            return error_at(source, start, too_much(sizes.DEEPEST))
+    return error_at(source, 0, too_much(sizes.DEEPEST))
 
 
 def dump(value: Any, number: Callable[[float], str] = repr) -> str:

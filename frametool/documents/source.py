@@ -224,28 +224,19 @@ def decode(data: bytes, name: str) -> str:
     try:
         text = data.decode(encoding)
     except UnicodeDecodeError as error:
-        raise _undecodable(data, name, encoding, error) from None
-    if "\0" in text:
-        raise _no_text(name, text[: text.index("\0")], not_text(data) or "not text: it holds a NUL byte")
-    return text
-
-
-def _undecodable(data: bytes, name: str, encoding: str, error: UnicodeDecodeError) -> FormatError:
-    """Return the error for the first invalid byte; the text before it is shown, and after it as far as possible."""
-    start = error.start + (3 if encoding == "utf-8-sig" and data.startswith(b"\xef\xbb\xbf") else 0)
-    before = data[:start].decode(encoding, "ignore")
-    if what := not_text(data):
-        return _no_text(name, before, what)
-    after = data[start : start + 200].decode(encoding, "replace")
-    label = "UTF-16" if encoding == "utf-16" else "UTF-8"
-    message = f"not {label}: byte 0x{data[start]:02x} does not belong there; convert the file (from Latin-1?)"
-    return error_at(Source(name, before + after), len(before), message)
-
-
-def _no_text(name: str, before: str, what: str) -> FormatError:
-    """Return the error for bytes after some text, without showing the line."""
+        start = error.start + (3 if encoding == "utf-8-sig" and data.startswith(b"\xef\xbb\xbf") else 0)
+        before, what = data[:start].decode(encoding, "ignore"), not_text(data)
+        if not what:  # the text before the byte is shown, and after it as far as possible
+            after = data[start : start + 200].decode(encoding, "replace")
+            label = "UTF-16" if encoding == "utf-16" else "UTF-8"
+            problem = f"not {label}: byte 0x{data[start]:02x} does not belong there; convert the file (from Latin-1?)"
+            raise error_at(Source(name, before + after), len(before), problem) from None
+    else:
+        if "\0" not in text:
+            return text
+        before, what = text[: text.index("\0")], not_text(data) or "not text: it holds a NUL byte"
     ((line, column),) = places_of(f"{before}.", [len(before)])
-    return FormatError(what, source=name, line=line, column=column)
+    raise FormatError(what, source=name, line=line, column=column)
 
 
 def not_text(data: bytes) -> str:
@@ -311,21 +302,14 @@ def line_of(text: str, line: int) -> str:
 
 def pointer(line: str, column: int) -> str:
     """Return the line with a caret below the column: tabs kept, wide characters count twice, long lines cut."""
-    line, column = _cut(line, column)
+    if len(line) > _WIDEST_SNIPPET:  # a window around the column
+        begin = max(0, min(column - _WIDEST_SNIPPET // 2, len(line) - _WIDEST_SNIPPET))
+        end, head = begin + _WIDEST_SNIPPET, "..." if begin else ""
+        column += len(head) - begin
+        line = head + line[begin:end] + ("..." if end < len(line) else "")
     visible = "".join(c if c.isprintable() or c == "\t" else "\ufffd" for c in line)
     gap = "".join("\t" if each == "\t" else " " * cells(each) for each in visible[: column - 1])
     return f"{visible}\n{gap}^"
-
-
-def _cut(line: str, column: int) -> tuple[str, int]:
-    """Shorten a long line to a window around the column."""
-    if len(line) <= _WIDEST_SNIPPET:
-        return line, column
-    begin = max(0, min(column - _WIDEST_SNIPPET // 2, len(line) - _WIDEST_SNIPPET))
-    end = begin + _WIDEST_SNIPPET
-    head = "..." if begin else ""
-    tail = "..." if end < len(line) else ""
-    return head + line[begin:end] + tail, column - begin + len(head)
 
 
 class InputFile:

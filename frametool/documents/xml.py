@@ -45,14 +45,6 @@ class XmlFile:
         snippet = pointer(line_of(text[0], 1), column)
         return FormatError(message, source=self.name, line=line, column=column, snippet=snippet, rule=rule)
 
-    def broken(self, error: expat.ExpatError) -> FormatError:
-        """Return a one-line error for invalid XML."""
-        if what := not_text(self.data):
-            return FormatError(what, source=self.name, line=1, column=1)
-        problem = "it ends too early" if error.code == _ENDS_EARLY else expat.ErrorString(error.code)
-        return self.at(error.lineno, error.offset + 1, f"not XML: {problem}")
-
-
 _ENDS_EARLY = 3  # expat's code for "no element found", also used for truncated text
 
 
@@ -175,7 +167,10 @@ def read_xml(file: InputFile, root: str = "", fmt: str = "") -> Element:
     try:
         parser.Parse(xml.data, True)  # noqa: FBT003 - expat's only way to say that this is all
     except expat.ExpatError as error:
-        raise xml.broken(error) from None
+        if what := not_text(xml.data):
+            raise FormatError(what, source=xml.name, line=1, column=1) from None
+        problem = "it ends too early" if error.code == _ENDS_EARLY else expat.ErrorString(error.code)
+        raise xml.at(error.lineno, error.offset + 1, f"not XML: {problem}") from None
     except (LookupError, ValueError) as error:  # of Python's codecs
         if isinstance(error, FormatError):
             raise

@@ -17,6 +17,7 @@ brackets after their key, `f1: {xyz: [0.9, 0, 2.0]}`, are read in the same way.
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 
 import yaml
 from yaml import AliasEvent, MappingStartEvent, ScalarEvent, SequenceStartEvent, StreamEndEvent
@@ -79,15 +80,11 @@ def split_brackets(text: str) -> tuple[str, list[Any]] | None:
     """
     if re.search(_NOT_PLAIN, text):
         return None
-    found: list[str] = []
-
-    def stand_in(match: re.Match[str]) -> str:
-        found.append(match[2])
-        return f"{match[1]}{STANDIN}"
-
-    rest = re.sub(_BRACKETED, stand_in, text)
+    parts = re.split(_BRACKETED, text)  # text, key, value, text, key, value, ..
+    found = parts[2::3]
+    parts[2::3] = [STANDIN] * len(found)
     items = _as_json("\n".join(found)) if found else None
-    return None if items is None else (rest, items)
+    return None if items is None else ("".join(parts), items)
 
 
 def _as_json(lines: str) -> list[Any] | None:
@@ -124,9 +121,16 @@ _HINTS = {
 def translated(source: Source, error: Exception) -> FormatError:
     """Convert an error of the parser: lower case, with its place, and a hint if one is known."""
     if isinstance(error, yaml.MarkedYAMLError) and (mark := error.problem_mark or error.context_mark):
-        line = mark.line + 1
-        message = _message(error, line_of(source.text, line), mark.column + 1)
-        return error_at(source, mark.index, message + _suspicion(source, line))
+        line, column = line_of(source.text, mark.line + 1), mark.column
+        problem, context = _one_line(error.problem or ""), _one_line(error.context or "")
+        has_tab = "\t" in (line[column : column + 1], *line[:column].split(" "))
+        if "maximum nesting depth" in problem:  # of libyaml, which reads ahead
+            message = too_much(sizes.DEEPEST)
+        elif has_tab and re.search("cannot start any token|tab character", problem):
+            message = "a tab cannot indent YAML; use blanks"
+        else:
+            message = problem + (_HINTS.get(problem) or (f", {context}" if context else ""))
+        return error_at(source, mark.index, message + _suspicion(source, mark.line + 1))
     if strange := re.search(_UNREADABLE, source.text):
         code = f"U+{ord(strange[0]):04X}"
         return error_at(source, strange.start(), f"the character {code} is not allowed in YAML or JSON; is this text?")
@@ -148,17 +152,6 @@ def _suspicion(source: Source, line: int) -> str:
 def _one_line(text: str) -> str:
     """Join the lines of the parser's text, in lower case."""
     return " ".join(text.split()).lower()
-
-
-def _message(error: yaml.MarkedYAMLError, line: str, column: int) -> str:
-    """Return what is wrong at a column of a line, from the parser's problem and its context."""
-    problem, context = _one_line(error.problem or ""), _one_line(error.context or "")
-    if "maximum nesting depth" in problem:  # of libyaml, which reads ahead
-        return too_much(sizes.DEEPEST)
-    has_tab = "\t" in (line[column - 1 : column], *line[: column - 1].split(" "))
-    if has_tab and re.search("cannot start any token|tab character", problem):
-        return "a tab cannot indent YAML; use blanks"
-    return problem + (_HINTS.get(problem) or (f", {context}" if context else ""))
 
 
 TAG = "!"  # the key for the tag of a mapping: no plain key of YAML looks like it
@@ -189,22 +182,17 @@ def parse_yaml(source: Source, tags: Collection[str] = ()) -> list[Value]:
     """
     if source.text.count("\n%TAG") > _MOST_DIRECTIVES:
         raise error_at(source, source.text.index("\n%TAG") + 1, f"more than {_MOST_DIRECTIVES} %TAG directives")
-    with paused_collector():
-        return _read_aside(source, tags) or _Builder(source, tags).build()
-
-
-def _read_aside(source: Source, tags: Collection[str]) -> list[Value] | None:
-    """Read a long text whose plain lists of maps or values in brackets are read as JSON; None for others and errors."""
     text = source.text
-    split = None if len(text) < sizes.ASIDE or STANDIN in text else split_run(text) or split_brackets(text)
-    if split is None:
-        return None
-    aside = iter(split[1])
-    try:
-        values = _Builder(Source(source.name, split[0]), tags, aside).build()
-    except FormatError:
-        return None
-    return values if next(aside, None) is None else None
+    with paused_collector():
+        # plain lists of maps, or values in brackets, of a long text are read as JSON; errors are left to the parser
+        split = None if len(text) < sizes.ASIDE or STANDIN in text else split_run(text) or split_brackets(text)
+        if split is not None:
+            aside = iter(split[1])
+            with suppress(FormatError):
+                values = _Builder(Source(source.name, split[0]), tags, aside).build()
+                if next(aside, None) is None:
+                    return values
+        return _Builder(source, tags).build()
 
 
 def yaml_events(text: str) -> Iterator[Event]:
@@ -344,22 +332,18 @@ class _Builder:
         self.aliases -= 1
         if self.aliases < 0:
             raise self._error(event, f"more than {MOST_ALIASES} aliases")
-        return self._copy(event, value)
-
-    def _copy(self, event: AliasEvent, value: Value) -> Value:
-        """Copy level by level, so that no depth can exhaust the stack."""
         root: list[Value] = [value]
-        level: list[Any] = [root]
+        level: list[Any] = [root]  # copied level by level, so that no depth can exhaust the stack
         for _ in range(sizes.DEEPEST + 1 - len(self.open)):
             below = []
             for container in level:
                 self.copies -= len(container)
                 if self.copies < 0:
                     raise self._error(event, f"aliases repeat more than {SPARE_COPIES + len(self.source.text)} values")
-                for key, inner in list(container.items() if type(container) is dict else enumerate(container)):
+                for at, inner in list(container.items() if type(container) is dict else enumerate(container)):
                     if type(inner) is dict or type(inner) is list:
-                        container[key] = inner.copy()
-                        below.append(container[key])
+                        container[at] = inner.copy()
+                        below.append(container[at])
             if not below:
                 return root[0]
             level = below

@@ -47,7 +47,18 @@ def flow(value: Any, number: Callable[[float], str] = repr) -> str:
         return "{" + ", ".join(f"{_key(key, value)}: {flow(each, number)}" for key, each in value.items()) + "}"
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(flow(each, number) for each in value) + "]"
-    return _scalar(value, number)
+    if isinstance(value, str):
+        return str(value) if isinstance(value, Verbatim) else quoted(value)
+    if value is None:
+        return "null"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if not isinstance(value, float):
+        return repr(value)
+    if not -_INFINITE < value < _INFINITE:
+        raise ValueInvalid(f"{value!r} is not finite and cannot be written")
+    text = number(value)
+    return text if "e" not in text or "." in text else text.replace("e", ".0e")  # with the point that YAML 1.1 needs
 
 
 def quoted(text: str) -> str:
@@ -73,25 +84,6 @@ def _escape(match: re.Match[str]) -> str:
     return _ESCAPES.get(match[0]) or (f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}")
 
 
-def _scalar(value: Any, number: Callable[[float], str]) -> str:
-    """Write a scalar."""
-    if isinstance(value, str):
-        return str(value) if isinstance(value, Verbatim) else quoted(value)
-    if value is None:
-        return "null"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return _float(value, number) if isinstance(value, float) else repr(value)
-
-
-def _float(value: float, number: Callable[[float], str]) -> str:
-    """Write a finite number with a point before the exponent."""
-    if not -_INFINITE < value < _INFINITE:
-        raise ValueInvalid(f"{value!r} is not finite and cannot be written")
-    text = number(value)
-    return text if "e" not in text or "." in text else text.replace("e", ".0e")
-
-
 def _one_line(value: Any, number: Callable[[float], str]) -> str | None:
     """Write a scalar, an empty or leaf list, or a small map of numbers; None for what needs a block."""
     if isinstance(value, dict):
@@ -105,29 +97,19 @@ def _one_line(value: Any, number: Callable[[float], str]) -> str | None:
 
 def _block(value: Any, number: Callable[[float], str]) -> Iterator[str]:
     """Yield the lines of a list or map, not indented."""
-    if isinstance(value, dict):
-        for key, each in value.items():
-            yield from _entry(key, _key(key, value), each, number)
-    else:
+    if not isinstance(value, dict):
         for each in value:
-            yield from _item(each, number)
-
-
-def _entry(key: str, written: str, value: Any, number: Callable[[float], str]) -> Iterator[str]:
-    """Yield the lines of one entry of a map."""
-    head = f"{written}:"
-    if len(key) > _LONGEST_KEY:
-        yield f"? {written}"
-        head = ":"
-    line = _one_line(value, number)
-    yield head if line is None else f"{head} {line}"
-    if line is None:
-        yield from (f"  {below}" for below in _block(value, number))
-
-
-def _item(value: Any, number: Callable[[float], str]) -> Iterator[str]:
-    """Yield the lines of one item of a list, the first after the dash."""
-    line = _one_line(value, number)
-    lines = _block(value, number) if line is None else iter((line,))
-    yield f"- {next(lines)}"
-    yield from (f"  {below}" for below in lines)
+            line = _one_line(each, number)
+            lines = _block(each, number) if line is None else iter((line,))
+            yield f"- {next(lines)}"
+            yield from (f"  {below}" for below in lines)
+        return
+    for key, each in value.items():
+        head = f"{_key(key, value)}:"
+        if len(key) > _LONGEST_KEY:
+            yield f"? {head[:-1]}"
+            head = ":"
+        line = _one_line(each, number)
+        yield head if line is None else f"{head} {line}"
+        if line is None:
+            yield from (f"  {below}" for below in _block(each, number))
