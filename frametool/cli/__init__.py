@@ -32,10 +32,10 @@ def main(arguments: list[str] | None = None) -> None:
 
 def run(arguments: list[str]) -> int:
     """Run one command; whatever goes wrong becomes one line on stderr and an exit code."""
-    from frametool.cli.commands import TROUBLE
+    from frametool.cli.commands import TROUBLE, answered, called
     from frametool.cli.signals import die_of
-    from frametool.cli.sink import TROUBLES, discard, say, say_warning, words_of
-    from frametool.errors import heard_by
+    from frametool.cli.sink import TROUBLES, discard, say, say_error, say_warning, wants_json, words_of
+    from frametool.errors import FrametoolError, heard_by
     from frametool.sizes import DEEPEST
 
     own = TROUBLE.get(arguments[0] if arguments else "")
@@ -50,7 +50,13 @@ def run(arguments: list[str]) -> int:
     status = 0
     try:
         with heard_by(say_warning):
-            status = _run(arguments, own)
+            try:
+                status = answered(lambda: called(arguments), arguments)
+            except KeyboardInterrupt:
+                status = INTERRUPTED
+            except FrametoolError as error:
+                say_error(error, in_json=wants_json(arguments))
+                status = own or error.exit_code
         sys.stdout.flush()
     except BrokenPipeError:
         status = die_of("SIGPIPE")  # as `cat` does when its reader is gone
@@ -61,18 +67,3 @@ def run(arguments: list[str]) -> int:
             discard(sys.stdout)
         status = in_out
     return status
-
-
-def _run(arguments: list[str], own: int | None) -> int:
-    """Run one command, whose errors may have an exit code of its own; trouble with stdout is the caller's."""
-    from frametool.cli.commands import answered, called
-    from frametool.cli.sink import say_error, wants_json
-    from frametool.errors import FrametoolError
-
-    try:
-        return answered(lambda: called(arguments), arguments)
-    except KeyboardInterrupt:
-        return INTERRUPTED
-    except FrametoolError as error:
-        say_error(error, in_json=wants_json(arguments))
-        return own or error.exit_code

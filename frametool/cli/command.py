@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from frametool.cli.sink import checked_by, say, show
+from frametool.cli.sink import CHECKS, say, show
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, heard_by
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
     from frametool.geometry.place import Earth
 
@@ -42,14 +42,15 @@ OF_MESSAGES = ("quiet", "verbose")
 class Inputs:
     """The arguments and options of a command, by the names of its parameters; to read one is to ask for it.
 
+    idle: the options that were passed and that nobody has asked for yet, each as it is called
     reads_trees: whether files of frames are opened: --in is then about these too
     earth: what the options say of places on the Earth, made when first needed
     """
 
     def __init__(self, values: Mapping[str, Any], idle: dict[str, str] | None = None) -> None:
-        """Keep the values; idle: the options that were passed, each as it is called."""
+        """Keep the values, and the options that were passed."""
         self._values = {**values}
-        self._idle = {} if idle is None else idle
+        self.idle = {} if idle is None else idle
         self.reads_trees = False
         self.earth: Earth | None = None
 
@@ -57,7 +58,7 @@ class Inputs:
         """Return the value of an argument or option, which counts as asked for; None where the command has none."""
         if name.startswith("_"):
             raise AttributeError(name)
-        self._idle.pop(name, None)
+        self.idle.pop(name, None)
         return self._values.get(name, WITHOUT.get(name))
 
     def peek(self, name: str) -> Any:
@@ -67,7 +68,7 @@ class Inputs:
     def ask(self, *names: str) -> None:
         """Count options as asked for."""
         for name in names:
-            self._idle.pop(name, None)
+            self.idle.pop(name, None)
 
     def leave(self, **values: Any) -> None:
         """Put what other readers have left in the place of what was passed."""
@@ -75,7 +76,7 @@ class Inputs:
 
     def but(self, **values: Any) -> Inputs:
         """Return these inputs with other values."""
-        return Inputs(self._values | values, self._idle)
+        return Inputs(self._values | values, self.idle)
 
     def says_earth(self) -> bool:
         """Return True if an option says something of places on the Earth."""
@@ -86,15 +87,11 @@ class Inputs:
         for text in () if self.quiet else filter(None, texts):
             say(text)
 
-    def idle(self) -> set[str]:
-        """Return the options that were passed and that nobody has asked for."""
-        return {*self._idle}
-
     def refuse_idle(self) -> None:
         """Raise a usage error for options that were passed and that nobody has asked for."""
-        if self._idle:
-            has = "has" if len(self._idle) == 1 else "have"
-            raise click.UsageError(f"{', '.join(self._idle.values())} {has} no effect here")
+        if self.idle:
+            has = "has" if len(self.idle) == 1 else "have"
+            raise click.UsageError(f"{', '.join(self.idle.values())} {has} no effect here")
 
 
 class Option(click.Option):
@@ -109,19 +106,6 @@ class Option(click.Option):
         """Keep these next to what click keeps."""
         super().__init__(names, **rest)
         self.excludes, self.requires, self.under = excludes, requires, under
-
-
-def _check_together(context: click.Context, passed: Sequence[Option]) -> None:
-    """Raise a usage error for options that do not belong together."""
-    called = {each.name: each.opts[-1] for each in passed}
-    for each in passed:
-        name = each.opts[-1]
-        if others := [called[other] for other in each.excludes if other in called]:
-            raise click.UsageError(f"{name} and {others[0]} exclude each other", context)
-        if each.requires and called.keys().isdisjoint(each.requires):
-            known = {each.name: each.opts[-1] for each in context.command.params}
-            choices = " or ".join(known[needed] for needed in each.requires if needed in known)
-            raise click.UsageError(f"{name} needs {choices}", context)
 
 
 def refuse(holds: object, message: str) -> None:
@@ -247,17 +231,6 @@ def write_options(formatter: click.HelpFormatter, groups: Mapping[str, Sequence[
             formatter.write_dl([(left.ljust(width), text) for left, text in each], WIDEST, col_spacing=1)
 
 
-def _write_names(formatter: click.HelpFormatter, groups: Mapping[str, Sequence[click.Option]]) -> None:
-    """Write a line of names for each heading; what one of 80 columns has no room for is left to --help-all."""
-    rows = []
-    for title, options in groups.items():
-        line = " ".join(each.opts[0] for each in options)
-        cut = f"{line[:LONGEST_LINE].rpartition(' ')[0]} .." if len(line) > LONGEST_LINE else line
-        rows.append((title.partition(" ")[0], cut))
-    with formatter.section("Common options (explained by --help-all and help common)"):
-        formatter.write_dl(rows)
-
-
 def _is_negative(argument: str) -> bool:
     """Return True if an argument begins as a number; most need no pattern for that, whose compiling takes longest."""
     is_long = argument[:2] == "--" and argument[2:3].isalpha()
@@ -269,13 +242,17 @@ class Text(click.types.StringParamType):
 
     read: returns what a text says; a ValueInvalid that it raises is a wrong value of the option
     offers: returns what the shell may complete, and what it means; None for names of files, which the shell knows
+    choices: all texts that there are, where they are few
     """
 
     name = "text"
 
-    def __init__(self, read: Callable[[str], Any] = str, offers: Offers = lambda _ctx, _incomplete: {}) -> None:
-        """Keep both."""
-        self.read, self.offers = read, offers
+    def __init__(
+        self, read: Callable[[str], Any] = str, offers: Offers = lambda _ctx, _incomplete: {},
+        choices: Collection[str] = (),
+    ) -> None:  # fmt: skip
+        """Keep these."""
+        self.read, self.offers, self.choices = read, offers, choices
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Remove the blank, and read the text."""
@@ -306,6 +283,8 @@ TEXT = Text()
 FILE = Text(offers=lambda _ctx, _incomplete: None)
 # options that may be without =VALUE, and their values: the first is what they mean then
 OPTIONAL = {"--explain": ("text", "markdown"), "--rows": ("ate", "rpe", "kitti")}
+OF_POSES = ("compose", "convert", "interpolate", "invert", "mean", "relative")  # they have no other arguments
+BEGIN_POSES = ("{", "[", "inv(", "p[")
 
 
 def _kind(kind: Any) -> click.ParamType[Any]:
@@ -347,11 +326,6 @@ def argument(name: str, kind: Any = TEXT, metavar: str | None = None, **more: An
     return click.argument(name, type=_kind(kind), metavar=metavar, **more)
 
 
-def command_named(name: str, cls: type[click.Command] | None = None, **more: Any) -> Callable[[Any], click.Command]:
-    """Return what makes a function a command."""
-    return click.command(name=name, cls=cls or Command, **more)
-
-
 def together(*options: Adds) -> Adds:
     """Return what adds several options to a command, in this order in its help."""
     return lambda function: reduce(lambda made, add: add(made), reversed(options), function)
@@ -379,8 +353,14 @@ class WithHelp(click.Command):
             write_options(formatter, groups)
         else:
             write_options(formatter, {"Options": groups.pop("Options")})
-            if groups:
-                _write_names(formatter, groups)
+            rows = []
+            for title, options in groups.items():  # what a line of 80 columns has no room for is left to --help-all
+                line = " ".join(each.opts[0] for each in options)
+                cut = f"{line[:LONGEST_LINE].rpartition(' ')[0]} .." if len(line) > LONGEST_LINE else line
+                rows.append((title.partition(" ")[0], cut))
+            if rows:
+                with formatter.section("Common options (explained by --help-all and help common)"):
+                    formatter.write_dl(rows)
         if isinstance(self, click.Group):
             self.format_commands(ctx, formatter)
 
@@ -417,24 +397,44 @@ class Command(WithHelp):
         if any(map(_is_negative, args)):
             options = {name for each in self.get_params(ctx) for name in each.opts}
             args = [f" {each}" if _is_negative(each) and each not in options else each for each in args]
-        if "inv" in args:
-            args = _joined(args, ctx, always=self.name in OF_POSES)
+        if "inv" in args:  # before a pose it is inv(POSE); before what may be no pose a name, unless all are poses
+            joined: list[str] = []
+            for each in reversed(args):
+                is_pose = self.name in OF_POSES or (joined and joined[-1].lstrip(" ~").startswith(BEGIN_POSES))
+                if each == "inv" and is_pose and joined and not joined[-1].startswith("--"):
+                    joined.append(f"inv({joined.pop()})")
+                elif each == "inv" and self.name in OF_POSES:
+                    raise click.UsageError("inv stands before the pose whose inverse is meant; nothing follows it", ctx)
+                else:
+                    joined.append(each)
+            args = joined[::-1]
         args = [f"{each}={OPTIONAL[each][0]}" if each in OPTIONAL else each for each in args]
         rest = super().parse_args(ctx, args)
-        if not ctx.resilient_parsing:
-            _check_together(ctx, ctx.meta[PASSED])
+        passed: Sequence[Option] = () if ctx.resilient_parsing else ctx.meta[PASSED]
+        called = {each.name: each.opts[-1] for each in passed}
+        for option in passed:
+            if others := [called[other] for other in option.excludes if other in called]:
+                raise click.UsageError(f"{option.opts[-1]} and {others[0]} exclude each other", ctx)
+            if option.requires and called.keys().isdisjoint(option.requires):
+                known = {each.name: each.opts[-1] for each in self.params}
+                choices = " or ".join(known[needed] for needed in option.requires if needed in known)
+                raise click.UsageError(f"{option.opts[-1]} needs {choices}", ctx)
         return rest
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command on its inputs, each of which must have been asked for when something is written."""
         idle = {each.name: each.opts[-1] for each in ctx.meta[PASSED] if each.name not in OF_MESSAGES}
         passed = ctx.meta[INPUTS] = Inputs(ctx.params, idle)
+        CHECKS.append(passed.refuse_idle)
         try:
-            with checked_by(passed.refuse_idle):
-                result = ctx.invoke(self.callback or (lambda _: 0), passed)
+            result = ctx.invoke(self.callback or (lambda _: 0), passed)
         except FormatError as error:
-            error.message = _without_others(error.message, self)
+            advised = re.search(r"; (?:give|name them with) (--[\w-]+)$", error.message)
+            if advised and not any(advised[1] in each.opts for each in self.params):  # this command has no such option
+                error.message = error.message[: advised.start()]
             raise
+        finally:
+            CHECKS.pop()
         passed.refuse_idle()
         return result
 
@@ -447,25 +447,4 @@ class Command(WithHelp):
         formatter.write_text(self.epilog or EXIT_CODES)
 
 
-def _without_others(message: str, command: click.Command) -> str:
-    """Leave out the advice at the end of a message to give an option that the command does not have."""
-    found = re.search(r"; (?:give|name them with) (--[\w-]+)$", message)
-    has = {name for each in command.params for name in each.opts}
-    return message if found is None or found[1] in has else message[: found.start()]
-
-
-OF_POSES = ("compose", "convert", "interpolate", "invert", "mean", "relative")  # they have no other arguments
-
-
-def _joined(args: list[str], ctx: click.Context, *, always: bool) -> list[str]:
-    """Write the word `inv` before a pose as inv(POSE); before what may be no pose it is a name, unless `always`."""
-    joined: list[str] = []
-    for each in reversed(args):
-        is_pose = bool(joined) and (always or joined[-1].lstrip(" ~").startswith(("{", "[", "inv(", "p[")))
-        if each == "inv" and is_pose and not joined[-1].startswith("--"):
-            joined.append(f"inv({joined.pop()})")
-        elif each == "inv" and always:
-            raise click.UsageError("inv stands before the pose whose inverse is meant; nothing follows it", ctx)
-        else:
-            joined.append(each)
-    return joined[::-1]
+command_named = partial(click.command, cls=Command)  # what makes a function a command

@@ -50,19 +50,14 @@ def run(
         for number, command in enumerate(commands, 1):
             out = Terminal() if columns and number == len(commands) else BytesIO()
             with streams(reader(BytesIO(data)), writer(out), writer(errors, errors="backslashreplace")):
-                status = _status_of(command)
+                try:
+                    words = split(command, _no_value) if isinstance(command, str) else [*map(str, command)]
+                    status = cli.run(words[words[:1] == ["frametool"] :])
+                except Misused as error:
+                    say_error(error, in_json=False)
+                    status = error.exit_code
             data = out.getvalue()
     return Ran(data, errors.getvalue().decode(), status, written)
-
-
-def _status_of(command: str | Sequence[object]) -> int:
-    """Run one command and return its exit status."""
-    try:
-        words = split(command, _no_value) if isinstance(command, str) else [*map(str, command)]
-    except Misused as error:
-        say_error(error, in_json=False)
-        return error.exit_code
-    return cli.run(words[words[:1] == ["frametool"] :])
 
 
 def _no_value(name: str) -> str:

@@ -19,7 +19,10 @@ class Terminated(BaseException):
 
 
 class _Signals:
-    """Whether the process is ours, there is what to clean up, a line is being written, and Ctrl-C came meanwhile."""
+    """Whether the process is ours, a line is being written, and Ctrl-C came meanwhile.
+
+    cleans_up: there is what to clean up: what ends the run is raised, in the middle of an import too
+    """
 
     owns_process = False
     cleans_up = False
@@ -59,11 +62,6 @@ def with_signals(run: Callable[[list[str]], int], arguments: list[str]) -> int:
     finally:
         for number in caught:
             signal.signal(number, signal.SIG_DFL)
-
-
-def clean_up() -> None:
-    """Let what ends the run be raised from here on, in the middle of an import too."""
-    STATE.cleans_up = True
 
 
 def die_of(name: str) -> int:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TextIO
 
 from click import echo_via_pager
 
-from frametool.cli.signals import STATE, clean_up
+from frametool.cli.signals import STATE
 from frametool.errors import FileProblem, FrametoolError, ValueInvalid, printable, shown
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     Write = Callable[[str | bytes | memoryview], None]
 
-_checks: list[Callable[[], None]] = []
+CHECKS: list[Callable[[], None]] = []  # each raises what it finds wrong with the call before anything is written
 BAG_FILE, BAG_DATA = "metadata.yaml", (".mcap", ".db3")  # what a folder may hold that is replaced
 STYLES = {"bold": 1, "dim": 2, "red": 31, "green": 32, "magenta": 35, "cyan": 36}  # legible on dark and light
 HELP_MARKS = (  # of helps, topics, formats and the cookbook
@@ -52,23 +52,17 @@ def writing(path: str | None, *, force: bool = False, folder: bool = False) -> I
     """
     if path in (None, "-", "/dev/stdout"):
         yield writer_into(sys.stdout.buffer, "standard output")
-    elif folder or not is_special(path):
-        with _replacing(path, force=force, folder=folder) as write:
-            yield write
-    else:
+        return
+    if not folder and is_special(path):
         number = _own_stream(path)
         with problems_of(path):
             special = open(path if number is None else os.dup(number), "wb", buffering=0)  # noqa: SIM115 - closed below
         with special:
             yield writer_into(special, path)
-
-
-@contextmanager
-def _replacing(path: str, *, force: bool, folder: bool) -> Iterator[Write]:
-    """Yield what writes a part that takes the place of `path` if all goes well."""
+        return
     refuse = partial(_refuse_folder if folder else refuse_existing, path, force=force)
     refuse()
-    clean_up()
+    STATE.cleans_up = True
     place = os.path.realpath(path)
     parent, name = os.path.split(place)
     part = os.path.join(parent, f"{name[:LONGEST_BEGIN]}.{os.getpid()}.part")
@@ -119,19 +113,9 @@ def show(text: str, *, paged: bool) -> None:
         write(in_colour(text, HELP_MARKS) if is_seen else text)
 
 
-@contextmanager
-def checked_by(each: Callable[[], None]) -> Iterator[None]:
-    """Let something be checked before anything is written."""
-    _checks.append(each)
-    try:
-        yield
-    finally:
-        _checks.pop()
-
-
 def check() -> None:
     """Raise what a check finds wrong with the call."""
-    for each in _checks:
+    for each in CHECKS:
         each()
 
 
@@ -157,33 +141,23 @@ def writer_into(stream: BinaryIO, name: str) -> Write:
 
     def write(piece: str | bytes | memoryview) -> None:
         check()
-        view = memoryview(_encoded(piece) if isinstance(piece, str) else piece)
-        with problems_of(name), whole_lines():
-            while view:  # an unbuffered stream may take a part
-                view = view[stream.write(view) :]
-            stream.flush()
+        try:
+            view = memoryview(piece.encode() if isinstance(piece, str) else piece)
+        except UnicodeEncodeError as error:
+            raise ValueInvalid(f"{shown(error.object[error.start :])} cannot be written as UTF-8 text") from None
+        STATE.writing = True  # Ctrl-C waits until the block of lines is written
+        try:
+            with problems_of(name):
+                while view:  # an unbuffered stream may take a part
+                    view = view[stream.write(view) :]
+                stream.flush()
+        finally:
+            STATE.writing = False
+        if STATE.interrupted:
+            STATE.interrupted = False
+            raise KeyboardInterrupt
 
     return write
-
-
-def _encoded(text: str) -> bytes:
-    try:
-        return text.encode()
-    except UnicodeEncodeError as error:
-        raise ValueInvalid(f"{shown(error.object[error.start :])} cannot be written as UTF-8 text") from None
-
-
-@contextmanager
-def whole_lines() -> Iterator[None]:
-    """Hold Ctrl-C back until a block of lines is written."""
-    STATE.writing = True
-    try:
-        yield
-    finally:
-        STATE.writing = False
-    if STATE.interrupted:
-        STATE.interrupted = False
-        raise KeyboardInterrupt
 
 
 @contextmanager
@@ -271,17 +245,7 @@ class BatchLine(NamedTuple):
         return f"{self.source}:{self.line}: "
 
 
-_lines: list[BatchLine] = []
-
-
-@contextmanager
-def telling_of(line: BatchLine) -> Iterator[None]:
-    """Name a line of a batch in all messages while its command runs."""
-    _lines.append(line)
-    try:
-        yield
-    finally:
-        _lines.pop()
+LINES: list[BatchLine] = []  # the last one is named in all messages
 
 
 def tell(text: str) -> None:
@@ -296,7 +260,7 @@ def tell(text: str) -> None:
 
 def say(text: str) -> None:
     """Write one line about the work, under the program's name; several where a terminal ends."""
-    text = printable(f"frametool: {_lines[-1] if _lines else ''}{text}")
+    text = printable(f"frametool: {LINES[-1] if LINES else ''}{text}")
     tell(folded(text) if sys.stderr is not None and sys.stderr.isatty() else text)
 
 
@@ -330,14 +294,23 @@ def say_warning(message: str, rule: str = "") -> None:
 
 
 def say_error(error: FrametoolError, *, in_json: bool, fate: str = "") -> None:
-    """Write an error: as a sentence with the source line, or as one object with the fields it is made of.
+    """Write an error: as a sentence with the source line, or as one object of its kind, its message and its fields.
 
+    The place of an object is the line of a batch, if one runs; its own place is then under `input`.
     fate: what became of the line of a batch in which it is
     """
+    fate = f" ({fate})" if fate else ""
     if in_json:
-        tell(as_json(error, _lines[-1] if _lines else None, fate))
+        from frametool.documents.json import dump
+
+        message, details = str(error), dict(error.details())
+        if LINES:
+            own = {key: details.pop(key) for key in ("source", "line", "column") if key in details}
+            message = f"{LINES[-1]}{message}"
+            details = {**LINES[-1]._asdict(), **({"input": own} if own else {}), **details}
+        tell(dump({"error": error.kind, "message": f"{message}{fate}", **details}))
         return
-    say(f"{error}{getattr(error, 'remedy', '')}{f' ({fate})' if fate else ''}")
+    say(f"{error}{getattr(error, 'remedy', '')}{fate}")
     if snippet := getattr(error, "snippet", ""):
         tell(snippet)
 
@@ -376,19 +349,3 @@ def wants_json(arguments: Sequence[str]) -> bool:
     if "--format=json" in arguments or "-fjson" in arguments:
         return True
     return any(option in ("-f", "--format") and value == "json" for option, value in pairwise(arguments))
-
-
-def as_json(error: FrametoolError, line: BatchLine | None = None, fate: str = "") -> str:
-    """Return the error's kind, its message and its fields.
-
-    line: of the batch in which it is; the object's place is then that one, and its own place is under `input`
-    fate: what became of that line
-    """
-    from frametool.documents.json import dump
-
-    message, details = str(error), dict(error.details())
-    if line is not None:
-        own = {key: details.pop(key) for key in ("source", "line", "column") if key in details}
-        message = f"{line}{message}"
-        details = {**line._asdict(), **({"input": own} if own else {}), **details}
-    return dump({"error": error.kind, "message": f"{message} ({fate})" if fate else message, **details})

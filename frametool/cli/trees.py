@@ -114,10 +114,10 @@ def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]
     passed = inputs()
     passed.reads_trees = True
     named = [each if is_inline(each) else tree_file(each) for each in arguments]
-    idle = passed.idle()
+    idle = {*passed.idle}
 
     def read_all() -> tuple[Value, set[str]]:
-        return read(), idle - passed.idle()
+        return read(), idle - passed.idle.keys()
 
     key = tuple(named), f"{options} {[passed.peek(name) for name in OF_FILES]}"
     files = [each for each in named if not is_inline(each) and os.path.exists(each)]

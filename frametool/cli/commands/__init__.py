@@ -121,25 +121,24 @@ class Group(WithHelp, click.Group):
         return named + click.Command.shell_complete(self, ctx, incomplete)
 
 
-def _show_version(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:  # click's signature
-    """Print the version; a literal, because asking importlib.metadata for it takes 25 ms."""
-    if chosen:
-        with writing(None) as write:
-            write(f"frametool {__version__}\n{_surroundings() if ctx.params.get('all_versions') else ''}")
-        ctx.exit()
-
-
 PACKAGES = ("numpy", "click", "rich", "pyyaml", "rosbags", "pyarrow", "laspy", "matplotlib")
 
 
-def _surroundings() -> str:
-    """Return the versions of Python and of the packages there are, one a line, for a report of a fault."""
-    import platform
-    from importlib.metadata import distributions
+def _show_version(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:  # click's signature
+    """Print the version; with -v, for a report of a fault, those of Python and of the packages too."""
+    if not chosen:
+        return
+    lines = [f"frametool {__version__}"]
+    if ctx.params.get("all_versions"):
+        import platform
+        from importlib.metadata import distributions  # 25 ms, for which the version above is a literal
 
-    there = {str(each.name).lower(): each.version for each in distributions()}
-    python = f"Python {platform.python_version()} on {platform.system()} {platform.machine()}\n"
-    return python + "".join(f"{package} {there.get(package, 'not installed')}\n" for package in PACKAGES)
+        there = {str(each.name).lower(): each.version for each in distributions()}
+        lines.append(f"Python {platform.python_version()} on {platform.system()} {platform.machine()}")
+        lines += [f"{package} {there.get(package, 'not installed')}" for package in PACKAGES]
+    with writing(None) as write:
+        write("".join(f"{line}\n" for line in lines))
+    ctx.exit()
 
 
 @click.command(cls=Group, help=HELP)
@@ -173,7 +172,14 @@ def _completed(wanted: str, line: str) -> int:
     """
     shells = sorted(os.listdir(SCRIPTS))
     if wanted == "words":
-        text = "".join("\t".join(row) + "\n" for row in _offers(line) if "".join(row).isprintable())
+        from click.shell_completion import ShellComplete, split_arg_string
+
+        *words, begun = split_arg_string(f"{line}.")  # the point: behind a blank a word begins
+        option = begun[: begun.find("=") + 1] if begun.startswith("--") else ""  # a word is also what is before its =
+        before = list(map(os.path.expanduser, words[1:]))
+        found = ShellComplete(group, {}, "frametool", COMPLETION).get_completions(before, begun[:-1])
+        rows = [(each.type, option + each.value, each.help or "") for each in found]
+        text = "".join("\t".join(row) + "\n" for row in rows if "".join(row).isprintable())
     elif (shell := wanted.removesuffix("_source")) in shells:
         with open(os.path.join(SCRIPTS, shell), encoding="utf-8") as script:
             text = script.read()
@@ -183,17 +189,6 @@ def _completed(wanted: str, line: str) -> int:
     with writing(None) as write:
         write(text)
     return 0
-
-
-def _offers(line: str) -> list[tuple[str, str, str]]:
-    """Return type, word and meaning of what may end a line; all of the word, also what comes before a `=`."""
-    from click.shell_completion import ShellComplete, split_arg_string
-
-    *words, begun = split_arg_string(f"{line}.")  # the point: behind a blank a word begins
-    option = begun[: begun.find("=") + 1] if begun.startswith("--") else ""
-    known = list(map(os.path.expanduser, words[1:]))
-    found = ShellComplete(group, {}, "frametool", COMPLETION).get_completions(known, begun[:-1])
-    return [(each.type, option + each.value, each.help or "") for each in found]
 
 
 def called_in(

@@ -10,14 +10,14 @@ import sys
 from functools import partial
 from io import BytesIO, TextIOBase, TextIOWrapper
 from itertools import chain
-from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import click
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, say_if_typed
 from frametool.cli.commands import TROUBLE, answered, called, called_in, group
 from frametool.cli.embedded import streams, writer
-from frametool.cli.sink import TROUBLES, BatchLine, say_error, telling_of, wants_json, words_of
+from frametool.cli.sink import LINES, TROUBLES, BatchLine, say_error, wants_json, words_of
 from frametool.documents.source import ReadCache, opened
 from frametool.errors import FileProblem, FrametoolError, Misused, ValueInvalid, alternatives
 from frametool.stream.faults import ROWS_SKIPPED, SKIP, STOP, RowsSkipped
@@ -30,21 +30,11 @@ EXIT_CODES = "Exit codes: 0 done, 3 lines or rows skipped, else that of the line
 _ASSIGNMENT = re.compile(rf"[ \t]*({NAME})[ \t]*=[ \t]*")
 
 
-class CommandLine(NamedTuple):
-    """A command of a batch.
+def command_lines(stream: BinaryIO) -> Iterator[tuple[int, str, str]]:
+    """Yield the commands of a batch, each as soon as its last line is there; a backslash joins the next line to one.
 
-    number: of its first line
-    name: what its result is kept as; "" if it is printed
-    text: the command itself
+    Of each: the number of its first line, the name that its result is kept by, "" if it is printed, and its text.
     """
-
-    number: int
-    name: str
-    text: str
-
-
-def command_lines(stream: BinaryIO) -> Iterator[CommandLine]:
-    """Yield the commands of a batch, each as soon as its last line is there; a backslash joins the next line to one."""
     begin, text = 0, ""
     for number, data in enumerate(chain(iter(stream.readline, b""), [b""]), 1):
         begin = begin or number
@@ -55,7 +45,7 @@ def command_lines(stream: BinaryIO) -> Iterator[CommandLine]:
             text = text[:-1]
             continue
         if name or has_words(command):
-            yield CommandLine(begin, name, command)
+            yield begin, name, command
         begin, text = 0, ""
 
 
@@ -106,9 +96,13 @@ class CommandBatch:
         """Run the commands of a stream as they come and return the exit status of all."""
         piped = _Pipe(sys.stdout.buffer, "utf-8", newline="\n") if sys.stdout.isatty() else sys.stdout
         with streams(_NoInput(), piped):  # standard input has the lines of the batch
-            for line in command_lines(stream):
+            for number, name, text in command_lines(stream):
                 self.count += 1
-                status = self._run_line(line)
+                LINES.append(BatchLine(self.source, number))
+                try:
+                    status = self._run_line(text, name, number)
+                finally:
+                    LINES.pop()
                 if status in FINISHED:
                     self.status = self.status or status
                 elif self.skips:
@@ -121,32 +115,31 @@ class CommandBatch:
         say_error(RowsSkipped(message, source=self.source, bad=self.failed, rows=self.count), in_json=self.in_json)
         return ROWS_SKIPPED
 
-    def _run_line(self, line: CommandLine) -> int:
-        """Run one command and report what goes wrong; return its status."""
+    def _run_line(self, text: str, name: str, number: int) -> int:
+        """Run one command, whose result may be kept by a name, and report what goes wrong; return its status."""
         words: list[str] = []
         status = 0
         problem: FrametoolError
-        with telling_of(BatchLine(self.source, line.number)):
-            try:
-                if "\0" in line.text:
-                    raise Misused("not UTF-8 text, but UTF-16 or no text: it holds a NUL byte")
-                words = split(line.text, self._value_of)
-                if not words:
-                    raise Misused(f"no command behind {line.name} =")
-                status = self._called(words, line.name)
-                if status in FINISHED:
-                    return status
-                problem = LineFailed(f"{words[0]} ended with status {status}", status=status)
-            except BrokenPipeError:
-                raise
-            except FrametoolError as error:
-                problem = error
-            except TROUBLES as error:
-                problem = FileProblem(words_of(error))
-            if line.name:
-                self.kept[line.name] = line.number
-            self.in_json &= (in_json := wants_json(words))
-            say_error(problem, in_json=in_json, fate="line skipped" if self.skips else "")
+        try:
+            if "\0" in text:
+                raise Misused("not UTF-8 text, but UTF-16 or no text: it holds a NUL byte")
+            words = split(text, self._value_of)
+            if not words:
+                raise Misused(f"no command behind {name} =")
+            status = self._called(words, name)
+            if status in FINISHED:
+                return status
+            problem = LineFailed(f"{words[0]} ended with status {status}", status=status)
+        except BrokenPipeError:
+            raise
+        except FrametoolError as error:
+            problem = error
+        except TROUBLES as error:
+            problem = FileProblem(words_of(error))
+        if name:
+            self.kept[name] = number
+        self.in_json &= (in_json := wants_json(words))
+        say_error(problem, in_json=in_json, fate="line skipped" if self.skips else "")
         return status or TROUBLE.get(words[0] if words else "", problem.exit_code)
 
     def _called(self, words: list[str], name: str) -> int:

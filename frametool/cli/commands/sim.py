@@ -17,7 +17,7 @@ from frametool.cli.commands import Group
 from frametool.cli.options import PRECISION, file_with, place_options, suffix_of
 from frametool.cli.output import Output
 from frametool.cli.poses import inline_misuse, source_of
-from frametool.cli.signals import clean_up
+from frametool.cli.signals import STATE
 from frametool.cli.sink import refuse_existing, say, writing
 from frametool.cli.streaming import explain_option, significant
 from frametool.documents.source import Source, read_text
@@ -155,7 +155,7 @@ class SimOutput:
         if self.live:
             from frametool.view.terminal import Screen
 
-            clean_up()  # the terminal's cursor
+            STATE.cleans_up = True  # the terminal's cursor
             yield stack.enter_context(Screen(scene, to_stderr=not sys.stdout.isatty())).watch
         else:
             yield event_log(say)
@@ -322,6 +322,6 @@ def teleop(inputs: Inputs) -> None:
     refuse(sys.stdin is None or not sys.stdin.isatty(), f"standard input is no terminal; {drivers.INSTEAD}")
     mailbox = drivers.Mailbox()
     output, scene = SimOutput(inputs.but(live=True), leaders=True), scene_of(inputs, mailbox)
-    clean_up()  # the terminal's keys
+    STATE.cleans_up = True  # the terminal's keys
     with drivers.keyboard(mailbox, headings=scene.variant == "ros2"):
         output.run(scene)
