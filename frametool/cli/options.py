@@ -60,11 +60,6 @@ def names_as(spec: str) -> Callable[[str], tuple[str, ...]]:
 FULL = -1  # digits: as many as the number has
 
 
-def _digits(text: str) -> Any:
-    """Read how many digits follow the point: a number, or `full`."""
-    return FULL if text == "full" else click.IntRange(0, 30)(text)
-
-
 def _read_notations(text: str) -> tuple[Notation, ...]:
     """Look each name up."""
     chosen = tuple(each for spec in text.split(",") for each in notations(spec.strip()))
@@ -87,28 +82,24 @@ def _offer_notations(_ctx: click.Context, incomplete: str) -> Mapping[str, str]:
 NOTATIONS = Text(_read_notations, _offer_notations)
 
 
-class FormatName(Text):
-    """The name of a format: any, or one of those that a command reads or writes."""
+def format_among(choices: Collection[str], are: str) -> Text:
+    """Return the type of the name of a format: any, or one of those that a command reads or writes.
 
-    def __init__(self, choices: Collection[str], are: str) -> None:
-        """Keep the formats that may be named, and what they are in an error: `read`, `known`."""
-        self.choices = choices
-        self.are = are
+    are: what the choices are, in an error: `read`, `known`
+    """
 
-    def read(self, text: str) -> str:
-        """Refuse an unknown one with the nearest name; of one that is not supported, say what to do."""
-        if text in self.choices:
+    def read(text: str) -> str:
+        if text in choices:
             return text
         from frametool.formats.detect import UNSUPPORTED
 
         if row := UNSUPPORTED.get(text):
             raise ValueInvalid(f"{text} ({row.summary}) is not supported: {row.remedy}")
-        near = did_you_mean(text, self.choices)
-        raise ValueInvalid(f"no format {shown(text)} is {self.are} (`frametool formats` lists all){near}")
+        near = did_you_mean(text, choices)
+        raise ValueInvalid(f"no format {shown(text)} is {are} (`frametool formats` lists all){near}")
 
-    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
-        """Offer the formats."""
-        return {name: FORMATS[name].summary if name in FORMATS else "for people" for name in self.choices}
+    meanings = {name: FORMATS[name].summary if name in FORMATS else "for people" for name in choices}
+    return Text(read, lambda _ctx, _incomplete: meanings, choices)
 
 
 def suffix_of(path: str) -> str:
@@ -189,7 +180,7 @@ _of_files, _of_times, _of_rotations, _of_results, _of_formats = (
 )
 verbose_option = _of_files("-v --verbose", "report the detected format of each input")
 _IN = "format of the input (`frametool formats`), once per file"
-in_option = _of_files("--in FORM", _IN, FormatName(READ, "read"), name="input_formats", multiple=True)
+in_option = _of_files("--in FORM", _IN, format_among(READ, "read"), name="input_formats", multiple=True)
 _AXES = "axes of the cameras in a file; converts nothing  [default: those of its format]"
 _CAMERA_AXES = _of_formats("--camera-axes", _AXES, CAMERA_AXES)
 _STAMPS = _of_formats("--stamps FILE", "timestamps for poses without any, one per line")
@@ -235,7 +226,8 @@ def for_each(formats: Sequence[str], files: int) -> list[str]:
 
 # --- results -------------------------------------------------------------------------------------------------------
 
-PRECISION = _of_results("--precision N|full", "decimals  [default: full; a terminal shows 9 digits]", _digits)
+PRECISION = _of_results("--precision N|full", "decimals  [default: full; a terminal shows 9 digits]",
+                        lambda text: FULL if text == "full" else click.IntRange(0, 30)(text))  # fmt: skip
 place_options = together(
     _of_results("-o --output FILE", "write to this file, atomically"),
     _of_results("--force", "let --output overwrite a file", requires=("output", "report", "plot", "view")),
@@ -266,7 +258,7 @@ def result_options(*what: str) -> Adds:
     """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
     formats = writers(*what)
     recording = [_RECORDING] * (not set(formats).isdisjoint(writers("recording")))
-    kind = FormatName(("text", *formats), "written here")
+    kind = format_among(("text", *formats), "written here")
     chosen = option("-f --format FORMAT", "of the result (frametool formats)", kind, name="format_name")
     return together(chosen, place_options, PRECISION, *recording)
 
@@ -366,11 +358,6 @@ limit_options = together(
 # a command of files of frames; of one tree whose frames may move
 file_options = together(reading_options, verbose_option, pose_options)
 moving_options = together(rules_options, offset_option, reading_options, verbose_option)
-
-
-def tree_result_options(*what: str) -> Adds:
-    """Add to a command of one tree the options of what is read, and of its result."""
-    return together(moving_options, pose_result_options(*what))
 
 
 _COLOR = "colour of the text; auto: on terminals, unless NO_COLOR is set"

@@ -6,7 +6,6 @@ Pictures on their way out: in which format, by the suffix of a file.
 from __future__ import annotations
 
 import os
-import re
 import sys
 from importlib import import_module
 from itertools import islice
@@ -33,14 +32,6 @@ if TYPE_CHECKING:
     from frametool.stream.record_values import Value
     from frametool.stream.request import Operation
     from frametool.stream.row_poses import RowPoses
-
-
-def recorded(chosen: Inputs, fmt: str, output: str | None) -> RecordingStyle:
-    """Return what of results a recording of a format holds, as options say; raises UsageError."""
-    place = _place(fmt, output)
-    frames = chosen.recorded_frames or next(iter(chosen.named_frames), ())
-    refuse(len(frames) not in (0, 2) or len({*frames}) < len(frames), "--frames takes WORLD,BODY, different names")
-    return RecordingStyle(tuple(chosen.messages), chosen.topic_out or "", frames, folder_of(place))
 
 
 def _place(fmt: str, output: str | None) -> str:
@@ -130,7 +121,11 @@ class Output:
         self.style.screen = self.chosen in (None, "text") and self.path is None and sys.stdout.isatty()
         self.style.put_at(place)
         if table.is_recording(fmt):
-            self.style.recording = recorded(inputs, fmt, self.path)
+            folder = folder_of(_place(fmt, self.path))
+            frames = inputs.recorded_frames or next(iter(inputs.named_frames), ())
+            is_pair = len(frames) in (0, 2) and len({*frames}) == len(frames)
+            refuse(not is_pair, "--frames takes WORLD,BODY, different names")
+            self.style.recording = RecordingStyle(tuple(inputs.messages), inputs.topic_out or "", frames, folder)
 
     def check_target(self, target: str) -> None:
         """Stop where places are asked for of what is seen from another frame than the Earth's."""
@@ -152,12 +147,6 @@ class Output:
         if source in tree.camera_axes or not tree.camera_axes:
             self.take_axes(tree.camera_axes.get(source, ""))
 
-    def mark_frames(self, target: str, source: str) -> None:
-        """Colour target and source, in what says which is seen from which."""
-        target, source = re.escape(printable(target)), re.escape(printable(source))
-        seen = rf"(?m)^(?P<green>{source})(?: at \S+)? seen from (?P<cyan>{target})(?= |$)"
-        self.marks += seen, rf"\(maps points in (?P<green>{source}) to points in (?P<cyan>{target})\)"
-
     def _refuse_place(self) -> None:
         """Stop where a format has no place for latitude and longitude."""
         if self.style.place is not None and self.style.format not in WITH_PLACES:
@@ -173,7 +162,15 @@ class Output:
         found = list(values)
         poses = [each for each in found if isinstance(each, Result)]
         if len(poses) < len(found) and self.style.format != "csv":
-            self._points([each.mapping(self.style) if isinstance(each, Result) else each for each in found])
+            if self.style.format in table.FORMATS and "points" not in self._writes:
+                raise ValueInvalid(f"{self.style.format} holds poses; a point has no rotation")
+            mappings = [each.mapping(self.style) if isinstance(each, Result) else each for each in found]
+            placed = [each for each in mappings if not {"point", "vector"}.isdisjoint(each) and "header" not in each]
+            self._warn_dropped(key for each in placed for key in each)
+            # for a person one a line, but what has more than three numbers as a mapping
+            is_plain = all(any(isinstance(each.get(kind), list) for kind in ("point", "vector")) for each in mappings)
+            text_module = "frametool.view.pose_text" if is_plain else table.FORMATS["yaml"].writer
+            self.text(self._module(text_module).write_points(mappings, self.style))
             return
         keys = {key for each in poses for key in each.said(self.style)}
         if len(poses) > 1 or "covariance" in keys:
@@ -222,23 +219,6 @@ class Output:
         yield from map(writer.of, batches)
         yield from writer.end()
 
-    def block(self, batch: list[Value] | RowPoses, *, placed: bool) -> tuple[str, RowPoses]:
-        """Return some results as a block, and what they are: poses, or points, vectors, .."""
-        from frametool.stream.row_layout import POSE
-        from frametool.stream.row_poses import block_of, block_of_points
-
-        if not isinstance(batch, list):
-            return POSE, batch if placed else batch._replace(numbers=batch.numbers[:, 3:])
-        found = batch if self.is_trajectory else list(map(_as_point, batch))
-        poses = [each for each in found if isinstance(each, Result)]
-        if len(poses) == len(found):
-            return POSE, block_of(poses, placed=placed)
-        if self.is_trajectory:
-            raise ValueInvalid("a trajectory holds poses; a point has no rotation")
-        if poses:
-            raise ValueInvalid(f"{self.style.format} holds things of one kind, found poses among others")
-        return block_of_points([each for each in found if not isinstance(each, Result)])
-
     def writer(self) -> ResultWriter:
         """Return what writes the results of a stream of records."""
         from frametool.stream.record_results import CollectedResults, CsvTable, Documents
@@ -262,7 +242,12 @@ class Output:
         holds_samples = "trajectory" in self._writes or (tree.moves and "poses" in self._writes)
         if holds_samples and self.style.format not in ("yaml", "json"):
             if self.is_trajectory:
-                self.take_axes_in(tree, _only_mover(tree, self.style.format))
+                children = [track.child for track in tree.tracks()]
+                if len(children) != 1:
+                    frames = first_of(children, 8, quote=shown) or "none"
+                    instead = f"name two: lookup TREE TARGET SOURCE -f {self.style.format}"
+                    raise ValueInvalid(f"{self.style.format} holds one frame, the tree has {frames}; {instead}")
+                self.take_axes_in(tree, children[0])
             self.values(sample_results(tree))
             return
         if self.style.format != "text":
@@ -275,16 +260,6 @@ class Output:
         text, self.marks = write_tree(tree, self.style), TREE_MARKS
         self.style.screen = self.path is None and (color == "always" or (color == "auto" and self.style.screen))
         self.text(text)
-
-    def _points(self, found: list[dict[str, Any]]) -> None:
-        """Write points; for a person one a line, but what has more than three numbers as a mapping."""
-        if self.style.format in table.FORMATS and "points" not in self._writes:
-            raise ValueInvalid(f"{self.style.format} holds poses; a point has no rotation")
-        placed = [each for each in found if not {"point", "vector"}.isdisjoint(each) and "header" not in each]
-        self._warn_dropped(key for each in placed for key in each)
-        is_plain = all(any(isinstance(each.get(kind), list) for kind in ("point", "vector")) for each in found)
-        text_module = "frametool.view.pose_text" if is_plain else table.FORMATS["yaml"].writer
-        self.text(self._module(text_module).write_points(found, self.style))
 
     def report(self, entries: Sequence[dict[str, Any]]) -> None:
         """Write flat records that are neither poses nor points."""
@@ -365,12 +340,24 @@ class Blocks:
     def of(self, batch: list[Value] | RowPoses) -> bytes:
         """Return the text of some results."""
         from frametool.stream.as_poses import writer_for
+        from frametool.stream.row_layout import POSE
+        from frametool.stream.row_poses import block_of, block_of_points
 
-        output = self.output
+        output, kind = self.output, POSE
         if self.writer is None:
             turns = [each for each in batch if isinstance(each, Result) and each.pose.position is None]
             self.placed = not (output.holds_arrays and len(turns) == len(batch))
-        kind, block = output.block(batch, placed=self.placed)
+        if isinstance(batch, list):
+            found = batch if output.is_trajectory else list(map(_as_point, batch))
+            poses = [each for each in found if isinstance(each, Result)]
+            points = [each for each in found if not isinstance(each, Result)]
+            if points and output.is_trajectory:
+                raise ValueInvalid("a trajectory holds poses; a point has no rotation")
+            if points and poses:
+                raise ValueInvalid(f"{output.style.format} holds things of one kind, found poses among others")
+            kind, block = block_of_points(points) if points else (POSE, block_of(poses, placed=self.placed))
+        else:
+            block = batch if self.placed else batch._replace(numbers=batch.numbers[:, 3:])
         if self.writer is None:
             self.kind, self.writer = kind, writer_for(output.style, kind, placed=self.placed)
         elif kind != self.kind:
@@ -388,13 +375,3 @@ class Blocks:
         if self.writer is None:
             self.of([])
         yield from self.writer.end()
-
-
-def _only_mover(tree: Frames, fmt: str) -> str:
-    """Return the one frame of a tree that has a parent; raise ValueInvalid for several."""
-    children = [track.child for track in tree.tracks()]
-    if len(children) != 1:
-        frames = first_of(children, 8, quote=shown) or "none"
-        instead = f"name two: lookup TREE TARGET SOURCE -f {fmt}"
-        raise ValueInvalid(f"{fmt} holds one frame, the tree has {frames}; {instead}")
-    return children[0]

@@ -90,8 +90,12 @@ def pasted_stream(
     notation, place: the notation, or the position on the Earth, that --from names
     """
     head = stream.peek()[:4096].decode("utf-8", "replace").lstrip("\ufeff")
-    if (re.match(_PLAIN, head) and not re.match(_NO_HEADER, head)) or _has_rows(head, notation, place):
+    if re.match(_PLAIN, head) and not re.match(_NO_HEADER, head):
         return None, stream
+    if found := re.match(_COMMAS, head):  # rows of what --from names, without a header; those of a matrix are pasted
+        rep = notation and notation.representation
+        if place or (rep and rep.whole is None and found[0].count(",") + 1 - len(rep.columns) in (0, 3)):
+            return None, stream
     from frametool.grammar.pasted import begins_freely
     from frametool.ros.pasted_blocks import MOST_PASTED, in_grammar, may_be_pasted
 
@@ -106,16 +110,8 @@ def pasted_stream(
     if len(data) > MOST_PASTED:
         raise FormatError(f"begins as what is pasted, which is {MOST_PASTED} bytes at most; give --in", source=name)
     source = Source(name, decode(data, name))
-    found = in_grammar(source, notation, normalize=request.rows.normalize, points=request.operation.moves)
-    return found, BufferedReader(BytesIO(data))
-
-
-def _has_rows(head: str, notation: Notation | None, place: str) -> bool:
-    """Return True for rows with commas of what --from names, without a header; the rows of a matrix are pasted."""
-    if not (found := re.match(_COMMAS, head)) or place or notation is None:
-        return bool(found and place)
-    rep = notation.representation
-    return rep.whole is None and found[0].count(",") + 1 - len(rep.columns) in (0, 3)
+    text = in_grammar(source, notation, normalize=request.rows.normalize, points=request.operation.moves)
+    return text, BufferedReader(BytesIO(data))
 
 
 def _inverted(text: str) -> re.Match[str] | None:
@@ -305,7 +301,10 @@ def rows_among(arguments: Sequence[str], request: Request, task: PoseTask) -> Ro
     read = [None if at == stream else _read_argument(each, request) for at, each in enumerate(arguments)]
     says_more = [at for at, each in enumerate(read) if each and each.others]
     at = [0, *says_more, *_several(read)][-1] if stream is None else stream
-    _warn_of_twins(bare, read)
+    both = zip(bare, read, strict=True)
+    uncertain = [text for text, each in both if each and any(pose.covariance is not None for pose in each.poses)]
+    if twice := [each for each in dict.fromkeys(uncertain) if uncertain.count(each) > 1]:
+        warn(f"{shown(twice[0])} appears twice: the two count as independent, as all poses do")
     rows, timed = read[at], None
     if rows is not None and len(rows.poses) == 1:
         from frametool.grammar.pose_algebra import shared_stamp
@@ -317,16 +316,6 @@ def rows_among(arguments: Sequence[str], request: Request, task: PoseTask) -> Ro
     )
     streamed = "inv(-)" if without_inverse(arguments[at])[1] else "-"
     return Rows(at, rows.source if rows else streamed, before, behind, timed)
-
-
-def _warn_of_twins(arguments: Sequence[str], read: Sequence[ArgumentPoses | None]) -> None:
-    """Report that the same uncertain pose twice counts as two that are independent."""
-    uncertain = [
-        argument for argument, each in zip(arguments, read, strict=True)
-        if each and any(pose.covariance is not None for pose in each.poses)
-    ]  # fmt: skip
-    if twice := [each for each in dict.fromkeys(uncertain) if uncertain.count(each) > 1]:
-        warn(f"{shown(twice[0])} appears twice: the two count as independent, as all poses do")
 
 
 def combinations(arguments: Sequence[str], request: Request) -> list[tuple[Pose, ...]]:

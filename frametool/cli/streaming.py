@@ -163,8 +163,18 @@ class Stream:
         if argument == "-" or is_pasted(argument, self.notation):
             return False
         once = os.path.exists(argument) and not (os.path.isfile(argument) or os.path.isdir(argument))
-        if not (once or is_bag(argument) or (self.chosen_format() or _format_of(argument)) not in ("", *RECORDS)):
-            return False
+        if not (once or is_bag(argument)):
+            fmt = self.chosen_format()
+            if not fmt:
+                from frametool.formats.detect import detect
+
+                try:
+                    with open(argument, "rb") as file:
+                        fmt = detect(file.read(HEAD), *options.STREAMED, name=argument)
+                except (OSError, ValueError):  # it cannot be read, or nothing tells what it is
+                    return False
+            if fmt in RECORDS:
+                return False
         self.path = argument
         return True
 
@@ -205,7 +215,14 @@ class Stream:
         if not (fmt or is_table or is_trajectory(signed) or holds_arrays(signed)):
             pasted, stream = pasted_stream(stream, self.name, request, self.notation, self.place)
             if pasted is not None:
-                return self._run_pasted(pasted, request)
+                self.inputs.ask("from_rep")
+                if request.gathered is None:
+                    output.values(values_of([pasted], request, output))
+                    return 0
+                from frametool.stream.record_values import read_poses
+
+                request.gathered.add(read_poses(pasted, request), pasted.name)
+                return 0
         if not fmt:
             fmt = self.detected(stream.peek(), is_table=is_table)
             if self.inputs.verbose:
@@ -273,7 +290,16 @@ class Stream:
 
         output, gathers, chosen = self.output, request.gathered is not None, self.output.chosen
         if holds_arrays(fmt) and (gathers or chosen is None or holds_arrays(chosen)):
-            return self._columns(stream, fmt, request), fmt, None
+            from frametool.stream.column_stream import run_columns
+
+            if output.path is None and not gathers and sys.stdout.isatty():
+                raise click.UsageError(f"{fmt} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
+            columns, into = open_columns(InputFile(self.path or "-", stream), fmt), None
+            if chosen and not gathers and FORMATS[chosen].writer != FORMATS[fmt].reader:
+                into = import_module(FORMATS[chosen].writer)
+            request = request.with_results(by_default=not output.notations)
+            style = output.style.changed(format=chosen or fmt)
+            return run_columns(columns, request, style, source=self.name, into=into), fmt, None
         listed = holds_arrays(fmt) or (is_trajectory(fmt) and not FORMATS[fmt].is_table)
         is_kindred = chosen == "csv" and fmt in ("tsv", "semicolon")
         # a trajectory has no room for more columns, or for other ones
@@ -281,7 +307,15 @@ class Stream:
         turns = output.style.axes and not output.notations and is_turned(output.style.changed(format=chosen or fmt))
         converts = chosen not in (None, fmt) or no_room or turns
         if (listed and gathers) or ((listed or converts) and not (gathers or is_kindred or fmt in RECORDS)):
-            return self._poses(stream, fmt, request)
+            from frametool.cli.trees import answers
+            from frametool.stream.as_poses import FormatConverter
+
+            target = chosen or (fmt if "poses" in FORMATS[fmt].writes and not output.notations else "csv")
+            is_for_one = f"--format {target} is for single results and records, not for a stream of {fmt}"
+            refuse(target not in FORMATS, is_for_one)
+            request = request.with_results(by_default=not output.notations)
+            converted = FormatConverter(fmt, request, self.name, output.style.changed(format=target), answers())
+            return converted.outcomes(stream, header=self.inputs.header), target, converted.tally
         request = request.with_results(notations=()) if gathers else request
         if fmt in RECORDS:
             from frametool.stream.record_stream import run_records
@@ -291,48 +325,10 @@ class Stream:
 
         return run_table(stream, fmt, request, source=self.name, header=self.inputs.header), fmt, None
 
-    def _poses(self, stream: Any, fmt: str, request: Request) -> tuple[Generator[Outcome], str, Diagnostics]:
-        """Write the results of rows, or of poses that no table holds, in another format."""
-        from frametool.cli.trees import answers
-        from frametool.stream.as_poses import FormatConverter
-
-        output = self.output
-        target = output.chosen or (fmt if "poses" in FORMATS[fmt].writes and not output.notations else "csv")
-        refuse(target not in FORMATS, f"--format {target} is for single results and records, not for a stream of {fmt}")
-        request = request.with_results(by_default=not output.notations)
-        converted = FormatConverter(fmt, request, self.name, output.style.changed(format=target), answers())
-        return converted.outcomes(stream, header=self.inputs.header), target, converted.tally
-
-    def _columns(self, stream: Any, fmt: str, request: Request) -> Generator[Outcome]:
-        """Write columns of numbers in the format they came in, or in another that holds such."""
-        from frametool.documents.source import InputFile
-        from frametool.stream.column_stream import run_columns
-
-        output = self.output
-        if output.path is None and request.gathered is None and sys.stdout.isatty():
-            raise click.UsageError(f"{fmt} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
-        columns = open_columns(InputFile(self.path or "-", stream), fmt)
-        written = FORMATS[output.chosen].writer if output.chosen and request.gathered is None else FORMATS[fmt].reader
-        into = None if written == FORMATS[fmt].reader else import_module(written)
-        style = output.style.changed(format=output.chosen or fmt)
-        request = request.with_results(by_default=not output.notations)
-        return run_columns(columns, request, style, source=self.name, into=into)
-
     def _says_columns(self) -> bool:
         """Return True if an option says that the stream is a table."""
         looked = self.inputs.peek
         return bool(looked("columns") or looked("keep") or looked("prefix") or looked("header") is False)
-
-    def _run_pasted(self, source: Source, request: Request) -> int:
-        """Write the results of a text that was pasted."""
-        self.inputs.ask("from_rep")
-        if request.gathered is None:
-            self.output.values(values_of([source], request, self.output))
-            return 0
-        from frametool.stream.record_values import read_poses
-
-        request.gathered.add(read_poses(source, request), source.name)
-        return 0
 
     def _run_as_values(self, stream: Any, fmt: str, request: Request) -> int:
         """Write the results of records in another format than theirs."""
@@ -415,17 +411,6 @@ def _signed(begin: bytes, name: str) -> str:
     return "" if fmt == "kitti" else fmt
 
 
-def _format_of(path: str) -> str:
-    """Return the format of a file by what is in it; "" where nothing tells, or it cannot be read."""
-    from frametool.formats.detect import detect
-
-    try:
-        with open(path, "rb") as file:
-            return detect(file.read(HEAD), *options.STREAMED, name=path)
-    except (OSError, ValueError):
-        return ""
-
-
 def is_bag(path: str) -> bool:
     """Recognize a bag by its first bytes, or as a folder."""
     if not os.path.isfile(path):
@@ -440,8 +425,7 @@ def is_bag(path: str) -> bool:
 class PoseTask(Stream):
     """What the options of a command on poses say.
 
-    derives: whether the derivation is wanted instead of the result
-    plan: how then
+    plan: how the derivation is written, if it is wanted instead of the result
     window: the first and the last nanosecond that --start and --stop leave
     """
 
@@ -450,8 +434,14 @@ class PoseTask(Stream):
         self.normalize: bool = inputs.normalize
         super().__init__(inputs, Output(inputs, *what or ("poses",)))
         self.window = options.window_of(inputs)
-        self.plan = self._plan() if inputs.explain else None
-        self.derives = self.plan is not None
+        self.plan: DerivationStyle | None = None
+        if inputs.explain:
+            from frametool.explain.derive import DerivationStyle
+
+            if self.output.chosen not in (None, "text"):
+                written = f"{', '.join(FORMS)}, not {self.output.chosen}"
+                raise click.UsageError(f"--explain writes {written}; leave one of them out")
+            self.plan = DerivationStyle(self.output.style, significant(inputs.precision))
 
     def request(
         self, *, poses: int = 1, extra_column: str | None = None, notations: tuple[Any, ...] = (), **rest: Any
@@ -465,7 +455,8 @@ class PoseTask(Stream):
             extra_column = extra_column or ""
         said = [self.inputs.peek(name) or () for name in ("values", "poses", "pose", "a", "b")]
         texts = [text for each in said for text in ([each] if isinstance(each, str) else each)]
-        if poses and not (texts and all(map(_says_all, texts))):
+        mappings = ((bare := without_inverse(each)[0].strip()).startswith("{") and ":" in bare for each in texts)
+        if poses and not (texts and all(mappings)):  # whose keys say what their numbers are
             self.inputs.ask("from_rep")
         rows = RowOptions(
             poses, given=self.notation, degrees=self.output.style.degrees, normalize=self.normalize,
@@ -500,15 +491,6 @@ class PoseTask(Stream):
         self.output.values(values)
         return 0
 
-    def _plan(self) -> DerivationStyle:
-        """Return how to derive; refuse what a derivation cannot be: a machine format, a stream."""
-        from frametool.explain.derive import DerivationStyle
-
-        if self.output.chosen not in (None, "text"):
-            written = f"{', '.join(FORMS)}, not {self.output.chosen}"
-            raise click.UsageError(f"--explain writes {written}; leave one of them out")
-        return DerivationStyle(self.output.style, significant(self.inputs.precision))
-
     def written(self, argument: str | Source | None, *, warned: bool = False) -> WrittenPose:
         """Read the one pose of an argument as it is written.
 
@@ -533,18 +515,9 @@ class PoseTask(Stream):
         """Write the derivation of an operation where the result would go."""
         from frametool.explain import derive
 
-        return self.write(getattr(derive, operation)(self.plan, *parts, **more))
-
-    def write(self, explanation: Explanation) -> int:
-        """Write a derivation where the result would go."""
-        self.output.text(explanation.render(self.inputs.explain))
+        made: Explanation = getattr(derive, operation)(self.plan, *parts, **more)
+        self.output.text(made.render(self.inputs.explain))
         return 0
-
-
-def _says_all(text: str) -> bool:
-    """Return True for a mapping, whose keys say what its numbers are."""
-    bare = without_inverse(text)[0].strip()
-    return bare.startswith("{") and ":" in bare
 
 
 def significant(precision: int | None) -> int | None:

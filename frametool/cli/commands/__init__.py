@@ -35,7 +35,7 @@ COMMANDS = {
     "calc": ("frametool.cli.commands.calc", "expressions over poses whose frames are checked like units"),
     "lookup": ("frametool.cli.commands.lookup", "where SOURCE is seen from TARGET in a tree of frames"),
     "tree": ("frametool.cli.commands.tree", "the frames of a tree, drawn or written in another format"),
-    "view": ("frametool.cli.commands.view", "frames in 3D: in the terminal, as an interactive page, as a picture"),
+    "view": ("frametool.cli.commands.tree", "frames in 3D: in the terminal, as an interactive page, as a picture"),
     "check": ("frametool.cli.commands.check", "mistakes in trees and recordings"),
     "diff": ("frametool.cli.commands.check", "what differs between two trees, calibrations or recordings"),
     "static": ("frametool.cli.commands.static", "static_transform_publisher arguments, written and read"),

@@ -41,7 +41,7 @@ def compose_command(inputs: Inputs) -> int:
     inverse of a pose is inv(POSE) or ~POSE, in quotes, or the word inv before it.
     """
     task = PoseTask(inputs)
-    if task.derives:
+    if task.plan:
         return task.derive("compose", *map(task.written, inputs.poses))
     from frametool.grammar.pose_algebra import product
     from frametool.stream.request import Operation
@@ -76,7 +76,7 @@ def invert_command(inputs: Inputs) -> int:
     POSE is a mapping, a file, or - for standard input, also with several poses.
     """
     task = PoseTask(inputs)
-    if task.derives:
+    if task.plan:
         return task.derive("invert", task.written(inputs.pose))
     from frametool.stream.request import Operation
 
@@ -113,7 +113,7 @@ def relative_command(inputs: Inputs) -> int:
     The twist in dt seconds is the body's, seen in A: linear R_A' (p_B - p_A) / dt, angular rotvec(A^-1 B) / dt.
     """
     task, a, b = PoseTask(inputs), inputs.a, inputs.b
-    if task.derives:
+    if task.plan:
         return task.derive("relative", *map(task.written, [one_argument(each) for each in (a, b)]))
     from frametool.stream.request import PREVIOUS, START, VELOCITIES, Operation
 
@@ -162,7 +162,7 @@ def interpolate_command(inputs: Inputs) -> int:
     Unlike a screw motion, position and rotation are independent.
     """
     task, asked = PoseTask(inputs), [each for some in inputs.fractions for each in some]
-    if task.derives:
+    if task.plan:
         refuse(len(asked) != 1, f"--explain derives one fraction, found {len(asked)}")
         return task.derive("interpolate", task.written(inputs.a), task.written(inputs.b), asked[0])
     from frametool.grammar.pose_algebra import interpolated, shared_stamp

@@ -262,7 +262,8 @@ def _derived(task: PoseTask, plan: DerivationStyle, way: Way, record: str | Sour
             kind=kind, degrees=asked.rows.degrees, normalize=task.normalize, frame_is_counter=way.counters
         )
         made = derive_record(plan, way.explained(task), pose_source(record, asked), rows, timeless=timeless)
-    return task.write(made)
+    task.output.text(made.render(task.inputs.explain))
+    return 0
 
 
 def _kind(inputs: Inputs) -> str | None:

@@ -66,7 +66,7 @@ def convert_command(inputs: Inputs) -> int:
 
         with misuse("--all-axes: "):
             world, axes = sides_of(inputs.all_axes)
-    if task.derives:
+    if task.plan:
         one_argument(values[0] if values else axes or world)
     from frametool.stream.request import Operation
 
@@ -83,9 +83,9 @@ def convert_command(inputs: Inputs) -> int:
         values, is_numbers = (mapping_of(values, request.rows.given_place),), False
     bare, is_inverse = poses.without_inverse(values[0]) if len(values) == 1 and not is_numbers else ("", False)
     if bare == "-" or (bare and not task.path and task.has_table(bare)):
-        refuse(task.derives, f"{values[0]} is a stream; {ONE_RECORD}")
+        refuse(task.plan, f"{values[0]} is a stream; {ONE_RECORD}")
         values, request = ("-",), request.of_inverses() if is_inverse else request
-    is_alone = operation.turns and not values and (task.derives or not task.has_input())
+    is_alone = operation.turns and not values and (task.plan or not task.has_input())
     if not (is_numbers or ((values or is_alone) and all(map(poses.is_inline, values)))):
         request = request.with_results(unwrap=inputs.unwrap)
     if values == ("-",) or not (values or is_alone):
@@ -97,12 +97,12 @@ def convert_command(inputs: Inputs) -> int:
         pose = poses.pose_from_numbers(values, request) if values else Pose()
         results = [Result(_changed(pose, operation))]
     else:
-        sources = [poses.pose_source(each, request) for each in values] if task.derives else values
+        sources = [poses.pose_source(each, request) for each in values] if task.plan else values
         results = list(poses.values_of(sources, request, output))
     found = [each.pose for each in results if isinstance(each, Result)]
     if inputs.find is not None:
         output.style = _found(found, inputs.find, inputs.tolerance, output.style)
-    if task.derives:
+    if task.plan:
         refuse(len(found) != 1, f"--explain derives one pose, found {len(results)}")
         if not sources:
             texts = list(map(repr, found[0].components[3:]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from frametool.cli.command import Inputs, argument, command_named
-from frametool.cli.options import FormatName, list_options
+from frametool.cli.options import format_among, list_options
 from frametool.cli.output import Output
 from frametool.cli.sink import show
 from frametool.formats.table import FORMATS
@@ -11,7 +11,7 @@ from frametool.view.reports import format_entry, write_format, write_formats
 
 
 @command_named("formats")
-@argument("name", FormatName(FORMATS, "known"), required=False)
+@argument("name", format_among(FORMATS, "known"), required=False)
 @list_options()
 def formats_command(inputs: Inputs) -> None:
     """List the file formats that are read and written: suffixes, meaning of the numbers, required options.

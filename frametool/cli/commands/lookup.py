@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,7 @@ from frametool.cli.output import QUATERNION, Output
 from frametool.cli.sink import say_error
 from frametool.cli.streaming import EXPLAIN, PoseTask, Stream, stream_options
 from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, opened, state
-from frametool.errors import FrametoolError, NoDataAt, UnknownFrame, warn
+from frametool.errors import FrametoolError, NoDataAt, UnknownFrame, printable, warn
 from frametool.formats.table import holds_arrays
 from frametool.geometry.rigid import EXACT, UNCERTAIN
 from frametool.grammar import pose_algebra as algebra
@@ -121,10 +122,14 @@ def lookup_command(inputs: Inputs) -> int:
         return status
     target, source = frame_name(target, tree), frame_name(source, tree)
     source_at, fixed = options.at_ns(inputs.source_at), inputs.fixed and frame_name(inputs.fixed, tree)
-    if task.derives:
+    if task.plan:
         return task.derive("lookup", tree, target, source, at_ns=at, source_at_ns=source_at, fixed=fixed)
     output.take_axes_in(tree, source)
-    output.mark_frames(target, source)
+    seen, by = re.escape(printable(source)), re.escape(printable(target))
+    output.marks += (
+        rf"(?m)^(?P<green>{seen})(?: at \S+)? seen from (?P<cyan>{by})(?= |$)",
+        rf"\(maps points in (?P<green>{seen}) to points in (?P<cyan>{by})\)",
+    )
     status, every = 0, output.holds_all or task.window is not None
     every = every and inputs.at is None and fixed is None and tree.latest(target, source) is not None
     if inputs.times is not None or every:
@@ -220,7 +225,8 @@ def _by_row(task: PoseTask, lookups: algebra.Lookups, target: str | None, source
 @option("--start T", "begin there  [default: when all edges have data]", options.read_limit, under="Time")
 @option("--stop T", "end there  [default: when the first edge has no more]", options.read_limit, under="Time")
 @option("-l --limit N", "print at most N blocks", click.IntRange(1))
-@options.tree_result_options("poses")
+@options.moving_options
+@options.pose_result_options("poses")
 def echo_command(inputs: Inputs) -> int:
     """Print the pose of SOURCE in TARGET over time, like tf2_echo on a running robot.
 

@@ -1,20 +1,33 @@
-"""`frametool tree`: the frames of a tree, drawn."""
+"""The frames of a tree: `tree` draws or writes them, `view` plots them in the terminal, as a page, as a picture."""
 
 from __future__ import annotations
 
+import os
+import sys
+from contextlib import closing
+from typing import TYPE_CHECKING, Any
+
 import click
 
-from frametool.cli.command import FILE, Inputs, argument, command_named, option
-from frametool.cli.options import at_ns, color_option, read_time, tree_result_options
-from frametool.cli.output import Output
-from frametool.cli.trees import load_tree
+from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse
+from frametool.cli.options import at_ns, color_option, moving_options, place_options, pose_result_options, read_time
+from frametool.cli.sink import refuse_existing, say, writing
+from frametool.cli.trees import FRAME, frame_name, load_tree, opened, tree_file
+from frametool.errors import FormatError, listing, shown
+from frametool.frames.stamps import format_stamp
 
+if TYPE_CHECKING:
+    from frametool.formats.robots.model import Solid
+    from frametool.view.scene import FrameScene
+
+    Eye = tuple[float, float]
 
 @command_named("tree", own=("notations", "joints"))
 @argument("tree", FILE)
 @option("--at TIME", "seconds, nanoseconds with ns  [default: latest of each edge]", read_time)
 @color_option
-@tree_result_options("tree", "trajectory")
+@moving_options
+@pose_result_options("tree", "trajectory")
 def tree_command(inputs: Inputs) -> None:
     """Draw the frames of TREE with their poses in their parents; moving frames with rate and interval.
 
@@ -30,6 +43,8 @@ def tree_command(inputs: Inputs) -> None:
     is the listing of tf2's all_frames_as_yaml. --at draws the tree at one time. Files of these two have no poses: only
     names and rates are shown.
     """
+    from frametool.cli.output import Output
+
     output = Output(inputs, "tree", "trajectory")
     place, drawn = output.style.place, output.style.format in ("yaml", "json", "text", "dot", "mermaid")
     if place is not None and (not drawn or place.origin is not None):
@@ -37,3 +52,155 @@ def tree_command(inputs: Inputs) -> None:
     frames = load_tree(inputs.tree, inputs.more, drawings=True)
     stamp = at_ns(inputs.at)
     output.tree(frames if stamp is None else frames.tree_at(stamp), inputs.color)
+
+
+FORMS = ("text", "html", "svg", "glb", "png")
+SUFFIXES = {".html": "html", ".htm": "html", ".svg": "svg", ".glb": "glb", ".png": "png", ".txt": "text"}
+PIPE_SIZE = (100, 30)  # columns and lines where nobody says how many there are
+
+
+def _eye(text: str) -> Eye:
+    from frametool.view.scene import parse_eye
+
+    return parse_eye(text)
+
+
+@command_named("view", own=("output",))
+@argument("tree", FILE)
+@argument("target", FRAME, required=False)
+@argument("source", FRAME, required=False)
+@option("--frame FIXED", "reference frame  [default: TARGET, or the root of most frames]", FRAME, name="fixed")
+@option("--at TIME", "seconds, nanoseconds with ns  [default: first time at which all edges have data]", read_time)
+@option("--below FRAME", "only this frame and its descendants", FRAME)
+@option("--only REGEX", "only frames whose name matches")
+@option("--path", "only the frames between TARGET and SOURCE", name="path_only")
+@option("--from EYE", "slanted, front, side, top, or AZ,EL in degrees", _eye, name="eye", default="slanted")
+@moving_options
+@option("-f --format", "format of the picture  [default: by the suffix of --output, else text]", FORMS, name="fmt")
+@place_options
+@option("--overlay", "compare TREE with a second tree, TARGET: what has moved?")
+@option("--no-sliders", "leave out the sliders for the joints of a robot", name="no_sliders")
+@option("--open", "show the page in the browser", name="opens")
+@color_option
+def view_command(inputs: Inputs) -> None:
+    """Plot the frames of TREE: in the terminal, as an interactive HTML page, as SVG, PNG, or GLB for 3-D programs.
+
+    \b
+      frametool view robot.yaml
+      frametool view robot.yaml --below base_link --from side
+      frametool view robot.yaml map tool -o robot.html
+      frametool view drive.yaml --at 2.5 -o drive.svg
+      sed s/0.28/0.3/ robot.yaml | frametool view robot.yaml - --overlay -o b.html
+
+    The page is self-contained and makes no network requests: rotate it, search, click a frame to see its transform from
+    TARGET in every representation, play moving frames. Robots have a slider for each joint, and their boxes, cylinders,
+    spheres and capsules are drawn. TREE is a file, a recording, - for standard input, or . for the file that
+    FRAMETOOL_TREE names.
+    """
+    tree, target, source, output = inputs.tree, inputs.target, inputs.source, inputs.output
+    chosen = _format(inputs.fmt, output, opens=inputs.opens)
+    refuse_existing(output, force=inputs.force)
+    if chosen == "png":
+        from frametool.view.pictures import require_matplotlib
+
+        require_matplotlib()
+    overlay, eye = inputs.overlay, inputs.peek("eye") if chosen == "glb" else inputs.eye  # a glb is seen from anywhere
+    refuse(overlay and (source or not target), "--overlay takes two trees: frametool view AFTER BEFORE --overlay")
+    refuse(inputs.path_only and not (target and source), "--path draws the way between TARGET and SOURCE; name both")
+    frames = load_tree(tree, inputs.more)
+    from frametool.view.scene import FrameScene
+
+    ends = {} if overlay else {"target": target, "source": source}
+    names = ends | {"fixed": inputs.fixed, "below": inputs.below}
+    named: Any = {key: name and frame_name(name, frames) for key, name in names.items()}
+    scene = FrameScene(frames, at_ns=at_ns(inputs.at), only=inputs.only, path_only=inputs.path_only, **named)
+    gone = [name for name, track in scene.tracks.items() if not track.covers(scene.at_ns or 0)]
+    if gone and chosen != "html":  # which goes to the nearest time
+        say(f"note: no data of {listing(gone, 5)} at {format_stamp(scene.at_ns or 0)}: not drawn, nor what hangs there")
+    before = None
+    if overlay:
+        before = FrameScene(load_tree(str(target)), at_ns=scene.at_ns, fixed=scene.fixed, ground=scene.ground)
+    if chosen == "text" and output is None:
+        color = inputs.color
+        if sys.stdout.isatty():
+            from frametool.view.terminal import print_terminal
+
+            print_terminal(scene, eye, color)
+            return
+    sliders = chosen == "html" and not overlay and not inputs.no_sliders
+    inputs.refuse_idle()
+    content = _content(inputs, scene, chosen, eye, before, sliders=sliders)
+    path = output
+    if inputs.opens and path is None:
+        from tempfile import NamedTemporaryFile
+
+        with NamedTemporaryFile(prefix="frametool_", suffix=".html", delete=False) as page:
+            path = page.name
+    with writing(path, force=inputs.force or output is None) as write:
+        write(content)
+    if inputs.opens and path:
+        import webbrowser
+        from pathlib import Path
+
+        say(f"the page is {path}")
+        webbrowser.open(Path(path).absolute().as_uri())
+
+
+def _format(fmt: str | None, output: str | None, *, opens: bool) -> str:
+    """Choose the format: that of --format, else by the file's suffix, else text; a browser shows pages."""
+    suffix = os.path.splitext(output or "")[1].lower()
+    chosen = fmt or SUFFIXES.get(suffix) or ("html" if opens else None)
+    if chosen is None and suffix and output != "-":
+        raise click.UsageError(f"no format has the suffix {shown(suffix)}; give --format {'|'.join(FORMS)}")
+    refuse(opens and (chosen != "html" or output == "-"), "--open shows a page: give -o FILE.html, or no -o")
+    return chosen or "text"
+
+
+def _content(
+    inputs: Inputs, scene: FrameScene, fmt: str, eye: Eye, before: FrameScene | None, *, sliders: bool
+) -> str | bytes:
+    """Return the picture in a format, and say what a still one does not show."""
+    tree: str = inputs.tree
+    title, other = (os.path.basename(each) if len(each) < 200 else "tree" for each in (tree, str(inputs.target)))
+    if fmt == "html":
+        from frametool.view.exports import write_page
+
+        return write_page(
+            scene, title=title, file=tree, eye=eye, other=before, other_title=other, sliders=sliders,
+            solids=_solids(tree) if scene.tree.robots and not before else (),
+        )  # fmt: skip
+    if fmt == "glb":
+        from frametool.view.exports import write_glb
+
+        return write_glb(scene)
+    if fmt == "text":
+        from shutil import get_terminal_size
+
+        from frametool.view.terminal import terminal_text
+
+        return terminal_text(scene, *get_terminal_size(PIPE_SIZE), eye)
+    from frametool.view.exports import still_picture
+    from frametool.view.pictures import write_picture
+
+    still = still_picture(scene, eye, title, before)
+    for note in still.notes:
+        say(f"note: {note}")
+    return write_picture(still, f".{fmt}")
+
+
+def _solids(tree: str) -> list[Solid]:
+    """Return the solids of a robot's file, and say which are not drawn as they are; its frames were read before."""
+    from frametool.formats.robots.model import read_solids
+
+    if not os.path.isfile(tree_file(tree)):
+        return []
+    (file,) = opened([tree])
+    with closing(file):
+        try:
+            solids = read_solids(file, file.format)
+        except FormatError as error:
+            say(f"note: solids not drawn: {str(error).partition(chr(10))[0]}")
+            return []
+    if meshes := sum(each.kind == "mesh" for each in solids):
+        say(f"note: {meshes} mesh{'es' * (meshes > 1)} drawn as boxes; mesh files are not read")
+    return solids
