@@ -284,7 +284,6 @@ FILE = Text(offers=lambda _ctx, _incomplete: None)
 # options that may be without =VALUE, and their values: the first is what they mean then
 OPTIONAL = {"--explain": ("text", "markdown"), "--rows": ("ate", "rpe", "kitti")}
 OF_POSES = ("compose", "convert", "interpolate", "invert", "mean", "relative")  # they have no other arguments
-BEGIN_POSES = ("{", "[", "inv(", "p[")
 
 
 def _kind(kind: Any) -> click.ParamType[Any]:
@@ -397,17 +396,8 @@ class Command(WithHelp):
         if any(map(_is_negative, args)):
             options = {name for each in self.get_params(ctx) for name in each.opts}
             args = [f" {each}" if _is_negative(each) and each not in options else each for each in args]
-        if "inv" in args:  # before a pose it is inv(POSE); before what may be no pose a name, unless all are poses
-            joined: list[str] = []
-            for each in reversed(args):
-                is_pose = self.name in OF_POSES or (joined and joined[-1].lstrip(" ~").startswith(BEGIN_POSES))
-                if each == "inv" and is_pose and joined and not joined[-1].startswith("--"):
-                    joined.append(f"inv({joined.pop()})")
-                elif each == "inv" and self.name in OF_POSES:
-                    raise click.UsageError("inv stands before the pose whose inverse is meant; nothing follows it", ctx)
-                else:
-                    joined.append(each)
-            args = joined[::-1]
+        if "inv" in args:
+            args = _joined(args, ctx, always=self.name in OF_POSES)
         args = [f"{each}={OPTIONAL[each][0]}" if each in OPTIONAL else each for each in args]
         rest = super().parse_args(ctx, args)
         passed: Sequence[Option] = () if ctx.resilient_parsing else ctx.meta[PASSED]
@@ -445,6 +435,20 @@ class Command(WithHelp):
             self.lists(formatter, bool(ctx.meta.get(EVERYTHING)))
             formatter.write_paragraph()
         formatter.write_text(self.epilog or EXIT_CODES)
+
+
+def _joined(args: list[str], ctx: click.Context, *, always: bool) -> list[str]:
+    """Write the word `inv` before a pose as inv(POSE); before what may be no pose it is a name, unless `always`."""
+    joined: list[str] = []
+    for each in reversed(args):
+        is_pose = bool(joined) and (always or joined[-1].lstrip(" ~").startswith(("{", "[", "inv(", "p[")))
+        if each == "inv" and is_pose and not joined[-1].startswith("--"):
+            joined.append(f"inv({joined.pop()})")
+        elif each == "inv" and always:
+            raise click.UsageError("inv stands before the pose whose inverse is meant; nothing follows it", ctx)
+        else:
+            joined.append(each)
+    return joined[::-1]
 
 
 command_named = partial(click.command, cls=Command)  # what makes a function a command

@@ -52,14 +52,20 @@ def writing(path: str | None, *, force: bool = False, folder: bool = False) -> I
     """
     if path in (None, "-", "/dev/stdout"):
         yield writer_into(sys.stdout.buffer, "standard output")
-        return
-    if not folder and is_special(path):
+    elif folder or not is_special(path):
+        with _replacing(path, force=force, folder=folder) as write:
+            yield write
+    else:
         number = _own_stream(path)
         with problems_of(path):
             special = open(path if number is None else os.dup(number), "wb", buffering=0)  # noqa: SIM115 - closed below
         with special:
             yield writer_into(special, path)
-        return
+
+
+@contextmanager
+def _replacing(path: str, *, force: bool, folder: bool) -> Iterator[Write]:
+    """Yield what writes a part that takes the place of `path` if all goes well."""
     refuse = partial(_refuse_folder if folder else refuse_existing, path, force=force)
     refuse()
     STATE.cleans_up = True

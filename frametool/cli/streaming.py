@@ -171,7 +171,7 @@ class Stream:
                 try:
                     with open(argument, "rb") as file:
                         fmt = detect(file.read(HEAD), *options.STREAMED, name=argument)
-                except (OSError, ValueError):  # it cannot be read, or nothing tells what it is
+                except (OSError, ValueError):  # it cannot be read, or its format is unknown
                     return False
             if fmt in RECORDS:
                 return False
@@ -215,14 +215,7 @@ class Stream:
         if not (fmt or is_table or is_trajectory(signed) or holds_arrays(signed)):
             pasted, stream = pasted_stream(stream, self.name, request, self.notation, self.place)
             if pasted is not None:
-                self.inputs.ask("from_rep")
-                if request.gathered is None:
-                    output.values(values_of([pasted], request, output))
-                    return 0
-                from frametool.stream.record_values import read_poses
-
-                request.gathered.add(read_poses(pasted, request), pasted.name)
-                return 0
+                return self._run_pasted(pasted, request)
         if not fmt:
             fmt = self.detected(stream.peek(), is_table=is_table)
             if self.inputs.verbose:
@@ -290,16 +283,7 @@ class Stream:
 
         output, gathers, chosen = self.output, request.gathered is not None, self.output.chosen
         if holds_arrays(fmt) and (gathers or chosen is None or holds_arrays(chosen)):
-            from frametool.stream.column_stream import run_columns
-
-            if output.path is None and not gathers and sys.stdout.isatty():
-                raise click.UsageError(f"{fmt} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
-            columns, into = open_columns(InputFile(self.path or "-", stream), fmt), None
-            if chosen and not gathers and FORMATS[chosen].writer != FORMATS[fmt].reader:
-                into = import_module(FORMATS[chosen].writer)
-            request = request.with_results(by_default=not output.notations)
-            style = output.style.changed(format=chosen or fmt)
-            return run_columns(columns, request, style, source=self.name, into=into), fmt, None
+            return self._columns(stream, fmt, request), fmt, None
         listed = holds_arrays(fmt) or (is_trajectory(fmt) and not FORMATS[fmt].is_table)
         is_kindred = chosen == "csv" and fmt in ("tsv", "semicolon")
         # a trajectory has no room for more columns, or for other ones
@@ -307,15 +291,7 @@ class Stream:
         turns = output.style.axes and not output.notations and is_turned(output.style.changed(format=chosen or fmt))
         converts = chosen not in (None, fmt) or no_room or turns
         if (listed and gathers) or ((listed or converts) and not (gathers or is_kindred or fmt in RECORDS)):
-            from frametool.cli.trees import answers
-            from frametool.stream.as_poses import FormatConverter
-
-            target = chosen or (fmt if "poses" in FORMATS[fmt].writes and not output.notations else "csv")
-            is_for_one = f"--format {target} is for single results and records, not for a stream of {fmt}"
-            refuse(target not in FORMATS, is_for_one)
-            request = request.with_results(by_default=not output.notations)
-            converted = FormatConverter(fmt, request, self.name, output.style.changed(format=target), answers())
-            return converted.outcomes(stream, header=self.inputs.header), target, converted.tally
+            return self._poses(stream, fmt, request)
         request = request.with_results(notations=()) if gathers else request
         if fmt in RECORDS:
             from frametool.stream.record_stream import run_records
@@ -325,10 +301,47 @@ class Stream:
 
         return run_table(stream, fmt, request, source=self.name, header=self.inputs.header), fmt, None
 
+    def _poses(self, stream: Any, fmt: str, request: Request) -> tuple[Generator[Outcome], str, Diagnostics]:
+        """Write the results of rows, or of poses that no table holds, in another format."""
+        from frametool.cli.trees import answers
+        from frametool.stream.as_poses import FormatConverter
+
+        output = self.output
+        target = output.chosen or (fmt if "poses" in FORMATS[fmt].writes and not output.notations else "csv")
+        refuse(target not in FORMATS, f"--format {target} is for single results and records, not for a stream of {fmt}")
+        request = request.with_results(by_default=not output.notations)
+        converted = FormatConverter(fmt, request, self.name, output.style.changed(format=target), answers())
+        return converted.outcomes(stream, header=self.inputs.header), target, converted.tally
+
+    def _columns(self, stream: Any, fmt: str, request: Request) -> Generator[Outcome]:
+        """Write columns of numbers in the format they came in, or in another that holds such."""
+        from frametool.stream.column_stream import run_columns
+
+        output, into = self.output, None
+        if output.path is None and request.gathered is None and sys.stdout.isatty():
+            raise click.UsageError(f"{fmt} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
+        columns = open_columns(InputFile(self.path or "-", stream), fmt)
+        if output.chosen and request.gathered is None and FORMATS[output.chosen].writer != FORMATS[fmt].reader:
+            into = import_module(FORMATS[output.chosen].writer)
+        style = output.style.changed(format=output.chosen or fmt)
+        request = request.with_results(by_default=not output.notations)
+        return run_columns(columns, request, style, source=self.name, into=into)
+
     def _says_columns(self) -> bool:
         """Return True if an option says that the stream is a table."""
         looked = self.inputs.peek
         return bool(looked("columns") or looked("keep") or looked("prefix") or looked("header") is False)
+
+    def _run_pasted(self, source: Source, request: Request) -> int:
+        """Write the results of a text that was pasted."""
+        self.inputs.ask("from_rep")
+        if request.gathered is None:
+            self.output.values(values_of([source], request, self.output))
+            return 0
+        from frametool.stream.record_values import read_poses
+
+        request.gathered.add(read_poses(source, request), source.name)
+        return 0
 
     def _run_as_values(self, stream: Any, fmt: str, request: Request) -> int:
         """Write the results of records in another format than theirs."""
