@@ -21,7 +21,7 @@ from frametool.formats.table import FORMATS
 from frametool.geometry import arrays
 from frametool.stream.row_layout import POSE, SIX, TWIST, WRENCH, six_names
 from frametool.stream.row_poses import NO_STAMP, is_typed, objects, plain_cells, text_of, texts_of
-from frametool.stream.writers import columns_of, settle, target_in
+from frametool.stream.writers import PoseWriter
 from frametool.text.parse import parse_floats
 from frametool.text.spans import Spans
 
@@ -219,69 +219,57 @@ def _in_columns(name: str, cells: Cells) -> dict[str, Made]:
     return {column: Made(each, not_finite(each)) for column, each in zip(columns(size), rows.T, strict=True)}
 
 
-class ArrayWriter(ColumnsWriter):
+class ArrayWriter(PoseWriter):
     """Write blocks of poses, points, vectors, twists or wrenches one after the other.
 
     The columns: frames where there are names, numbers, stamps, and what is not ours.
     """
 
     def __init__(self, style: Style, kind: str, extras: Sequence[str] = (), *, placed: bool = True) -> None:
-        """Choose the format; kind: what a row is; extras: the numbers with each; placed: it has a position."""
-        super().__init__(style)
-        self.kind = kind
-        self.extras = tuple(extras)
-        self.target = target_in(style, kind, placed=placed)
-        self.placed = placed or kind != POSE
-        self.own = {POSE: 7, TWIST: 6, WRENCH: 6}.get(kind, 3)
+        """Choose the format, and take what a row is."""
+        super().__init__(style, kind, extras, placed=placed)
+        self.file = ColumnsWriter(style)
+        self.names = [*self.target.position_columns, *self.target.names]
+        self.names = [*(six_names(kind) if kind in SIX else self.names), *extras]
 
     def of_block(self, block: RowPoses) -> bytes:
         """Return what is written of a block; numbers are metres and x y z w, nan in rows without a result."""
-        if self.style.place is not None and len(block.numbers):
-            settle(self.style.place, block)
+        self.settle(block)
         if not len(block.numbers):
-            block = block._replace(numbers=np.empty((0, self.own - 3 * (not self.placed) + len(self.extras))))
-        return self.of_columns(len(block.numbers), self._made(block))
+            own = {POSE: 7 if self.placed else 4, TWIST: 6, WRENCH: 6}.get(self.kind, 3)
+            block = block._replace(numbers=np.empty((0, own + len(self.extras))))
+        return self.file.of_columns(len(block.numbers), self._made(block))
 
     def end(self) -> Iterator[bytes]:
         """Yield what comes behind the last block."""
-        if not self.begun:
-            self.of_columns(0, {name: Made(np.empty(0)) for name in self._names()})
-        return super().end()
-
-    def _names(self) -> list[str]:
-        """Name the numbers of a result."""
-        if self.kind in SIX:
-            return [*six_names(self.kind), *self.extras]
-        return [*self.target.position_columns, *self.target.names, *self.extras]
+        if not self.file.begun:
+            self.file.of_columns(0, {name: Made(np.empty(0)) for name in self.names})
+        return self.file.end()
 
     def _made(self, block: RowPoses) -> dict[str, Made]:
-        """Return the columns of a block by name."""
-        size = len(block.numbers)
-        made: dict[str, Made] = {}
+        """Return the columns of a block by name, its numbers in the notations that are written."""
+        size, made, place = len(block.numbers), dict[str, Made](), self.target.place
         for name, frames in (("name", block.names), ("parent" if self.kind == POSE else "frame", block.parents)):
             if any(frames):
-                made[name] = Made(objects(list(frames) * (1 if len(frames) == size else size)))
-        for name, column in zip(self._names(), self._numbers(block), strict=True):
+                made[name] = Made(objects(block.for_each(frames)))
+        columns = self.columns(block)
+        own = len(columns) - len(self.extras)
+        with np.errstate(invalid="ignore"):
+            numbers = self.target.written(block.unmoved(columns[:own]), arrays)
+        for name, each in zip(self.names, (*numbers, *columns[own:]), strict=True):
+            # nan in rows without a result; the last row of a matrix is four plain numbers
+            column = each + columns[0] * 0.0 if isinstance(each, float) else each
             made[name] = Made(column, not_finite(column))
-        if (place := self.target.place) is not None:
+        if place is not None:
             for at, words in place.words.items():
-                name = place.columns[at]
-                numbers = np.nan_to_num(made[name].values).tolist()
-                made[name] = Made(objects([words[int(number)] for number in numbers]))
+                codes = np.nan_to_num(made[place.columns[at]].values).tolist()
+                made[place.columns[at]] = Made(objects([words[int(code)] for code in codes]))
             if self.target.notations:
                 made["axes"] = Made(objects([place.axes] * size))
         if block.stamps_ns is not None:
             none = block.stamps_ns == NO_STAMP
             made["stamp_ns"] = Made(block.stamps_ns.astype(STAMP_NS), none if none.any() else None)
         for name, cells in block.extras.items():
-            for column, each in _in_columns(name, cells).items():
-                made.setdefault(column, each)
+            for column_name, each in _in_columns(name, cells).items():
+                made.setdefault(column_name, each)
         return made
-
-    def _numbers(self, block: RowPoses) -> list[Any]:
-        """Return the numbers of the results in the notations that are written."""
-        columns = columns_of(block, placed=self.placed)
-        nothing = columns[0] * 0.0  # nan in rows without a result; the last row of a matrix is four plain numbers
-        with np.errstate(invalid="ignore"):
-            numbers = self.target.written(block.unmoved(columns[: self.own]), arrays)
-        return [*(each + nothing if isinstance(each, float) else each for each in numbers), *columns[self.own :]]

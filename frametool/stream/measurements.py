@@ -184,7 +184,7 @@ def _of_edges(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
 def _of_table(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
     """Yield the rows of a table."""
     from frametool.stream.as_poses import FormatConverter
-    from frametool.stream.row_poses import results_of
+    from frametool.stream.row_poses import values_of
 
     converter = FormatConverter(file.format, request._replace(operation=MOVED), file.name)
     bare, line = file.tally.names.bare, 0
@@ -197,7 +197,7 @@ def _of_table(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
             warn(f"{file.name}:1: no rotation among the columns {rows.columns}: each is taken for 0")
         line = line or 1
         BadRows(file.name).take(fault._replace(line=line + fault.line) for fault in outcome.faults)
-        results = results_of(block, columns() if shape.covariance else (), placed=has_place)
+        results = values_of(block, POSE, columns() if shape.covariance else (), placed=has_place)
         inputs = rows.inputs.T.tolist() if results else []
         for at, result, own in zip((block.lines + line).tolist(), results, inputs, strict=True):
             pose, cells = result.pose, result.extras

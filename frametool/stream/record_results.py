@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from itertools import chain
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from frametool import sizes
 from frametool.errors import FrametoolError
@@ -16,37 +16,26 @@ from frametool.stream.faults import STOP, Outcome
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterable, Iterator, Sequence
 
-    from frametool.stream.record_rows import RecordBatch
     from frametool.stream.record_values import Value
     from frametool.stream.row_poses import RowPoses
-    from frametool.stream.writers import PoseBatch
+    from frametool.stream.text_rows import AlikeRows
     from frametool.text.spans import Ints, Spans
 
 
 class BlockResults(NamedTuple):
     """What the rows or records of a block became: those that are alike together, and single results, by place."""
 
-    batches: Sequence[RecordBatch | PoseBatch]
+    batches: Sequence[AlikeRows]
     values: list[tuple[int, Value]]
 
     def posed(self) -> RowPoses | None:
         """Return the rows as one block of poses; None where they are more, or others."""
-        if self.values or len(self.batches) != 1:
-            return None
-        from frametool.stream.record_rows import poses_of
-
-        return poses_of(cast("RecordBatch", self.batches[0]))
+        return None if self.values or len(self.batches) != 1 else self.batches[0].poses()
 
     def in_order(self) -> Iterator[Value]:
         """Yield all results as values, in the order of their records."""
-        found = self.values
-        if self.batches:
-            from frametool.stream.record_rows import rows_as_values
-
-            batches = cast("Sequence[RecordBatch]", self.batches)
-            rows = (zip(batch.places.tolist(), rows_as_values(batch), strict=True) for batch in batches)
-            found = sorted(chain(found, *rows), key=itemgetter(0))
-        yield from map(itemgetter(1), found)
+        rows = (zip(batch.places.tolist(), batch.values(), strict=True) for batch in self.batches)
+        yield from map(itemgetter(1), sorted(chain(self.values, *rows), key=itemgetter(0)))
 
 
 LINE = re.compile(rb'((?:[^"\n]|"[^"]*")*+)\n')
@@ -104,10 +93,11 @@ class Documents(ResultWriter):
         lines = [(place, (self.parting + write_poses([value], self.style)).encode()) for place, value in block.values]
         groups = []
         for batch in block.batches:
-            from frametool.stream.text_rows import in_document
+            from frametool.stream.text_rows import JSON, YAML
 
-            text = in_document(self.parting + write_poses([batch.marked.value], self.exact), self.style)
-            groups.append((batch.places, batch.text(text, self.style)))
+            text = self.parting + write_poses([batch.marked.value], self.exact)
+            syntax = YAML if self.style.format == "yaml" else JSON
+            groups.append((batch.places, batch.text([(text, syntax)], self.style)))
         found = text_of(lines, groups)
         begun, self.begun = self.begun, self.begun or bool(found)
         return found if begun else found[len(self.parting) :]
@@ -115,12 +105,10 @@ class Documents(ResultWriter):
 
 def csv_rows(block: BlockResults, columns: dict[str, None], style: Style) -> bytes:
     """Return the rows of a block in a table, and add its columns to those that the table has."""
-    rows: list[tuple[int, dict[str, Any], RecordBatch | PoseBatch | None]] = [
+    rows: list[tuple[int, dict[str, Any], AlikeRows | None]] = [
         (place, cells_of(value, style), None) for place, value in block.values
     ]
-    for batch in block.batches:
-        first, value = int(batch.places[0]), batch.marked.value
-        rows.append((first, cells_of(value, style), batch))
+    rows += [(int(each.places[0]), cells_of(each.marked.value, style), each) for each in block.batches]
     rows.sort(key=itemgetter(0))
     for _, cells, _ in rows:
         columns |= dict.fromkeys(cells)

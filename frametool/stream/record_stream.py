@@ -33,9 +33,10 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components
     from frametool.stream.evaluate import Plan, Run, State
     from frametool.stream.record_cuts import Cut, Hit, RecordCutter
-    from frametool.stream.record_rows import RecordBatch, RecordRows
+    from frametool.stream.record_rows import RecordRows
     from frametool.stream.request import Request
     from frametool.stream.template import Template
+    from frametool.stream.text_rows import AlikeRows
     from frametool.text.lines import ByteStream
     from frametool.text.spans import Bytes
 
@@ -127,7 +128,7 @@ class Found:
         self.items: list[tuple[int, Any]] = []
         self.faults: list[tuple[int, Fault]] = []
         self.runs: list[Run] = []
-        self.batches: list[RecordBatch] = []
+        self.batches: list[AlikeRows] = []
         self.notes: list[RowNote] = []
         self.rows = self.kept = self.mended = 0
 

@@ -10,7 +10,7 @@ from contextlib import suppress
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.document import Aliased, Node, refuse_alias
+from frametool.documents.document import Aliased, Node, parse_nodes, refuse_alias
 from frametool.documents.json import JSON_NUMBER
 from frametool.documents.source import Source, Verbatim
 from frametool.errors import FormatError, Misused, ValueInvalid, shown, warn
@@ -313,3 +313,10 @@ def plain_scalar(text: str) -> str | Verbatim | None:
     if text in ("null", "~", ""):
         return None
     return Verbatim(text) if text in ("true", "false") or re.fullmatch(JSON_NUMBER, text) else text
+
+
+def plain_text(text: str, quote: str) -> Any:
+    """Return the text within the quotes of a scalar as a plain value."""
+    if not quote:
+        return plain_scalar(text)
+    return plain(parse_nodes(f"{quote}{text}{quote}")[0]) if "\\" in text else text

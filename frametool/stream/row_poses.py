@@ -17,13 +17,13 @@ from frametool.documents.source import Verbatim
 from frametool.errors import ValueInvalid
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.result import NoResult, Result, with_entries
-from frametool.stream.row_layout import AS_READ, NOWHERE, PARTS
+from frametool.stream.row_layout import AS_READ, NOWHERE, PARTS, POSE
 from frametool.text.cells import without_quotes
 from frametool.text.spans import Floats, Ints, Spans
 from frametool.text.write import rounded_to_single, shortest_spans
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -184,45 +184,38 @@ def objects(values: Iterable[Any]) -> NDArray[Any]:
     return column
 
 
-def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -> list[Result]:
-    """Return a block as results, one a pose."""
+def values_of(
+    block: RowPoses, kind: str, extras: Sequence[str] = (), place: Place | None = None, *, placed: bool = True
+) -> list[Any]:
+    """Return a block as single results of a kind: poses, placed or not, or points, vectors, .. as mappings.
+
+    extras: the numbers that come with each; place: how positions on the Earth are written
+    """
     names, parents = map(block.for_each, (block.names, block.parents))
-    made = []
-    for at, (numbers, said) in enumerate(_each(block, extras)):
-        own = NOWHERE if numbers is None else tuple(numbers) if placed else (0.0, 0.0, 0.0, *numbers)
-        pose = Pose.of(own, names[at], parents[at])._replace(read=block.spot(at))
-        made.append((NoResult if numbers is None else Result)(pose if placed else pose._replace(position=None), said))
-    return made
-
-
-def points_of(
-    block: RowPoses, kind: str, extras: Sequence[str] = (), place: Place | None = None
-) -> list[dict[str, Any]]:
-    """Return a block of points or vectors as mappings, one each, or of points on the Earth at a place."""
-    names, frames = map(block.for_each, (block.names, block.parents))
-    made = []
-    for at, (numbers, said) in enumerate(_each(block, extras)):
-        own: dict[str, Any] = {"name": names[at]} if names[at] else {}
-        if place is not None and numbers is not None:
-            from frametool.grammar.place import point_entry
-
-            made.append(own | point_entry(frames[at], numbers, place, block.spot(at)) | said)
-        else:
-            own |= {"frame": frames[at]} if frames[at] else {}
-            made.append(own | spelled(kind, numbers) | said)
-    return made
-
-
-def _each(block: RowPoses, extras: Sequence[str]) -> Iterator[tuple[list[float] | None, dict[str, Any]]]:
-    """Yield the numbers of each row, None in one without a result, and what else it says."""
     others = {name: plain_cells(cells) for name, cells in block.extras.items()}
     stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
+    made: list[Any] = []
     for at, numbers in enumerate(block.numbers.tolist()):
-        is_null, own = isnan(numbers[0]), len(numbers) - len(extras)
-        said = with_entries(dict(zip(extras, [None] * len(extras) if is_null else numbers[own:], strict=True)))
+        has_none, size = isnan(numbers[0]), len(numbers) - len(extras)
+        own = None if has_none else numbers[:size]
+        said = with_entries(dict(zip(extras, [None] * len(extras) if has_none else numbers[size:], strict=True)))
         if stamps is not None:
             said["stamp_ns"] = None if stamps[at] == NO_STAMP else stamps[at]
-        yield None if is_null else numbers[:own], said | {name: cells[at] for name, cells in others.items()}
+        said |= {name: cells[at] for name, cells in others.items()}
+        named: dict[str, Any] = {"name": names[at]} if names[at] else {}
+        if kind == POSE:
+            components = NOWHERE if own is None else own if placed else (0.0, 0.0, 0.0, *own)
+            pose = Pose.of(components, names[at], parents[at])._replace(read=block.spot(at))
+            pose = pose if placed else pose._replace(position=None)
+            made.append(NoResult(pose, said) if own is None else Result(pose, said))
+        elif place is not None and own is not None:
+            from frametool.grammar.place import point_entry
+
+            made.append(named | point_entry(parents[at], own, place, block.spot(at)) | said)
+        else:
+            named |= {"frame": parents[at]} if parents[at] else {}
+            made.append(named | spelled(kind, own) | said)
+    return made
 
 
 def spelled(kind: str, numbers: Sequence[float] | None) -> dict[str, Any]:
@@ -260,7 +253,9 @@ def plain_cells(cells: Cells) -> list[Any]:
     """Return cells as plain values."""
     if not isinstance(cells, Spans) and cells.dtype == object:
         return list(cells)
-    return [plain_cell(text) for text in texts_of(cells)]
+    texts = texts_of(cells)
+    known = {text: plain_cell(text) for text in {*texts}}
+    return [known[text] for text in texts]
 
 
 def plain_cell(text: str) -> str | Verbatim | None:
