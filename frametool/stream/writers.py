@@ -61,7 +61,8 @@ class PoseWriter:
         """Take the style and what a row is, with the numbers that come with each; placed: poses have a position."""
         self.style, self.kind, self.extras, self.placed = style, kind, tuple(extras), placed or kind != POSE
         unit: Any = style.place or 1.0
-        notations = tuple((each, each.in_degrees(style.degrees)) for each in style.notations or (notation("quaternion"),))
+        asked = style.notations or (notation("quaternion"),)
+        notations = tuple((each, each.in_degrees(style.degrees)) for each in asked)
         whole = placed and len(notations) == 1 and notations[0][0].representation.whole is not None
         self.target = Target(None if whole or not placed else unit, notations, style.keep_sign, whole)
         if kind != POSE:
@@ -197,7 +198,8 @@ class RowsWriter(PoseWriter):
             numbers = self.target.written(some.unmoved(self.columns(some)), arrays)
             values = np.stack(np.broadcast_arrays(*numbers), axis=-1) + 0.0  # none is -0.0
             refuse_infinite(values)
-            alike = [AlikeRows(self._marked(some), rows, values, some)]
+            scalars = {leaf_mark(at): cells for at, cells in enumerate(some.extras.values())}
+            alike = [AlikeRows(self._marked(some), rows, values, some._replace(extras=scalars))]
         others = kept(block, singles) if len(singles) < len(alone) else block
         made = values_of(others, self.kind, self.extras, self.target.place, placed=self.placed) if len(singles) else ()
         results = BlockResults(alike, [*zip(singles.tolist(), made, strict=True)])
