@@ -46,7 +46,7 @@ from frametool.stream.row_poses import RowPoses, kept
 from frametool.stream.rows import Block, spans_of
 from frametool.stream.table import rename_of
 from frametool.stream.table_stream import PlannedRows, TableRows
-from frametool.stream.writers import LEARNED, RowsWriter, TextWriter
+from frametool.stream.writers import LEARNED, RowsWriter, SingleWriter, TextWriter
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Sequence
@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     from frametool.text.spans import Ints
 
     Step: TypeAlias = tuple[RowPoses, Outcome]  # what a block became, and what is reported about it
-    BlockWriter: TypeAlias = "TextWriter | RowsWriter | ArrayWriter | RecordingWriter"
+    BlockWriter: TypeAlias = "SingleWriter | RowsWriter | ArrayWriter | RecordingWriter"
 
 QUATERNION = notation("quaternion")
 NO_ROTATION = "no rotation among the columns {}: poses are wanted"
@@ -79,7 +79,8 @@ def writer_for(style: Style, kind: str = POSE, extras: Sequence[str] = (), *, pl
         from frametool.stream.recording_writer import RecordingWriter
 
         return RecordingWriter(style, kind, extras, placed=placed)
-    return (RowsWriter if style.format in LEARNED else TextWriter)(style, kind, extras, placed=placed)
+    text = TextWriter if rows_of(style.format) else SingleWriter
+    return (RowsWriter if style.format in LEARNED else text)(style, kind, extras, placed=placed)
 
 
 class FormatConverter:

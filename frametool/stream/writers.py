@@ -84,19 +84,16 @@ class PoseWriter:
         self.style.place.settle(*self.columns(block)[:3])
 
 
-class TextWriter(PoseWriter):
-    """Write blocks of poses, points or vectors in formats whose rows are fixed, or one by one as single results."""
+class SingleWriter(PoseWriter):
+    """Write blocks of poses, points or vectors as the format does for single results."""
 
     def __init__(self, style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> None:
-        """Take the style and what a row is; raises ValueInvalid for what the format does not hold, notations too."""
+        """Take the style and what a row is; raises ValueInvalid for what the format does not hold."""
         super().__init__(style, kind, extras, placed=placed)
         if kind in SIX:
             raise ValueInvalid(f"{style.format} is not written of rows of a {kind}; write csv, json or yaml")
         if kind != POSE and "points" not in FORMATS[style.format].writes:
             raise ValueInvalid(f"{style.format} holds poses; a {kind} has no rotation")
-        self.fixed = rows_of(style.format)
-        self.dropped_fields = None if self.fixed is None else DroppedFields(self.fixed, style)
-        self.count = 0
         self.dropped: dict[str, None] = {}
         self.first: Any = None
 
@@ -104,34 +101,50 @@ class TextWriter(PoseWriter):
         """Return the text of a block of poses; numbers are metres and x y z w."""
         if not len(block.numbers):
             return b""
-        if (place := self.style.place) is not None and self.fixed is not None:
-            names = ", ".join(each.name for each in (place, *place.more))
-            raise ValueInvalid(f"{self.style.format} holds x, y, z; leave --to {names} out, or write csv or json")
         self.settle(block)
         self.dropped |= dict.fromkeys((*self.extras, *block.extras))
         refuse_scale_in(self.style.format, self.dropped)
-        before, self.count = self.count, self.count + len(block.numbers)
-        if self.fixed is not None and self.dropped_fields is not None:
-            return self._fixed(self.fixed, self.dropped_fields, block, before)
         results = values_of(block, self.kind, self.extras, self.target.place, placed=self.placed)
-        first = self.first = self.first or results[0]
         module: Any = import_module(FORMATS[self.style.format].writer)
         write: Callable[[Sequence[Any], Style], str] = module.write_poses if self.kind == POSE else module.write_points
-        known = write([first], self.style) if before else ""  # the text of several begins with that of the first
-        return write([first, *results] if before else results, self.style)[len(known) :].encode()
+        if self.first is None:
+            self.first = results[0]
+            return write(results, self.style).encode()
+        known = write([self.first], self.style)  # the text of several begins with that of the first
+        return write([self.first, *results], self.style)[len(known) :].encode()
+
+    def end(self) -> Iterator[bytes]:
+        """Warn of what was left out."""
+        if self.dropped:
+            warn(f"{self.style.format}: {listing(self.dropped, MOST_NAMED)} left out")
+        return iter(())
+
+
+class TextWriter(SingleWriter):
+    """Write blocks of poses in a format that says what its rows are."""
+
+    def __init__(self, style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> None:
+        """Take the style and what a row is; raises ValueInvalid for notations that the format does not have."""
+        super().__init__(style, kind, extras, placed=placed)
+        self.fixed = rows_of(style.format) or RowForm(())
+        self.dropped_fields = DroppedFields(self.fixed, style)
+        self.count = 0
 
     def end(self) -> Iterator[bytes]:
         """Yield what comes behind the last pose, and warn of what was left out."""
-        if self.fixed is None or self.dropped_fields is None:
-            if self.dropped:
-                warn(f"{self.style.format}: {listing(self.dropped, MOST_NAMED)} left out")
-            return
         self.dropped_fields.tell()
         yield self.fixed.tail if self.count else self.fixed.head + self.fixed.tail
 
-    def _fixed(self, fmt: RowForm, dropped: DroppedFields, block: RowPoses, before: int) -> bytes:
-        """Return the rows of a block as the format has them; before: how many there were."""
-        images, size = block.extras.get(IMAGE), len(block.numbers)
+    def of_block(self, block: RowPoses) -> bytes:
+        """Return the text of a block of poses; numbers are metres and x y z w."""
+        if not len(block.numbers):
+            return b""
+        if (place := self.style.place) is not None:
+            names = ", ".join(each.name for each in (place, *place.more))
+            raise ValueInvalid(f"{self.style.format} holds x, y, z; leave --to {names} out, or write csv or json")
+        refuse_scale_in(self.style.format, (*self.extras, *block.extras))
+        fmt, dropped, images, size = self.fixed, self.dropped_fields, block.extras.get(IMAGE), len(block.numbers)
+        before, self.count = self.count, self.count + size
         dropped.record(
             frames=any(block.parents) or any(block.names),
             stamps=block.stamps_ns is not None and NUMBER not in block.extras,
@@ -162,8 +175,8 @@ class TextWriter(PoseWriter):
                 first += piece.size
                 continue
             if piece == IMAGE:
-                names = [None] * size if images is None else texts_of(images)
-                texts = [image_name(*each).encode() for each in zip(names, times, strict=True)]
+                known = [None] * size if images is None else texts_of(images)
+                texts = [image_name(*each).encode() for each in zip(known, times, strict=True)]
             elif piece == "seconds" and min(times) >= 0:
                 texts = [b"%d.%09d" % divmod(time, BILLION) for time in times]
             else:
