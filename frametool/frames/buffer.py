@@ -9,7 +9,7 @@ from frametool.errors import ValueInvalid, shown, warn
 from frametool.frames import topology
 from frametool.frames.lookups import Frames, taken
 from frametool.frames.stamps import FURTHEST_NS, format_stamp, whole_stamp
-from frametool.frames.track import MovingTrack, StaticTransform, Track
+from frametool.frames.track import MovingTrack, StaticTransform
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -79,7 +79,13 @@ class TransformBuffer(Frames):
         ):  # fmt: skip
             track.add(stamp_ns, parent, components)
             return False
-        topology.check_edge(parent, child, components)
+        if not parent or not child:
+            raise ValueInvalid(f"an edge needs two frames, found parent {shown(parent)} and child {shown(child)}")
+        if parent == child:
+            raise topology.own_parent(child)
+        if not all(map(isfinite, components)):
+            numbers = " ".join(map(repr, components))
+            raise ValueInvalid(f"the pose of {shown(child)} in {shown(parent)} is not finite: {numbers}")
         static = stamp_ns is None if static is None else static
         stamp = 0 if stamp_ns is None else whole_stamp(stamp_ns)
         return self._admit(parent, child, components, stamp, static=static)
@@ -145,7 +151,10 @@ class TransformBuffer(Frames):
         if child not in self._frames:
             return
         line = [parent]
-        while (track := self._tracks.get(line[-1])) is not None and _holds(track, None if static else stamp_ns):
+        while (track := self._tracks.get(line[-1])) is not None:
+            at_stamp = not static and track.covers(stamp_ns) and track.parent_at(stamp_ns) == track.parent
+            if not (track.is_static or at_stamp):  # it has no data under its newest parent then
+                return
             line.append(track.parent)
             if line[-1] == child:
                 raise topology.cycle([*line, parent])
@@ -161,10 +170,3 @@ class TransformBuffer(Frames):
         """Return how many frames and samples there are."""
         samples = sum(track.count for track in self._tracks.values())
         return f"TransformBuffer({len(self._frames)} frames, {samples} samples)"
-
-
-def _holds(track: Track, at_ns: int | None) -> bool:
-    """Return True if an edge under its newest parent has data at a time; None asks for static ones."""
-    if track.is_static:
-        return True
-    return at_ns is not None and track.covers(at_ns) and track.parent_at(at_ns) == track.parent

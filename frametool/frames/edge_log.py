@@ -11,9 +11,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import UnknownFrame
-from frametool.frames.path import seconds
 from frametool.frames.stamps import BILLION
-from frametool.frames.topology import edges_between
+from frametool.frames.topology import edges_between, seconds
 from frametool.geometry import rigid
 
 if TYPE_CHECKING:

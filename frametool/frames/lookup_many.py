@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from frametool.frames.lookups import Frames
-    from frametool.frames.path import Query
+    from frametool.frames.topology import Query
     from frametool.frames.track import MovingTrack
     from frametool.geometry.types import Rigid
 
@@ -39,7 +39,25 @@ def lookup_many(frames: Frames, target: str, source: str, at_ns: Any, *, missing
     flat = times.reshape(-1)
     order = None if bool(np.all(flat[1:] >= flat[:-1])) else np.argsort(flat)
     out = np.empty((7, flat.size))
-    _fill_sorted(out, frames, target, source, flat if order is None else flat[order])
+    ordered = flat if order is None else flat[order]
+    frames.require(target, source)
+    if flat.size:
+        frames.way_at(target, source, int(ordered[0]))  # detects a cycle of newest parents
+    if changes := frames.changes():  # intervals in which no parent changes, grouped by the path valid in each
+        stretches: dict[Way | None, list[Any]] = {}
+        for begin, end in itertools.pairwise([0, *np.searchsorted(ordered, changes).tolist(), flat.size]):
+            if begin < end:
+                found = frames.way_at(target, source, int(ordered[begin]))
+                way = None if found is None else (tuple(found[0]), tuple(found[1]))
+                stretches.setdefault(way, []).append(np.arange(begin, end))
+        for way, parts in stretches.items():
+            at = np.concatenate(parts)
+            piece = np.full((7, at.size), np.nan)
+            if way is not None:
+                _fill(piece, frames.query_of(*way), ordered[at])
+            out[:, at] = piece
+    else:
+        _fill(out, frames.query(target, source, None), ordered)
     if order is not None:
         for column in out:
             column[order] = column.copy()
@@ -61,37 +79,6 @@ def as_stamps(at_ns: Any) -> Stamps:
         raise ValueInvalid("a time is beyond 64 bits of nanoseconds") from None
 
 
-def _fill_sorted(out: Floats, frames: Frames, target: str, source: str, times: Stamps) -> None:
-    """Compute sorted times, in intervals in which no parent changes."""
-    frames.require(target, source)
-    if times.size:
-        frames.way_at(target, source, int(times[0]))  # detects a cycle of newest parents
-    changes = frames.changes()
-    if not changes:
-        _fill(out, frames.query(target, source, None), times)
-        return
-    cuts = [0, *np.searchsorted(times, changes).tolist(), times.size]
-    for way, parts in _stretches(frames, target, source, times, cuts).items():
-        at = np.concatenate([np.arange(begin, end) for begin, end in parts])
-        piece = np.full((7, at.size), np.nan)
-        if way is not None:
-            _fill(piece, frames.query_of(*way), times[at])
-        out[:, at] = piece
-
-
-def _stretches(
-    frames: Frames, target: str, source: str, times: Stamps, cuts: list[int]
-) -> dict[Way | None, list[tuple[int, int]]]:
-    """Return the intervals between cuts that contain times, grouped by the path that is valid in each, or None."""
-    stretches: dict[Way | None, list[tuple[int, int]]] = {}
-    for begin, end in itertools.pairwise(cuts):
-        if begin < end:
-            found = frames.way_at(target, source, int(times[begin]))
-            way = None if found is None else (tuple(found[0]), tuple(found[1]))
-            stretches.setdefault(way, []).append((begin, end))
-    return stretches
-
-
 def _fill(out: Floats, query: Query, times: Stamps) -> None:
     """Compute one interval block by block; NaN where an edge has no data."""
     if query.span is None:
@@ -102,15 +89,11 @@ def _fill(out: Floats, query: Query, times: Stamps) -> None:
     out[:, max(begin, end) :] = np.nan
     inside = out[:, begin:end]
     for start, stop in arrays.blocks(max(end - begin, 0)):
-        for row, column in zip(inside, _joined(query, times[begin + start : begin + stop]), strict=True):
+        block = times[begin + start : begin + stop]
+        found = query.compose(methodcaller("at_many", block))
+        assert found is not None  # noqa: S101 - all times are covered
+        for row, column in zip(inside, (*found[:3], *quaternion.unit(*found[3:], arrays)), strict=True):
             row[start:stop] = column
-
-
-def _joined(query: Query, times: Stamps) -> Rigid:
-    """Return target_from_source at sorted times covered by every edge's samples."""
-    found = query.compose(lambda track: track.at_many(times))
-    assert found is not None  # noqa: S101 - all times are covered
-    return *found[:3], *quaternion.unit(*found[3:], arrays)
 
 
 def carried_many(frames: Frames, target: str, source: str, at_ns: Any, poses: Rigid) -> Floats:
@@ -146,19 +129,13 @@ class TrackTable:
 
     def at(self, times: Stamps) -> Rigid:
         """Return the poses at sorted times, all within the samples."""
-        stamps, columns = self._spread(times)
-        arguments: tuple[Any, ...] = (*columns[:15], (times - stamps) * columns[15], arrays)
-        return rigid.along(*arguments)
-
-    def _spread(self, times: Stamps) -> tuple[Stamps, Floats]:
-        """Return for each time the stamp and the columns of the newest sample that is not after it.
-
-        Repeating is several times faster than indexing if many times share a sample.
-        """
         low = int(np.searchsorted(self.stamps, times[0], "right")) - 1
         high = int(np.searchsorted(self.stamps, times[-1], "right"))
         if (high - low) * SHARED > times.size:
             at = np.searchsorted(self.stamps, times, "right") - 1
-            return self.stamps.take(at), self.columns.take(at, axis=1)
-        counts = np.diff(np.searchsorted(times, self.stamps[low + 1 : high]), prepend=0, append=times.size)
-        return self.stamps[low:high].repeat(counts), self.columns[:, low:high].repeat(counts, axis=1)
+            stamps, columns = self.stamps.take(at), self.columns.take(at, axis=1)
+        else:  # many times share a sample: repeating is several times faster than indexing
+            counts = np.diff(np.searchsorted(times, self.stamps[low + 1 : high]), prepend=0, append=times.size)
+            stamps, columns = self.stamps[low:high].repeat(counts), self.columns[:, low:high].repeat(counts, axis=1)
+        arguments: tuple[Any, ...] = (*columns[:15], (times - stamps) * columns[15], arrays)
+        return rigid.along(*arguments)

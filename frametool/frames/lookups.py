@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import BadTopology, NoDataAt, NotConnected, UnknownFrame, ValueInvalid, bare, listing, warn
 from frametool.frames import topology
-from frametool.frames.path import Query, left_out, no_data
 from frametool.frames.stamps import BILLION, FURTHEST_NS, whole_stamp
-from frametool.frames.topology import Groups, edges_between, to_root
+from frametool.frames.topology import Groups, Query, edges_between, left_out, no_data, to_root
 from frametool.frames.track import StaticTransform, Track
 from frametool.geometry import rigid
 from frametool.geometry.rigid import IDENTITY
@@ -443,20 +442,16 @@ class FrameTree(Frames):
         self._put(StaticTransform(child, parent, components))
         self.groups.join(child, parent)
 
-    def reroot(self, frame: str) -> None:
-        """Invert the edges above a frame, so that it becomes the root of its tree."""
-        way = []
-        while (track := self._tracks.pop(frame, None)) is not None:
-            way.append(track)
-            frame = track.parent
-        for track in way:
-            self._put(StaticTransform(track.parent, track.child, rigid.inverse(*track.components)))
-
     def hang(self, parent: str, child: str, components: Rigid) -> bool:
         """Add an edge between two trees, whatever their roots; return False if it would close a loop."""
         if self.groups.of(parent) == self.groups.of(child):
             return False
-        self.reroot(child)
+        above, way = child, []  # the edges above the child are inverted, so that it becomes the root of its tree
+        while (track := self._tracks.pop(above, None)) is not None:
+            way.append(track)
+            above = track.parent
+        for track in way:
+            self._put(StaticTransform(track.parent, track.child, rigid.inverse(*track.components)))
         self.add_components(parent, child, components)
         return True
 

@@ -56,7 +56,14 @@ def parse_stamp(text: str) -> int:
     if match := re.fullmatch(_NANOSECONDS, text):
         return int(match[1])
     if match := re.fullmatch(_DATE, text):
-        return _date_ns(match)
+        from datetime import datetime
+
+        zone = "+00:00" if match[3] == "Z" else match[3]
+        try:
+            seconds = datetime.fromisoformat(match[1] + zone).timestamp()  # an integer: exact
+        except ValueError as error:
+            raise NotATime(f"{shown(text)} is not a time: {error}") from None
+        return int(seconds) * BILLION + int((match[2] or "").ljust(9, "0"))
     match = re.fullmatch(_SECONDS, text)
     if match is None or not (match[2] or match[3]) or len(text) > 60:
         raise NotATime(f"{shown(text)} is not a time; write decimal seconds (12.5) or nanoseconds (12500000000ns)")
@@ -94,18 +101,6 @@ def parse_times(text: str) -> Sequence[int]:
     if (stop - start) // step >= MOST_TIMES:
         raise ValueInvalid(f"more than {MOST_TIMES} times")
     return range(start, stop + 1, step)
-
-
-def _date_ns(match: re.Match[str]) -> int:
-    """Return the nanoseconds since 1970 of a date and time with a zone."""
-    from datetime import datetime
-
-    zone = "+00:00" if match[3] == "Z" else match[3]
-    try:
-        seconds = datetime.fromisoformat(match[1] + zone).timestamp()  # an integer: exact
-    except ValueError as error:
-        raise NotATime(f"{shown(match[0])} is not a time: {error}") from None
-    return int(seconds) * BILLION + int((match[2] or "").ljust(9, "0"))
 
 
 def nanoseconds_each(whole: Any) -> Any:

@@ -197,25 +197,21 @@ class MovingTrack:
             self.begin = 0
             self.segments.clear()
         else:
-            for row in self.late:
-                self._insert(columns, row)
+            for late in self.late:
+                at = bisect_right(self.stamps, late[0], self.begin)
+                self.segments.pop(self.stamps[at - 1], None)
+                if at > self.begin:
+                    for column, part in zip(columns, late, strict=True):
+                        column.insert(at, part)
+                    continue
+                if not self.begin:  # before the oldest there is room, doubled when it is used up, so that this is fast
+                    self.begin = len(self.stamps)
+                    for column in columns:
+                        column[:0] = column[:1] * self.begin
+                self.begin -= 1
+                for column, part in zip(columns, late, strict=True):
+                    column[self.begin] = part
         self.late.clear()
-
-    def _insert(self, columns: tuple[list[Any], ...], row: tuple[int, str, Rigid]) -> None:
-        """Insert a late sample; before the oldest there is room, doubled when it is used up, so that this is fast."""
-        at = bisect_right(self.stamps, row[0], self.begin)
-        self.segments.pop(self.stamps[at - 1], None)
-        if at > self.begin:
-            for column, part in zip(columns, row, strict=True):
-                column.insert(at, part)
-            return
-        if not self.begin:
-            self.begin = len(self.stamps)
-            for column in columns:
-                column[:0] = column[:1] * self.begin
-        self.begin -= 1
-        for column, part in zip(columns, row, strict=True):
-            column[self.begin] = part
 
     def _place(self, at_ns: int) -> int:
         """Return the index of the newest sample that is not after a time; `begin` - 1 if there is none."""
@@ -290,15 +286,11 @@ class MovingTrack:
             return self.samples[at]
         if at_ns > self.last_ns:
             return None
-        way = self.segments.get(begin) or self._prepare(at)
+        way = self.segments.get(begin)
+        if way is None:
+            after = self.samples[at + 1] if self.parents[at] == self.parents[at + 1] else self.samples[at]
+            way = self.segments[begin] = rigid.prepare(*self.samples[at], *after, floats)
         return rigid.along(*self.samples[at], *way, (at_ns - begin) / (self.stamps[at + 1] - begin), floats)
-
-    def _prepare(self, at: int) -> Way:
-        """Prepare the segment from a sample to the next, and cache it."""
-        here = self.samples[at]
-        there = self.samples[at + 1] if self.parents[at] == self.parents[at + 1] else here
-        way = self.segments[self.stamps[at]] = rigid.prepare(*here, *there, floats)
-        return way
 
     def at_many(self, times: Any) -> Rigid:
         """Return parent_from_child at sorted times, an int64 array, all of them covered."""

@@ -174,20 +174,17 @@ def rows(
     If `out` is not contiguous or overlaps components, the result is computed in a new array first.
     """
     shape = (*batch_shape(parts), *inner)
-    direct = out is not None and _is_free(out, shape, parts)
+    direct = False  # whether an output array can be filled row by row while components are read
+    if out is not None:
+        require_fitting(out, shape)
+        overlaps = any(np.shares_memory(out, part) for part in parts if not isinstance(part, float))
+        direct = out.flags.c_contiguous and not overlaps
     made = out if out is not None and direct else np.empty(shape)
     walk(kernel, parts, np.asarray(made).reshape(-1, int(np.prod(inner))).T, *args)
     if out is None or direct:
         return made
     out[...] = made
     return out
-
-
-def _is_free(out: Array, shape: tuple[int, ...], parts: Components) -> bool:
-    """Return True if an output array can be filled row by row while components are read."""
-    require_fitting(out, shape)
-    overlaps = any(np.shares_memory(out, part) for part in parts if not isinstance(part, float))
-    return out.flags.c_contiguous and not overlaps
 
 
 def batch_shape(parts: Components) -> tuple[int, ...]:

@@ -340,7 +340,13 @@ class Camera:
             raise ValueInvalid(f"axes {shown(axes)} are not known; axes: {', '.join(AXES)}")
         lens = Lens((*d, *(0.0,) * 12)[:12], stretch=2.0 * tan(0.5 * own["w"]) if "w" in own else 1.0, **own)
         lens = lens._replace(end=row.end(lens.D))
-        numbers = _intrinsics(K, skew)
+        k = _numbers(K, "K", 4, 9)
+        k = k if len(k) == 9 else (k[0], 0.0, k[2], 0.0, k[1], k[3], 0.0, 0.0, 1.0)
+        if k[3] or k[6:] != (0.0, 0.0, 1.0):
+            raise ValueInvalid("K is not a camera matrix: its rows are fx skew cx, 0 fy cy and 0 0 1")
+        if not (k[0] and k[4]):
+            raise ValueInvalid(f"{'fy' if k[0] else 'fx'} is 0: the camera is not calibrated")
+        numbers = k[0], k[4], k[2], k[5], _numbers(skew, "skew", 1)[0] or k[1]
         size = None if size is None else _size(size)
         fields: dict[str, Any] = {"model": name, "K": [*numbers[:4]], "D": [*d], "size": size and [*size]}
         fields |= {"skew": numbers[4], **own, "axes": axes, "shift": shift}
@@ -555,17 +561,6 @@ def _numbers(value: Any, what: str, *counts: int) -> tuple[float, ...]:
     if counts and len(flat) not in counts:
         raise ValueInvalid(f"{what} is {' or '.join(map(str, counts))} number{'s' * (counts != (1,))}, not {len(flat)}")
     return tuple(float(each) + 0.0 for each in flat)
-
-
-def _intrinsics(value: Any, skew: float) -> tuple[float, ...]:
-    """Return fx, fy, cx, cy, skew of K, four numbers or three rows."""
-    k = _numbers(value, "K", 4, 9)
-    k = k if len(k) == 9 else (k[0], 0.0, k[2], 0.0, k[1], k[3], 0.0, 0.0, 1.0)
-    if k[3] or k[6:] != (0.0, 0.0, 1.0):
-        raise ValueInvalid("K is not a camera matrix: its rows are fx skew cx, 0 fy cy and 0 0 1")
-    if not (k[0] and k[4]):
-        raise ValueInvalid(f"{'fy' if k[0] else 'fx'} is 0: the camera is not calibrated")
-    return k[0], k[4], k[2], k[5], _numbers(skew, "skew", 1)[0] or k[1]
 
 
 def _size(value: Any) -> tuple[int, int]:

@@ -70,24 +70,10 @@ class AxesChange(NamedTuple):
     rotation: Rotation
     mirrors: bool = False
 
-    def inverse(self) -> AxesChange:
-        """Return the inverse change."""
-        return AxesChange(AxesChange(self.rotation.inverse(), self.mirrors).behind(), self.mirrors)
-
-    def after(self, other: AxesChange) -> AxesChange:
-        """Return the change by another, followed by this one."""
-        second = _in_mirror(other.rotation) if self.mirrors else other.rotation
-        return AxesChange(self.rotation @ second, self.mirrors != other.mirrors)
-
     def behind(self) -> Rotation:
         """Return the rotation that follows the reflection if this change is on the right side of a pose."""
-        return _in_mirror(self.rotation) if self.mirrors else self.rotation
-
-
-def _in_mirror(rotation: Rotation) -> Rotation:
-    """Return a rotation as seen in a mirror across y."""
-    x, y, z, w = rotation.components
-    return Rotation.of(-x, y, -z, w)
+        x, y, z, w = self.rotation.components
+        return Rotation.of(-x, y, -z, w) if self.mirrors else self.rotation
 
 
 def named_change(text: str, *, of_world: bool = False) -> AxesChange:
@@ -98,23 +84,17 @@ def named_change(text: str, *, of_world: bool = False) -> AxesChange:
     Raises:
         ValueInvalid: unknown name; lists the nearest name and all names.
     """
-    if "," in text:
-        return _own_axes(text)
+    if "," in text:  # (x, y, z) becomes (x, -y, -z) for `x,-y,-z`
+        rows = [[float((letter == each) - (f"-{letter}" == each)) for letter in "xyz"] for each in _letters(text)]
+        mirrors = matrix.determinant(*matrix.nine(entry for row in rows for entry in row)) < 0.0
+        entries = matrix.nine(entry for x, y, z in rows for entry in (x, -y if mirrors else y, z))
+        return AxesChange(Rotation.of(*matrix.to_quaternion(*entries, floats)), mirrors)
     target, joint, source = text.partition("_from_")
     if not joint:
         target, source = "flu", text
     names = (_system(name)[not of_world] for name in (target, source))
-    back, there = (AxesChange({**AXES, **MIRRORED}[name][0], name in MIRRORED) for name in names)
-    return back.inverse().after(there)
-
-
-def _own_axes(text: str) -> AxesChange:
-    """Return the change from (x, y, z) to (x, -y, -z) for `x,-y,-z`."""
-    rows = [[float((letter == each) - (f"-{letter}" == each)) for letter in "xyz"] for each in _letters(text)]
-    mirrors = matrix.determinant(*matrix.nine(entry for row in rows for entry in row)) < 0.0
-    sign = -1.0 if mirrors else 1.0
-    entries = matrix.nine(entry for x, y, z in rows for entry in (x, sign * y, z))
-    return AxesChange(Rotation.of(*matrix.to_quaternion(*entries, floats)), mirrors)
+    (back, mirrors), (there, other) = (({**AXES, **MIRRORED}[name][0], name in MIRRORED) for name in names)
+    return AxesChange(AxesChange(back.inverse() @ there, mirrors).behind(), mirrors != other)
 
 
 def _letters(text: str) -> list[str]:
@@ -139,7 +119,11 @@ def sides_of(text: str) -> tuple[str, str]:
         at = {each.removeprefix("-"): ("-" * each.startswith("-")) + "xyz"[place] for place, each in enumerate(letters)}
         return ",".join(letters), ",".join(at[letter] for letter in "xyz")
     target, joint, source = text.partition("_from_")
-    (world, body), (from_world, from_body) = _system_with(target), _system_with(source if joint else "ros")
+    ends = (  # a name of axes means the system that it belongs to: `ned` aircraft
+        next((axes for axes in SYSTEMS.values() if name in axes), None) or _system(name)
+        for name in (target, source if joint else "ros")
+    )
+    (world, body), (from_world, from_body) = ends
     if not joint:
         raise ValueInvalid(f"{shown(text)} is one end of a change; give A_from_B, as {text}_from_ros")
     return f"{world}_from_{from_world}", f"{from_body}_from_{body}"
@@ -155,12 +139,13 @@ def world_of(change: str) -> str:
 def _system(name: str) -> tuple[str, str]:
     """Return the world axes and the body axes of a system."""
     name = ALIASES.get(name, name)
-    return SYSTEMS[name] if name in SYSTEMS else (_known(name),) * 2
-
-
-def _system_with(name: str) -> tuple[str, str]:
-    """Return the axes of the system that a name means or belongs to: `ned` belongs to aircraft."""
-    return next((axes for axes in SYSTEMS.values() if name in axes), None) or _system(name)
+    if name in SYSTEMS or name in AXES or name in MIRRORED:
+        return SYSTEMS.get(name, (name, name))
+    known = (*AXES, *MIRRORED, *SYSTEMS, *ALIASES)
+    near = nearest(name, known)
+    meant = {ALIASES.get(each, each) for each in near}  # a suggestion never has axes of the opposite sense
+    hint = f"; did you mean {shown(near[0])}?" if len(meant) == 1 else ";"
+    raise ValueInvalid(f"unknown axes {shown(name)}{hint} axes: {', '.join(known)}, or three letters: {OWN}")
 
 
 def both_sides(world: str | None, axes: str | None) -> tuple[Rotation | None, bool, Rotation | None]:
@@ -217,14 +202,3 @@ def find_euler(rotation: Rotation, angles: Sequence[float], *, tolerance: float 
         found = f"{near} is off by {off[near]:g}, which --tolerance {1.01 * off[near]:.2g} takes"
         raise ValueInvalid(f"no Euler convention gives these angles within {tolerance:g} rad; {found}")
     return [axes for axes, angle in off.items() if angle <= tolerance]
-
-
-def _known(name: str) -> str:
-    """Return a name of axes; a suggestion never has axes that look similar but have the opposite sense."""
-    if name in AXES or name in MIRRORED:
-        return name
-    known = (*AXES, *MIRRORED, *SYSTEMS, *ALIASES)
-    near = nearest(name, known)
-    meant = {ALIASES.get(each, each) for each in near}
-    hint = f"; did you mean {shown(near[0])}?" if len(meant) == 1 else ";"
-    raise ValueInvalid(f"unknown axes {shown(name)}{hint} axes: {', '.join(known)}, or three letters: {OWN}")

@@ -179,26 +179,22 @@ class Place(NamedTuple):
     def turned(self, numbers: Sequence[Any], rotation: Components) -> Components:
         """Return in ECEF a rotation that is relative to the local axes, as x y z w."""
         if AXES in self.fields:
-            return self._by_row(numbers, rotation)
+            at = self.fields.index(AXES)  # rotations are relative to the axes of each row
+            codes, others = numbers[at], [*numbers[:at], *numbers[at + 1 :]]
+            bare = self._replace(fields=(*self.fields[:at], *self.fields[at + 1 :]))
+            xp = namespace(numbers)
+            found: Components = rotation
+            for code, axes in enumerate(earth.AXES):
+                if xp.some(codes == code):
+                    each = bare._replace(axes=axes).turned(others, rotation)
+                    found = tuple(xp.where(codes == code, a, b) for a, b in zip(each, found, strict=True))
+            return found
         if self.axes == ECEF:
             return tuple(rotation)
         if self.level and self.axes != NED:  # a heading is about down: yaw = 90 degrees - it where z is up
             _, _, s, c = rotation
             rotation = quaternion.settled(0.0 * s, 0.0 * s, SQRT_HALF * (c - s), SQRT_HALF * (c + s))
         return quaternion.compose(*self._axes_at(numbers), *rotation)
-
-    def _by_row(self, numbers: Sequence[Any], rotation: Components) -> Components:
-        """Return rotations relative to the axes of each row."""
-        at = self.fields.index(AXES)
-        codes, others = numbers[at], [*numbers[:at], *numbers[at + 1 :]]
-        bare = self._replace(fields=(*self.fields[:at], *self.fields[at + 1 :]))
-        xp = namespace(numbers)
-        found: Components = rotation
-        for code, axes in enumerate(earth.AXES):
-            if xp.some(codes == code):
-                each = bare._replace(axes=axes).turned(others, rotation)
-                found = tuple(xp.where(codes == code, a, b) for a, b in zip(each, found, strict=True))
-        return found
 
     def base(self, numbers: Sequence[Any]) -> Components:
         """Return ecef_from_axes at the position."""
@@ -209,15 +205,12 @@ class Place(NamedTuple):
         if self.name in LOCAL and self.axes == self.name and self.origin is not None:
             return self.origin.pose(self.name)[3:]
         lat, lon, _ = self.lla(numbers)
-        return self._turn_at(lat, lon, self._zone_of(numbers), namespace(numbers))
+        return self._turn_at(lat, lon, self.named(numbers).get(ZONE, self.zone), namespace(numbers))
 
     def _turn_at(self, lat: Any, lon: Any, zone: Any, xp: Namespace) -> Components:
         """Return the rotation of its axes at a latitude and longitude."""
         convergence = earth.utm(_held(zone, lat, lon, xp), lat, lon, xp)[2] if self.axes == GRID else None
         return earth.ecef_from_axes(lat, lon, self.axes, xp, convergence)
-
-    def _zone_of(self, numbers: Sequence[Any]) -> Any:
-        return self.named(numbers).get(ZONE, self.zone)
 
     def check(self, numbers: Sequence[float]) -> None:
         """Raise ValueInvalid unless floats are a valid position."""
@@ -228,7 +221,7 @@ class Place(NamedTuple):
             earth.check_lla(*self.lla(numbers))
         if GRID in (self.axes, AXES in named and earth.AXES[int(named[AXES])]):
             lat, lon, _ = self.lla(numbers)
-            earth.check_utm(_held(self._zone_of(numbers), lat, lon, floats), lat, lon)
+            earth.check_utm(_held(named.get(ZONE, self.zone), lat, lon, floats), lat, lon)
 
     # --- writing ---
 
@@ -257,10 +250,9 @@ class Place(NamedTuple):
                 lla = lla or earth.lla(x, y, z, xp)
             own = row.write(each, lla if row.is_angular else (x, y, z), xp)[: len(each.fields)]
             if read is not None and (read.place.name, read.place.origin) == (each.name, each.origin):
-                as_read = read.place.named(read.numbers)
-                own = tuple(
-                    _as_read(as_read.get(field), number, xp) for field, number in zip(each.fields, own, strict=True)
-                )
+                as_read = read.place.named(read.numbers)  # where the computed number differs only by rounding
+                pairs = zip((as_read.get(field) for field in each.fields), own, strict=True)
+                own = tuple(b if a is None else xp.where(abs(a - b) <= ROUNDING, a, b) for a, b in pairs)
             found += own
         return found
 
@@ -302,6 +294,12 @@ class Spot(NamedTuple):
 
     place: Place
     numbers: Sequence[Any]
+
+    @property
+    def ecef(self) -> Vector:
+        """Return x, y, z in ECEF."""
+        x, y, z = self.place.ecef(self.numbers)
+        return x, y, z
 
 
 class Unmoved(tuple[Any, ...]):  # noqa: SLOT001 - the slots of a tuple cannot be added to
@@ -396,11 +394,6 @@ def kernels(name: str) -> Kernels:
 def _height(named: dict[str, Any], other: Any) -> Any:
     """Return the height above the ellipsoid, by default 0."""
     return named["msl"] + named["undulation"] if "msl" in named else named.get("alt", other - other)
-
-
-def _as_read(own: Any, made: Any, xp: Namespace) -> Any:
-    """Return a number as it was read if the computed one differs only by rounding."""
-    return made if own is None else xp.where(abs(own - made) <= ROUNDING, own, made)
 
 
 class Earth(NamedTuple):

@@ -61,7 +61,8 @@ class Batched:
         """Select elements as numpy does."""
         if not self.shape:
             raise TypeError(f"one {type(self).__name__.lower()} has no elements")
-        return self.of(*validation.chosen(self._components, index))
+        parts = (part[index] for part in self._components)
+        return self.of(*(part if getattr(part, "shape", ()) else float(part) for part in parts))
 
     def __iter__(self) -> Iterator[Self]:
         """Iterate over the first axis."""

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import rigid, validation
+from frametool.geometry.quaternion import SILENT
+from frametool.geometry.representations import LAST_ROW
 from frametool.geometry.rotation import NEAR, Batched, Rotation
 
 TYPE_CHECKING = False
@@ -95,7 +97,13 @@ class Transform(Batched):
             ValueInvalid: wrong shape, another last row, not finite, or not a rotation; names the first such row.
         """
         m = validation.matrices(matrices, 4, "matrix")
-        validation.check_last_row(m, "matrix")
+        off = sum(abs(entry - wanted) for entry, wanted in zip(m[12:], LAST_ROW, strict=True))
+        if not (type(off) is float and off <= SILENT):
+            import numpy as np
+
+            if (bad := ~(np.asarray(off) <= SILENT)).any():
+                found = f"last row {validation.shown_row(m[12:], bad)}; expected 0 0 0 1"
+                raise ValueInvalid(f"{validation.at_first('matrix', bad)}: {found}")
         rotation = Rotation.from_columns("matrix", (*m[0:3], *m[4:7], *m[8:11]), "matrix", normalize=normalize)
         return cls.of(*validation.joined((m[3], m[7], m[11]), rotation.components, "matrix"))
 

@@ -10,8 +10,6 @@ from math import isfinite
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats
-from frametool.geometry.quaternion import SILENT
-from frametool.geometry.representations import LAST_ROW
 
 TYPE_CHECKING = False
 
@@ -144,18 +142,6 @@ def joined(shift: Components, turn: Components, name: str) -> Components:
     return *moved, *(part if np.shape(part) == shape else np.broadcast_to(part, shape).copy() for part in turn)
 
 
-def check_last_row(entries: Components, name: str) -> None:
-    """Raise ValueInvalid unless the last rows of homogeneous matrices are 0 0 0 1, to 1e-6."""
-    off = sum(abs(entry - wanted) for entry, wanted in zip(entries[12:], LAST_ROW, strict=True))
-    if type(off) is float and off <= SILENT:
-        return
-    import numpy as np
-
-    bad = ~(np.asarray(off) <= SILENT)
-    if bad.any():
-        raise ValueInvalid(f"{at_first(name, bad)}: last row {shown_row(entries[12:], bad)}; expected 0 0 0 1")
-
-
 def checked(kernel: Kernel, count: int, inputs: Components, name: str, check: Callable[..., object]) -> Components:
     """Run a kernel that not every finite input suits; `check` validates one item, and the first row that fails."""
     if single(inputs):
@@ -233,11 +219,6 @@ def stacked(components: Components) -> Array:
     import numpy as np
 
     return np.stack(components, axis=-1)
-
-
-def chosen(components: Components, index: Any) -> Components:
-    """Index every component; single elements become floats."""
-    return tuple(part[index] if getattr(part[index], "shape", ()) else float(part[index]) for part in components)
 
 
 def second_moment(components: Components, mass: Array) -> Array:

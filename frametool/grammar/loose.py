@@ -39,20 +39,6 @@ WORDS = frozenset((*POSE_KEYS, *_FLAT, *_POSITIONS, *_TURNS, *_WHOLE))
 def read_loose_pose(fields: dict[str, Any], reading: Reading, also: Collection[str] = (), *, order: str = "") -> Pose:
     """Read a pose whose numbers may each have a name: x, y, z, yaw; raises Misfit."""
     places: dict[Path, str] = {}
-    mapping = _in_grammar(fields, order, places)
-    try:
-        return read_pose(mapping, reading, also)
-    except Misfit as misfit:  # at the key as written
-        known = next((end for end in (2, 1) if misfit.path[:end] in places), 0)
-        misfit.path = (places[misfit.path[:known]], *misfit.path[known:]) if known else misfit.path
-        raise
-
-
-def _in_grammar(fields: dict[str, Any], order: str, places: dict[Path, str]) -> dict[str, Any]:
-    """Return an entry with the keys of the grammar of poses; raises Misfit.
-
-    places: is filled with the original keys of these
-    """
     found: dict[str, Any] = {}
     for key, value in fields.items():
         is_number = type(value) is not list and type(value) is not dict
@@ -85,7 +71,12 @@ def _in_grammar(fields: dict[str, Any], order: str, places: dict[Path, str]) -> 
         if wanted and type(present) is dict and present.keys() not in ({*wanted}, {"yaw"}):
             missing = ", ".join(part for part in wanted if part not in present)
             raise Misfit(f"incomplete rotation: missing {missing} beside {', '.join(present)}")
-    return found
+    try:
+        return read_pose(found, reading, also)
+    except Misfit as misfit:  # at the key as written
+        known = next((end for end in (2, 1) if misfit.path[:end] in places), 0)
+        misfit.path = (places[misfit.path[:known]], *misfit.path[known:]) if known else misfit.path
+        raise
 
 
 def _meant(key: str, value: Any, order: str) -> dict[str, Any]:

@@ -77,7 +77,7 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
     turn = _heading(own, axes)
     if turn is not None and inner.rotation is not None:
         raise Misfit("a heading is a rotation; keep one", (next(key for key in HEADINGS if key in own),), key=True)
-    position = _position(spots[0])
+    position = spots[0].ecef
     if AT not in own and inner.position is not None:
         _agree(position, inner.position)
         if not said:  # also stated in ecef: then the rotation is relative to it
@@ -128,7 +128,7 @@ def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
     for spot in found:
         within((next(iter(own)),), spot.place.check, spot.numbers)
     for other in found[1:]:
-        _agree(_position(found[0]), _position(other))
+        _agree(found[0].ecef, other.ecef)
     return found
 
 
@@ -225,11 +225,6 @@ def band_s(zone: float, northing: float) -> str:
     return f"{name}: S is south of the equator; the band S lies north, write N"
 
 
-def _position(spot: Spot) -> tuple[float, float, float]:
-    x, y, z = spot.place.ecef(spot.numbers)
-    return x, y, z
-
-
 def _agree(first: Any, second: Any) -> None:
     """Raise Misfit unless two positions are equal."""
     apart = max(abs(a - b) for a, b in zip(first, second, strict=True))
@@ -312,7 +307,7 @@ def _numbers_of(frame: str | None, position: Sequence[float], place: Place, read
     x, y, z = position
     place.settle(x, y, z)
     place.check_result(x, y, z)
-    stays = read is not None and tuple(read.place.ecef(read.numbers)) == (x, y, z)
+    stays = read is not None and read.ecef == (x, y, z)
     return [number + 0.0 for number in place.numbers(x, y, z, read if stays else None)]
 
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from frametool.errors import FormatError, Misused, shown
 from frametool.formats.load import FrameFile, refuse_unknown_joints
 from frametool.frames.edge_log import EdgeLog, chain
-from frametool.frames.path import frames_on
 from frametool.frames.stamps import BILLION
+from frametool.frames.topology import frames_on
 from frametool.grammar.edges import stop
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ import pytest
 
 from frametool import FrameTree, Transform, TransformBuffer
 from frametool.errors import BadTopology, LookupFailed, NoDataAt, TooLate, UnknownFrame, ValueInvalid
-from frametool.frames.path import compose_path
+from frametool.frames.topology import compose_path
 from frametool.frames.track import MovingTrack
 
 if TYPE_CHECKING:

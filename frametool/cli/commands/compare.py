@@ -15,8 +15,8 @@ from frametool.cli.sink import refuse_existing, say, say_error, writing
 from frametool.cli.trees import answers, load_tree
 from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, shown, warn
 from frametool.formats.table import by_name, writers
-from frametool.frames.path import seconds
 from frametool.frames.stamps import parse_stamp, parse_time
+from frametool.frames.topology import seconds
 from frametool.grammar.edges import stop
 from frametool.stream.faults import ROWS_SKIPPED, STOP, BadRows
 from frametool.text.numbers import parse_lengths, parse_share
