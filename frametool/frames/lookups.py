@@ -303,9 +303,7 @@ class Frames:
 
     def way(self, target: str, source: str, at_ns: int | None = None) -> list[Track]:
         """Return the edges between two frames, from the target to the source, at a time or by the newest parents."""
-        return self._along(*self.between(target, source, at_ns))
-
-    def _along(self, down: Sequence[str], up: Sequence[str]) -> list[Track]:
+        down, up = self.between(target, source, at_ns)
         return [self._tracks[child] for child in (*reversed(down), *reversed(up))]
 
     def span(self, target: str, source: str) -> tuple[int, int] | None:
@@ -389,10 +387,10 @@ class Frames:
         if at_ns is None or not self._varies:
             return error
         with suppress(NotConnected):
-            edges = edges_between(
+            down, up = edges_between(
                 target, source, lambda frame: each.parent_near(at_ns) if (each := self._tracks.get(frame)) else None
             )
-            return no_data(target, source, at_ns, self._along(*edges))
+            return no_data(target, source, at_ns, [self._tracks[child] for child in (*reversed(down), *reversed(up))])
         return error
 
 

@@ -330,7 +330,7 @@ class Kernels(NamedTuple):
     """
 
     read: Callable[[Place, dict[str, Any], Namespace], Vector]
-    write: Callable[[Place, Components, Namespace], Components]
+    write: Callable[[Place, Components, Namespace], Components] = lambda _place, three, _xp: three
     is_angular: bool = True
     least: int | None = None
     axes: str = ENU
@@ -372,15 +372,11 @@ def _origin(place: Place) -> Rigid:
     return place.origin.pose(place.name)
 
 
-def _as_is(_: Place, three: Components, _xp: Namespace) -> Components:
-    return three
-
-
-LLA_KERNELS = Kernels(_read_lla, _as_is, least=2)
+LLA_KERNELS = Kernels(_read_lla, least=2)
 UTM_KERNELS = Kernels(_read_utm, _write_utm, least=3, axes=GRID, is_nested=True)
 LOCAL_KERNELS = Kernels(_read_local, _write_local, is_angular=False)
 ECEF_KERNELS = Kernels(
-    lambda _, named, _xp: (named["x"], named["y"], named["z"]), _as_is, is_angular=False, axes=ECEF, is_nested=True
+    lambda _, named, _xp: (named["x"], named["y"], named["z"]), is_angular=False, axes=ECEF, is_nested=True
 )
 
 

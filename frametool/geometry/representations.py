@@ -204,10 +204,6 @@ def _homogeneous(position: Components, rows: Components) -> Components:
     return (*upper, *LAST_ROW)
 
 
-def _three_rows(position: Components, rows: Components) -> Components:
-    return _homogeneous(position, rows)[:12]
-
-
 def _of_homogeneous(m: Components) -> tuple[Components, Components]:
     return (m[3], m[7], m[11]), (*m[0:3], *m[4:7], *m[8:11])
 
@@ -438,7 +434,7 @@ class Notation:
 
 # a pose as the first three rows of its 4x4, as in a KITTI trajectory: no name spells it, twelve numbers are it
 UPPER_ROWS = Notation("matrix", ROTATIONS["matrix"]._replace(
-    whole=Whole(HOMOGENEOUS.columns[:12], _three_rows, _of_homogeneous)
+    whole=Whole(HOMOGENEOUS.columns[:12], lambda position, rows: _homogeneous(position, rows)[:12], _of_homogeneous)
 ), None, degrees=None)  # fmt: skip
 
 # of other tools

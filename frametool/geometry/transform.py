@@ -102,8 +102,9 @@ class Transform(Batched):
             import numpy as np
 
             if (bad := ~(np.asarray(off) <= SILENT)).any():
-                found = f"last row {validation.shown_row(m[12:], bad)}; expected 0 0 0 1"
-                raise ValueInvalid(f"{validation.at_first('matrix', bad)}: {found}")
+                place, row = validation.first_bad(m[12:], bad, "matrix")
+                numbers = " ".join(f"{value:g}" for value in row)
+                raise ValueInvalid(f"{place}: last row {numbers}; expected 0 0 0 1")
         rotation = Rotation.from_columns("matrix", (*m[0:3], *m[4:7], *m[8:11]), "matrix", normalize=normalize)
         return cls.of(*validation.joined((m[3], m[7], m[11]), rotation.components, "matrix"))
 

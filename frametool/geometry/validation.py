@@ -97,13 +97,9 @@ def all_finite(columns: Components, name: str) -> Components:
 
     bad = ~np.logical_and.reduce([np.isfinite(column) for column in np.broadcast_arrays(*columns)])
     if bad.any():
-        raise ValueInvalid(f"{at_first(name, bad)}: {shown_row(columns, bad)} is not finite; give finite numbers")
+        place, row = first_bad(columns, bad, name)
+        finite(row, place)
     return columns
-
-
-def at_first(name: str, bad: Any) -> str:
-    """Return the name of the first bad row: `xyzw[3]`."""
-    return at_row(name, bad.argmax(), bad.shape)
 
 
 def at_row(name: str, row: int, shape: tuple[int, ...]) -> str:
@@ -114,17 +110,13 @@ def at_row(name: str, row: int, shape: tuple[int, ...]) -> str:
     return f"{name}[{', '.join(str(int(index)) for index in place)}]" if place else name
 
 
-def first_row(columns: Components, bad: Any) -> tuple[float, ...]:
-    """Return the numbers of the first bad row as floats."""
+def first_bad(columns: Components, bad: Any, name: str) -> tuple[str, tuple[float, ...]]:
+    """Return the name of the first bad row and its numbers as floats."""
     import numpy as np
 
     row = int(np.argmax(bad))
-    return tuple(float(np.broadcast_to(column, bad.shape).reshape(-1)[row]) for column in columns)
-
-
-def shown_row(columns: Components, bad: Any) -> str:
-    """Format the numbers of the first bad row."""
-    return " ".join(f"{value:g}" for value in first_row(columns, bad))
+    numbers = tuple(float(np.broadcast_to(column, bad.shape).reshape(-1)[row]) for column in columns)
+    return at_row(name, row, bad.shape), numbers
 
 
 def joined(shift: Components, turn: Components, name: str) -> Components:
@@ -154,10 +146,11 @@ def checked(kernel: Kernel, count: int, inputs: Components, name: str, check: Ca
     def refuse() -> None:
         all_finite(inputs, name)
         bad = ~np.logical_and.reduce([np.isfinite(part) for part in arrays.run(kernel, count, inputs, arrays)])
+        place, row = first_bad(inputs, bad, name)
         try:
-            check(*first_row(inputs, bad))
+            check(*row)
         except ValueInvalid as error:
-            raise ValueInvalid(f"{at_first(name, bad)}: {error}") from None
+            raise ValueInvalid(f"{place}: {error}") from None
 
     return arrays.run(arrays.guarded(kernel, refuse), count, inputs, arrays)
 

@@ -99,11 +99,6 @@ class Pose(NamedTuple):
         return (*(self.position or (0.0, 0.0, 0.0)), *(self.rotation or (0.0, 0.0, 0.0, 1.0)))
 
     @property
-    def is_exact(self) -> bool:
-        """Return True if there is neither a covariance nor a scale."""
-        return self.covariance is None and self.scale == 1.0
-
-    @property
     def placed(self) -> Components:
         """Return the components, followed by the covariance or the scale: as in `geometry.placed`.
 

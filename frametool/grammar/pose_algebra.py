@@ -70,7 +70,8 @@ def relative(a: Pose, b: Pose) -> Result:
 
 def relative_names(a: Pose, b: Pose) -> tuple[str | None, str | None]:
     """Return parent and name of the pose of B in A; raise ValueInvalid if they are in different frames."""
-    _refuse_two_parents(a, b)
+    if a.parent is not None and b.parent is not None and a.parent != b.parent:
+        raise ValueInvalid(f"A is in {shown(a.parent)} and B in {shown(b.parent)}; use one frame for both")
     return a.name, b.name
 
 
@@ -90,17 +91,12 @@ def interpolated(a: Pose, b: Pose, fraction: float) -> Pose:
 
     Raises ValueInvalid if the two are in different frames.
     """
-    _refuse_two_parents(a, b)
+    relative_names(a, b)  # raises an error for two frames
     components = rigid.interpolate(*a.components, *b.components, fraction, floats)
     start, end = a.stamp_ns, b.stamp_ns
     between = end if start is None or end is None else start + round(fraction * (end - start))
     pose = Pose.of(components, a.name if a.name == b.name else None, a.parent or b.parent)
     return pose._replace(stamp_ns=start if between is None else between)
-
-
-def _refuse_two_parents(a: Pose, b: Pose) -> None:
-    if a.parent is not None and b.parent is not None and a.parent != b.parent:
-        raise ValueInvalid(f"A is in {shown(a.parent)} and B in {shown(b.parent)}; use one frame for both")
 
 
 BLOCK = 1 << 14  # times

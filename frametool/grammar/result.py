@@ -123,7 +123,9 @@ class Result:
             from frametool.grammar.place import placed_entry
 
             written, pose = placed_entry(pose, style.place)
-            entry = without_frame(entry, style.place) | written
+            if style.place.origin is not None:  # the keys state its axes
+                entry.pop("parent", None)
+            entry |= written
         elif pose.rotation is None or (pose.position is not None and not is_within):
             entry |= placed(pose.position or (0.0, 0.0, 0.0), style)
         for each in style.notations if pose.rotation is not None else ():
@@ -163,11 +165,6 @@ class NoResult(Result):
             return dict(self.extras)
         entry = Result(self.pose).mapping(style)
         return {key: value if key in NAMES else None for key, value in entry.items()} | with_entries(self.extras)
-
-
-def without_frame(entry: dict[str, Any], place: Place) -> dict[str, Any]:
-    """Return a result without its frame if that is the frame of an origin: the keys state its axes."""
-    return entry if place.origin is None else {key: value for key, value in entry.items() if key != "parent"}
 
 
 def with_entries(extras: dict[str, Any]) -> dict[str, Any]:
@@ -311,21 +308,22 @@ def edge_label(transform: Transform, style: Style, parent: str) -> tuple[str, st
     """
     pose, at, axes = Pose.of(transform.components, None, parent), "", ""
     digits = {"lat": 9, "lon": 9} if style.precision is None else {}  # 0.1 mm
+    usual = METRES if style.precision is None else style.precision
     if parent in EARTH_FRAMES:
         from frametool.grammar.place import seen_at
 
         members, pose = seen_at(pose, style.place)
         axes = f"{members.pop(AXES_KEY)} " if members else ""
-        usual = METRES if style.precision is None else style.precision
         at = " ".join(
             f"{key} {each if type(each) is str else _rounded(each, digits.get(key, usual))}"
             for key, each in members.items()
         )
     chosen = style.notations[0] if style.notations else notation("rpy_deg")
     degrees = bool(chosen.representation.angles) and chosen.in_degrees(style.degrees)
-    position = _short(pose.components[:3], style.precision if style.precision is not None else METRES)
-    decimals = style.precision if style.precision is not None else DEGREES if degrees else METRES
-    return at or f"xyz {position}", f"{axes}{chosen.spec} {_short(rotation_numbers(pose, chosen, style), decimals)}"
+    decimals = DEGREES if degrees and style.precision is None else usual
+    position = " ".join(_rounded(part, usual) for part in pose.components[:3])
+    rotation = " ".join(_rounded(part, decimals) for part in rotation_numbers(pose, chosen, style))
+    return at or f"xyz {position}", f"{axes}{chosen.spec} {rotation}"
 
 
 def graphviz(text: str) -> str:
@@ -333,13 +331,8 @@ def graphviz(text: str) -> str:
     return text.replace("&", "&amp;").replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
 
 
-def _short(values: Iterable[float], decimals: int) -> str:
-    """Round for display, without trailing zeros and minus zero."""
-    return " ".join(_rounded(value, decimals) for value in values)
-
-
 def _rounded(value: float, decimals: int) -> str:
-    """Round a number for display; very small and very large numbers get an exponent."""
+    """Round a number for display, without trailing zeros; very small and very large numbers get an exponent."""
     if abs(value) < NOISE:
         value = 0.0
     if value and not 0.5 * 10.0**-decimals <= abs(value) < MOST_PLAIN:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid
 from frametool.grammar.pose import NAMES
-from frametool.grammar.result import NoResult, Result, Style, in_columns, pose_numbers, without_frame
+from frametool.grammar.result import NoResult, Result, Style, in_columns, pose_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -77,7 +77,9 @@ def _pose_cells(result: Result, style: Style) -> dict[str, Any]:
         from frametool.grammar.place import placed_cells
 
         placed, pose = placed_cells(pose, style.place)
-        cells = without_frame(cells, style.place) | placed
+        if style.place.origin is not None:  # the columns state its axes
+            cells.pop("parent", None)
+        cells |= placed
     elif pose.position is not None and not any(each.representation.whole for each in style.notations):
         cells |= zip("xyz", pose.position, strict=True)
     for notation in style.notations if pose.rotation is not None else ():
