@@ -18,9 +18,8 @@ from frametool.documents.source import Source, opened
 from frametool.errors import FormatError, FrametoolError
 from frametool.geometry.floats import RADIAN as DEGREES
 from frametool.geometry.representations import notation
-from frametool.grammar.names import may_be_on_earth
 from frametool.grammar.pose import COVARIANCE_KEYS
-from frametool.grammar.readers import Misfit
+from frametool.grammar.readers import Misfit, may_be_on_earth
 from frametool.grammar.readers import tell as tell_notes
 from frametool.ros.messages import LISTS
 from frametool.stream.as_poses import FormatConverter

@@ -18,7 +18,7 @@ from frametool.cli.command import misuse, refuse, refuse_two_readers, say_if_typ
 from frametool.documents.source import Source, decode, read_text
 from frametool.errors import FormatError, Misused, ValueInvalid, heard_by, shown, warn
 from frametool.grammar.pose import Pose, pose_of_numbers
-from frametool.grammar.readers import NotARotation, Reading
+from frametool.grammar.readers import NotARotation, Reading, stamp_column
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -242,8 +242,6 @@ class ArgumentPoses(NamedTuple):
 
     def only_poses(self, *, timed: bool) -> list[Pose]:
         """Return the poses alone; warn of what was noted and of what is left out, except stamps if `timed`."""
-        from frametool.grammar.names import stamp_column
-
         for message, rule in self.warnings:
             warn(message, rule=rule)
         left_out = [key for key in sorted(self.others) if not (timed and stamp_column([key]) is not None)]

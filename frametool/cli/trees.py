@@ -19,9 +19,8 @@ from frametool.documents.source import ReadCache
 from frametool.errors import bare, listing, shown, warn
 from frametool.formats.table import FORMATS, ORDERS
 from frametool.grammar.edges import Answers
-from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose_algebra import Lookups
-from frametool.grammar.readers import is_slashed
+from frametool.grammar.readers import EARTH_FRAMES, is_slashed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

@@ -31,7 +31,7 @@ from frametool.geometry import earth
 from frametool.geometry.place import ENU, Origin
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
-from frametool.grammar.names import EARTH_FRAMES
+from frametool.grammar.readers import EARTH_FRAMES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -26,8 +26,7 @@ from frametool.frames import topology
 from frametool.frames.lookups import FrameTree
 from frametool.geometry.representations import EARTH_FRAMES
 from frametool.grammar.edges import Answers, Diagnostics, Edge, EdgeColumns, Options, Samples, Topics, stop
-from frametool.grammar.names import NAME_KEYS, PARENT_COLUMNS
-from frametool.grammar.readers import alike, more_like_it
+from frametool.grammar.readers import NAME_KEYS, PARENT_COLUMNS, alike, more_like_it
 
 TYPE_CHECKING = False
 

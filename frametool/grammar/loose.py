@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import bare
 from frametool.geometry.representations import RPY
-from frametool.grammar.names import COLUMN_WORDS
 from frametool.grammar.pose import POSE_KEYS, POSITION_WORDS, ROTATION_WORDS, Pose, is_position, own_key, read_pose
-from frametool.grammar.readers import Misfit, Path, Reading, Unclear, kind, within
+from frametool.grammar.readers import COLUMN_WORDS, Misfit, Path, Reading, Unclear, kind, within
 
 if TYPE_CHECKING:
     from collections.abc import Collection

@@ -19,8 +19,18 @@ from frametool.geometry import floats, placed, quaternion
 from frametool.geometry.earth import NORTH, SOUTH, ZONES, standard_zone, utm, zone_number
 from frametool.geometry.place import ECEF, ENU, GRID, GRIDDED, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place, Spot
 from frametool.geometry.representations import HEADING, POSITIONS
-from frametool.grammar.names import EARTH_FRAMES, FLAT
-from frametool.grammar.readers import AXES_KEY, Misfit, Quaternion, Reading, kind, read_number, read_numbers, within
+from frametool.grammar.readers import (
+    AXES_KEY,
+    EARTH_FRAMES,
+    FLAT,
+    Misfit,
+    Quaternion,
+    Reading,
+    kind,
+    read_number,
+    read_numbers,
+    within,
+)
 from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:

@@ -122,9 +122,7 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
     Raises Misfit with the path of what is wrong in this mapping.
     """
     if not POSE_KEYS.issuperset(mapping):
-        from frametool.grammar.names import may_be_on_earth
-
-        if any(map(may_be_on_earth, mapping)):
+        if any(map(readers.may_be_on_earth, mapping)):
             from frametool.grammar.place import EARTH_KEYS, placed_by, without_place
 
             if not EARTH_KEYS.isdisjoint(mapping):

@@ -14,7 +14,7 @@ from frametool.frames import topology
 from frametool.frames.edge_log import EdgeLog
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry.representations import EARTH_FRAMES
-from frametool.grammar.names import may_be_on_earth
+from frametool.grammar.readers import may_be_on_earth
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence

@@ -36,7 +36,7 @@ from frametool.formats.table import FORMATS, Rows, is_recording, is_trajectory
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Answers, Diagnostics, Edge, Options, Samples, Topics, stop
-from frametool.grammar.names import EARTH_FRAMES
+from frametool.grammar.readers import EARTH_FRAMES
 from frametool.grammar.result import Style
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, BadRow, Fault, Outcome, RowNote

@@ -17,7 +17,7 @@ from frametool.errors import FormatError, Misused, listing, warn
 from frametool.formats.rows import pcd
 from frametool.formats.rows.column_file import FLOATS, ColumnFile, Made, OutColumn, RecordFile, not_finite
 from frametool.formats.table import FORMATS
-from frametool.grammar.names import NORMALS, in_nanoseconds
+from frametool.grammar.readers import NORMALS, in_nanoseconds
 from frametool.stream.array_writer import ColumnsWriter
 from frametool.stream.faults import SKIP, STOP, Fault, Outcome, RowNote
 from frametool.stream.layout import Fixed, Kept, Named, New, quoted

@@ -25,15 +25,6 @@ from frametool.geometry.earth import zone_number
 from frametool.geometry.place import AXES, ECEF, ENU, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Earth, Place, kernels
 from frametool.geometry.representations import HEADING, POSITIONS, Notation, notation
 from frametool.grammar.covariance import check, entries_of, of_position
-from frametool.grammar.names import (
-    EARTH_FRAMES,
-    FIX,
-    FLAT,
-    FLAT_KEYS,
-    PARENT_COLUMNS,
-    may_be_on_earth,
-    may_be_uncertain,
-)
 from frametool.grammar.place import (
     AT,
     EARTH_KEYS,
@@ -51,7 +42,20 @@ from frametool.grammar.place import (
 )
 from frametool.grammar.place import FIELDS as PLACE_FIELDS
 from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose
-from frametool.grammar.readers import AXES_KEY, Misfit, NotARotation, Reading, within
+from frametool.grammar.readers import (
+    AXES_KEY,
+    EARTH_FRAMES,
+    FIX,
+    FLAT,
+    FLAT_KEYS,
+    PARENT_COLUMNS,
+    Misfit,
+    NotARotation,
+    Reading,
+    may_be_on_earth,
+    may_be_uncertain,
+    within,
+)
 from frametool.stream.faults import ZONES, RowNote
 from frametool.stream.header import Columns, Header, PoseColumns, find_positions, find_rotations, listed, places_named
 from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape, place_of

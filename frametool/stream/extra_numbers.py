@@ -17,9 +17,8 @@ from frametool.geometry.quaternion import TOLERATED
 from frametool.geometry.rigid import EXACT, SCALED
 from frametool.geometry.uncertainty import UNKNOWN
 from frametool.grammar import covariance
-from frametool.grammar.names import RATES
 from frametool.grammar.pose import LEFT_OUT, SCALE, read_angle_unit
-from frametool.grammar.readers import Misfit, NotARotation, Path, Reading, read_number, within
+from frametool.grammar.readers import RATES, Misfit, NotARotation, Path, Reading, read_number, within
 from frametool.ros.messages import whole_list
 from frametool.stream.row_layout import IDENTITY, MOVERS, NORMAL, PARTS, POINT, POSE, RATE, TWIST, VECTOR, WRENCH, Shape
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.errors import ValueInvalid
-from frametool.grammar.names import EARTH_FRAMES
+from frametool.grammar.readers import EARTH_FRAMES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator, Sequence

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import FormatError, Misused, ValueInvalid, bare, did_you_mean, listing, shown
 from frametool.geometry.representations import NAMED, ROTATIONS, UPPER_ROWS, Notation, Representation
 from frametool.geometry.representations import notation as parse_notation
-from frametool.grammar.names import COLUMN_WORDS, NORMALS
+from frametool.grammar.readers import COLUMN_WORDS, NORMALS
 from frametool.stream.row_layout import POINT, POSE, SIX, TWIST, WRENCH, Shape, Unit, six_names
 from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS
 

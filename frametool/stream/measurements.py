@@ -22,9 +22,8 @@ from frametool.formats.trees.tree_reader import MOST_KEYS, read_edges
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 from frametool.grammar.covariance import AXES, columns, is_sigma
-from frametool.grammar.names import NAME_KEYS, STAMP_KEYS
 from frametool.grammar.pose import COVARIANCE_KEYS, Pose, inverted, read_angle_unit
-from frametool.grammar.readers import Misfit, Path, Reading, kind, tell, within
+from frametool.grammar.readers import NAME_KEYS, STAMP_KEYS, Misfit, Path, Reading, kind, tell, within
 from frametool.stream.faults import BadRows
 from frametool.stream.record import INNER, KNOWN, Record, find_records, pose_of, value_at
 from frametool.stream.record_values import stamp_of

@@ -17,15 +17,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.errors import MOST_COMPARED, ValueInvalid, alternatives, did_you_mean, first_of, shown
 from frametool.geometry import floats
 from frametool.geometry.representations import ROTATIONS, notation
-from frametool.grammar.names import (
-    EARTH_FRAMES,
-    NAME_KEYS,
-    PARENT_KEYS,
-    STAMP_KEYS,
-    is_rate,
-    may_be_on_earth,
-    may_be_uncertain,
-)
 from frametool.grammar.pose import (
     COVARIANCE_KEYS,
     LISTED_WORDS,
@@ -46,7 +37,23 @@ from frametool.grammar.pose import (
     shape_of,
     unknown_keys,
 )
-from frametool.grammar.readers import AXES_KEY, Misfit, NotARotation, Reading, kind, places_in, read_numbers, within
+from frametool.grammar.readers import (
+    AXES_KEY,
+    EARTH_FRAMES,
+    NAME_KEYS,
+    PARENT_KEYS,
+    STAMP_KEYS,
+    Misfit,
+    NotARotation,
+    Reading,
+    is_rate,
+    kind,
+    may_be_on_earth,
+    may_be_uncertain,
+    places_in,
+    read_numbers,
+    within,
+)
 from frametool.stream.row_layout import ACCEL, PARTS, POINT, POSE, TURN, VECTOR, Shape, checked_rotation, doubt
 from frametool.stream.stamp_source import key_path
 from frametool.text.numbers import parse_number, read_number_or_angle

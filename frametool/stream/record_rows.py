@@ -16,7 +16,7 @@ from frametool.errors import FrametoolError
 from frametool.formats.rows.csv import cells_of
 from frametool.geometry import floats
 from frametool.geometry.representations import notation
-from frametool.grammar.names import in_nanoseconds
+from frametool.grammar.readers import in_nanoseconds
 from frametool.grammar.result import Result, Style
 from frametool.stream.record_cuts import Cut, names_of, plan_of
 from frametool.stream.record_text import Answer

@@ -13,8 +13,7 @@ from frametool.documents.json import strict_json
 from frametool.documents.source import Source, check_text
 from frametool.errors import Finding, FrametoolError, ValueInvalid
 from frametool.geometry import floats
-from frametool.grammar.names import in_nanoseconds
-from frametool.grammar.readers import Misfit, Path, Reading, within
+from frametool.grammar.readers import Misfit, Path, Reading, in_nanoseconds, within
 from frametool.stream.faults import ZONES, RowNote
 from frametool.stream.record import Record, find_records, value_at
 from frametool.stream.row_layout import FLAT, LEAVES_PLANE, Target, checked_rotation

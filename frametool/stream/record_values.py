@@ -15,9 +15,8 @@ from frametool.documents.json import JSON_NUMBER
 from frametool.documents.source import Source, Verbatim
 from frametool.errors import FormatError, Misused, ValueInvalid, shown, warn
 from frametool.formats.table import is_recording
-from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import SCALE, Pose
-from frametool.grammar.readers import Misfit, NotARotation, Path, Reading, tell
+from frametool.grammar.readers import Misfit, NotARotation, Path, Reading, in_nanoseconds, stamp_column, tell
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream.record import STALE, Record, pose_of, value_at
 from frametool.stream.record_text import Answer, Outside, RecordText, wide_turn, written

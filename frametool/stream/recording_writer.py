@@ -9,7 +9,7 @@ import numpy as np
 from frametool.errors import ValueInvalid, first_of, listing, warn
 from frametool.formats.rows.pose_rows import MOST_NAMED
 from frametool.geometry import arrays, earth, quaternion
-from frametool.grammar.names import EARTH_FRAMES
+from frametool.grammar.readers import EARTH_FRAMES
 from frametool.recordings.write import KINDS, RecordingFile, check_stamps, filled, serialised
 from frametool.stream.row_layout import POINT, POSE
 from frametool.stream.row_poses import RowPoses, plain_cells

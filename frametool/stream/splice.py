@@ -15,9 +15,8 @@ from frametool.documents.yaml_writer import dump as yaml
 from frametool.documents.yaml_writer import flow, quoted
 from frametool.errors import FormatError, FrametoolError
 from frametool.geometry.representations import ROTATIONS
-from frametool.grammar.names import EARTH_FRAMES, PLACE_KEYS
 from frametool.grammar.pose import LISTED_WORDS, ROTATION_KEYS, Pose
-from frametool.grammar.readers import AXES_KEY
+from frametool.grammar.readers import AXES_KEY, EARTH_FRAMES, PLACE_KEYS
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream.faults import Fault
 from frametool.stream.layout import Const, IfLocked, In, Item, Out, Piece, Renamed, Word, number_text

@@ -12,7 +12,7 @@ import numpy as np
 
 from frametool.errors import FrametoolError
 from frametool.frames.stamps import BILLION, nanoseconds_each, tell_size
-from frametool.grammar.names import in_nanoseconds
+from frametool.grammar.readers import in_nanoseconds
 from frametool.stream.row_layout import NOWHERE
 from frametool.stream.row_poses import NO_STAMP, texts_of
 from frametool.stream.rows import numbered, read_each

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, AnyStr, NamedTuple
 from frametool.documents.document import Node, parse_nodes
 from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.geometry.rigid import EXACT
-from frametool.grammar.names import STAMP_KEYS, in_nanoseconds
-from frametool.grammar.readers import Misfit, Path, kind
+from frametool.grammar.readers import STAMP_KEYS, Misfit, Path, in_nanoseconds, kind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

@@ -17,7 +17,7 @@ from frametool.errors import FormatError, FrametoolError
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import UPPER_ROWS, notation
-from frametool.grammar.names import EARTH_FRAMES, in_nanoseconds, stamp_column
+from frametool.grammar.readers import EARTH_FRAMES, in_nanoseconds, stamp_column
 from frametool.stream.faults import Fault
 from frametool.stream.header import Columns, PoseColumns, has_pose_column
 from frametool.stream.layout import ADDED, NAMED, Layout, quoted

@@ -7,7 +7,8 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, Misused, ValueInvalid, alternatives, shown
-from frametool.grammar.names import (
+from frametool.grammar.readers import (
+    AXES_KEY,
     NAME_KEYS,
     PARENT_COLUMNS,
     PARENT_KEYS,
@@ -18,7 +19,6 @@ from frametool.grammar.names import (
     stamp_places,
     without_mark,
 )
-from frametool.grammar.readers import AXES_KEY
 from frametool.stream.evaluate import Plan
 from frametool.stream.header import (
     XYZ,

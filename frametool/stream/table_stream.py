@@ -11,7 +11,7 @@ import numpy as np
 
 from frametool.errors import FormatError, FrametoolError, Misused, listing
 from frametool.formats.table import FORMATS
-from frametool.grammar.names import NORMALS, stamp_places
+from frametool.grammar.readers import NORMALS, stamp_places
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import Fault, Outcome, RowNote
 from frametool.stream.header import listed

@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from frametool.documents.json import JSON_NUMBER
 from frametool.errors import FrametoolError
-from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, may_be_uncertain
 from frametool.grammar.pose import DESCRIPTIVE, LISTED_WORDS, POSE_KEYS, ROTATION_KEYS
-from frametool.grammar.readers import AXES_KEY, Path
+from frametool.grammar.readers import AXES_KEY, NAME_KEYS, PARENT_KEYS, Path, may_be_uncertain
 from frametool.stream.layout import Const, Renamed
 from frametool.stream.record import POINT_KEYS, Record
 from frametool.stream.row_layout import POSE

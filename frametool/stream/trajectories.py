@@ -22,8 +22,8 @@ from frametool.formats.table import BAG, FORMATS, by_suffix
 from frametool.frames.stamps import FURTHEST_NS
 from frametool.frames.trajectory import BODY, WORLD, Trajectory
 from frametool.grammar.edges import Answers, Diagnostics, Names
-from frametool.grammar.names import in_nanoseconds, stamp_column, stamp_places
 from frametool.grammar.pose_algebra import sample_stamps
+from frametool.grammar.readers import in_nanoseconds, stamp_column, stamp_places
 from frametool.grammar.result import Result, Style
 from frametool.ros.messages import body_of
 from frametool.stream import stamp_columns

@@ -31,8 +31,8 @@ from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
 from frametool.geometry import arrays, floats, quaternion, rigid
 from frametool.geometry.representations import notation
-from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose import SCALE, Pose
+from frametool.grammar.readers import EARTH_FRAMES
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream.layout import Const, In, Out, Piece
 from frametool.stream.record_results import BlockResults, Documents, csv_rows

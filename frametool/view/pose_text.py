@@ -13,8 +13,8 @@ from frametool.errors import printable
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import ROTATIONS, ROWS, Notation, notation
-from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose import TIMES, Pose
+from frametool.grammar.readers import EARTH_FRAMES
 from frametool.grammar.result import ROUNDED_TO_ZERO, Result, Style, is_locked, placed, rotation_entry, rotation_numbers
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from frametool.frames.stamps import format_stamp
 from frametool.geometry.rigid import EXACT, UNCERTAIN
 from frametool.geometry.uncertainty import warn_if_wide
 from frametool.grammar.edges import Diagnostics
-from frametool.grammar.names import EARTH_FRAMES
+from frametool.grammar.readers import EARTH_FRAMES
 from frametool.stream.faults import BadRows, Fault, run
 from frametool.text.numbers import NotFinite, parse_length
 

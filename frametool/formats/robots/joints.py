@@ -29,8 +29,7 @@ from frametool.formats.trees.tree_reader import read_time
 from frametool.frames.stamps import SUFFIXES, format_stamp, parse_stamp
 from frametool.geometry import floats, rigid
 from frametool.grammar.edges import Diagnostics, Edge, Options
-from frametool.grammar.names import STAMP_KEYS, in_nanoseconds, stamp_column
-from frametool.grammar.readers import Misfit, Path, as_mapping
+from frametool.grammar.readers import STAMP_KEYS, Misfit, Path, as_mapping, in_nanoseconds, stamp_column
 from frametool.ros import messages
 from frametool.ros.message_stream import TextMessage, line_texts, read_messages
 from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS, parse_number

@@ -22,7 +22,7 @@ import numpy as np
 from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
 from frametool.formats.rows import column_file
 from frametool.formats.table import FORMATS
-from frametool.grammar.names import NORMALS
+from frametool.grammar.readers import NORMALS
 from frametool.text.cells import Cells, split_blank
 from frametool.text.lines import read_blocks
 from frametool.text.numbers import explain_number

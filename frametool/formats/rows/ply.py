@@ -29,7 +29,7 @@ import numpy as np
 from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
 from frametool.formats.rows import clouds, column_file
 from frametool.geometry.rigid import EXACT, SCALED
-from frametool.grammar.names import NORMALS
+from frametool.grammar.readers import NORMALS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

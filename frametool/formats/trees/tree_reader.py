@@ -21,9 +21,20 @@ from frametool.errors import Finding, FormatError, alternatives, bare, first_of,
 from frametool.frames.stamps import parse_stamp
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Diagnostics, Edge, Options
-from frametool.grammar.names import EARTH_FRAMES, may_be_on_earth
 from frametool.grammar.pose import COVARIANCE_KEYS, NAMES, POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
-from frametool.grammar.readers import AXES_KEY, Misfit, Path, Reading, Unclear, as_mapping, kind, tell, within
+from frametool.grammar.readers import (
+    AXES_KEY,
+    EARTH_FRAMES,
+    Misfit,
+    Path,
+    Reading,
+    Unclear,
+    as_mapping,
+    kind,
+    may_be_on_earth,
+    tell,
+    within,
+)
 from frametool.ros import messages
 from frametool.text.numbers import parse_number
 
