@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import reduce
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -16,9 +16,6 @@ from frametool.errors import warn
 from frametool.grammar.pose import LEFT_OUT, Pose
 from frametool.stream.faults import MOST
 from frametool.text.numbers import parse_fractions, parse_number
-
-if TYPE_CHECKING:
-    from frametool.grammar.readers import Vector
 
 
 @command_named("compose")
@@ -259,26 +256,20 @@ def between_command(inputs: Inputs) -> None:
     valid; one is chosen and reported.
     """
     from frametool.grammar.pose_algebra import turn_between
+    from frametool.stream.record_values import read_text
+    from frametool.stream.request import Operation, Request, RowOptions
+    from frametool.stream.row_layout import VECTOR
 
-    output = Output(inputs, "poses")
-    texts = inputs.vectors
+    output, request = Output(inputs, "poses"), Request(Operation(moves=True), RowOptions(kind=VECTOR))
+    texts, found = inputs.vectors, list[Any]()
     if len(texts) == 6:
         texts = ",".join(texts[:3]), ",".join(texts[3:])
-    found = [vector for text in texts for vector in _vectors(text)]
+    for text in texts:
+        with poses.inline_misuse():
+            records = read_text(poses.pose_source(text, request), request).records
+            found += [record.shape.position(record.values) for record in records]
     refuse(len(found) != 2, f"two vectors are wanted, V1 and V2, of three numbers each; found {len(found)}")
     result = turn_between(*found)
     if result.extras["angle_deg"] > 180.0 - OPPOSITE:
         say("note: the directions are opposite: half a turn about any axis at right angles to them; one was chosen")
     output.values([result])
-
-
-def _vectors(text: str) -> list[Vector]:
-    """Read the vectors of an argument."""
-    from frametool.stream.record_values import read_text
-    from frametool.stream.request import Operation, Request, RowOptions
-    from frametool.stream.row_layout import VECTOR
-
-    request = Request(Operation(moves=True), RowOptions(kind=VECTOR))
-    with poses.inline_misuse():
-        records = read_text(poses.pose_source(text, request), request).records
-        return [record.shape.position(record.values) for record in records]

@@ -6,7 +6,7 @@ import os
 import re
 import sys
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -31,7 +31,6 @@ from frametool.stream.faults import STOP, Fault
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from frametool.calc.rows import RowExpressions
     from frametool.stream.request import Request
 
 
@@ -39,9 +38,9 @@ LIKE_A_FILE = r"(?!row\.)[^\s(){}\[\]*<>\"']*\.[A-Za-z]\w*"
 
 
 def file_named_in(text: str, scope: Scope) -> Term | None:
-    """Bind the name of `NAME=FILE` to what the file holds, and return it; None for everything else.
+    """Bind the name of `NAME=FILE` to what the file, or `-`, holds, and return it; None for everything else.
 
-    What looks like the name of a file is read as one, and refused if there is none.
+    What looks like the name of a file is read as one, and refused if there is none.  Raises FileProblem, FormatError.
     """
     head, equals, tail = text.partition("=")
     name, path = head.strip(), tail.strip()
@@ -50,12 +49,6 @@ def file_named_in(text: str, scope: Scope) -> Term | None:
     if path != "-" and not os.path.exists(path) and not re.fullmatch(LIKE_A_FILE, path):
         return None
     read_line(f"{name}=0")  # refuses a name that is taken
-    scope.names[name] = named_file(path, scope)._replace(text=name)
-    return scope.names[name]
-
-
-def named_file(path: str, scope: Scope) -> Term:
-    """Read a file for a name in expressions; `-` is standard input.  Raises FileProblem, FormatError."""
     from frametool.calc.rows import poses_of_table, values_of_document
 
     fmt = "yaml"
@@ -64,15 +57,19 @@ def named_file(path: str, scope: Scope) -> Term:
 
         with opened(path) as file:  # what is neither a table nor a document may be a tree
             fmt = detect(file.read(HEAD), "tree", "rows", "records", name=path, otherwise=fmt)
+    found, source = None, None
     if "rows" in FORMATS[fmt].reads:
-        return poses_of_table(path, fmt, normalize=scope.normalize, degrees=scope.degrees)
-    source = source_of(path) if "records" in FORMATS[fmt].reads else None
-    if source and (found := values_of_document(source, scope)):
-        return found
-    from frametool.formats.load import load_sources
+        found = poses_of_table(path, fmt, normalize=scope.normalize, degrees=scope.degrees)
+    elif "records" in FORMATS[fmt].reads:
+        source = source_of(path)
+        found = values_of_document(source, scope)
+    if found is None:
+        from frametool.formats.load import load_sources
 
-    tree = load_sources([source]) if source and path == "-" else load_tree(path, streams=True)
-    return Term(Type(TREE), (), tree=tree)
+        tree = load_sources([source]) if source and path == "-" else load_tree(path, streams=True)
+        found = Term(Type(TREE), (), tree=tree)
+    scope.names[name] = found._replace(text=name)
+    return scope.names[name]
 
 
 def _offer_words(ctx: click.Context, incomplete: str) -> Mapping[str, str]:
@@ -245,14 +242,13 @@ class CalcCommand(Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Put a blank before such arguments, which click takes for options."""
-        return super().parse_args(ctx, [f" {each}" if _begins_with_minus(each) else each for each in args])
-
-
-def _begins_with_minus(argument: str) -> bool:
-    """Distinguish an expression with a sign from an option."""
-    behind = argument[1:].lstrip("- ")
-    name, bracket, _ = behind.partition("(")
-    return argument.startswith("-") and (behind[:1] in tuple('([{"') or (bool(bracket) and name in FUNCTIONS))
+        shielded = []
+        for each in args:
+            behind = each[1:].lstrip("- ")
+            name, bracket, _ = behind.partition("(")
+            is_signed = behind[:1] in tuple('([{"') or (bracket and name in FUNCTIONS)
+            shielded.append(f" {each}" if each.startswith("-") and is_signed else each)
+        return super().parse_args(ctx, shielded)
 
 
 @command_named("calc", own=("input_path",), cls=CalcCommand)
@@ -286,59 +282,42 @@ def calc_command(inputs: Inputs) -> int:
         from frametool.cli.earth import earth
 
         scope.earth = earth()
-    texts = list(_expressions(inputs.arguments, inputs.expressions, scope))
-    lines = [read_line(text) for text, _ in texts]
-    scope.tree = _tree(inputs.trees, lines)
+    alone = () if inputs.arguments == ("-",) else inputs.arguments  # a lone - is standard input, read in any case
+    texts = [text.strip() for text in alone if file_named_in(text, scope) is None]
+    named = [(read_text(each[1:]) if each.startswith("@") else each).strip() for each in inputs.expressions]
+    lines = [read_line(text) for text in (*texts, *named)]
+    if inputs.trees:
+        scope.tree = load_tree(inputs.trees[0], inputs.trees[1:], streams=True)
+    elif os.environ.get("FRAMETOOL_TREE"):  # read where a bare look-up asks for it
+        asks = any(branch.kind == "lookup" and not branch.value[1] for line in lines for branch in walk(line.tree))
+        scope.tree = load_tree(".", streams=True) if asks or not lines else None
     if not lines:
         inputs.ask("origin", "local_axes", "zone")  # whatever comes
         refuse(stream.path is not None, "-i FILE needs an expression over row")
         is_prompt = sys.stdin is not None and sys.stdin.isatty()
         return talk(scope, output) if is_prompt else calculate_lines(stream, scope)
     if stream.path is not None or any(mentions_row(line.tree) for line in lines):
-        formula = _over_rows(lines, [is_option for _, is_option in texts], scope, output)
-        formula.check((inputs.kind,) if inputs.kind else ("pose", "point", "vector"))
-        request = _request(formula, inputs)
-        return stream.run(request)
+        return stream.run(_over_rows(lines, len(texts), scope, inputs, output.style))
     values = ((line, evaluate_line(line, scope)) for line in lines)
     output.pieces(value_texts(shown_of(values), output.style))
     return 0
 
 
-def _expressions(arguments: Iterable[str], expressions: Iterable[str], scope: Scope) -> Iterator[tuple[str, bool]]:
-    """Yield the expressions in order, and whether -e gave them; names of files are bound."""
-    for text in () if tuple(arguments) == ("-",) else arguments:  # a lone - is standard input, read in any case
-        if file_named_in(text, scope) is None:
-            yield text.strip(), False
-    for text in expressions:
-        yield (read_text(text[1:]) if text.startswith("@") else text).strip(), True
+def _over_rows(lines: Sequence[Line], behind: int, scope: Scope, inputs: Inputs, style: Style) -> Request:
+    """Return what is asked of rows: lines whose results are written, those of -e or the last; others bind names.
 
-
-def _tree(files: Sequence[str], lines: Sequence[Line]) -> Any:
-    """Read the tree of bare look-ups: --tree, else what FRAMETOOL_TREE names, if any is asked for."""
-    if files:
-        return load_tree(files[0], files[1:], streams=True)
-    asks = any(branch.kind == "lookup" and not branch.value[1] for line in lines for branch in walk(line.tree))
-    return load_tree(".", streams=True) if os.environ.get("FRAMETOOL_TREE") and (asks or not lines) else None
-
-
-def _over_rows(lines: Sequence[Line], flags: Sequence[bool], scope: Scope, output: Output) -> RowExpressions:
-    """Part lines into those whose results are written and those that only bind names."""
+    behind: so many lines come before those of -e
+    """
     from frametool.calc.rows import RowExpressions
-
-    marked = [line for line, is_option in zip(lines, flags, strict=True) if is_option or not line.name]
-    results = marked or [lines[-1]]
-    names = [line.name for line in results]
-    refuse(len(names) > 1 and not all(names), "rows get one result, or several with names: -e NAME=EXPR -e NAME=EXPR")
-    refuse(twice := next((name for name in names if name and names.count(name) > 1), ""), f"-e {twice}= appears twice")
-    bindings = [line for line in lines if line not in results]
-    return RowExpressions(results, bindings, scope, output.style)
-
-
-def _request(formula: RowExpressions, inputs: Inputs) -> Request:
-    """Return what is asked of the rows."""
     from frametool.stream.request import Operation, Request, RowOptions
     from frametool.stream.stamp_source import Timed
 
+    results = [line for at, line in enumerate(lines) if at >= behind or not line.name] or [lines[-1]]
+    names = [line.name for line in results]
+    refuse(len(names) > 1 and not all(names), "rows get one result, or several with names: -e NAME=EXPR -e NAME=EXPR")
+    refuse(twice := next((name for name in names if name and names.count(name) > 1), ""), f"-e {twice}= appears twice")
+    formula = RowExpressions(results, [line for line in lines if line not in results], scope, style)
+    formula.check((inputs.kind,) if inputs.kind else ("pose", "point", "vector"))
     timed = Timed.of_rows(inputs.time_column or "") if formula.needs_time else None
     counters = not any(frame.isdecimal() for _, tree in formula.scope.trees for frame in tree.frames)
     return Request(

@@ -14,14 +14,14 @@ from frametool.cli.sink import folded, in_colour, say, say_error, say_first, wri
 from frametool.cli.trees import FRAME, frame_name, load_sides, opened, state
 from frametool.errors import Finding, FormatError, listing, warn
 from frametool.lint.findings import RULES, WRITERS, github_command, level
-from frametool.lint.tree_diff import Tolerance, TreeComparison, diff, entry, parse_tolerance
+from frametool.lint.tree_diff import Tolerance, diff, entry, parse_tolerance
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     import click
 
-    from frametool.formats.load import EdgePlace, FrameFile
+    from frametool.formats.load import FrameFile
     from frametool.stream.measurements import Measurement
 
 FAILED = 1
@@ -62,11 +62,27 @@ def check_command(inputs: Inputs) -> int:
     files, measured, normalize = inputs.files, inputs.measured, inputs.normalize
     fmt, strict = inputs.fmt, inputs.strict
     refuse_two_readers((*files, *measured))
-    if inputs.each:
-        findings = _one_by_one(files, normalize=normalize)
+    findings: list[Finding] = []
+    if inputs.each:  # that a file holds no frames, or is of an unknown format, is a warning
+        from frametool.lint.rules import check
+
+        for number, name in enumerate(files):
+            try:
+                recordings = opened([name], behind=number, of=len(files))
+            except FormatError as error:
+                findings.append(Finding("no-frames", error.message, error.source, error.line or 1, 1))
+            else:
+                findings += check(recordings, normalize=normalize, others=True)
+                state(recordings)
     else:
         count = len(files) + len(measured)
-        rows = _read(opened(measured, behind=len(files), of=count), normalize=normalize) if measured else []
+        rows: list[Measurement] = []
+        if measured:
+            from frametool.stream.measurements import read_measurements
+
+            recordings = opened(measured, behind=len(files), of=count)
+            rows = read_measurements(recordings, normalize=normalize)
+            state(recordings, whole=False)
         recordings = opened(files, of=count)
         findings = _with_loops(recordings, rows, inputs.tolerance, normalize=normalize)
         state(recordings)
@@ -79,30 +95,6 @@ def check_command(inputs: Inputs) -> int:
     if summary or (fmt == "text" and sys.stdout.isatty()):
         say(summary or f"{listing(files)}: no findings ({len(RULES)} rules)")
     return FAILED if counts["error"] or (strict and counts["warning"]) else 0
-
-
-def _one_by_one(files: Sequence[str], *, normalize: bool) -> list[Finding]:
-    """Return what is wrong with each file alone; that one holds no frames, or is of an unknown format, is a warning."""
-    from frametool.lint.rules import check
-
-    findings = []
-    for number, file in enumerate(files):
-        try:
-            recordings = opened([file], behind=number, of=len(files))
-        except FormatError as error:
-            findings.append(Finding("no-frames", error.message, error.source, error.line or 1, 1))
-        else:
-            findings += check(recordings, normalize=normalize, others=True)
-            state(recordings)
-    return findings
-
-
-def _read(files: Sequence[FrameFile], *, normalize: bool) -> list[Measurement]:
-    from frametool.stream.measurements import read_measurements
-
-    rows = read_measurements(files, normalize=normalize)
-    state(files, whole=False)
-    return rows
 
 
 def _with_loops(
@@ -167,7 +159,17 @@ def diff_command(inputs: Inputs) -> int:
     inputs.note(*comparison.notes)
     differences = [*comparison.differences, *(comparison.unmoved if inputs.everything else ())]
     if output.style.format == "github":
-        output.text(_annotations(comparison, (of_one, of_other)))
+        from frametool.formats.load import lines_of
+
+        # each at the line where B says where the frame is, or else A
+        known = {each.frame: of_other.get(each.frame) or of_one.get(each.frame) for each in comparison.differences}
+        placed = {frame: place for frame, place in known.items() if place is not None}
+        where = dict(zip(placed, lines_of([*placed.values()]), strict=True))
+        commands = []
+        for each in comparison.differences:
+            file, line = where.get(each.frame, ("", 0))
+            commands.append(github_command("error", each.sentence, file=file, line=line, title=each.kind))
+        output.text("".join(commands))
     elif output.style.format == "text":
         from frametool.view.reports import write_diff
 
@@ -179,21 +181,6 @@ def diff_command(inputs: Inputs) -> int:
         say(f"{count} frame{'s' * (count != 1)} not compared: no data in A and B; --at chooses another time")
         return TROUBLE
     return DIFFERENT if comparison.differences else 0
-
-
-def _annotations(found: TreeComparison, places: Sequence[Mapping[str, EdgePlace]]) -> str:
-    """Return workflow commands, each at the line where B says where the frame is, or else A."""
-    from frametool.formats.load import lines_of
-
-    in_a, in_b = places
-    known = {each.frame: in_b.get(each.frame) or in_a.get(each.frame) for each in found.differences}
-    placed = {frame: place for frame, place in known.items() if place is not None}
-    where = dict(zip(placed, lines_of([*placed.values()]), strict=True))
-    lines = []
-    for each in found.differences:
-        file, line = where.get(each.frame, ("", 0))
-        lines.append(github_command("error", each.sentence, file=file, line=line, title=each.kind))
-    return "".join(lines)
 
 
 MOST_TOLD = 3  # frames that come by the topics of two robots

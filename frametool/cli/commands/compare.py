@@ -24,7 +24,7 @@ from frametool.text.numbers import parse_lengths, parse_share
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.fit.comparison import Comparison, Delta, Settings
+    from frametool.fit.comparison import Comparison, Delta
     from frametool.fit.numbers import Limit
     from frametool.frames.trajectory import Trajectory
 
@@ -139,7 +139,13 @@ def compare_command(inputs: Inputs) -> int:
         asked = [(each, limit) for each in every for limit in limits]
         passed = [(each, limit, now) for each, limit in asked if (now := limit.passed(each)) is not None]
         for path in reports:
-            _write_report(found, path, force=force)
+            import shlex
+
+            from frametool.view.comparison_report import write_report
+
+            line = shlex.join(["frametool", *click.get_current_context().obj])
+            with writing(path, force=force) as write:
+                write(write_report(found, REPORTS[options.suffix_of(path)], line))
         if explain:
             from frametool.view.comparison_report import write_explanation
 
@@ -153,17 +159,6 @@ def compare_command(inputs: Inputs) -> int:
     for each, limit, now in passed:
         say(f"limit exceeded: {each['est']}: {limit.name} is {now:.6g}, {limit.text}")
     return EXCEEDED if passed else (TROUBLE if limits else ROWS_SKIPPED) if skipped else 0
-
-
-def _write_report(found: Sequence[Comparison], path: str, *, force: bool) -> None:
-    """Write the pictures of a comparison, with the command that made them."""
-    import shlex
-
-    from frametool.view.comparison_report import write_report
-
-    line = shlex.join(["frametool", *click.get_current_context().obj])
-    with writing(path, force=force) as write:
-        write(write_report(found, REPORTS[options.suffix_of(path)], line))
 
 
 def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], rows: str | None) -> None:
@@ -317,10 +312,19 @@ def trajectory(inputs: Inputs, argument: str, fmt: str = "", on_error: str = STO
 
 def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Comparison], bool]:
     """Compare estimates with a reference as the options say, with warnings. Also: whether rows were skipped."""
-    from frametool.fit.comparison import compare
+    from frametool.fit.comparison import EVO, SETTINGS, Settings, compare
 
     refuse_two_readers([ref, *ests])
-    chosen, formats = _settings(inputs), options.for_each(inputs.input_formats, 1 + len(ests))
+    base = EVO if inputs.like else Settings()
+    of_other_match = "max_gap_ns" if (inputs.match or base.pairing.match) == "nearest" else "max_diff_ns"
+    asked = (name for name in SETTINGS if name != of_other_match)
+    passed = {name: value for name in asked if (value := getattr(inputs, name)) is not None}
+    if "offset" in passed:
+        passed["offset"], limit = passed["offset"]
+        passed |= {} if limit is None else {"offset_limit_s": limit}
+    if "mount" in passed:
+        passed["mount"] = _mount(passed["mount"])
+    chosen, formats = base.changed(**passed), options.for_each(inputs.input_formats, 1 + len(ests))
     reference, ref_name, skipped = trajectory(inputs, ref, formats[0], inputs.on_error)
     found = []
     for est, fmt in zip(ests, formats[1:], strict=True):
@@ -333,22 +337,6 @@ def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Com
         for hint in found[-1].hints:
             warn(hint)
     return found, skipped
-
-
-def _settings(inputs: Inputs) -> Settings:
-    """Take what the options say; those not passed are as evo has them, or as we do."""
-    from frametool.fit.comparison import EVO, SETTINGS, Settings
-
-    base = EVO if inputs.like else Settings()
-    of_other_match = "max_gap_ns" if (inputs.match or base.pairing.match) == "nearest" else "max_diff_ns"
-    asked = (name for name in SETTINGS if name != of_other_match)
-    passed = {name: value for name in asked if (value := getattr(inputs, name)) is not None}
-    if "offset" in passed:
-        passed["offset"], limit = passed["offset"]
-        passed |= {} if limit is None else {"offset_limit_s": limit}
-    if "mount" in passed:
-        passed["mount"] = _mount(passed["mount"])
-    return base.changed(**passed)
 
 
 def _mount(text: str) -> Any:

@@ -76,13 +76,14 @@ def questions() -> dict[str, str]:
 def finder(words: Iterable[str]) -> Callable[[str], bool]:
     """Return the test whether a text holds all these words, in any case and number; `y-up` is one word."""
     found = re.findall(r"\w+(?:-\w+)*", " ".join(words).lower())
-    stems = [r"\b" + r"\W?".join(map(_stem, each.split("-"))) for each in found]
+    stems = []
+    for each in found:  # in any number; a short one must be a whole word
+        parts = [
+            re.sub(r"s$", "", re.sub(r"(ies|y)$", "(?:ie|y)", part)) if len(part) > 3 else rf"{part}s?\b"
+            for part in each.split("-")
+        ]
+        stems.append(r"\b" + r"\W?".join(parts))
     return lambda text: bool(stems) and all(re.search(each, text.lower()) for each in stems)
-
-
-def _stem(word: str) -> str:
-    """Return the pattern of a word in any number; a short one must be a whole word."""
-    return re.sub(r"s$", "", re.sub(r"(ies|y)$", "(?:ie|y)", word)) if len(word) > 3 else rf"{word}s?\b"
 
 
 def _listed(rows: dict[str, str]) -> str:
@@ -137,7 +138,11 @@ def _search(ctx: click.Context, name: str) -> str:
         if holds(each) and abs(len(each) - len(name)) <= len("ies") - len("y"):  # the same in another number
             return topic(each)
     about = sorted((each for each in known if holds(f"{each} {topic(each)}")), key=lambda each: not holds(known[each]))
-    calls = [each for each, one in _commands(ctx).items() if each != "help" and any(map(holds, _texts(one, ctx)))]
+    calls = []
+    for each, one in _commands(ctx).items():  # what a command says of itself, and of each of its own options
+        own = shared.option_groups(one, ctx)["Options"]
+        texts = [f"{one.name} {one.help}", *(f"{option.opts[-1]} {option.help}" for option in own)]
+        calls += [each] * (each != "help" and any(map(holds, texts)))
     formats = [each for each, row in FORMATS.items() if holds(f"{each} {row.summary}")]
     titles = sorted((each for each in asked if holds(f"{each} {asked[each]}")), key=lambda each: not holds(each))
     if about and not (about[1:] or calls or formats or titles):
@@ -151,12 +156,6 @@ def _search(ctx: click.Context, name: str) -> str:
         _wrapped(f"File formats (frametool formats NAME): {', '.join(formats)}"): formats,
         _titles(f"Cookbook (frametool help cookbook {name})", titles): titles,
     })  # fmt: skip
-
-
-def _texts(command: click.Command, ctx: click.Context) -> list[str]:
-    """Return what a command says of itself, and of each of its own options."""
-    own = shared.option_groups(command, ctx)["Options"]
-    return [f"{command.name} {command.help}", *(f"{each.opts[-1]} {each.help}" for each in own)]
 
 
 def common(ctx: click.Context) -> str:
@@ -206,13 +205,11 @@ def _option(option: click.Option, group: str, ctx: click.Context) -> dict[str, A
     }  # fmt: skip
 
 
-def _offer_topics(_ctx: click.Context, _incomplete: str) -> dict[str, str]:
-    """Offer the subjects and the commands."""
-    return topics() | MADE | {name: row[1] for name, row in COMMANDS.items()}
+TOPIC = Text(offers=lambda _ctx, _incomplete: topics() | MADE | {name: row[1] for name, row in COMMANDS.items()})
 
 
 @command_named("help")
-@argument("words", Text(offers=_offer_topics), nargs=-1, metavar="[TOPIC | COMMAND | WORD ..]")
+@argument("words", TOPIC, nargs=-1, metavar="[TOPIC | COMMAND | WORD ..]")
 @option("-f --format", "json: options, values and exit codes of all commands or one", ("text", "json"), name="fmt",
     default="text")  # fmt: skip
 @click.pass_context
@@ -275,13 +272,8 @@ def _read_example(text: str) -> str:
     return name
 
 
-def _offer_examples(_ctx: click.Context, _incomplete: str) -> dict[str, str]:
-    """Offer the files."""
-    return dict.fromkeys(names(), "")
-
-
 @command_named("examples")
-@argument("name", Text(_read_example, _offer_examples), required=False)
+@argument("name", Text(_read_example, lambda _ctx, _incomplete: dict.fromkeys(names(), "")), required=False)
 @option("-o --output FOLDER|FILE", "copy all files into this folder, or NAME into this file", FILE, under="Result")
 @option("--force", "let --output overwrite files", requires=("output",), under="Result")
 def examples_command(inputs: Inputs) -> None:

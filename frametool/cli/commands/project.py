@@ -22,7 +22,7 @@ from frametool.geometry.rigid import EXACT
 from frametool.text.numbers import parse_length, parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from frametool.geometry.camera import Camera
     from frametool.geometry.types import Components
@@ -124,19 +124,16 @@ class CameraTask(Stream):
         self.rest: tuple[str, ...] = inputs.arguments
         _, colon, name = (inputs.camera or "").rpartition(":")
         self.camera_name = name if colon and not is_inline(inputs.camera) else ""
-        if inputs.camera is None or _names_tree(self.rest):
+        # the first argument is a tree if it is no number and no record, or one that is written inline
+        inner = [each for each in self.rest[:2] if not (is_record(each) or begins_number(each))]
+        if inputs.camera is None or (inner and (inner[0] == self.rest[0] or inner == [self.rest[1]])):
             *before, _ = names = named.split()
             if len(self.rest) < len(names) or begins_number(self.rest[0]):
                 raise click.UsageError(f"name {', '.join(before)} and CAMERA, or give --camera FILE[:NAME]")
             self.camera_name = self.rest[len(before)]
             self.way = apply.TreeWay(inputs, numbers=True)
             self.rest = self.way.rest
-        self.is_stream = self.rest in ((), ("-",))
-        self.camera = self._camera()
-
-    def _camera(self) -> Camera:
-        """Return the camera in the axes of its frame, as its pixels are wanted."""
-        inputs, tree = self.inputs, None if self.way is None else self.way.tree
+        self.is_stream, tree = self.rest in ((), ("-",)), None if self.way is None else self.way.tree
         from frametool.formats.cameras import load_camera, resized
 
         if tree is not None and inputs.camera is None:
@@ -148,7 +145,7 @@ class CameraTask(Stream):
                 axes = "optical" if own is None else own.axes
                 axes = axes if tree is None else tree.camera_axes.get(self.camera_name, axes)
                 camera = camera.changed(axes=axes)
-        return camera.changed(axes=inputs.camera_axes) if inputs.camera_axes else camera
+        self.camera: Camera = camera.changed(axes=inputs.camera_axes) if inputs.camera_axes else camera
 
     def rectified(self) -> Camera:
         """Return the camera of the rectified picture, if that is wanted."""
@@ -184,12 +181,6 @@ class CameraTask(Stream):
         return status
 
 
-def _names_tree(arguments: Sequence[str]) -> bool:
-    """Return True where the first argument is no number and no record, or is a tree that is written inline."""
-    inner = [each for each in arguments[:2] if not (is_record(each) or begins_number(each))]
-    return bool(arguments) and (inner[:1] == [arguments[0]] or (len(arguments) > 1 and inner == [arguments[1]]))
-
-
 FAR = ("depth", "range")
 WANTED = "a key pixel, or u and v"
 PIXEL = ("pixel.0", "pixel.1")
@@ -221,8 +212,17 @@ def unproject_command(inputs: Inputs) -> int:
     raw, rectified = task.camera, task.rectified()
     task.camera = raw if inputs.undistort else rectified
     into = None if not inputs.undistort else rectified if inputs.rectified else raw.flat()
-    records = [] if task.is_stream else [*_records(task.rest)]
-    columns = _columns(inputs, _names(task, records), task.name)
+    records: list[Source] = []
+    if not task.is_stream:  # mappings, or the numbers of one pixel
+        numbers = [each for each in task.rest if not is_record(each)]
+        records = [Source("argument", each) for each in task.rest if is_record(each)]
+        wrong = f"a pixel is U V or U V DEPTH, found {len(numbers)}; more pixels are rows"
+        refuse(len(numbers) not in (0, 2, 3), wrong)
+        if numbers:
+            u, v, *depth = map(parse_length, numbers)
+            behind = "".join(f", {DEPTH}: {each!r}" for each in depth)
+            records.append(Source("argument", f'{{"pixel": [{u!r}, {v!r}]{behind}}}'))
+    columns = _columns(task, records)
     far = next(((name, value) for name in FAR if (value := getattr(inputs, name)) is not None), ("", None))
     if far[0] or inputs.ground or into:
         columns = columns[:2]
@@ -263,30 +263,21 @@ class GroundWay(apply.TreeWay):
         return *first[:6], first[6] + 0.0 * second[6], *second
 
 
-def _records(arguments: Sequence[str]) -> Iterator[Source]:
-    """Yield the records of arguments: mappings, or the numbers of one pixel."""
-    numbers = [each for each in arguments if not is_record(each)]
-    yield from (Source("argument", each) for each in arguments if is_record(each))
-    refuse(len(numbers) not in (0, 2, 3), f"a pixel is U V or U V DEPTH, found {len(numbers)}; more pixels are rows")
-    if numbers:
-        u, v, *depth = map(parse_length, numbers)
-        yield Source("argument", f'{{"pixel": [{u!r}, {v!r}]{"".join(f", {DEPTH}: {each!r}" for each in depth)}}}')
+def _columns(task: CameraTask, records: Sequence[Source]) -> Sequence[str]:
+    """Return the columns or keys of u and v, and of how far away it is where there is one; raises FormatError.
 
-
-def _names(task: CameraTask, records: Sequence[Source]) -> Sequence[str]:
-    """Return the names of the columns of the stream, or its keys; those of the first record where there are some."""
+    They are those of the first record, where there are some, and else of the stream.
+    """
     from frametool.stream.joint_rows import names_in
 
+    inputs = task.inputs
     if records:
-        return names_in(records[0].text.encode(), "yaml", records[0].name, WANTED)
-    task.read_clouds_as_rows()
-    begin = task.opened().peek()
-    fmt = task.within or task.chosen_format() or task.detected(begin, is_table=True)
-    return names_in(begin, fmt, task.name, WANTED, header=task.inputs.header)
-
-
-def _columns(inputs: Inputs, names: Sequence[str], source: str) -> Sequence[str]:
-    """Return the columns of u and v, and of how far away it is where there is one; raises FormatError."""
+        names = names_in(records[0].text.encode(), "yaml", records[0].name, WANTED)
+    else:
+        task.read_clouds_as_rows()
+        begin = task.opened().peek()
+        fmt = task.within or task.chosen_format() or task.detected(begin, is_table=True)
+        names = names_in(begin, fmt, task.name, WANTED, header=inputs.header)
     if inputs.peek("columns"):
         columns: Sequence[str] = [each.strip() for each in inputs.columns[0].split(",")]
         refuse(len(columns) not in (2, 3), "--columns names those of u and v, and of a depth if there is one")
@@ -295,6 +286,6 @@ def _columns(inputs: Inputs, names: Sequence[str], source: str) -> Sequence[str]
         return names[:3]
     if not ({"u", "v"} <= {*names} or "pixel" in names):
         message = f"no columns u and v among: {listing(names)}; name them with --columns"
-        raise FormatError(message, source=source, line=1)
+        raise FormatError(message, source=task.name, line=1)
     far = [each for each in FAR if each in names]
     return *(("u", "v") if "u" in names else PIXEL), *far[:1]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.options import place_options, pose_options, reading_options, verbose_option
@@ -18,9 +17,6 @@ from frametool.frames.stamps import parse_time
 from frametool.grammar.edges import Diagnostics
 from frametool.stream.faults import ON_ERROR, STOP, BadRows
 from frametool.view.progress import ProgressBar
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 messages skipped, 4 lookup, 5 file."
 TRANSFORMS = ("tf", "tf_static")  # how topics of transforms are called, in any namespace
@@ -77,9 +73,18 @@ def record_command(inputs: Inputs) -> int:
     path = tree_file(inputs.tree)
     if path == "-":
         raise FileProblem("stdin: a recording cannot be read from a pipe; name its file")
-    fmt = _format_of(path)
-    copy, place = copied_as(fmt, path, inputs.output, inputs.format_name)
-    _refuse_input(place, (path, *map(tree_file, more)))
+    source = FrameFile(path)
+    source.close()
+    if not is_recording(source.format):
+        hint = "frametool tree, convert and lookup write one: -o NEW.mcap"
+        raise FormatError(f"{FORMATS[source.format].summary}: no recording of messages; {hint}", source=path)
+    copy, place = copied_as(source.format, path, inputs.output, inputs.format_name)
+    new = Path(place).resolve()
+    for each in filter(os.path.exists, (path, *map(tree_file, more))):
+        read = Path(each).resolve()
+        if new in (read, *read.parents) or read in new.parents:  # a file, its folder, or what is in that: data would go
+            changes = f"would change {printable(each)}, which is read; give another name"
+            raise FileProblem(f"{printable(place)}: {changes}")
     tally, edges = Diagnostics(), load_tree(more[0], more[1:]) if more else None
     if edges is not None and (resting := [name for *_, names in edges.robots for name in names]):
         raise BadAnswer(f"joints without a value would be static: {listing(resting)}; --joint NAME=VALUE gives it")
@@ -102,22 +107,3 @@ def record_command(inputs: Inputs) -> int:
         warn(f"{path}: {remark.message}", rule=remark.rule)
     inputs.note(*(f"{path}: {sentence}" for sentence in run.summary()))
     return bad.finish(sum(run.moved.values()))
-
-
-def _refuse_input(output: str, inputs: Iterable[str]) -> None:
-    """Raise FileProblem for a place that is an input, in the folder of one, or a folder that has one: data would go."""
-    place = Path(output).resolve()
-    for path in filter(os.path.exists, inputs):
-        read = Path(path).resolve()
-        if place in (read, *read.parents) or read in place.parents:
-            raise FileProblem(f"{printable(output)}: would change {printable(path)}, which is read; give another name")
-
-
-def _format_of(path: str) -> str:
-    """Return the format of a recording; raises FormatError for anything else."""
-    source = FrameFile(path)
-    source.close()
-    if not is_recording(source.format):
-        hint = "frametool tree, convert and lookup write one: -o NEW.mcap"
-        raise FormatError(f"{FORMATS[source.format].summary}: no recording of messages; {hint}", source=path)
-    return source.format

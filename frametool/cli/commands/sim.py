@@ -113,9 +113,19 @@ class SimOutput:
 
         Raises KeyboardInterrupt after the summary if it was interrupted.
         """
-        summary = RunSummary(scene, self.reach)
-        pictures = self._pictures(scene)
-        interrupted = False
+        summary, interrupted = RunSummary(scene, self.reach), False
+        # what is written after the run, by file: what watches the steps, and what then makes the content
+        pictures: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
+        if self.plot:
+            from frametool.view.exports import Drawing, run_picture
+            from frametool.view.pictures import write_picture
+
+            run, suffix = Drawing(scene), suffix_of(self.plot)
+            pictures[self.plot] = run.watch, lambda: write_picture(run_picture(run), suffix)
+        if self.view:
+            from frametool.view.exports import run_page
+
+            pictures[self.view] = run_page()
         try:
             with ExitStack() as stack:
                 watchers = [summary.watch, *self._watchers(scene, stack), *(watch for watch, _ in pictures.values())]
@@ -131,21 +141,6 @@ class SimOutput:
                 write(content())
         if interrupted:
             raise KeyboardInterrupt
-
-    def _pictures(self, scene: Scene) -> dict[str, tuple[Watch, Callable[[], str | bytes]]]:
-        """Return what is written after the run, by file: what watches the steps, and what then makes the content."""
-        pictures: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
-        if self.plot:
-            from frametool.view.exports import Drawing, run_picture
-            from frametool.view.pictures import write_picture
-
-            run, suffix = Drawing(scene), suffix_of(self.plot)
-            pictures[self.plot] = run.watch, lambda: write_picture(run_picture(run), suffix)
-        if self.view:
-            from frametool.view.exports import run_page
-
-            pictures[self.view] = run_page()
-        return pictures
 
     def _watchers(self, scene: Scene, stack: ExitStack) -> Iterator[Watch]:
         """Open what the steps go to; the stack closes it."""
@@ -172,27 +167,22 @@ def leader_of(inputs: Inputs) -> MakeLeader:
 
     Raises FormatError; FileProblem; click.UsageError for a name that is neither a leader nor a file.
     """
-    argument, seed, paced = inputs.leader, inputs.seed, inputs.realtime or inputs.live
+    argument, seed, is_paced = inputs.leader, inputs.seed, inputs.realtime or inputs.live
     if argument in drivers.LEADERS:
         return drivers.built_in(argument, seed)
     if argument == "-":
-        return _from_stdin(paced=paced)
+        if sys.stdin is None:
+            raise FileProblem("standard input is closed")
+        say_if_typed()
+        if not is_paced:
+            return drivers.scripted(read_stream(sys.stdin.buffer, "stdin"))
+        mailbox = drivers.Mailbox()
+        mailbox.fill_from(read_stream(sys.stdin.buffer, "stdin", period_ns=0))
+        return mailbox
     if not os.path.exists(argument) and not os.path.splitext(argument)[1]:
         known = alternatives(argument, drivers.LEADERS, "leaders")
         raise click.UsageError(f"no leader {shown(argument)}{known}, or a file")
     return drivers.scripted(read_script(Source(argument, read_text(argument))))
-
-
-def _from_stdin(*, paced: bool) -> MakeLeader:
-    """Read commands as they come: by their times, or in real time whenever they arrive."""
-    if sys.stdin is None:
-        raise FileProblem("standard input is closed")
-    say_if_typed()
-    if not paced:
-        return drivers.scripted(read_stream(sys.stdin.buffer, "stdin"))
-    mailbox = drivers.Mailbox()
-    mailbox.fill_from(read_stream(sys.stdin.buffer, "stdin", period_ns=0))
-    return mailbox
 
 
 SUBCOMMANDS = {
@@ -241,17 +231,11 @@ def follow(inputs: Inputs) -> None:
     on with --realtime, where they act when they come. A turtle at a wall is reported once, and every tick
     there is counted in the summary. Below 2 micrometres from its target a follower stands still.
     """
-    if inputs.explain_step is not None:
-        _explain(inputs)
-        return
     leader = leader_of(inputs)
-    SimOutput(inputs).run(scene_of(inputs, leader))
-
-
-def _explain(inputs: Inputs) -> None:
-    """Write the derivation of one control step of the followers."""
-    scene = scene_of(inputs, leader_of(inputs))
-    output = Output(inputs, "report", otherwise="text")
+    if inputs.explain_step is None:
+        SimOutput(inputs).run(scene_of(inputs, leader))
+        return
+    scene, output = scene_of(inputs, leader), Output(inputs, "report", otherwise="text")
     refuse(output.style.format != "text", f"--explain-step writes text, not {output.style.format}")
     from frametool.explain.derive import DerivationStyle
     from frametool.sim.followed import derive_follow, follow_steps

@@ -23,11 +23,8 @@ from frametool.view.reports import Solution, sigma_entry
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
 
-    from frametool.frames.lookups import Frames
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Array
-    from frametool.stream.measurements import Measurement
-    from frametool.stream.samples import HandEyeSamples
 
 
 NAMES = ("base", "gripper", "camera", "target")
@@ -38,10 +35,25 @@ UNSURE = 1.2  # times: sigmas of the input that are smaller than that are report
 def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
     """Solve the tree of the measurements in files, with its fixed edges."""
     from frametool.fit.measured_tree import solve_tree
+    from frametool.stream.measurements import parted, read_measurements, without
 
-    measurements = _measurements(inputs, files)
-    fixed = _fixed_tree(inputs, {name for each in measurements for name in each[:2]}) if inputs.fix else None
-    found = solve_tree(measurements, root=inputs.root, fixed=fixed, robust=robust)
+    recordings = opened(files)
+    rows = read_measurements(recordings, normalize=inputs.normalize)
+    state(recordings)
+    for each in recordings:
+        own = [row for row in rows if parted(row.place)[0] == each.name]
+        first = f": {own[0].parent}<-{own[0].child} .." if own else ""
+        count = f"{len(own)} row{'s' * (len(own) != 1)}"
+        inputs.note(f"{each.name}: {count}, each the pose of child in parent{first}")
+    rows, fixed = without(rows, inputs.without), None
+    if inputs.fix:
+        fixed = load_tree(inputs.fix[0], inputs.fix[1:])
+        if moving := next((track.child for track in fixed.tracks() if not track.is_static), None):
+            raise ValueInvalid(f"{fixed.name}: {shown(moving)} moves; fixed frames must be static (tree --at TIME)")
+        if not {*fixed.frames} & (measured := {name for row in rows for name in row[:2]}):
+            known = alternatives(one := fixed.frames[0], measured, "frames")
+            raise ValueInvalid(f"{fixed.name}: no frame of it is measured: {shown(one)}{known}")
+    found = solve_tree(rows, root=inputs.root, fixed=fixed, robust=robust)
     if found.sigma_factor > UNSURE:
         warn(f"the sigmas of the input are {found.sigma_factor:.2g} times too small for what the used rows are off")
     poses, exact = [], {name for name in found.frames if fixed and fixed.track(name)}
@@ -56,31 +68,6 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
     inputs.note(f"in no loop, cannot be cross-checked: {first_of(alone, 5)}" if alone else None)
     labels = [(m.place, m.id, m.parent, m.child) for m in found.measurements]
     return _solution("tree", found, poses, labels, found.root, exact)
-
-
-def _fixed_tree(inputs: Inputs, measured: Collection[str]) -> Frames:
-    """Return the edges of --fix trees."""
-    tree = load_tree(inputs.fix[0], inputs.fix[1:])
-    if moving := next((track.child for track in tree.tracks() if not track.is_static), None):
-        raise ValueInvalid(f"{tree.name}: {shown(moving)} moves; fixed frames must be static (tree --at TIME)")
-    if not {*tree.frames} & {*measured}:
-        known = alternatives(one := tree.frames[0], measured, "frames")
-        raise ValueInvalid(f"{tree.name}: no frame of it is measured: {shown(one)}{known}")
-    return tree
-
-
-def _measurements(inputs: Inputs, files: Sequence[str]) -> list[Measurement]:
-    from frametool.stream.measurements import parted, read_measurements, without
-
-    recordings = opened(files)
-    found = read_measurements(recordings, normalize=inputs.normalize)
-    state(recordings)
-    for each in recordings:
-        own = [row for row in found if parted(row.place)[0] == each.name]
-        first = f": {own[0].parent}<-{own[0].child} .." if own else ""
-        rows = f"{len(own)} row{'s' * (len(own) != 1)}"
-        inputs.note(f"{each.name}: {rows}, each the pose of child in parent{first}")
-    return without(found, inputs.without)
 
 
 def _pose(name: str, parent: str | None, components: Iterable[Any], covariance: Iterable[float] | None) -> Pose:
@@ -138,7 +125,14 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
         columns, normalize = inputs.columns, inputs.normalize
         samples = read_samples(files[0], eye_to_hand=eye_to_hand, normalize=normalize, fmt=fmt, columns=columns)
     else:
-        samples = _paired(inputs, files)
+        from frametool.fit.alignment import paired_samples
+
+        formats, gap = options.for_each(inputs.input_formats, 2), inputs.max_gap_ns
+        read = [trajectory(inputs, file, fmt)[:2] for file, fmt in zip(files, formats, strict=True)]
+        for each, name in read:
+            refuse(gap is not None and each.stamps_ns is None, f"--max-gap is not used: {name} has no stamps")
+        (gripper_poses, first), (target_poses, second) = read
+        samples = paired_samples(gripper_poses, target_poses, (first, second), gap)
     named = [each or name for each, name in zip(samples.names, NAMES, strict=True)]
     called = base, gripper, camera, target = tuple(inputs.names or named)
     if len({*called}) < len(NAMES):
@@ -158,17 +152,6 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
     poses = _side(holder, camera, found.x, sigmas[0]) + _side(other, target, found.z, sigmas[1])
     labels = [(place, None, camera, target) for place in samples.places]
     return _solution("hand-eye", found, poses, labels, None)
-
-
-def _paired(inputs: Inputs, files: Sequence[str]) -> HandEyeSamples:
-    from frametool.fit.alignment import paired_samples
-
-    named, gap = zip(files, options.for_each(inputs.input_formats, 2), strict=True), inputs.max_gap_ns
-    read = [trajectory(inputs, file, fmt)[:2] for file, fmt in named]
-    (gripper, first), (target, second) = read
-    for each, name in read:
-        refuse(gap is not None and each.stamps_ns is None, f"--max-gap is not used: {name} has no stamps")
-    return paired_samples(gripper, target, (first, second), gap)
 
 
 def solved_points(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
