@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from contextlib import ExitStack
 from functools import cache
@@ -102,7 +103,11 @@ class BagOfClouds:
         except FrametoolError as error:
             bad.take([Fault.of(cloud.number, "", error)])
             return 0
-        name = self._name(cloud)
+        texts = {place: re.sub(r"[/\0]|^\.+", "_", text(cloud)) for place, text in PLACES.items()}  # no other folder
+        name = re.sub(r"\{(\w+)\}", lambda found: texts.get(found[1], found[0]), str(self.output.path))
+        if name in self.names:
+            both = f"messages {self.names[name]} and {cloud.number} would both become {shown(name)}"
+            raise FormatError(f"{both}; put {{stamp_ns}} or {{number}} into its name", source=self.path)
         style = self.output.style.changed(format=self.output.chosen or "")
         with writing(name, force=self.output.force) as write:
             for outcome in moved_cloud(cloud, pose, style, self.path):
@@ -112,15 +117,6 @@ class BagOfClouds:
                 write(outcome.text)
         self.names[name] = cloud.number
         return len(cloud.rows)
-
-    def _name(self, cloud: PointCloud) -> str:
-        """Return the name of a cloud's file; raises FormatError for one that another has."""
-        texts = {place: re.sub(r"[/\0]|^\.+", "_", text(cloud)) for place, text in PLACES.items()}  # no other folder
-        name = re.sub(r"\{(\w+)\}", lambda found: texts.get(found[1], found[0]), str(self.output.path))
-        if name in self.names:
-            both = f"messages {self.names[name]} and {cloud.number} would both become {shown(name)}"
-            raise FormatError(f"{both}; put {{stamp_ns}} or {{number}} into its name", source=self.path)
-        return name
 
 
 class SeveralClouds:
@@ -172,16 +168,6 @@ class SeveralClouds:
         return status
 
 
-def clouds_of(task: PoseTask) -> BagOfClouds | SeveralClouds | None:
-    """Return several clouds, or those of a bag if -i names one whose messages are no records."""
-    if len(task.paths) > 1:
-        return SeveralClouds(task)
-    is_bag = task.path and streaming.is_bag(task.path)
-    if not is_bag or (not holds_arrays(task.output.chosen or "") and task.messages() is not None):
-        return None
-    return BagOfClouds(task)
-
-
 CHOICES = ("point", "vector", "pose", "twist", "wrench")
 # of rows that are moved by a tree
 frame_column_option = option("--frame-column NAME", "column with the frame of each row, without SOURCE", options.COLUMN)
@@ -220,7 +206,11 @@ def apply_command(inputs: Inputs) -> int:
     """
     task = streaming.PoseTask(inputs, "points", "trajectory")
     output, plan = task.output, task.plan
-    clouds = clouds_of(task)
+    clouds: BagOfClouds | SeveralClouds | None = None
+    if len(task.paths) > 1:
+        clouds = SeveralClouds(task)
+    elif task.path and streaming.is_bag(task.path) and (holds_arrays(output.chosen or "") or task.messages() is None):
+        clouds = BagOfClouds(task)  # whose messages are no records
     way = Way(task) if inputs.pose is not None else TreeWay(inputs, numbers=bool(task.place))
     rest = way.rest
     is_stream = rest in ((), ("-",))
@@ -228,7 +218,10 @@ def apply_command(inputs: Inputs) -> int:
         is_more = way.uncertain or not is_stream or plan is not None
         refuse(is_more, "clouds are moved whole, without records, --covariance or --explain")
         return clouds.run(way)
-    kind = _kind(inputs)
+    kinds, count = inputs.kinds, len(inputs.peek("columns"))
+    if len(kinds) > 1 and len(kinds) != count:
+        raise click.UsageError(f"--as appears {len(kinds)} times, --columns {count} times; each --columns has its own")
+    kind = kinds[0] if len(kinds) == 1 else None
     if plan is not None:
         records = list(sources_of(rest, kind))
         refuse(is_stream or len(records) != 1, f"a stream, or several records; {streaming.ONE_RECORD}")
@@ -238,9 +231,8 @@ def apply_command(inputs: Inputs) -> int:
     request = task.at_places(request)
     status = 0
     if is_stream:
-        if (count := len(inputs.peek("columns"))) > 1:
-            kinds = inputs.kinds if len(inputs.kinds) == count else (kind or "",) * count
-            request = request.with_rows(poses=count, kinds=kinds)
+        if count > 1:
+            request = request.with_rows(poses=count, kinds=kinds if len(kinds) == count else (kind or "",) * count)
         status = task.run(request)
     else:
         task.only_arguments(rest)
@@ -264,14 +256,6 @@ def _derived(task: PoseTask, plan: DerivationStyle, way: Way, record: str | Sour
         made = derive_record(plan, way.explained(task), pose_source(record, asked), rows, timeless=timeless)
     task.output.text(made.render(task.inputs.explain))
     return 0
-
-
-def _kind(inputs: Inputs) -> str | None:
-    """Return what all records are; None where --as does not say, or says it for each --columns."""
-    kinds, count = inputs.kinds, len(inputs.peek("columns"))
-    if len(kinds) > 1 and len(kinds) != count:
-        raise click.UsageError(f"--as appears {len(kinds)} times, --columns {count} times; each --columns has its own")
-    return kinds[0] if len(kinds) == 1 else None
 
 
 class Way:
@@ -431,23 +415,19 @@ def sources_of(arguments: Sequence[str], kind: str | None, place: str = "") -> I
         return
     for are_apart, group in groupby(arguments, _is_apart):
         texts = list(group)
-        yield from filter(None, texts) if are_apart else _points(texts, kind)
-
-
-def _points(texts: Sequence[str], kind: str | None) -> Iterator[Source]:
-    """Take bare numbers three at a time."""
-    if kind not in (None, "point", "vector"):
-        raise click.UsageError(f"a {kind} is a mapping, e.g. '{{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}}'")
-    try:
-        numbers = [parse_length(text) for text in texts]
-    except NotFinite:
-        raise
-    except ValueInvalid as error:
-        import os
-
-        file = next(filter(os.path.isfile, texts), "")
-        refuse(file, f"pass a file of records with -i {file}")
-        raise click.UsageError(f"{error}; a point is three numbers or a mapping") from None
-    refuse(len(numbers) % 3, f"points are three numbers each, found {len(numbers)}")
-    for at in range(0, len(numbers), 3):
-        yield Source("argument", f'{{"{kind or "point"}": {numbers[at : at + 3]}}}')
+        if are_apart:
+            yield from filter(None, texts)
+            continue
+        if kind not in (None, "point", "vector"):
+            raise click.UsageError(f"a {kind} is a mapping, e.g. '{{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}}'")
+        try:
+            numbers = [parse_length(text) for text in texts]
+        except NotFinite:
+            raise
+        except ValueInvalid as error:
+            file = next(filter(os.path.isfile, texts), "")
+            refuse(file, f"pass a file of records with -i {file}")
+            raise click.UsageError(f"{error}; a point is three numbers or a mapping") from None
+        refuse(len(numbers) % 3, f"points are three numbers each, found {len(numbers)}")
+        for at in range(0, len(numbers), 3):
+            yield Source("argument", f'{{"{kind or "point"}": {numbers[at : at + 3]}}}')

@@ -27,12 +27,11 @@ if TYPE_CHECKING:
     from frametool.stream.request import Operation
 
 
-def _representations(formatter: click.HelpFormatter, _everything: bool) -> None:
-    """Write the list of representations."""
-    formatter.write_text(f"Representations: {', '.join(row.spelling for row in REPRESENTATIONS.values())}.")
+_REPRESENTATIONS = f"Representations: {', '.join(row.spelling for row in REPRESENTATIONS.values())}."
 
 
-@command_named("convert", own=("from_rep", "notations"), lists=_representations)
+@command_named("convert", own=("from_rep", "notations"),
+    lists=lambda formatter, _everything: formatter.write_text(_REPRESENTATIONS))  # fmt: skip
 @argument("values", nargs=-1, metavar="[VALUES.. | POSE]")
 @option("--axes NAME", "the pose at the same place in these axes (help axes)", options.AXIS)
 @option("--world-axes A_from_B", "axes of the reference frame (help axes)", options.AXIS, name="world")
@@ -60,22 +59,17 @@ def convert_command(inputs: Inputs) -> int:
     its unit: 90deg, 1.57rad, pi/2. POSE is a mapping, what a tool printed (help pose), a file, or - for stdin.
     """
     values, task = poses.rejoined(inputs.values), PoseTask(inputs, "poses", "points")
-    output, axes, world = task.output, inputs.axes, inputs.world
-    if inputs.all_axes is not None:
-        from frametool.geometry.conventions import sides_of
-
-        with misuse("--all-axes: "):
-            world, axes = sides_of(inputs.all_axes)
-    if task.plan:
-        one_argument(values[0] if values else axes or world)
     from frametool.stream.request import Operation
 
-    operation = Operation() if axes is None and world is None else _change_of_axes(axes, world)
+    output, axes, world, operation = task.output, inputs.axes, inputs.world, Operation()
+    if {axes, world, inputs.all_axes} != {None}:
+        axes, world, operation = _change_of_axes(axes, world, inputs.all_axes)
+    if task.plan:
+        one_argument(values[0] if values else axes or world)
     notations = output.notations or QUATERNION
     request = task.request(operation=operation, extra_column=inputs.time_column, notations=notations)
     if operation.turns and (values or task.path or task.has_input()):
-        _say_other_side(axes, world)
-        _say_of_engines(world, request.rows.given, output, is_anew=bool(values) and values != ("-",))
+        _say_of_axes(axes, world, request.rows.given, output, is_anew=bool(values) and values != ("-",))
     is_numbers = _are_numbers(values, has_from=request.rows.given is not None or bool(request.rows.given_place))
     if is_numbers and request.rows.given_place:
         from frametool.cli.earth import mapping_of
@@ -95,7 +89,9 @@ def convert_command(inputs: Inputs) -> int:
     sources: Sequence[str | Source] = ()
     if is_numbers or not values:
         pose = poses.pose_from_numbers(values, request) if values else Pose()
-        results = [Result(_changed(pose, operation))]
+        moved = operation.pose([pose.components], None, floats)
+        position = pose.position if pose.position is None or operation.keeps_position else moved[:3]
+        results = [Result(Pose(position, moved[3:7], pose.name, pose.parent))]
     else:
         sources = [poses.pose_source(each, request) for each in values] if task.plan else values
         results = list(poses.values_of(sources, request, output))
@@ -145,23 +141,21 @@ def _found(poses: Sequence[Pose], find: str, tolerance: float, style: Style) -> 
     return style.changed(notations=tuple(notation(f"{'euler_deg' if degrees else 'euler'}:{each}") for each in axes))
 
 
-def _changed(pose: Pose, operation: Operation) -> Pose:
-    """Return a pose with other axes; without a change its bits stay as they are."""
-    components = operation.pose([pose.components], None, floats)
-    position = None if pose.position is None else pose.position if operation.keeps_position else components[:3]
-    return Pose(position, components[3:7], pose.name, pose.parent)
-
-
-def _change_of_axes(axes: str | None, world: str | None) -> Operation:
-    """Return the operation that --axes and --world-axes name."""
-    from frametool.geometry.conventions import both_sides
+def _change_of_axes(
+    axes: str | None, world: str | None, both: str | None
+) -> tuple[str | None, str | None, Operation]:
+    """Return what --axes and --world-axes name, or --all-axes for both, and the operation that it is."""
+    from frametool.geometry.conventions import both_sides, sides_of
     from frametool.stream.request import Operation
 
+    if both is not None:
+        with misuse("--all-axes: "):
+            world, axes = sides_of(both)
     with misuse():
         left, mirrors, right = both_sides(world, axes)
     before = (0.0, 0.0, 0.0, *left.components) if left is not None else None
     behind = ((0.0, 0.0, 0.0, *right.components),) if right is not None else ()
-    return Operation(before, behind, turns=True, mirrors=mirrors)
+    return axes, world, Operation(before, behind, turns=True, mirrors=mirrors)
 
 
 def _named_change(axes: str | None, world: str | None, operation: Operation) -> OtherAxes | None:
@@ -173,10 +167,18 @@ def _named_change(axes: str | None, world: str | None, operation: Operation) -> 
     return OtherAxes(left, right, operation.mirrors) if left or right else None
 
 
-def _say_of_engines(world: str | None, read_as: Notation | None, output: Output, *, is_anew: bool) -> None:
-    """Report the units and angles that engines call by the same names, and write what is written anew in theirs."""
-    from frametool.geometry.conventions import ENGINE_ANGLES, IN_CENTIMETRES
+def _say_of_axes(
+    axes: str | None, world: str | None, read_as: Notation | None, output: Output, *, is_anew: bool
+) -> None:
+    """Report what changes the other frame's axes, where conventions come in pairs, and what engines call by one name.
 
+    What is written anew is in the units of an engine.
+    """
+    from frametool.geometry.conventions import ENGINE_ANGLES, IN_CENTIMETRES, other_side
+
+    changed, stays, option = ("world", "body", "--axes") if world else ("body", "world", "--world-axes")
+    if not (axes and world) and (other := other_side(world or axes or "", of_world=bool(world))):
+        say(f"note: only the {changed} axes changed; the {stays} axes are as before ({option} {other})")
     into, _, out_of = (world or "").partition("_from_")
     if into == IN_CENTIMETRES:
         separate = not any(each.representation.whole for each in output.notations)
@@ -188,12 +190,3 @@ def _say_of_engines(world: str | None, read_as: Notation | None, output: Output,
     for engine, wanted in ((into, output.notations), (out_of, (read_as,) if read_as else ())):
         if engine in ENGINE_ANGLES and any(each.representation.name == "rpy" for each in wanted):
             say(f"warning: rpy is not what {engine.title()} calls its angles; {ENGINE_ANGLES[engine]} is")
-
-
-def _say_other_side(axes: str | None, world: str | None) -> None:
-    """Report what changes the axes of the other frame of a pose where such conventions come in pairs."""
-    from frametool.geometry.conventions import other_side
-
-    changed, stays, option = ("world", "body", "--axes") if world else ("body", "world", "--world-axes")
-    if not (axes and world) and (other := other_side(world or axes or "", of_world=bool(world))):
-        say(f"note: only the {changed} axes changed; the {stays} axes are as before ({option} {other})")

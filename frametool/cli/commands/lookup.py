@@ -113,7 +113,12 @@ def lookup_command(inputs: Inputs) -> int:
         output.check_target(target)
     covariance = inputs.covariance
     if covariance:
-        _check_covariance(output, by_row=by_row)
+        if (place := output.style.place) is not None:
+            both = f"--to {place.name}: the covariance is along the axes of ecef"
+            raise click.UsageError(f"{both}; leave one of the two out")
+        fmt = output.chosen if by_row else output.style.format
+        if fmt not in (None, "text", *WITH_COVARIANCE) and not holds_arrays(fmt):
+            raise click.UsageError(f"{fmt} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")
     tree = load_tree(inputs.tree, inputs.more, streams=by_row)
     lookups, at = lookups_in(tree, carried=covariance), options.at_ns(inputs.at)
     if by_row:
@@ -140,16 +145,6 @@ def lookup_command(inputs: Inputs) -> int:
         output.values([lookups.result(target, source, at)])
     inputs.note(lookups.granted())
     return status
-
-
-def _check_covariance(output: Output, *, by_row: bool) -> None:
-    """Refuse --covariance where it has no meaning, and in formats that have no place for it."""
-    if output.style.place is not None:
-        name = output.style.place.name
-        raise click.UsageError(f"--to {name}: the covariance is along the axes of ecef; leave one of the two out")
-    fmt = output.chosen if by_row else output.style.format
-    if fmt not in (None, "text", *WITH_COVARIANCE) and not holds_arrays(fmt):
-        raise click.UsageError(f"{fmt} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")
 
 
 def _many(task: PoseTask, lookups: algebra.Lookups, target: str, source: str) -> int:
