@@ -84,28 +84,23 @@ def solve_mean(
 
 
 def _agreeing(poses: Transform, mass: Array) -> Mask:
-    """Return the poses that are no outliers."""
-    roots = np.sqrt(mass)[:, None]
+    """Return the poses that are no outliers.
 
-    def residuals(middle: Transform) -> Array:
-        found: Array = roots * lsq.errors(poses, middle)
-        return found
-
-    def mean(_: Transform, weights: Array) -> Transform:
-        return poses.mean(weights * mass)
-
-    return lsq.settled(_middle(poses, roots), residuals, mean, mean, unknown=3, robust=True).kept
-
-
-def _middle(poses: Transform, roots: Array) -> Transform:
-    """Return the pose closest to the others, by the medians of metres and radians."""
-    count = len(poses)
-    tried = range(count) if count <= MOST_TRIED else next(lsq.draws(1, MOST_TRIED, count))
+    The start is the pose closest to the others, by the medians of metres and radians.
+    """
+    count, roots = len(poses), np.sqrt(mass)[:, None]
 
     def apart(at: int) -> float:
         return sum(log(max(np.median(roots[:, 0] * off), lsq.LEAST)) for off in poses[at].distance(poses))
 
-    return poses[min(tried, key=apart)]
+    def mean(_: Transform, weights: Array) -> Transform:
+        return poses.mean(weights * mass)
+
+    start = poses[min(range(count) if count <= MOST_TRIED else next(lsq.draws(1, MOST_TRIED, count)), key=apart)]
+    found = lsq.settled(
+        start, lambda middle: roots * lsq.errors(poses, middle), mean, mean, unknown=3, robust=True
+    )  # fmt: skip
+    return found.kept
 
 
 FEWEST = 3
@@ -163,25 +158,33 @@ def solve_points(
     pairs.require_plane()
     robust = robust and count >= FEWEST_ROBUST
     start, typical = pairs.start(with_scale=scale, robust=robust)
-    pairs.require_same_hand(typical, with_scale=scale, robust=robust)
+    mirrored = pairs._replace(source=pairs.source * MIRROR).start(with_scale=scale, robust=robust)[1]
+    if BETTER * mirrored <= typical:
+        off = f"{1000.0 * mirrored:.1f} mm, not {1000.0 * typical:.1f} mm"
+        raise ValueInvalid(f"a mirror image fits ({off}): one set is left-handed")
+
+    def rough(_: Fit, weights: Array) -> Fit:
+        return umeyama(*pairs[:2], pairs.mass * weights, with_scale=scale)
 
     def fit(_: Fit, kept: Array) -> Fit:
         chosen = pairs.at(kept > 0.0)
         chosen.require_plane()
-        return chosen.fitted(with_scale=scale, weights=kept[kept > 0.0])
+        return umeyama(*chosen, with_scale=scale)
 
-    found = lsq.settled(
-        start, pairs.weighted_residuals, lambda _, first: pairs.fitted(with_scale=scale, weights=first), fit,
-        unknown=6 + scale, robust=robust,
-    )  # fmt: skip
+    found = lsq.settled(start, pairs.weighted_residuals, rough, fit, unknown=6 + scale, robust=robust)
     best, sigma, kept = found.model, float(found.sigmas[0]), found.kept
     covariance, scale_sigma = pairs.at(kept).covariance(best, sigma, with_scale=scale)
     used = mass > 0.0
     used[used] = kept
-    residuals = _residuals(best, a, b)
-    hints = [] if scale else pairs.scale_hints(typical, names, robust=robust)
-    for hint in hints:
-        warn(hint)
+    residuals, hints = _Pairs(a, b, mass).residuals(best), list[str]()
+    if not scale:
+        scaled, its_typical = pairs.start(with_scale=True, robust=robust)
+        if BETTER * its_typical <= typical and scaled.scale > 0.0:
+            is_great = scaled.scale > 1.0
+            (great, small), ratio = (names, scaled.scale) if is_great else (names[::-1], 1.0 / scaled.scale)
+            unit = next((unit for unit in UNITS if abs(ratio / unit - 1.0) < ABOUT), ratio)
+            hints.append(f"{great} is {unit:.4g} times {small}: {UNITS.get(unit, 'a scale?')}")
+            warn(hints[0])
     return PointsFit(
         best.transform.canonical(), best.scale, scale_sigma, covariance, used, (mass > 0.0) & ~used, residuals,
         np.sqrt(mass / 3.0) * lsq.length(residuals) / sigma, sigma, 3 * int(kept.sum()) - 6 - scale,
@@ -199,11 +202,12 @@ class _Pairs(NamedTuple):
     def at(self, index: Rows) -> _Pairs:
         return _Pairs(*(part[index] for part in self))
 
-    def fitted(self, *, with_scale: bool, weights: Array | float = 1.0) -> Fit:
-        return umeyama(self.target, self.source, self.mass * weights, with_scale=with_scale)
+    def residuals(self, fit: Fit) -> Array:
+        placed: Array = fit.transform.rotation.apply(fit.scale * self.source) + fit.transform.xyz
+        return self.target - placed
 
     def weighted_residuals(self, fit: Fit) -> Array:
-        found: Array = np.sqrt(self.mass)[:, None] * _residuals(fit, self.target, self.source)
+        found: Array = np.sqrt(self.mass)[:, None] * self.residuals(fit)
         return found
 
     def start(self, *, with_scale: bool, robust: bool) -> tuple[Fit, float]:
@@ -220,7 +224,7 @@ class _Pairs(NamedTuple):
             chosen = self.at(few)
             if chosen.is_line():
                 continue
-            fit = chosen.fitted(with_scale=with_scale)
+            fit = umeyama(*chosen, with_scale=with_scale)
             off = (seen.weighted_residuals(fit) ** 2).sum(-1)
             best = min(best, (float(np.partition(off, middle)[middle]), fit), key=lambda each: each[0])
         return best[1], max(sqrt(best[0]), ROUNDING * max(np.abs(self.target).max(), np.abs(self.source).max()))
@@ -236,21 +240,6 @@ class _Pairs(NamedTuple):
     def require_plane(self) -> None:
         if len(self.mass) < FEWEST or self.is_line():
             raise ValueInvalid("the points lie on a line: the turn about it cannot be known")
-
-    def require_same_hand(self, typical: float, *, with_scale: bool, robust: bool) -> None:
-        mirrored = self._replace(source=self.source * MIRROR).start(with_scale=with_scale, robust=robust)[1]
-        if BETTER * mirrored <= typical:
-            off = f"{1000.0 * mirrored:.1f} mm, not {1000.0 * typical:.1f} mm"
-            raise ValueInvalid(f"a mirror image fits ({off}): one set is left-handed")
-
-    def scale_hints(self, typical: float, names: tuple[str, str], *, robust: bool) -> list[str]:
-        """Return a warning if a scale would fit much better."""
-        fit, scaled = self.start(with_scale=True, robust=robust)
-        if BETTER * scaled > typical or fit.scale <= 0.0:
-            return []
-        (great, small), ratio = (names, fit.scale) if fit.scale > 1.0 else (names[::-1], 1.0 / fit.scale)
-        unit = next((unit for unit in UNITS if abs(ratio / unit - 1.0) < ABOUT), ratio)
-        return [f"{great} is {unit:.4g} times {small}: {UNITS.get(unit, 'a scale?')}"]
 
     def covariance(self, fit: Fit, sigma: float, *, with_scale: bool) -> tuple[Array, float | None]:
         """Return the inverse Hessian of pose and scale: the pose's part, and the scale's sigma if it is estimated.
@@ -269,11 +258,6 @@ class _Pairs(NamedTuple):
         found = levers @ about @ levers.T
         found = sigma**2 / 2.0 * (found + found.T)
         return found[:6, :6], sqrt(found[6, 6]) if with_scale else None
-
-
-def _residuals(fit: Fit, target: Array, source: Array) -> Array:
-    placed: Array = fit.transform.rotation.apply(fit.scale * source) + fit.transform.xyz
-    return target - placed
 
 
 def _points(values: Numbers, name: str) -> Array:

@@ -9,20 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from frametool.errors import ValueInvalid, shown
-from frametool.fit.alignment import (
-    ALIGNMENTS,
-    LIMIT_S,
-    SCALED,
-    Fit,
-    Pairs,
-    Unaligned,
-    clock_offset,
-    fitted,
-    interval,
-    lever_arm,
-    paired,
-    principal_axes,
-)
+from frametool.fit import alignment
+from frametool.fit.alignment import ALIGNMENTS, Fit, Pairs, Unaligned, clock_offset, fitted, lever_arm, principal_axes
 from frametool.fit.least_squares import require_near
 from frametool.fit.numbers import ROUNDING, absolute_errors, all_pairs, chained, relative_errors, segment_errors
 from frametool.frames.stamps import format_stamp
@@ -95,7 +83,7 @@ class Pairing(NamedTuple):
     max_diff_ns: float = 10_000_000
     min_match: float = 0.1
     offset: int | str | None = None
-    offset_limit_s: float = LIMIT_S
+    offset_limit_s: float = alignment.LIMIT_S
     start: tuple[bool, int] | None = None
     stop: tuple[bool, int] | None = None
 
@@ -277,10 +265,10 @@ def _paired(
             raise ValueInvalid(f"{names[ref.stamps_ns is not None]} has no stamps; give them with --stamps FILE")
         if pairing.offset:
             raise ValueInvalid("poses that are counted have no clock; leave the offset out")
-        return paired(ref, est), 0, None
+        return alignment.paired(ref, est), 0, None
     offset_ns, score = 0, None
     if pairing.offset == AUTO:
-        kind = "sim3" if settings.fitting.align in SCALED else "se3"
+        kind = "sim3" if settings.fitting.align in alignment.SCALED else "se3"
         by_turning = settings.fitting.mount == AUTO
         found = clock_offset(ref, est, limit_s=pairing.offset_limit_s, kind=kind, by_turning=by_turning)
         if found.score < CLEAR:
@@ -292,7 +280,7 @@ def _paired(
     elif pairing.offset is not None:
         offset_ns = int(pairing.offset)
     shifted = est._replace(stamps_ns=est.stamps_ns + offset_ns)
-    pairs = paired(ref, shifted, pairing.max_gap_ns, pairing.max_diff_ns if is_nearest else None)
+    pairs = alignment.paired(ref, shifted, pairing.max_gap_ns, pairing.max_diff_ns if is_nearest else None)
     share = pairs.ref.size / max(pairs.possible, 1)
     counted = f"{pairs.ref.size} of {pairs.possible} poses have a partner in {names[0]}"
     if not pairs.ref.size or share < pairing.min_match:
@@ -315,7 +303,7 @@ def _span(each: Trajectory, name: str) -> str:
 
 def _warn_of_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]) -> None:
     """Warn about an offset that is clearly larger than half an interval, if estimating it is cheap."""
-    intervals = [interval(each.stamps_ns) for each in (ref, est)]
+    intervals = [alignment.interval(each.stamps_ns) for each in (ref, est)]
     span = max(ref.stamps_ns[-1], est.stamps_ns[-1]) - min(ref.stamps_ns[0], est.stamps_ns[0])
     if span > MOST_TRIED * min(intervals) / 2:
         return

@@ -96,7 +96,11 @@ def solve_hand_eye(
     _require_two_axes(_turns(hand), 0.0, holder, names[2])
     start, medians = _start(samples, robust=robust)
     others = _start(other, robust=robust)[1]
-    _require_this_way(medians, others, names, eye_to_hand=eye_to_hand)
+    if (CLEARLY * others <= medians).all() and BETTER**2 * others.prod() <= medians.prod():
+        raise ValueInvalid(
+            f"the samples do not fit ({_off(medians)}); they do ({_off(others)}) {'without' if eye_to_hand else 'with'}"
+            f" --eye-to-hand, or with TARGET inverted ({names[3]}<-{names[2]})"
+        )
 
     def likeliest(model: _Model, weights: Array) -> _Model:
         if (kept := weights > 0.0).sum() < FEWEST:
@@ -120,8 +124,16 @@ def solve_hand_eye(
         raise _unfitting(rms)
     _require_two_axes(turns, s_r, holder, names[2])
     covariance = lsq.inverse(model.hessian)
-    warnings = _warnings(turns, count, holder, bool(others.prod() <= BETTER**2 * medians.prod()))
-    warnings += _scale_warnings(samples.at(found.kept), model.x)
+    warnings = []
+    if turns.rms[1] < SLIGHT:
+        small = f"{degrees(turns.rms[1]):.1f} deg rms, first axis {turns.axis} in {holder}"
+        warnings.append(f"turns about a second axis are small ({small}): turn more")
+    if count < FEWEST_CERTAIN:
+        both = " fit with and without --eye-to-hand, and" * bool(others.prod() <= BETTER**2 * medians.prod())
+        warnings.append(f"{count} samples{both} say little of their own noise: the sigmas are rough; take 8 or more")
+    if (factor := _scale(samples.at(found.kept), model.x)) != 1.0:
+        scaled = f"TARGET fits better with its places times {factor:.4g}"
+        warnings.append(f"{scaled}: another unit, or the size of a marker?")
     for warning in warnings:
         warn(warning)
     noise_at = "base" if eye_to_hand and model.cut == "gripper" else model.cut
@@ -143,19 +155,12 @@ class _Model(NamedTuple):
     misfit: float = 0.0
 
 
-class _Loop(NamedTuple):
-    """The errors E = left X right = before inv(Z) after: the factors around X and Z."""
-
-    left: Transform
-    right: Transform
-    before: Transform
-    after: Transform
-
-
-CUTS: dict[str, Callable[[Transform, Transform, Transform, Transform], _Loop]] = {
-    "target": lambda g, c, x, z: _Loop(z.inverse() @ g, c, ONE, g @ x @ c),
-    "camera": lambda g, c, x, z: _Loop(c @ z.inverse() @ g, ONE, c, g @ x),
-    "gripper": lambda g, c, x, z: _Loop(ONE, c @ z.inverse() @ g, x @ c, g),
+# the errors E = left X right = before inv(Z) after, by the location of the noise: the factors around X and Z
+Factors = tuple[Transform, Transform, Transform, Transform]
+CUTS: dict[str, Callable[[Transform, Transform, Transform, Transform], Factors]] = {
+    "target": lambda g, c, x, z: (z.inverse() @ g, c, ONE, g @ x @ c),
+    "camera": lambda g, c, x, z: (c @ z.inverse() @ g, ONE, c, g @ x),
+    "gripper": lambda g, c, x, z: (ONE, c @ z.inverse() @ g, x @ c, g),
 }
 
 
@@ -170,8 +175,9 @@ class _Samples(NamedTuple):
 
     def residuals(self, model: _Model) -> Array:
         """Return [t(E), Log R(E)] of a model."""
-        loop = CUTS[model.cut](*self, model.x, model.z)
-        return _errors(loop, model.x)
+        left, right, _, _ = CUTS[model.cut](*self, model.x, model.z)
+        off = left @ model.x @ right
+        return np.concatenate([off.xyz, off.rotation.as_rotvec()], 1)
 
     def fitted(self, model: _Model, weights: Array, steps: int) -> _Model:
         """Minimise ln S_t + ln S_r by Gauss-Newton steps with updated sigmas, damped if a step does not help."""
@@ -194,34 +200,24 @@ class _Samples(NamedTuple):
 
     def _linear(self, model: _Model, weights: Array) -> tuple[_Model, Array]:
         """Return a model with its Hessian and its cost, and the gradient."""
-        loop = CUTS[model.cut](*self, model.x, model.z)
-        errors = _errors(loop, model.x)
+        left, right, before, after = CUTS[model.cut](*self, model.x, model.z)
+        off = left @ model.x @ right
+        errors = np.concatenate([off.xyz, off.rotation.as_rotvec()], 1)
+        turn, back = left.rotation.as_matrix(), (before.rotation @ model.z.rotation.inverse()).as_matrix()
+        bent = lsq.inverse_left_jacobian(errors[:, 3:])
+        slopes: Array = np.zeros((len(errors), 6, 12))  # the derivatives of the errors by steps of X and of Z
+        slopes[:, :3, :3] = turn
+        slopes[:, :3, 3:6] = -turn @ lsq.skew(model.x.rotation.apply(right.xyz))
+        slopes[:, 3:, 3:6] = bent @ turn
+        slopes[:, :3, 6:9] = -back
+        slopes[:, :3, 9:] = back @ lsq.skew(after.xyz - model.z.xyz)
+        slopes[:, 3:, 9:] = -bent @ back
         sigmas = lsq.fitted_sigmas(errors, weights, 6)
         weighed = (weights[:, None] / np.repeat(sigmas**2, 3)).reshape(-1, 1)
-        slopes = _jacobian(loop, model, errors[:, 3:]).reshape(-1, 12)
+        slopes = slopes.reshape(-1, 12)
         gradient = slopes.T @ (weighed * errors.reshape(-1, 1))
         misfit = 2.0 * fsum(map(log, sigmas.tolist()))
         return model._replace(sigmas=sigmas, hessian=slopes.T @ (weighed * slopes), misfit=misfit), gradient[:, 0]
-
-
-def _errors(loop: _Loop, x: Transform) -> Array:
-    off = loop.left @ x @ loop.right
-    return np.concatenate([off.xyz, off.rotation.as_rotvec()], 1)
-
-
-def _jacobian(loop: _Loop, model: _Model, turned: Array) -> Array:
-    """Return the derivatives of errors (n, 6) by steps of X and of Z: (n, 6, 12)."""
-    left = loop.left.rotation.as_matrix()
-    back = (loop.before.rotation @ model.z.rotation.inverse()).as_matrix()
-    bent = lsq.inverse_left_jacobian(turned)
-    slopes = np.zeros((len(turned), 6, 12))
-    slopes[:, :3, :3] = left
-    slopes[:, :3, 3:6] = -left @ lsq.skew(model.x.rotation.apply(loop.right.xyz))
-    slopes[:, 3:, 3:6] = bent @ left
-    slopes[:, :3, 6:9] = -back
-    slopes[:, :3, 9:] = back @ lsq.skew(loop.after.xyz - model.z.xyz)
-    slopes[:, 3:, 9:] = -bent @ back
-    return slopes
 
 
 def _start(samples: _Samples, *, robust: bool) -> tuple[_Model, Array]:
@@ -262,15 +258,13 @@ def _motions(gripper: Transform, camera: Transform) -> tuple[Transform, Transfor
     return gripper[i].inverse() @ gripper[j], camera[i] @ camera[j].inverse()
 
 
-def _scale_warnings(samples: _Samples, x: Transform) -> list[str]:
-    """Return a warning if a factor on the target's translations fits better: (R_A - I) t_X - s R_X t_B = -t_A."""
+def _scale(samples: _Samples, x: Transform) -> float:
+    """Return a factor on the target's translations that fits much better, else 1: (R_A - I) t_X - s R_X t_B = -t_A."""
     a, b = _motions(*samples)
     lever, turned = (a.rotation.as_matrix() - np.eye(3)).reshape(-1, 3), x.rotation.apply(b.xyz).reshape(-1)
     place, plain = _least_squares(lever, turned - a.xyz.reshape(-1))
     place, scaled = _least_squares(np.column_stack([lever, -turned]), -a.xyz.reshape(-1))
-    if place[3] <= 0.0 or plain <= max(BETTER * scaled, lsq.LEAST):
-        return []
-    return [f"TARGET fits better with its places times {place[3]:.4g}: another unit, or the size of a marker?"]
+    return 1.0 if place[3] <= 0.0 or plain <= max(BETTER * scaled, lsq.LEAST) else float(place[3])
 
 
 def _least_squares(slopes: Array, wanted: Array) -> tuple[Array, float]:
@@ -312,25 +306,6 @@ def _require_two_axes(turns: _Turns, s_r: float, holder: str, camera: str) -> No
         raise ValueInvalid(
             f"all turns are about one axis ({turns.axis} in {holder}): where {camera} is along it cannot be known; "
             "turn about a second one"
-        )
-
-
-def _warnings(turns: _Turns, count: int, holder: str, fits_both: bool) -> list[str]:  # noqa: FBT001 - of a triple
-    notes = []
-    if turns.rms[1] < SLIGHT:
-        small = f"{degrees(turns.rms[1]):.1f} deg rms, first axis {turns.axis} in {holder}"
-        notes.append(f"turns about a second axis are small ({small}): turn more")
-    if count < FEWEST_CERTAIN:
-        both = " fit with and without --eye-to-hand, and" * fits_both
-        notes.append(f"{count} samples{both} say little of their own noise: the sigmas are rough; take 8 or more")
-    return notes
-
-
-def _require_this_way(medians: Array, others: Array, names: tuple[str, str, str, str], *, eye_to_hand: bool) -> None:
-    if (CLEARLY * others <= medians).all() and BETTER**2 * others.prod() <= medians.prod():
-        raise ValueInvalid(
-            f"the samples do not fit ({_off(medians)}); they do ({_off(others)}) {'without' if eye_to_hand else 'with'}"
-            f" --eye-to-hand, or with TARGET inverted ({names[3]}<-{names[2]})"
         )
 
 

@@ -78,6 +78,13 @@ def applied(matrices: Array, vectors: Array) -> Array:
     return found
 
 
+def sigmas(errors: Array, information: Array) -> Array:
+    """Return the root mean square of errors (.., 6) in sigmas; information: the inverse covariances, (.., 6, 6)."""
+    squares = (errors * applied(information, errors)).sum(-1)
+    found: Array = np.sqrt(np.maximum(squares, 0.0) / 6)
+    return found
+
+
 def length(vectors: Array) -> Array:
     """Return the lengths of vectors along the last axis."""
     found: Array = np.linalg.norm(vectors, axis=-1)

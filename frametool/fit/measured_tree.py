@@ -15,7 +15,7 @@ import numpy as np
 
 from frametool.errors import Finding, NotConnected, ValueInvalid, alternatives, first_of, printable, shown, warn
 from frametool.fit import least_squares as lsq
-from frametool.fit.tree_problem import Noise, TreeProblem, bodies_of, bridges, jacobians, of_body, top_of
+from frametool.fit.tree_problem import Fitted, Noise, TreeProblem, bodies_of, bridges, jacobians, of_body, top_of
 from frametool.frames.lookups import Frames, FrameTree
 from frametool.frames.topology import Groups
 from frametool.geometry.conventions import axes_change
@@ -27,7 +27,7 @@ from frametool.stream.measurements import Measurement, parted
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.fit.tree_problem import Bodies, Fitted
+    from frametool.fit.tree_problem import Bodies
     from frametool.geometry.types import Array
 
 
@@ -73,11 +73,11 @@ def best_blunder(measurement: Measurement, pose: Transform, information: Array) 
     meant = {words: made for words, blunder in BLUNDERS.items() if (made := blunder(measurement)) is not None}
     tried = [*meant.values(), measurement.transform]
     off = lsq.errors(pose, lsq.stacked(tried))
-    u = _sigmas(off, information)
+    u = lsq.sigmas(off, information)
     best = int(u[:-1].argmin())
     if u[best] > FITTING or u[best] >= u[-1] * (1 - TIE):
         return None
-    as_good = (_sigmas(off - off[best], information) <= ALIKE) & (u <= FITTING)
+    as_good = (lsq.sigmas(off - off[best], information) <= ALIKE) & (u <= FITTING)
     return list(meant)[int(as_good.argmax())]
 
 
@@ -103,7 +103,7 @@ def loops(
         metres, radians = map(float, lsq.length(error.reshape(2, 3)))
         if tolerance is None and each.covariance is not None:
             information = np.linalg.pinv(np.reshape(each.covariance, (6, 6)), hermitian=True)
-            u = _sigmas(error[None], information)[0]
+            u = lsq.sigmas(error[None], information)[0]
             agrees, sigmas = u <= lsq.KEPT, f" ({u:.1f} sigmas)"
         else:
             near = tolerance or NEAR
@@ -117,12 +117,6 @@ def loops(
             message += f"; fits when {words}" if words else ""
             findings.append(Finding("loop", message, *parted(each.place)))
     return findings, [*lacking], apart
-
-
-def _sigmas(errors: Array, information: Array) -> Array:
-    squares = (errors * lsq.applied(information, errors)).sum(-1)
-    found: Array = np.sqrt(np.maximum(squares, 0.0) / 6)
-    return found
 
 
 class TreeFit:
@@ -185,9 +179,14 @@ class TreeFit:
                 break
             tried.add(kept.tobytes())
             bodies = problem.placed(problem.tree(np.flatnonzero(kept).tolist()))
-            fit = TreeFit(problem, problem.selected(bodies, kept, fit.found.noise, robust=True))
+            start = Fitted(bodies, kept, fit.found.noise)
+            fit = TreeFit(problem, lsq.reselected(start, kept, problem.refitted, robust=True))
         if undecided:
-            raise ValueInvalid(fit.open_loop(*undecided))
+            row, rivals = undecided
+            off, places = lsq.off_text(fit.errors[row]), [problem.place(each) for each in sorted([row, *rivals])]
+            leave = f" (--without {problem.place(row)})" if problem.measurements[row].place else ""
+            loop = f"{first_of(places, 2)} form a loop open by {off}"
+            raise ValueInvalid(f"undecided: {loop}; measure again or leave one out{leave}")
         return fit, fits
 
     def verdicts(self) -> tuple[list[str | None], list[int], list[tuple[int, int]], tuple[int, list[int]] | None]:
@@ -241,13 +240,6 @@ class TreeFit:
         ends = self.parents[rival], self.children[rival]
         parent, child = (moved @ end if body in hanging else end for end, body in zip(ends, pairs[rival], strict=True))
         return parent.inverse() @ child
-
-    def open_loop(self, row: int, rivals: list[int]) -> str:
-        """Return the rows of a loop and its closure error, on one line."""
-        off = lsq.off_text(self.errors[row])
-        places = first_of([self.problem.place(each) for each in sorted([row, *rivals])], 2)
-        leave = f" (--without {self.problem.place(row)})" if self.problem.measurements[row].place else ""
-        return f"undecided: {places} form a loop open by {off}; measure again or leave one out{leave}"
 
 
 FEW_LOOPS = 6  # with fewer the sigmas are rough if rotations can close them
@@ -316,7 +308,7 @@ class TreeSolution:
         squares = (fit.errors[found.kept] ** 2).reshape(-1, 2, 3).sum((0, 2))
         self.rms_distance, self.rms_angle = np.sqrt(squares / found.kept.sum()).tolist()
         self.checked = ~np.isin(np.arange(problem.size), list(fit.alone))
-        sure = [True] * bodies.size
+        sure = [True] * problem.count
         for body in fit.tree.order[1:]:
             sure[body] = sure[fit.tree.above[body]] and fit.tree.row[body] not in fit.alone
         self.frame_checked = {name: sure[bodies.number[name]] for name in self.frames}
@@ -340,9 +332,8 @@ class TreeSolution:
 
         As in ROS: x, y, z, rotation about X, Y, Z, in metres and radians along the axes of target.
         """
-        return self._fit.covariance(self._at(target), self._at(source))
-
-    def _at(self, frame: str) -> tuple[int, Transform]:
-        if frame not in self.poses:
-            raise ValueInvalid(f"unknown frame {shown(frame)}{alternatives(frame, self.frames, 'frames')}")
-        return self._number[frame], self._poses[self.frames.index(frame)]
+        for frame in (target, source):
+            if frame not in self.poses:
+                raise ValueInvalid(f"unknown frame {shown(frame)}{alternatives(frame, self.frames, 'frames')}")
+        ends = ((self._number[frame], self._poses[self.frames.index(frame)]) for frame in (target, source))
+        return self._fit.covariance(*ends)

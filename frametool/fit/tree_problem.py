@@ -108,11 +108,6 @@ class Bodies(NamedTuple):
     number: dict[str, int]
     pose: dict[str, Transform]
 
-    @property
-    def size(self) -> int:
-        """Return how many bodies there are."""
-        return 1 + max(self.number.values())
-
 
 def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Frames) -> Bodies:
     """Group frames into bodies; raises ValueInvalid for an unknown root, and if frames are not connected."""
@@ -125,7 +120,14 @@ def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Fram
         root = next((name for name in frames if name not in children), frames[0])
     elif root not in frames:
         raise ValueInvalid(f"unknown root {shown(root)}{alternatives(root, frames, 'frames')}")
-    _require_connected(frames, edges)
+    joined, groups = Groups[str](), dict[str, list[str]]()
+    for edge in edges:
+        joined.join(*edge)
+    for name in frames:
+        groups.setdefault(joined.of(name), []).append(name)
+    if len(groups) > 1:
+        texts = [listing(group, 3) for group in groups.values()]
+        raise ValueInvalid(f"no measurement connects {first_of(texts, 3, gap=' | ')}")
     first: dict[str, str] = {}  # of each body, by the top of its tree
     for name in (root, *frames):
         first.setdefault(top_of(fixed, name), name)
@@ -140,19 +142,6 @@ def top_of(fixed: Frames, name: str) -> str:
     while name in fixed.frames and (above := fixed.parent(name)) is not None:
         name = above
     return name
-
-
-def _require_connected(names: Iterable[str], edges: Iterable[tuple[str, str]]) -> None:
-    """Raise ValueInvalid, with the groups of frames, if edges do not join all frames."""
-    joined = Groups[str]()
-    for edge in edges:
-        joined.join(*edge)
-    groups: dict[str, list[str]] = {}
-    for name in names:
-        groups.setdefault(joined.of(name), []).append(name)
-    if len(groups) > 1:
-        texts = [listing(group, 3) for group in groups.values()]
-        raise ValueInvalid(f"no measurement connects {first_of(texts, 3, gap=' | ')}")
 
 
 TREES = 200
@@ -216,14 +205,20 @@ class TreeProblem:
 
     def __init__(self, measurements: Sequence[Measurement], bodies: Bodies) -> None:
         """Store measurements as arrays: of bodies, of the poses of the measured frames in them, of covariances."""
-        self.measurements, self.count, self.size = measurements, bodies.size, len(measurements)
-        self.unknown = self.count - 1
+        self.measurements, self.size, self.unknown = measurements, len(measurements), max(bodies.number.values())
+        self.count = self.unknown + 1
         sides = [[each.parent for each in measurements], [each.child for each in measurements]]
         self.parent, self.child = (np.array([bodies.number[name] for name in side]) for side in sides)
         self.in_parent, self.in_child = (lsq.stacked(bodies.pose[name] for name in side) for side in sides)
         self.measured = lsq.stacked(each.transform for each in measurements)
         self.stated = np.array([each.covariance is not None for each in measurements])
-        self._stated = np.stack([_information(each, self.place(row)) for row, each in enumerate(measurements)])
+        self._stated = np.zeros((self.size, 6, 6))  # the inverses of their covariances
+        for row in np.flatnonzero(self.stated).tolist():
+            covariance = np.array(measurements[row].covariance, float).reshape(6, 6)
+            sigmas = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+            if not sigmas.all() or np.linalg.eigvalsh(covariance / np.outer(sigmas, sigmas))[0] < SINGULAR:
+                raise ValueInvalid(f"{self.place(row)}: the covariance is exact in some direction; exact: --fix")
+            self._stated[row] = lsq.inverse(covariance)
         self.pairs = list(zip(self.parent.tolist(), self.child.tolist(), strict=True))
         self.arm = max(float(np.median(lsq.length(self.measured.xyz))), lsq.LEAST)
         across = self.in_parent @ self.measured @ self.in_child.inverse()  # parent_from_child, of bodies
@@ -251,9 +246,7 @@ class TreeProblem:
 
     def u(self, errors: Array, noise: Noise) -> Array:
         """Return the residual of each row in sigmas: the root mean square of its six numbers."""
-        squares = (errors * lsq.applied(self.information(noise, noise.factor), errors)).sum(-1)
-        found: Array = np.sqrt(np.maximum(squares, 0.0) / 6)
-        return found
+        return lsq.sigmas(errors, self.information(noise, noise.factor))
 
     def tree(self, rows: Iterable[int]) -> SpanningTree:
         """Return the spanning tree of the first rows that close no loop."""
@@ -334,20 +327,6 @@ class TreeProblem:
             damping = max(damping * 10, 1e-6)
         return bodies, 0.0, 0.0
 
-    def settled(
-        self, bodies: Transform, kept: Any, noise: Noise, *, estimate: bool, few_loops: bool
-    ) -> tuple[Transform, Noise]:
-        """Return the least-squares solution of the used rows, and their noise, both converged."""
-        damping = 0.0
-        for _ in range(STEPS):
-            information = self.information(noise) * kept[:, None, None]
-            bodies, size, damping = self.improved(bodies, information, damping)
-            before, noise = noise, self.estimated(bodies, kept, noise, estimate=estimate, few_loops=few_loops)
-            changes = (abs(new / old - 1) for new, old in zip(noise, before, strict=True))
-            if size <= REST and max(changes) <= REST:
-                break
-        return bodies, noise
-
     # noise, and selection of rows
 
     def estimated(self, bodies: Transform, kept: Any, noise: Noise, *, estimate: bool, few_loops: bool) -> Noise:
@@ -363,28 +342,21 @@ class TreeProblem:
             factor = max(1.0, math.sqrt(chi2 / (2 * dof * stated.sum() / kept.sum())))
         if not estimate:
             return Noise(factor=factor)
-        squares = [float((part[free] ** 2).sum()) for part in _halves(errors)]
+        squares = [float((part[free] ** 2).sum()) for part in np.hsplit(errors, 2)]
         dofs = [dof * free.sum() / kept.sum()] * 2
         if few_loops:
-            dofs = [BORROWED + each for each in self.redundancies(bodies, kept, noise)]
+            # with the degrees of freedom of metres and of radians the sigmas converge to the maximum of the restricted
+            # likelihood (REML); source: Foerstner 1979
+            information = self.information(noise) * kept[:, None, None]
+            covariance = lsq.inverse(self.normal_equations(bodies, information)[0])
+            information *= ~self.stated[:, None, None]
+            for at, half in enumerate(np.kron(np.eye(2), np.ones(3))):
+                own = self.normal_equations(bodies, information * np.outer(half, half))[0]
+                dofs[at] = BORROWED + (3.0 * free.sum() - float((covariance * own).sum()))
             squares[0] += BORROWED * (noise.turn * self.arm) ** 2
             squares[1] += BORROWED * (noise.place / self.arm) ** 2
         place, turn = map(lsq.rms_sigma, squares, dofs)
         return Noise(place, turn, factor)
-
-    def redundancies(self, bodies: Transform, kept: Any, noise: Noise) -> list[float]:
-        """Return the degrees of freedom of metres and of radians of rows without sigmas.
-
-        With these the sigmas converge to the maximum of the restricted likelihood (REML); source: Foerstner 1979.
-        """
-        information = self.information(noise) * kept[:, None, None]
-        covariance = lsq.inverse(self.normal_equations(bodies, information)[0])
-        information *= ~self.stated[:, None, None]
-        count, found = 3.0 * (kept & ~self.stated).sum(), []
-        for half in np.kron(np.eye(2), np.ones(3)):
-            own = self.normal_equations(bodies, information * np.outer(half, half))[0]
-            found.append(count - float((covariance * own).sum()))
-        return found
 
     def medians(self, errors: Array, looped: Any) -> Noise:
         """Return the noise from the medians of the rows in loops."""
@@ -396,7 +368,8 @@ class TreeProblem:
             factor = float(np.median(_odd_count(self.u(errors, noise)[stated]))) / (lsq.MEDIAN_OF_SIX * share)
             noise = noise._replace(factor=max(1.0, factor))
         if free.any():
-            place, turn = (lsq.median_sigma(_odd_count(lsq.length(part[free])), share) for part in _halves(errors))
+            halves = np.hsplit(errors, 2)
+            place, turn = (lsq.median_sigma(_odd_count(lsq.length(part[free])), share) for part in halves)
             noise = noise._replace(place=place, turn=turn)
         return noise.at_least(LOWEST) if looped.sum() <= 2 * unknown else noise
 
@@ -419,14 +392,13 @@ class TreeProblem:
         if robust and looped.any():
             bodies, kept = lsq.first_inliers(bodies, by_medians, rough)
             noise = self.medians(self.errors(bodies), looped)
-        return self.selected(bodies, kept, noise, robust=robust)
-
-    def selected(self, bodies: Transform, kept: Any, noise: Noise, *, robust: bool) -> Fitted:
-        """Fit the used rows and test all of them again, until the set does not change."""
         return lsq.reselected(Fitted(bodies, kept, noise), kept, self.refitted, robust=robust)
 
     def refitted(self, found: Fitted, kept: Any) -> tuple[Fitted, Any, Array]:
-        """Fit the used rows, and the nearest of the others if frames would be disconnected."""
+        """Fit the used rows, and the nearest of the others if frames would be disconnected.
+
+        Bodies and noise are those of the least-squares solution, both converged.
+        """
         bodies, noise = found.bodies, found.noise
         u = self.u(self.errors(bodies), noise)
         tree = self.tree(np.lexsort((u, ~kept)).tolist() if not kept.all() else range(self.size))
@@ -436,12 +408,15 @@ class TreeProblem:
         alone = np.isin(np.arange(self.size), list(bridges(tree, self.pairs, np.flatnonzero(kept).tolist())))
         estimate = bool((kept & ~alone & ~self.stated).any()) and kept.sum() > self.unknown
         few_loops = bool((kept & ~alone).sum() <= 2 * (self.unknown - alone.sum()))
-        bodies, noise = self.settled(bodies, kept, noise, estimate=estimate, few_loops=few_loops)
+        damping = 0.0
+        for _ in range(STEPS):
+            information = self.information(noise) * kept[:, None, None]
+            bodies, size, damping = self.improved(bodies, information, damping)
+            before, noise = noise, self.estimated(bodies, kept, noise, estimate=estimate, few_loops=few_loops)
+            changes = (abs(new / old - 1) for new, old in zip(noise, before, strict=True))
+            if size <= REST and max(changes) <= REST:
+                break
         return Fitted(bodies, kept, noise, estimate, few_loops), kept, self.u(self.errors(bodies), noise)
-
-
-def _halves(errors: Array) -> tuple[Array, Array]:
-    return errors[:, :3], errors[:, 3:]
 
 
 def _odd_count(values: Array) -> Array:
@@ -449,12 +424,3 @@ def _odd_count(values: Array) -> Array:
     return values if len(values) % 2 else np.sort(values)[:-1]
 
 
-def _information(measurement: Measurement, place: str) -> Array:
-    """Return the inverse of the covariance of a measurement, zeros if it has none."""
-    if measurement.covariance is None:
-        return np.zeros((6, 6))
-    covariance = np.array(measurement.covariance, float).reshape(6, 6)
-    sigmas = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
-    if not sigmas.all() or np.linalg.eigvalsh(covariance / np.outer(sigmas, sigmas))[0] < SINGULAR:
-        raise ValueInvalid(f"{place}: the covariance is exact in some direction; exact: --fix")
-    return lsq.inverse(covariance)
