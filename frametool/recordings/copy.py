@@ -22,7 +22,7 @@ from frametool.ros.message_stream import unit_components
 from frametool.ros.messages import PATH, STAMPS, stamp_problem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Iterable, Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
@@ -93,20 +93,32 @@ class RecordedEdges:
         Raises BadTopology for a frame that moves here or there, has another parent or would be below itself, and for
         other values without `replace`.
         """
-        added, same, others = list[AddedEdge](), list[AddedEdge](), list[AddedEdge]()
+        added, same, others, name = list[AddedEdge](), list[AddedEdge](), list[AddedEdge](), bare(tree.name)
         for track in tree.tracks():
             child, parent = (resolve_name(frame, self.frames) for frame in (track.child, track.parent))
             if not track.is_static:
-                raise static_and_moving(child, f" moves in {bare(tree.name)}; --with adds static frames")
+                raise static_and_moving(child, f" moves in {name}; --with adds static frames")
             edge, known = AddedEdge(parent, child, track.components), self.known.get(child)
             if known is None:
                 added.append(edge)
                 continue
-            self._refuse_other(edge, known, tree.name)
+            topics, here = Topics(), f"{self.name}, {first_of([*known.topics], MOST_NAMED)}"
+            for problem in filter(None, (topics.conflict(topic, child) for topic in known.topics)):
+                raise BadTopology(problem, source=self.name, rule="two-topics")  # it comes from two robots
+            if wrong := [other for other in known.parents if other != parent]:
+                raise two_parents(child, wrong[0], parent, (here, name))
+            if known.varies and not any(topic.endswith(STATIC) for topic in known.topics):
+                raise static_and_moving(child, f": it moves in {shown(parent)} ({here}) and is static in it ({name})")
             is_there = not known.varies and is_same(known.numbers, edge.numbers)
             (same if is_there else others).append(edge)
         if others and not replace:
-            raise BadTopology(self._others(others, tree.name), rule="two-poses")
+            differing = []
+            for edge in others:
+                numbers, on = self.known[edge.child].numbers, first_of([*self.known[edge.child].topics], MOST_NAMED)
+                metres, radians = rigid.distance(*numbers, *edge.numbers, xp=floats)
+                differing.append(f"{edge} on {on} ({metres:.3g} m and {radians * floats.RADIAN:.3g} deg off)")
+            what = f"other values than in {name}: {first_of(differing, MOST_NAMED)}; --replace uses those of {name}"
+            raise BadTopology(f"{self.name}: {what}", rule="two-poses")
         return EdgePlan(*self._by_topic(added), same, others)
 
     def _by_topic(self, added: Iterable[AddedEdge]) -> tuple[dict[str, list[AddedEdge]], list[str]]:
@@ -122,28 +134,6 @@ class RecordedEdges:
             is_held[line[-2]] = is_held.get(line[-2], False) or not self.frames.keys().isdisjoint(line[:1] + line[-1:])
         return topics, sorted(root for root, held in is_held.items() if not held) if self.frames else []
 
-    def _refuse_other(self, edge: AddedEdge, known: RecordedEdge, tree: str) -> None:
-        """Raise BadTopology for a frame with another parent, a moving one, and one that comes from two robots."""
-        topics, here = Topics(), f"{self.name}, {first_of([*known.topics], MOST_NAMED)}"
-        for problem in filter(None, (topics.conflict(topic, edge.child) for topic in known.topics)):
-            raise BadTopology(problem, source=self.name, rule="two-topics")
-        if others := [parent for parent in known.parents if parent != edge.parent]:
-            raise two_parents(edge.child, others[0], edge.parent, (here, bare(tree)))
-        if known.varies and not any(topic.endswith(STATIC) for topic in known.topics):
-            both = f"it moves in {shown(edge.parent)} ({here}) and is static in it ({bare(tree)})"
-            raise static_and_moving(edge.child, f": {both}")
-
-    def _others(self, edges: list[AddedEdge], tree: str) -> str:
-        """Return which edges have other values, and the differences."""
-        differing = []
-        for edge in edges:
-            known = self.known[edge.child]
-            metres, radians = rigid.distance(*known.numbers, *edge.numbers, xp=floats)
-            off = f"{metres:.3g} m and {radians * floats.RADIAN:.3g} deg off"
-            differing.append(f"{edge} on {first_of([*known.topics], MOST_NAMED)} ({off})")
-        what = first_of(differing, MOST_NAMED)
-        return f"{self.name}: other values than in {bare(tree)}: {what}; --replace uses those of {bare(tree)}"
-
 
 def is_same(a: Rigid, b: Rigid) -> bool:
     """Return True if two transforms are equal, whatever the sign of their quaternions; a zero quaternion never is."""
@@ -152,16 +142,6 @@ def is_same(a: Rigid, b: Rigid) -> bool:
     one, other = ((*each[:3], *quaternion.normalized(*each[3:], floats)) for each in (a, b))
     metres, radians = rigid.distance(*one, *other, xp=floats)
     return bool(metres <= SAME * (1.0 + max(map(abs, a[:3]))) and radians <= SAME)
-
-
-def replaced(message: Any, edges: dict[str, AddedEdge], bare_name: Callable[[str], str]) -> bool:
-    """Replace the numbers of some edges in a message of transforms; return True if it has any of them."""
-    found = [(each, edges.get(bare_name(each.child_frame_id))) for each in message.transforms]
-    for each, edge in found:
-        if edge is not None:
-            put(each.transform.translation, edge.numbers[:3])
-            put(each.transform.rotation, edge.numbers[3:])
-    return any(edge for _, edge in found)
 
 
 def put(part: Any, numbers: Sequence[float]) -> None:

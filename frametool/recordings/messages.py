@@ -109,10 +109,19 @@ def _cloud(message: Any, number: int, topic: str, tally: Diagnostics) -> PointCl
         raise problem
     names, kind = _record_of(message)
     width, height = int(message.width), int(message.height)
+    data, least = np.asarray(message.data, np.uint8), width * kind.itemsize
+    row = int(message.row_step) or least  # of a grid may be padded
+    needed = (height - 1) * row + least if width and height else 0
+    if needed > len(data) or (height > 1 and row < least):
+        points = f"{width} x {height} points of {kind.itemsize} bytes"
+        raise ValueInvalid(f"{points} in rows of {row} (row_step) do not fit: the message has {len(data)} bytes")
+    rows: NDArray[Any] = np.empty(0, kind)
+    if needed:
+        rows = np.ndarray((height, width), kind, data, 0, (max(row, least), kind.itemsize)).reshape(-1)
     frame = message.header.frame_id
     return PointCloud(
-        number, topic, stamp.sec * BILLION + stamp.nanosec, tally.names.bare(frame) if frame else "", names,
-        _rows(message, kind, width, height), width, height,
+        number, topic, stamp.sec * BILLION + stamp.nanosec, tally.names.bare(frame) if frame else "", names, rows,
+        width, height,
     )  # fmt: skip
 
 
@@ -139,20 +148,6 @@ def _record_of(message: Any) -> tuple[tuple[str, ...], np.dtype[Any]]:
     return tuple(columns), np.dtype({"names": places, "formats": formats, "offsets": offsets, "itemsize": step})
 
 
-def _rows(message: Any, kind: np.dtype[Any], width: int, height: int) -> NDArray[Any]:
-    """Return the points; the rows of a grid may be padded."""
-    data, least = np.asarray(message.data, np.uint8), width * kind.itemsize
-    row = int(message.row_step) or least
-    needed = (height - 1) * row + least if width and height else 0
-    if needed > len(data) or (height > 1 and row < least):
-        points = f"{width} x {height} points of {kind.itemsize} bytes"
-        raise ValueInvalid(f"{points} in rows of {row} (row_step) do not fit: the message has {len(data)} bytes")
-    if not needed:
-        return np.empty(0, kind)
-    grid: NDArray[Any] = np.ndarray((height, width), kind, data, 0, (max(row, least), kind.itemsize))
-    return grid.reshape(-1)
-
-
 FIX = "sensor_msgs/msg/NavSatFix"
 STAMPED = ("Point", "Pose", "PoseWithCovariance", "Vector3", "Quaternion", "Twist", "TwistWithCovariance", "Wrench",
            "Accel", "AccelWithCovariance", "Transform")  # fmt: skip
@@ -173,7 +168,8 @@ def open_records(path: str, chosen: Collection[str], tally: Diagnostics) -> Buff
         reader = opened.enter_context(opened_recording(path, tally))
         if reader.on_topics({CLOUD}, chosen) and not reader.on_topics(RECORDS, chosen):
             return None
-        return _opened_lines(reader, _of_one_topic(reader, RECORDS, chosen, "points, poses or fixes"), opened)
+        found = _of_one_topic(reader, RECORDS, chosen, "points, poses or fixes")
+        return BufferedReader(Pieces(_pieces(reader, found), opened.pop_all()))
 
 
 def open_trajectory(path: str, chosen: Collection[str], tally: Diagnostics) -> tuple[BufferedReader, str] | None:
@@ -186,12 +182,7 @@ def open_trajectory(path: str, chosen: Collection[str], tally: Diagnostics) -> t
         found = reader.on_topics(POSES, chosen)
         if len({each.topic for each in found}) != 1 or reader.on_topics(TYPES, chosen):
             return None
-        return _opened_lines(reader, found, opened), found[0].topic
-
-
-def _opened_lines(reader: RecordingReader, channels: Sequence[Channel], opened: ExitStack) -> BufferedReader:
-    pieces = filter(None, _pieces(reader, channels))  # an empty one would be the end
-    return BufferedReader(Pieces(pieces, opened.pop_all()))
+        return BufferedReader(Pieces(_pieces(reader, found), opened.pop_all())), found[0].topic
 
 
 def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[bytes]:
@@ -208,7 +199,8 @@ def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[by
                     lines.append(known.get(place) or text_of(reader.types, each.channel, each.data))
             finally:
                 number += len(lines)
-                yield b"".join(lines)
+                if any(lines):  # an empty piece would be the end
+                    yield b"".join(lines)
     except FormatError:
         raise
     except Exception as error:  # noqa: BLE001 - of broken bytes the libraries raise anything

@@ -137,7 +137,7 @@ class McapFile:
         found: list[Recorded] = []
         for each in self._records(numbers):
             if isinstance(each, records.Chunk):
-                self._take(_unpacked_chunk(each), numbers, found)
+                self._take(each, numbers, found)
             elif isinstance(each, records.Message):
                 channel = self.channels[each.channel_id]
                 if each.channel_id in numbers:
@@ -149,13 +149,24 @@ class McapFile:
                 found = []
         yield found
 
-    def _take(self, data: bytes, numbers: set[int], found: list[Recorded]) -> None:
-        """Add the messages on some channels that are in a chunk; register what else is there."""
+    def _take(self, chunk: Any, numbers: set[int], found: list[Recorded]) -> None:
+        """Add the messages on some channels that are in a chunk; register what else is there.
+
+        Raises ValueError for a chunk that is too large, before it is unpacked.
+        """
+        import zstandard
         from mcap import records
         from mcap.data_stream import ReadDataStream
         from mcap.opcode import Opcode
+        from mcap.stream_reader import get_chunk_data_stream
 
-        end, message = 0, Opcode.MESSAGE.value
+        size = chunk.uncompressed_size
+        if chunk.compression == "zstd" and size <= MOST:
+            size = max(size, zstandard.frame_content_size(chunk.data))  # so much memory would be asked for
+        if size > MOST:
+            raise ValueError(f"a chunk of {size} bytes; {MOST} are read")
+        stream, length = get_chunk_data_stream(chunk, validate_crc=True)
+        data, end, message = bytes(stream.read(length)), 0, Opcode.MESSAGE.value
         while end < len(data):
             code, size = RECORD.unpack_from(data, end)
             begin, end = end + RECORD_HEAD, end + RECORD_HEAD + size
@@ -183,20 +194,6 @@ class McapFile:
                 digest = each.metadata.get(HASH, "")
                 made = Channel(each.topic, name, each.message_encoding, schema, each.metadata, digest)
                 self.channels[each.id] = made
-
-
-def _unpacked_chunk(chunk: Any) -> bytes:
-    """Return the records of a chunk; raises ValueError for one that is too large, before it is unpacked."""
-    import zstandard
-    from mcap.stream_reader import get_chunk_data_stream
-
-    size = chunk.uncompressed_size
-    if chunk.compression == "zstd" and size <= MOST:
-        size = max(size, zstandard.frame_content_size(chunk.data))  # so much memory would be asked for
-    if size > MOST:
-        raise ValueError(f"a chunk of {size} bytes; {MOST} are read")
-    stream, length = get_chunk_data_stream(chunk, validate_crc=True)
-    return bytes(stream.read(length))
 
 
 def _in_order(chunks: Iterable[list[Recorded]]) -> Iterator[list[Recorded]]:
@@ -282,27 +279,25 @@ class Bag1File:
 
     def found(self, numbers: set[int]) -> Iterator[list[Recorded]]:
         """Yield the messages of each chunk on some channels."""
-        for each in sorted(self.reader.chunk_infos, key=attrgetter("start_time")):
-            if not numbers.isdisjoint(each.connection_counts):
-                about = self.reader.chunks[each.pos]
-                self.reader.bio.seek(about.datapos)
-                found: list[Recorded] = []
-                try:
-                    self._take(about.decompressor(self.reader.bio.read(about.datasize)), numbers, found)
-                finally:
-                    yield found
-
-    def _take(self, chunk: bytes, numbers: set[int], found: list[Recorded]) -> None:
-        """Add the messages of some connections in a chunk."""
         from rosbags.rosbag1.reader import Header, RecordType, read_bytes, read_uint32
 
-        records = BytesIO(chunk)
-        while records.tell() < len(chunk):
-            header = Header.read(records)
-            data = read_bytes(records, read_uint32(records))
-            if header.get_uint8("op") != RecordType.CONNECTION and (number := header.get_uint32("conn")) in numbers:
-                log_ns = header.get_time("time")
-                found.append(Recorded(self.channels[number], log_ns, data, log_ns))
+        infos = (each for each in self.reader.chunk_infos if not numbers.isdisjoint(each.connection_counts))
+        for each in sorted(infos, key=attrgetter("start_time")):
+            about = self.reader.chunks[each.pos]
+            self.reader.bio.seek(about.datapos)
+            found: list[Recorded] = []
+            try:
+                chunk = about.decompressor(self.reader.bio.read(about.datasize))
+                records = BytesIO(chunk)
+                while records.tell() < len(chunk):
+                    header = Header.read(records)
+                    data = read_bytes(records, read_uint32(records))
+                    is_message = header.get_uint8("op") != RecordType.CONNECTION
+                    if is_message and (number := header.get_uint32("conn")) in numbers:
+                        log_ns = header.get_time("time")
+                        found.append(Recorded(self.channels[number], log_ns, data, log_ns))
+            finally:
+                yield found
 
 
 @lru_cache
@@ -384,7 +379,11 @@ class RecordingReader:
             files = _files_of(files[0], self.metadata, opened)
         with files[0].open("rb") as first:
             self.is_ros1 = first.read(8) == b"#ROSBAG "
-        self.files = [self._kind(file)(file, opened, tally) for file in files]
+        self.files: list[Any] = []
+        for file in files:
+            storage = self.metadata.get("storage_identifier") or file.suffix.removeprefix(".")
+            kind: Any = DatabaseFile if storage in ("sqlite3", "db3") else McapFile
+            self.files.append((Bag1File if self.is_ros1 else kind)(file, opened, tally))
         self._is_packed = self.metadata.get("compression_mode", "").lower() == "message"
         known: dict[tuple[Any, ...], Channel] = {}
         for each in self.files:
@@ -401,10 +400,6 @@ class RecordingReader:
         self.channels = [each for each in self.all if each.encoding == encoding]
         self.types = MessageTypes(self.channels, ros1=self.is_ros1)
 
-    def _kind(self, file: Path) -> Any:
-        storage = self.metadata.get("storage_identifier") or file.suffix.removeprefix(".")
-        return Bag1File if self.is_ros1 else DatabaseFile if storage in ("sqlite3", "db3") else McapFile
-
     def messages(self, wanted: Collection[Channel] | None = None) -> Iterator[Recorded]:
         """Yield the messages on some channels, or on all; raises FormatError if any are missing."""
         return chain.from_iterable(self.blocks(wanted))
@@ -415,8 +410,13 @@ class RecordingReader:
         for file in self.files:
             count, numbers = 0, {number for number, each in file.channels.items() if wanted is None or each in wanted}
             for block in _in_order(filter(None, file.found(numbers))):
-                yield [*map(_unpacked, block)] if self._is_packed else block
                 count += len(block)
+                if self._is_packed:  # each message by itself
+                    import zstandard
+
+                    yield [each._replace(data=zstandard.open(BytesIO(each.data)).read(MOST)) for each in block]
+                else:
+                    yield block
             known = None if file.stated is None else sum(file.stated.get(number, 0) for number in numbers)
             self._check(wanted, count, known, file.total if wanted is None else None)  # a channel may be lost
             total += count
@@ -437,13 +437,6 @@ class RecordingReader:
         """Return the channels of some types, on some topics, with or without a leading `/`, or on all."""
         named = {topic.strip("/") for topic in topics}
         return [each for each in self.channels if each.type in types and (not named or each.topic.strip("/") in named)]
-
-
-def _unpacked(message: Recorded) -> Recorded:
-    """Unpack a message that is packed by itself."""
-    import zstandard
-
-    return message._replace(data=zstandard.open(BytesIO(message.data)).read(MOST))
 
 
 def read_metadata(text: str, name: str) -> dict[str, Any]:

@@ -107,7 +107,14 @@ def _template(kind: Kind, fmt: str, frames: tuple[str, str]) -> tuple[bytes, int
 def serialised(kind: Kind, fmt: str, samples: Iterable[Sample]) -> bytes:
     """Return one message of some transforms, poses or points; raises ValueInvalid for names that are not text."""
     store = typestore(ros1=fmt == BAG1)
-    whole = [_leaves(kind, *sample) for sample in samples]
+    whole = []  # the contents of stamped messages, in the order of their definitions
+    for stamp_ns, frames, numbers in samples:
+        second, part = divmod(stamp_ns, BILLION)
+        stamp = (second + (1 << 31)) % (1 << 32) - (1 << 31), part  # rosbags takes seconds of ROS 1 as int32
+        if kind.type == KINDS["fix"].type:  # by GPS, of unknown covariance
+            whole.append([*stamp, frames[0], 0, 1, *numbers, np.zeros(9), 0])
+        else:
+            whole.append([*stamp, *frames[: 1 + (kind.type == TF)], *numbers])
     leaves = whole[0]
     if kind.each:
         stamp_and_frame = whole[-1][:3] if kind == KINDS["path"] else []
@@ -117,15 +124,6 @@ def serialised(kind: Kind, fmt: str, samples: Iterable[Sample]) -> bytes:
         return bytes((store.serialize_ros1 if fmt == BAG1 else store.serialize_cdr)(message, kind.type))
     except UnicodeEncodeError as error:
         raise ValueInvalid(f"{shown(error.object)} is not a name that can be written") from None
-
-
-def _leaves(kind: Kind, stamp_ns: int, frames: tuple[str, str], numbers: Sequence[float]) -> list[Any]:
-    """Return the contents of a stamped message in the order of its definition."""
-    second, part = divmod(stamp_ns, BILLION)
-    stamp = (second + (1 << 31)) % (1 << 32) - (1 << 31), part  # rosbags takes seconds of ROS 1 as int32
-    if kind.type == KINDS["fix"].type:  # by GPS, of unknown covariance
-        return [*stamp, frames[0], 0, 1, *numbers, np.zeros(9), 0]
-    return [*stamp, *frames[: 1 + (kind.type == TF)], *numbers]
 
 
 def _built(store: Any, kind: str, leaves: Iterator[Any]) -> Any:
@@ -191,29 +189,28 @@ class RecordingFile:
     def begin(self, channels: Iterable[Channel]) -> None:
         """Begin some channels."""
         for each in channels:
-            if each not in self.counts:
-                self.counts[each], self._numbers[each] = 0, self._number(each)
-
-    def _number(self, channel: Channel) -> Any:
-        """Return what the writer knows a channel by."""
-        said, schema = channel.said, channel.schema
-        if self.format == BAG1:
-            return self._writer.add_connection(
-                channel.topic, channel.type, msgdef=schema[2].decode() if schema else "", md5sum=channel.digest or "*",
-                callerid=said.get("callerid"), latching=int(said["latching"]) if said.get("latching") else None,
-            )  # fmt: skip
-        if schema and schema not in self._numbers:
-            self._numbers[schema] = self._writer.register_schema(*schema)
-        number = self._numbers[schema] if schema else 0
-        return self._writer.register_channel(channel.topic, channel.encoding, number, said)
+            if each in self.counts:
+                continue
+            said, schema = each.said, each.schema
+            if self.format == BAG1:
+                number = self._writer.add_connection(
+                    each.topic, each.type, msgdef=schema[2].decode() if schema else "", md5sum=each.digest or "*",
+                    callerid=said.get("callerid"), latching=int(said["latching"]) if said.get("latching") else None,
+                )  # fmt: skip
+            else:
+                if schema and schema not in self._numbers:
+                    self._numbers[schema] = self._writer.register_schema(*schema)
+                of_schema = self._numbers[schema] if schema else 0
+                number = self._writer.register_channel(each.topic, each.encoding, of_schema, said)
+            self.counts[each], self._numbers[each] = 0, number
 
     def write(self, messages: Iterable[tuple[Channel, int, bytes]]) -> None:
         """Write messages with their channels and stamps; a late one is logged with the previous one."""
-        self.add(Recorded(channel, self._logged(stamp_ns), data, self.log_ns) for channel, stamp_ns, data in messages)
-
-    def _logged(self, stamp_ns: int) -> int:
-        self.log_ns = max(self.log_ns, stamp_ns)
-        return self.log_ns
+        logged = []
+        for channel, stamp_ns, data in messages:
+            self.log_ns = max(self.log_ns, stamp_ns)
+            logged.append(Recorded(channel, self.log_ns, data, self.log_ns))
+        self.add(logged)
 
     def add(self, messages: Iterable[Recorded]) -> None:
         """Write messages as they were recorded."""
@@ -341,19 +338,16 @@ def new_channel(kind: Kind, topic: str, *, ros1: bool, like: Iterable[Channel] =
     schema: Any = kind.type, f"ros{2 - ros1}msg", definition.encode()
     said = {"latching": str(int(kind.stays))}
     if not ros1:
+        said, digest = {QOS: ""}, store.hash_rihs01(kind.type)
+    if kind.stays and not ros1:  # the quality of service of a topic that is there for who comes late
+        from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+        from rosbags.rosbag2.metadata import dump_qos_v8, dump_qos_v9
+
+        for_ever = QosTime(9223372036, 854775807)
+        made = Qos(QosHistory.KEEP_LAST, 1, QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL, for_ever, for_ever,
+                   QosLiveliness.AUTOMATIC, for_ever, avoid_ros_namespace_conventions=False)  # fmt: skip
         by_numbers = any(BY_NUMBERS.search(each.said.get(QOS, "")) for each in like)
-        said, digest = {QOS: latched(by_numbers=by_numbers) if kind.stays else ""}, store.hash_rihs01(kind.type)
+        said[QOS] = str(dump_qos_v8([made])) if by_numbers else dump(dump_qos_v9([made]))
     if same:
         schema, digest = same.schema, same.digest
     return Channel(topic, kind.type, "ros1" if ros1 else read.CDR, schema, said, digest)
-
-
-def latched(*, by_numbers: bool) -> str:
-    """Return the quality of service of a topic that is there for who comes late, as channels have it."""
-    from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
-    from rosbags.rosbag2.metadata import dump_qos_v8, dump_qos_v9
-
-    for_ever = QosTime(9223372036, 854775807)
-    made = Qos(QosHistory.KEEP_LAST, 1, QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL, for_ever, for_ever,
-               QosLiveliness.AUTOMATIC, for_ever, avoid_ros_namespace_conventions=False)  # fmt: skip
-    return str(dump_qos_v8([made])) if by_numbers else dump(dump_qos_v9([made]))

@@ -38,7 +38,16 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
 
 def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
     """Return PointStamped and Vector3Stamped messages; messages are unchanged."""
-    return "".join(message_text(_stamped(record, style), style) for record in records)
+    made = []
+    for record in records:
+        inner = next((value for value in record.values() if isinstance(value, (list, dict))), record)
+        values: list[Any] = inner if isinstance(inner, list) else [inner.get(axis) for axis in "xyz"]
+        message = record
+        if MESSAGE_KEYS.isdisjoint(record) and len(values) == 3 and all(type(each) is float for each in values):
+            key, xyz = "vector" if "vector" in record else "point", dict(zip("xyz", values, strict=True))
+            message = {"header": header(record.get("frame"), record.get("stamp_ns"), style), key: xyz}
+        made.append(message_text(message, style))
+    return "".join(made)
 
 
 def write_tree(tree: FrameTree, style: Style) -> str:
@@ -99,16 +108,6 @@ def stamp(stamp_ns: int, fmt: str) -> dict[str, int]:
     return dict(zip(names, (whole, rest), strict=True))
 
 
-def _stamped(record: dict[str, Any], style: Style) -> dict[str, Any]:
-    """Return the message of a point or vector; anything with a header, or another message, is unchanged."""
-    inner = next((value for value in record.values() if isinstance(value, (list, dict))), record)
-    values: list[Any] = inner if isinstance(inner, list) else [inner.get(axis) for axis in "xyz"]
-    if not MESSAGE_KEYS.isdisjoint(record) or len(values) != 3 or any(type(each) is not float for each in values):
-        return record
-    key, position = "vector" if "vector" in record else "point", dict(zip("xyz", values, strict=True))
-    return {"header": header(record.get("frame"), record.get("stamp_ns"), style), key: position}
-
-
 def _lines(mapping: dict[str, Any], style: Style, indent: str = "") -> Iterator[str]:
     """Write block style as PyYAML does for ROS 2, as genpy does for ROS 1, where a list of numbers is one line."""
     is_ros1 = style.format == "ros1"
@@ -119,25 +118,20 @@ def _lines(mapping: dict[str, Any], style: Style, indent: str = "") -> Iterator[
             yield from _lines(value, style, indent + "  ")
         elif isinstance(value, list) and (any(isinstance(item, dict) for item in value) if is_ros1 else value):
             yield f"{indent}{key}{opening}"
-            for item in value:
-                yield from _item(item, style, indent)
+            for item in value:  # in ROS 2 in the column of its key and the dash before it, in ROS 1 below the dash
+                if is_ros1:
+                    yield f"{indent}  - "
+                    yield from _lines(item, style, indent + "    ")
+                elif isinstance(item, dict):
+                    lines = _lines(item, style, indent + "  ")
+                    yield f"{indent}- {next(lines).lstrip()}"
+                    yield from lines
+                else:
+                    yield f"{indent}- {scalar(item, style)}"
         elif isinstance(value, list) and is_ros1:
             yield f"{indent}{key}: [{', '.join(scalar(item, style) for item in value)}]"
         else:
             yield f"{indent}{key}: {scalar(value, style):>{9 if key == 'nsecs' else 0}}"
-
-
-def _item(item: Any, style: Style, indent: str) -> Iterator[str]:
-    """Write an item of a list: in ROS 2 in the column of its key and the dash before it, in ROS 1 below the dash."""
-    if style.format == "ros1":
-        yield f"{indent}  - "
-        yield from _lines(item, style, indent + "    ")
-    elif isinstance(item, dict):
-        lines = _lines(item, style, indent + "  ")
-        yield f"{indent}- {next(lines).lstrip()}"
-        yield from lines
-    else:
-        yield f"{indent}- {_ros2_scalar(item, style)}"
 
 
 def _ros2_scalar(value: Any, style: Style) -> str:

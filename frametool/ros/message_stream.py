@@ -62,20 +62,6 @@ _POSE = [*_HEADER2, *_axes("pose.position"), *_axes("pose.orientation", "xyzw")]
 _MANY = re.compile(r"field\.(\w*?)0\.header\.seq")
 
 
-def _message(cells: Sequence[str], header: Sequence[str]) -> dict[str, Any]:
-    """Return the message of one row, under a header of `rostopic echo -p`, or without one, of `ros2 topic echo --csv`.
-
-    Raises Misfit for a row that does not fit its header, or that is neither a pose nor transforms.
-    """
-    if not header:
-        return _nested(_POSE, cells) if len(cells) == len(_POSE) else {"transforms": _entries(cells, TRANSFORM2)}
-    if many := _MANY.fullmatch("".join(header[1:2])):
-        return {many[1]: _entries(cells[1:], TRANSFORM1)}
-    if len(cells) != len(header):
-        raise Misfit(f"expected {len(header)} cells, found {len(cells)}")
-    return _nested([name.removeprefix("field.") for name in header[1:]], cells[1:])
-
-
 def _entries(cells: Sequence[str], names: Sequence[str]) -> list[dict[str, Any]]:
     """Split one row into its transforms."""
     size = len(names)
@@ -94,16 +80,13 @@ def _nested(names: Sequence[str], cells: Sequence[str]) -> dict[str, Any]:
         inner = message
         for step in outer:
             inner = inner.setdefault(step, {})
-        inner[last] = _stamp1(cell) if last == "stamp" else cell
+        inner[last] = cell
+        if last == "stamp":
+            if not (cell.isascii() and cell.isdigit()):
+                raise Misfit(f"stamp must be whole nanoseconds, found {shown(cell)}")
+            seconds, nanoseconds = divmod(int(cell), BILLION)
+            inner[last] = {"secs": str(seconds), "nsecs": str(nanoseconds)}
     return message
-
-
-def _stamp1(cell: str) -> dict[str, str]:
-    """Split integer nanoseconds."""
-    if not (cell.isascii() and cell.isdigit()):
-        raise Misfit(f"stamp must be whole nanoseconds, found {shown(cell)}")
-    seconds, nanoseconds = divmod(int(cell), BILLION)
-    return {"secs": str(seconds), "nsecs": str(nanoseconds)}
 
 
 # what the tools or the shell print between messages; only the warning about lost messages ends a document
@@ -185,7 +168,10 @@ def _data_lines(piece: Piece, tally: Diagnostics) -> Iterator[tuple[int, str]]:
 
 
 def _csv(stream: BinaryIO, name: str, tally: Diagnostics) -> Iterator[TextMessage | FormatError]:
-    """Read rows; a line that begins with `%time` is the header of those below it."""
+    """Read rows: under a header of `rostopic echo -p`, `%time,..`, or without one, of `ros2 topic echo --csv`.
+
+    An error for a row that does not fit its header, or that is neither a pose nor transforms.
+    """
     header: list[str] = []
     for number, line in line_texts(stream, name, tally):
         cells = line.split(",")
@@ -193,7 +179,16 @@ def _csv(stream: BinaryIO, name: str, tally: Diagnostics) -> Iterator[TextMessag
             header = cells
             continue
         try:
-            value = _message(cells, header)
+            if not header and len(cells) == len(_POSE):
+                value = _nested(_POSE, cells)
+            elif not header:
+                value = {"transforms": _entries(cells, TRANSFORM2)}
+            elif many := _MANY.fullmatch("".join(header[1:2])):
+                value = {many[1]: _entries(cells[1:], TRANSFORM1)}
+            elif len(cells) == len(header):
+                value = _nested([name.removeprefix("field.") for name in header[1:]], cells[1:])
+            else:
+                raise Misfit(f"expected {len(header)} cells, found {len(cells)}")
         except Misfit as misfit:
             yield FormatError(str(misfit), source=name, line=number)
             continue
@@ -257,7 +252,11 @@ def _message_edges(message: TextMessage | FormatError, options: Options) -> Iter
     except Misfit as misfit:
         options.report(message.error(misfit))
         return
-    numbers = _header_lines(message, len(found))
+    text = message.source.text
+    starts = [match.start() for match in _HEADER.finditer(text)] if text.count("\n") > 1 else []
+    numbers = [message.line + text.count("\n", 0, start) for start in starts]  # of the lines on which they begin
+    if len(numbers) != len(found):
+        numbers = [message.line] * len(found)
     topic = messages.topic_of(message.value)
     for (transform, path), line in zip(found, numbers, strict=True):
         if topic and not options.topics.takes(topic):
@@ -297,15 +296,6 @@ def _transforms(value: Any, path: Path, options: Options) -> Iterator[tuple[dict
     else:
         keys = first_of(list(mapping), 8, quote=shown)
         raise Misfit(f"expected a message with transforms, found the keys {keys}", path)
-
-
-def _header_lines(message: TextMessage, count: int) -> list[int]:
-    """Return the lines on which the transforms of a message begin."""
-    text = message.source.text
-    offsets = [match.start() for match in _HEADER.finditer(text)] if text.count("\n") > 1 else []
-    if len(offsets) != count:
-        return [message.line] * count
-    return [message.line + text.count("\n", 0, offset) for offset in offsets]
 
 
 # --- the fast path for plain transforms ---
@@ -384,17 +374,15 @@ def _echoed(entry: str) -> MessageLayout:
     return _layout(ECHO_GROUPS, "transforms:\n", entry, "", "---\n", *lines)
 
 
-def _on_lines(opening: str, between: str, closing: str) -> list[MessageLayout]:
-    """Return the layouts of a kind of lines, in ROS 2 and in ROS 1."""
-    return [_layout(JSON_GROUPS, opening, json.dumps(each), between, closing) for each in (FIELDS, FIELDS1)]
-
-
 LAYOUTS = (
     (_echoed(f"- {_block(FIELDS, '  ')[2:]}"), _echoed(f"  -\n{_block(FIELDS1, '    ')}")),
-    _on_lines(PUBLISHED + TRANSFORMS, ", ?", r"\]\}\}\n"),
-    _on_lines(TRANSFORMS, ", ?", r"\]\}\n"),
-    _on_lines("", "\n", "\n"),
-)
+    *(
+        [_layout(JSON_GROUPS, opening, json.dumps(each), between, closing) for each in (FIELDS, FIELDS1)]
+        for opening, between, closing in (
+            (PUBLISHED + TRANSFORMS, ", ?", r"\]\}\}\n"), (TRANSFORMS, ", ?", r"\]\}\n"), ("", "\n", "\n")
+        )
+    ),
+)  # fmt: skip
 ROS1_BEGINS = "  ", '{"header": {"seq"', '{"header":{"seq"'
 EACH = 12  # items that `split` returns per transform: text, two parts of the stamp, two names, seven numbers
 

@@ -96,8 +96,12 @@ def read_transform(
 
     body: the child of a pose that names none
     """
-    if "parent_frame_id" in message:
-        return _read_frame_transform(message, reading)
+    if "parent_frame_id" in message:  # a FrameTransform
+        only(message, ("timestamp", "parent_frame_id", "child_frame_id", *_TRANSFORM))
+        parent, child = (frame_of(message, key, (), reading) for key in ("parent_frame_id", "child_frame_id"))
+        position, rotation = read_rigid(message, _TRANSFORM, reading)
+        stamp_ns = within(("timestamp",), _read_timestamp, message["timestamp"]) if "timestamp" in message else None
+        return parent, child, position, rotation, stamp_ns
     is_posed = is_pose(message)
     key, what, keys = ("pose", HAS, _POSE) if is_posed else ("transform", PARTS, _TRANSFORM)
     path: Path = (key,)
@@ -146,16 +150,6 @@ def body_of(topic: str, answers: Answers) -> str:
     return answers.frames[-1] if answers.frames else topic.strip("/") or "body"
 
 
-def _read_frame_transform(message: dict[str, Any], reading: Reading) -> tuple[str, str, Vector, Quaternion, int | None]:
-    """Read one FrameTransform as (parent, child, position, rotation, stamp_ns); None without a timestamp."""
-    only(message, ("timestamp", "parent_frame_id", "child_frame_id", *_TRANSFORM))
-    parent = frame_of(message, "parent_frame_id", (), reading)
-    child = frame_of(message, "child_frame_id", (), reading)
-    position, rotation = read_rigid(message, _TRANSFORM, reading)
-    stamp_ns = within(("timestamp",), _read_timestamp, message["timestamp"]) if "timestamp" in message else None
-    return parent, child, position, rotation, stamp_ns
-
-
 def _read_timestamp(value: Any) -> int:
     """Read {sec, nsec}, or a date with a zone, `2023-11-14T22:13:20.123456789Z`."""
     try:
@@ -202,7 +196,10 @@ def read_stamp(value: Any) -> int:
     stamp = as_mapping(value, "stamp as {sec, nanosec}")
     for names in STAMPS:
         if (*stamp,) == names or set(stamp) == set(names):
-            seconds, nanoseconds = (_whole(stamp, name) for name in names)
+            for name in names:
+                if not isinstance(stamp[name], str) or not re.fullmatch(_INTEGER, stamp[name]):
+                    raise Misfit(f"{name} must be a whole number, found {kind(stamp[name])}", (name,))
+            seconds, nanoseconds = (int(stamp[name]) for name in names)
             if problem := stamp_problem(seconds, nanoseconds, names):
                 raise problem
             return seconds * BILLION + nanoseconds
@@ -217,13 +214,6 @@ def stamp_problem(seconds: int, nanoseconds: int, names: tuple[str, str]) -> Mis
     if not 0 <= nanoseconds < BILLION:
         return Misfit(f"{names[1]} {nanoseconds} is beyond 0 .. 999999999", (names[1],))
     return None
-
-
-def _whole(stamp: dict[str, Any], key: str) -> int:
-    text = stamp[key]
-    if not isinstance(text, str) or not re.fullmatch(_INTEGER, text):
-        raise Misfit(f"{key} must be a whole number, found {kind(text)}", (key,))
-    return int(text)
 
 
 def whole_list(value: Any, what: str) -> list[Any]:

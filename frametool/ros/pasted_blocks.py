@@ -84,8 +84,13 @@ def in_grammar(
         return None
     values: list[Any] | None
     try:
-        values = _blocks(text) or _gazebo(text) or _published(source, normalize=normalize)
-        values = values or _unless_grammar(source, default, points=points)
+        values = _blocks(text)
+        if not values and (gazebo := _GAZEBO.findall(text)):
+            if len(gazebo) > 1:  # its links and their inertias are printed with it
+                what = f"Gazebo printed {len(gazebo)} poses; `gz model -m NAME -p` prints the model's alone"
+                raise ValueInvalid(what)
+            values = [{"xyz": re.split(r"[ |]+", xyz), "rpy_rad": re.split(r"[ |]+", rpy)} for xyz, rpy in gazebo]
+        values = values or _published(source, normalize=normalize) or _unless_grammar(source, default, points=points)
     except ValueInvalid as error:
         raise FormatError(str(error), source=source.name) from error
     if values is not None:
@@ -96,7 +101,8 @@ def in_grammar(
 def _unless_grammar(source: Source, default: Notation | None, *, points: bool) -> list[Any] | None:
     """Return the values of pasted numbers; of JSON only what the grammar would refuse."""
     read = parse_json(source) if looks_like_json(source.text) else None
-    has_matrix = read is not None and not {*map(_size, read)}.isdisjoint({(3, 3), (4, 4)})
+    lists = (each for each in read or () if type(each) is list and each and type(each[0]) is list)
+    has_matrix = any((len(each), len(each[0])) in ((3, 3), (4, 4)) for each in lists)
     if (points and read is not None) or (has_matrix and default is None):
         return None
     try:
@@ -105,12 +111,6 @@ def _unless_grammar(source: Source, default: Notation | None, *, points: bool) -
         if has_matrix:
             return None
         raise
-
-
-def _size(value: Any) -> tuple[int, int]:
-    """Count the rows of a list, and what is in the first."""
-    is_rows = type(value) is list and value and type(value[0]) is list
-    return (len(value), len(value[0])) if is_rows else (0, 0)
 
 
 def _blocks(text: str) -> list[Any]:
@@ -132,14 +132,6 @@ def _blocks(text: str) -> list[Any]:
                 raise ValueInvalid(f"expected a list of numbers, found {shown(line)}")
             values[-1][key] = numbers[1].replace(",", " ").split()
     return values
-
-
-def _gazebo(text: str) -> list[Any]:
-    """Read the pose of a model; raises ValueInvalid if its links and their inertias are printed with it."""
-    found = _GAZEBO.findall(text)
-    if len(found) > 1:
-        raise ValueInvalid(f"Gazebo printed {len(found)} poses; `gz model -m NAME -p` prints the model's alone")
-    return [{"xyz": re.split(r"[ |]+", xyz), "rpy_rad": re.split(r"[ |]+", rpy)} for xyz, rpy in found]
 
 
 def _published(source: Source, *, normalize: bool) -> list[Any]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from frametool.documents.source import InputFile, Source
 from frametool.errors import FormatError, ValueInvalid, shown
@@ -45,12 +45,28 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
 
     Raises ValueInvalid.
     """
-    poses = [result.pose for result in results]
-    text = "".join(f"{_line(pose, style)}\n" for pose in poses)
-    different = {(pose.name, pose.parent, pose.components): pose.name for pose in poses}
+    from shlex import quote
+
+    lines, different = [], dict[Any, str]()
+    angles = bool(style.notations) and style.notations[0].representation.name == "rpy"
+    names = WITH_ANGLES if angles else WITH_QUATERNION
+    for pose in (result.pose for result in results):
+        if not pose.name or not pose.parent:
+            raise ValueInvalid(f"{CALL} needs the names of both frames; give name: and parent:")
+        for name in (pose.parent, pose.name):
+            if not name.isprintable() or (style.format == "static1" and any(map(str.isspace, name))):
+                raise ValueInvalid(f"frame {name!r} cannot be written in {style.format}: it could not be read back")
+        numbers = rotation_numbers(pose, notation("rpy_rad" if angles else "quaternion"), style)
+        cells = [*map(style.number, (*pose.components[:3], *numbers)), quote(pose.parent), quote(pose.name)]
+        flags = dict(zip((*XYZ, *(RPY if angles else QUATERNION), *FRAMES), cells, strict=True))
+        if style.format == "static1":
+            lines.append(" ".join(flags[name] for name in names))
+        else:
+            lines.append(" ".join(f"--{name} {cell}" for name, cell in flags.items()))
+        different[pose.name, pose.parent, pose.components] = pose.name
     if moving := [name for name, count in Counter(different.values()).items() if count > 1]:
-        raise ValueInvalid(moving_frames(map(str, moving)))
-    return text
+        raise ValueInvalid(moving_frames(moving))
+    return "".join(f"{line}\n" for line in lines)
 
 
 def moving_frames(names: Iterable[str]) -> str:
@@ -61,23 +77,6 @@ def moving_frames(names: Iterable[str]) -> str:
 def write_tree(tree: Frames, style: Style) -> str:
     """Return one line per edge."""
     return write_poses(edge_results(tree), style)
-
-
-def _line(pose: Pose, style: Style) -> str:
-    from shlex import quote
-
-    if not pose.name or not pose.parent:
-        raise ValueInvalid(f"{CALL} needs the names of both frames; give name: and parent:")
-    for name in (pose.parent, pose.name):
-        if not name.isprintable() or (style.format == "static1" and any(map(str.isspace, name))):
-            raise ValueInvalid(f"frame {name!r} cannot be written in {style.format}: it could not be read back")
-    angles = bool(style.notations) and style.notations[0].representation.name == "rpy"
-    numbers = rotation_numbers(pose, notation("rpy_rad" if angles else "quaternion"), style)
-    cells = [*map(style.number, (*pose.components[:3], *numbers)), quote(pose.parent), quote(pose.name)]
-    flags = dict(zip((*XYZ, *(RPY if angles else QUATERNION), *FRAMES), cells, strict=True))
-    if style.format == "static1":
-        return " ".join(flags[name] for name in (WITH_ANGLES if angles else WITH_QUATERNION))
-    return " ".join(f"--{name} {cell}" for name, cell in flags.items())
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
@@ -137,23 +136,18 @@ def read_words(words: Sequence[str], reading: Reading) -> Pose:
     if words[-1:] == ["&"]:  # a script starts the tool in the background
         del words[-1]
     words = [word for word in words if ":=" not in word]  # remappings such as __name:=camera
-    if any(word.startswith("--") for word in words):
-        return read_flags(_flags(words), reading)
-    return read_positional(words, reading)
-
-
-def _flags(words: Sequence[str]) -> dict[str, str]:
-    """Return the flags and their values, `--x 1` or `--x=1`."""
-    found: dict[str, str] = {}
+    if not any(word.startswith("--") for word in words):
+        return read_positional(words, reading)
+    flags: dict[str, str] = {}
     rest = iter(words)
     for word in rest:
         name, equals, value = word.removeprefix("--").partition("=")
         if not word.startswith("--") or name not in FLAGS:
             raise ValueInvalid(f"unknown argument {shown(word)}; the flags are --{', --'.join(FLAGS)}")
-        found[name] = value if equals else next(rest, "")
-        if not found[name]:
+        flags[name] = value if equals else next(rest, "")
+        if not flags[name]:
             raise ValueInvalid(f"not enough arguments for --{name}")
-    return found
+    return read_flags(flags, reading)
 
 
 def read_flags(flags: dict[str, str], reading: Reading) -> Pose:

@@ -21,7 +21,7 @@ from frametool.errors import (
 from frametool.formats.load import FrameFile, Rules, load_sources
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.grammar.edges import Edge, Options, stop
-from frametool.recordings.copy import MOST_NAMED, MOVED_TYPES, STATIC, EdgePlan, MessageMover, RecordedEdges, replaced
+from frametool.recordings.copy import MOST_NAMED, MOVED_TYPES, STATIC, EdgePlan, MessageMover, RecordedEdges, put
 from frametool.recordings.messages import TYPES, RawTransform, recorded_edges
 from frametool.recordings.read import ITSELF, SERIALIZED, Recorded, broken, read_metadata, typestore
 from frametool.recordings.write import KINDS, SECONDS_ROS2, RecordingFile, new_channel, serialised
@@ -95,25 +95,35 @@ class RecordRun:
         Raises FormatError for a recording that is not whole and a topic that cannot be moved, BadTopology for edges
         that do not fit, LookupFailed for a frame that is not there and a window without messages.
         """
-        request = self.request
+        request, reader = self.request, self.reader
         self._read_all(advance)
         self._check_topics()
         if request.window and not self.inside:
             there = f"they are logged from {' to '.join(map(format_stamp, self.span))}" if self.span else "it has none"
             raise NoDataAt(f"{self.path}: no messages from {' to '.join(map(format_stamp, request.window))}; {there}")
-        if request.tree is not None or request.into:
-            self._refuse_others()
+        others = [each for each in reader.all if each not in reader.channels]
+        for each in others if request.tree is not None or request.into else ():
+            if each.type.replace(".", "/").rpartition("/")[2].startswith(OTHER_TRANSFORMS):  # as protobuf's
+                raise FormatError(f"{each.topic} holds {each.type}: no transforms of recordings", source=self.path)
+            if each.encoding == "ros1":
+                raise FormatError("messages of ROS 1 in MCAP are only copied, not read", source=self.path)
         if request.tree is not None:
             self.plan = self.edges.plan(request.tree, replace=request.replace)
             for root in self.plan.apart:
                 near = did_you_mean(root, self.edges.frames)
                 warn(f"{self.path}: frame {shown(root)} is in none of its transforms{near}")
-        if request.into:
-            types = self.reader.types
-            self.mover = MessageMover(self._frames(), request.into, types, normalize=request.normalize)
+        if request.into:  # by all transforms as they are in the copy
+            more = [*chain.from_iterable(self.plan.added.values()), *self.plan.replaced]
+            used = [each for each in self.used if self.counts[each]]
+            if not more and not used:
+                raise FormatError("no transforms in it; --with FILE brings some", source=self.path)
+            source = TransformsOfCopy(reader, used, self.transform_topics, more)
+            frames = load_sources([source], Rules(normalize=request.normalize))
+            self.mover = MessageMover(frames, request.into, reader.types, normalize=request.normalize)
 
     def _read_all(self, advance: Advance) -> None:
-        """Read everything; raises FormatError if the recording is not complete."""
+        """Count the messages, and collect the edges; raises FormatError if the recording is not complete."""
+        used = self.used if self.request.tree is not None else ()
         for channel, log_ns, data, *_ in self._messages(advance):
             self.counts[channel] += 1
             first, last = self.span or (log_ns, log_ns)
@@ -123,11 +133,8 @@ class RecordRun:
                 self.first_ns = log_ns if self.first_ns is None else min(self.first_ns, log_ns)
                 self.outside += not is_inside
             self.inside += is_inside
-            self._see(channel, data)
-
-    def _see(self, channel: Channel, data: bytes) -> None:
-        """Collect the edges of a message of transforms."""
-        if self.request.tree is not None and channel in self.used:
+            if channel not in used:
+                continue
             try:
                 found = self.reader.types.read(channel, data).transforms
             except ValueInvalid as error:
@@ -149,42 +156,6 @@ class RecordRun:
             movable = sorted({each.topic for each in self.reader.all if each.type in MOVED_TYPES})
             remedy = f"--topic {first_of(movable, MOST_NAMED, gap='|')}" if movable else f"none of them is {MOVES}"
             raise Misused(f"--into moves the messages of topics that are named; {remedy}", source=self.path)
-
-    def _refuse_others(self) -> None:
-        """Raise FormatError for transforms that cannot be read here, as protobuf's or ROS 1's in MCAP."""
-        for each in (one for one in self.reader.all if one not in self.reader.channels):
-            if each.type.replace(".", "/").rpartition("/")[2].startswith(OTHER_TRANSFORMS):
-                raise FormatError(f"{each.topic} holds {each.type}: no transforms of recordings", source=self.path)
-            if each.encoding == "ros1":
-                raise FormatError("messages of ROS 1 in MCAP are only copied, not read", source=self.path)
-
-    def _frames(self) -> Frames:
-        """Return all transforms as they are in the copy."""
-        more = [*chain.from_iterable(self.plan.added.values()), *self.plan.replaced]
-        used = [each for each in self.used if self.counts[each]]
-        if not more and not used:
-            raise FormatError("no transforms in it; --with FILE brings some", source=self.path)
-        source = TransformsOfCopy(self.reader, used, self.transform_topics, more)
-        return load_sources([source], Rules(normalize=self.request.normalize))
-
-    def _changed(self, channel: Channel, data: bytes) -> bytes | None:
-        """Return a message as it is in the copy; None for one that is left out."""
-        if self.plan.replaced and channel in self.used:
-            return self._replaced(channel, data)
-        if self.mover and channel in self.named:
-            return self._moved(self.mover, channel, data)
-        return data
-
-    def _replaced(self, channel: Channel, data: bytes) -> bytes:
-        """Return a message of transforms with the new values of edges."""
-        edges, types = {edge.child: edge for edge in self.plan.replaced}, self.reader.types
-        if not any(name.encode() in data for name in edges):
-            return data
-        message = types.read(channel, data)
-        if not replaced(message, edges, self.edges.names.bare):
-            return data
-        self.rewritten += 1
-        return types.write(channel, message)
 
     def _moved(self, mover: MessageMover, channel: Channel, data: bytes) -> bytes | None:
         """Return a message in the other frame; one that cannot be moved is an error, or left out."""
@@ -222,58 +193,53 @@ class RecordRun:
 
         folder: for temporary files while it is written
         """
-        files, first_ns = self.reader.files, self.first_ns or 0
+        reader, first_ns = self.reader, self.first_ns or 0
+        files, channels, ros1 = reader.files, reader.all, reader.is_ros1
         stamp_ns = first_ns if first_ns // BILLION <= SECONDS_ROS2[1] else 0
-        for each in self.reader.all:
-            if each.schema is None and each.type:
-                self._define(each)
+        for each in (one for one in channels if one.schema is None and one.type):  # is it in ROS 2 Humble?
+            store = typestore(ros1=False)
+            is_known = self.undefined[each.type] = each.type in store.types
+            text = store.generate_msgdef(each.type, ros_version=2)[0] if is_known else ""
+            each.schema = each.type, "ros2msg" if is_known else "", text.encode()
         file = RecordingFile(fmt, folder, files[0].compression, head=files[0].head)
         for topic, edges in self.plan.added.items():
-            channel = self._latched(topic)
+            # a new channel in a ROS 1 bag even if there is one: players keep only the last message of each
+            same = [each for each in reader.channels if (each.topic, each.type) == (topic, TF_STATIC.type)]
+            channel = same[0] if same and not ros1 else new_channel(TF_STATIC, topic, ros1=ros1, like=channels)
             file.begin([channel])
             data = serialised(TF_STATIC, fmt, [(stamp_ns, (edge.parent, edge.child), edge.numbers) for edge in edges])
             file.add([Recorded(channel, first_ns, data, first_ns)])
-        file.begin(self.reader.all)
+        file.begin(channels)
         file.add(self._copied(advance))
+        said: dict[str, Any] | None = None  # the metadata of rosbag2 about an MCAP file
         with broken(self.path):
-            said = self._others(file)
-            yield from file.pieces(said or self.reader.metadata, itself=said is not None)
-
-    def _copied(self, advance: Advance) -> Iterator[Recorded]:
-        """Yield the messages of the copy."""
-        for message in self._messages(advance):
-            if self._is_inside(message.log_ns) or message.channel.is_static:
-                copied = self._changed(message.channel, message.data)
-                if copied is not None:
-                    yield message._replace(data=copied)
-
-    def _others(self, file: RecordingFile) -> dict[str, Any] | None:
-        """Copy attachments and metadata of MCAP; return the metadata of rosbag2 in them, or None."""
-        said = None
-        for source in self.reader.files:
-            for other in source.others() if hasattr(source, "others") else ():
+            for other in chain.from_iterable(each.others() for each in files if hasattr(each, "others")):
                 if getattr(other, "metadata", None) is not None and other.name == ITSELF:
                     said = read_metadata(other.metadata.get(SERIALIZED, ""), self.path)
                 else:
                     file.add_other(other)
-        return said
+            yield from file.pieces(said or reader.metadata, itself=said is not None)
 
-    def _define(self, channel: Channel) -> None:
-        """Define a type that the recording does not define as ROS 2 Humble does, if possible."""
-        store = typestore(ros1=False)
-        is_known = channel.type in store.types
-        self.undefined[channel.type] = is_known
-        text = store.generate_msgdef(channel.type, ros_version=2)[0] if is_known else ""
-        channel.schema = channel.type, "ros2msg" if is_known else "", text.encode()
-
-    def _latched(self, topic: str) -> Channel:
-        """Return a channel of static transforms: that of the recording, or a new one.
-
-        In a ROS 1 bag it is always new, because players keep only the last message of each.
-        """
-        ros1 = self.reader.is_ros1
-        same = [each for each in self.reader.channels if (each.topic, each.type) == (topic, TF_STATIC.type)]
-        return same[0] if same and not ros1 else new_channel(TF_STATIC, topic, ros1=ros1, like=self.reader.all)
+    def _copied(self, advance: Advance) -> Iterator[Recorded]:
+        """Yield the messages of the copy: with new values of edges, or in another frame; some are left out."""
+        edges, types, bare = {edge.child: edge for edge in self.plan.replaced}, self.reader.types, self.edges.names.bare
+        for message in self._messages(advance):
+            channel, data = message.channel, message.data
+            if not (self._is_inside(message.log_ns) or channel.is_static):
+                continue
+            if channel in self.used and any(name.encode() in data for name in edges):
+                found = types.read(channel, data)
+                named = [(edges.get(bare(each.child_frame_id)), each.transform) for each in found.transforms]
+                for edge, part in named:
+                    if edge is not None:
+                        put(part.translation, edge.numbers[:3])
+                        put(part.rotation, edge.numbers[3:])
+                if any(edge for edge, _ in named):
+                    self.rewritten += 1
+                    data = types.write(channel, found)
+            new = self._moved(self.mover, channel, data) if self.mover and channel in self.named else data
+            if new is not None:
+                yield message._replace(data=new)
 
     def summary(self) -> Iterator[str]:
         """Yield a sentence for each thing that was done or not needed."""

@@ -78,7 +78,7 @@ class RecordingWriter:
         self.dropped |= dict.fromkeys(name for name in block.extras if name not in used)
         refuse_scale_in(self.style.format, self.dropped)
         frames = self._frames(block)
-        numbers = self._places(block) if "fix" in self.kinds else self._numbers(block)
+        numbers = self._numbers(block)
         channels = {name: self.file.channel(name, self.style.recording.topic) for name in self.kinds}
         if channels.pop("path", None):
             self.path += [(frames[0][0], stamps, numbers)]
@@ -90,9 +90,15 @@ class RecordingWriter:
 
     def end(self) -> Iterator[bytes]:
         """Yield the recording, and warn of what was left out or made up."""
-        if self.path:
-            self._write_path()
         fmt = self.style.format
+        if self.path:  # all poses in one message, at the last stamp
+            parents = {parent for parent, _, _ in self.path}
+            if len(parents) > 1:
+                raise ValueInvalid(f"a path is seen from one frame, the poses from {listing(parents)}")
+            rows = (zip(stamps.tolist(), poses.tolist(), strict=True) for _, stamps, poses in self.path)
+            samples = [(stamp, (min(parents), ""), pose) for each in rows for stamp, pose in each]
+            data = serialised(KINDS["path"], fmt, samples)
+            self.file.write([(self.file.channel("path", self.style.recording.topic), samples[-1][0], data)])
         if not self.is_named:
             warn(f"{fmt}: nothing names the frame that the rows are seen from; {FRAMES[0]!r} is written")
         if self.lost:
@@ -123,7 +129,19 @@ class RecordingWriter:
         return [(parents[at] or parent, names[at] or child) for at in range(size)]
 
     def _numbers(self, block: RowPoses) -> Floats:
-        """Return position and quaternion, or a point, of each row as they are written."""
+        """Return position and quaternion, a point, or lat, lon, alt, of each row as they are written.
+
+        Places are as they were read where nothing changed them.
+        """
+        if "fix" in self.kinds:
+            if not {*block.parents} <= {*EARTH_FRAMES}:
+                others = listing(each or "no frame" for each in block.parents if each not in EARTH_FRAMES)
+                raise ValueInvalid(f"a fix is a place on the Earth: of rows in ecef, found {others}")
+            self.dropped |= dict.fromkeys(["rotation"] * (self.kind == POSE))
+            if block.read is not None:
+                return block.read + 0.0
+            x, y, z = (np.ascontiguousarray(column) for column in block.numbers.T[:3])
+            return np.column_stack(earth.lla(x, y, z, arrays)) + 0.0
         numbers = block.numbers[:, : 7 if self.kind == POSE else 3]
         if self.kind == POSE and not self.placed:
             numbers = np.column_stack([np.zeros((len(numbers), 3)), numbers[:, :4]])
@@ -134,17 +152,6 @@ class RecordingWriter:
             x, y, z, w = quaternion.unit(x, y, z, w, arrays)
             numbers = np.column_stack([numbers[:, :3], *quaternion.from_quaternion(x, y, z, w, arrays)])
         return numbers + 0.0  # none is -0.0
-
-    def _places(self, block: RowPoses) -> Floats:
-        """Return lat, lon, alt of each row, as they were read where nothing changed them."""
-        if not {*block.parents} <= {*EARTH_FRAMES}:
-            others = listing(each or "no frame" for each in block.parents if each not in EARTH_FRAMES)
-            raise ValueInvalid(f"a fix is a place on the Earth: of rows in ecef, found {others}")
-        self.dropped |= dict.fromkeys(["rotation"] * (self.kind == POSE))
-        if block.read is not None:
-            return block.read + 0.0
-        x, y, z = (np.ascontiguousarray(column) for column in block.numbers.T[:3])
-        return np.column_stack(earth.lla(x, y, z, arrays)) + 0.0
 
     def _messages(
         self, name: str, frames: Sequence[tuple[str, str]], stamps: Ints, numbers: Floats
@@ -160,12 +167,3 @@ class RecordingWriter:
             made |= zip(rows, filled(KINDS[name], self.style.format, each, stamps[rows], numbers[rows]), strict=True)
         return [made[row] for row in range(len(frames))]
 
-    def _write_path(self) -> None:
-        """Write all poses in one message, at the last stamp."""
-        parents = {parent for parent, _, _ in self.path}
-        if len(parents) > 1:
-            raise ValueInvalid(f"a path is seen from one frame, the poses from {listing(parents)}")
-        rows = (zip(stamps.tolist(), poses.tolist(), strict=True) for _, stamps, poses in self.path)
-        samples = [(stamp, (min(parents), ""), pose) for each in rows for stamp, pose in each]
-        data = serialised(KINDS["path"], self.style.format, samples)
-        self.file.write([(self.file.channel("path", self.style.recording.topic), samples[-1][0], data)])
