@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import frametool
-from frametool.formats.rows.arrow import codec_in
+from frametool.formats.rows.arrow import CODECS
 
 pa = pytest.importorskip("pyarrow")
 pq = pytest.importorskip("pyarrow.parquet")
@@ -169,7 +169,8 @@ def test_the_schema_that_parquet_itself_has_stays(use: Use, options: dict[str, A
 def test_batches_and_their_compression_stay(use: Use, codec: str | None) -> None:
     data = encoded(cloud(), "arrow", codec=codec)
     made = use("apply", "--transform", POSE, data=data, form="arrow").data
-    assert codec_in(made) == codec_in(data) == codec
+    for each in (made, data):
+        assert [name for magic, name in CODECS.items() if magic in each] == ([codec] if codec else [])
     reader = ipc.open_file(io.BytesIO(made))
     assert [reader.get_batch(at).num_rows for at in range(reader.num_record_batches)] == [16, 16, 8]
 

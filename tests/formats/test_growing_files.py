@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
+from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from frametool.documents.source import InputFile
 from frametool.formats.load import FrameFile
 from frametool.formats.rows.ply import read_head
 from frametool.grammar.edges import Answers
@@ -87,6 +89,6 @@ def test_the_head_of_a_cloud_costs_work_in_proportion_to_its_size(entry: str, tm
     for count in (10, 1000, 2000):
         path = tmp_path / "a.ply"
         path.write_text("ply\nformat ascii 1.0\nelement vertex 1\n" + "".join(map(entry.format, range(count))) + "end_header\n")
-        with path.open("rb") as stream:
-            work.append(calls_of(lambda stream=stream: read_head(stream, "a.ply")))  # type: ignore[misc]
+        with closing(InputFile(path)) as file:
+            work.append(calls_of(lambda file=file: read_head(file)))  # type: ignore[misc]
     assert work[2] < 2.3 * work[1]

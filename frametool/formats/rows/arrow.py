@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from frametool.formats.rows.column_file import Kind, Made, OutColumn
     from frametool.grammar.result import Style
-    from frametool.text.spans import Flags, Ints
+    from frametool.text.spans import Flags, Floats, Ints
 
 
 # number types in Arrow's notation -> in numpy's
@@ -110,10 +110,10 @@ class ArrowBatch(column_file.Batch):
         self.size = int(rows.num_rows)
         self.bytes_read, self.ends_group = bytes_read, ends_group
 
-    def numbers(self, place: int) -> column_file.ColumnNumbers:
-        """Return a column as floats, nan for null."""
+    def numbers(self, place: int) -> tuple[Floats, Flags | None]:
+        """Return a column as floats, nan for null, and the null mask."""
         column = self.rows.column(place)
-        return column_file.ColumnNumbers(column.to_numpy(zero_copy_only=False).astype(np.float64), nulls_of(column))
+        return column.to_numpy(zero_copy_only=False).astype(np.float64), nulls_of(column)
 
     def stamps(self, place: int, *, in_ns: int) -> tuple[Ints, dict[int, str]]:
         """Return a column as nanoseconds, and why rows have none: timestamps, integers by name, float seconds."""
@@ -182,33 +182,38 @@ class ArrowFile(column_file.ColumnFile):
 
     gaps = False
 
-    def __init__(self, file: InputFile, fmt: str) -> None:
-        """Read the schema; raises FormatError."""
-        self.name = file.name
-        self.format = fmt
+    def __init__(self, file: InputFile) -> None:
+        """Read the schema; raises FileProblem without pyarrow, FormatError for a broken file."""
+        pa, head, self.name = require_pyarrow(file.name), file.head(), file.name
+        self.format = next((fmt for begin, fmt in BEGINNINGS.items() if head.startswith(begin)), "")
+        if not self.format:
+            found = f"it begins with {shown(head[:8])}" if head else "it is empty"
+            raise file.error(f"neither Parquet (PAR1) nor Arrow (ARROW1): {found}")
+        self.codec = next((codec for magic, codec in CODECS.items() if magic in head), None)
         with column_file.translated(self.name):
-            codec = codec_in(file.head())
-            self.source = self._random_access(file)
-            self.reader: IpcReader | ParquetReader
-            self.reader = ParquetReader(self.source, file.name) if fmt == "parquet" else IpcReader(self.source, codec)
-            self.schema = self.reader.schema
+            if file.path != "-" and os.path.isfile(file.path):
+                self.source = pa.OSFile(file.path)
+            else:  # a pipe is first copied to an unnamed file
+                stream = column_file.seekable(file, self)
+                stream.seek(0)
+                self.source = pa.PythonFile(stream, mode="r")
+            if self.format == "parquet":
+                parquet = require_pyarrow(self.name, "parquet")
+                self.reader = parquet.ParquetFile(self.source, pre_buffer=False, buffer_size=BUFFER)
+                self.schema = self.reader.schema_arrow
+                if self.reader.metadata.num_row_groups:  # raises for a damaged group, where reading it would abort
+                    next(self.reader.iter_batches(1, [0]), None)
+            else:
+                self.reader = require_pyarrow("Arrow", "ipc").open_file(self.source)
+                self.schema = self.reader.schema
             self.names: tuple[str, ...] | None = tuple(self.schema.names)
         self.width = len(self.schema.names)
         self.kinds = [kind_of(field.type) for field in self.schema]
 
-    def _random_access(self, file: InputFile) -> Any:
-        """Return a source with random access; a pipe is first copied to an unnamed file."""
-        pa = require_pyarrow(self.name)
-        if file.path != "-" and os.path.isfile(file.path):
-            return pa.OSFile(file.path)
-        stream = column_file.seekable(file, self)
-        stream.seek(0)
-        return pa.PythonFile(stream, mode="r")
-
     def batches(self) -> Iterator[ArrowBatch]:
         """Yield the rows, and close the file; raises FormatError if it is broken."""
         with self.source:  # a thread of pyarrow may hold it longer than its reader
-            found = self.reader.batches()
+            found = self._parquet() if self.format == "parquet" else self._arrow()
             while True:
                 with column_file.translated(self.name):
                     batch = next(found, None)
@@ -217,28 +222,8 @@ class ArrowFile(column_file.ColumnFile):
                 yield batch
                 batch.rows = None  # before the next are read
 
-    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> GroupWriter:
-        """Return a writer with the same schema and compression; the output may be the other Arrow format."""
-        del drops
-        fmt = style.format if style.format in BEGINNINGS.values() else self.format
-        return GroupWriter(fmt, columns, self.schema, self.reader.encoding() if fmt == self.format else {})
-
-
-class IpcReader:
-    """Reads a file of Arrow: batches of rows, with a directory at its end (Feather)."""
-
-    def __init__(self, source: Any, codec: str | None) -> None:
-        """Read the schema."""
-        self.codec = codec
-        self.reader = require_pyarrow("Arrow", "ipc").open_file(source)
-        self.schema = self.reader.schema
-
-    def encoding(self) -> dict[str, Any]:
-        """Return the arguments of the writer for the same compression."""
-        return {"compression": self.codec}
-
-    def batches(self) -> Iterator[ArrowBatch]:
-        """Yield the rows."""
+    def _arrow(self) -> Iterator[ArrowBatch]:
+        """Yield the rows of a file of Arrow: batches of rows, with a directory at its end (Feather)."""
         for group in range(self.reader.num_record_batches):
             rows = self.reader.get_batch(group)
             rows.validate(full=True)  # broken data would end the process later
@@ -247,52 +232,38 @@ class IpcReader:
                 yield ArrowBatch(part, bytes_of(part), ends_group=start + AT_ONCE >= rows.num_rows)
             del rows, part  # before the next are read
 
-
-class ParquetReader:
-    """Reads a file of Parquet."""
-
-    def __init__(self, source: Any, name: str) -> None:
-        """Read the schema."""
-        self.name = name
-        parquet = require_pyarrow(name, "parquet")
-        self.file = parquet.ParquetFile(source, pre_buffer=False, buffer_size=BUFFER)
-        self.about = self.file.metadata
-        if self.about.num_row_groups:
-            next(self.file.iter_batches(1, [0]), None)  # raises for a damaged group, where reading it would abort
-        self.schema = self.file.schema_arrow
-
-    def batches(self) -> Iterator[ArrowBatch]:
-        """Yield the rows, group by group."""
-        groups = [self.about.row_group(at) for at in range(self.about.num_row_groups)]
+    def _parquet(self) -> Iterator[ArrowBatch]:
+        """Yield the rows of a file of Parquet, group by group."""
+        groups = [self.reader.metadata.row_group(at) for at in range(self.reader.metadata.num_row_groups)]
         if any(group.total_byte_size > sizes.GROUP for group in groups):
             warn(f"{self.name}: groups of rows beyond {sizes.GROUP >> 20} MiB are written in parts")
         for at, group in enumerate(groups):
             left = group.num_rows
             share = sum(group.column(place).total_compressed_size for place in range(group.num_columns)) / max(left, 1)
-            for rows in self.file.iter_batches(AT_ONCE, [at]) if left else [empty_rows(self.schema)]:
+            for rows in self.reader.iter_batches(AT_ONCE, [at]) if left else [empty_rows(self.schema)]:
                 left -= rows.num_rows
                 yield ArrowBatch(rows, int(share * rows.num_rows), ends_group=left <= 0)
                 del rows  # before the next are read
 
-    def encoding(self) -> dict[str, Any]:
-        """Return the compression and encoding of the columns, as arguments of pyarrow's writer."""
-        if not self.about.num_row_groups:
-            return {}
-        group = self.about.row_group(0)
-        columns = [group.column(at) for at in range(group.num_columns)]
-        codecs = {column.path_in_schema: column.compression.replace("UNCOMPRESSED", "NONE") for column in columns}
-        return {
-            "compression": codecs,
-            "use_dictionary": [column.path_in_schema for column in columns if _repeats(column)],
-            "use_deprecated_int96_timestamps": any(column.physical_type == "INT96" for column in columns),
-            "use_compliant_nested_type": not any(OLD_LIST in column.path_in_schema for column in columns),
-            "store_schema": OWN_SCHEMA in (self.about.metadata or {}),
-        }
-
-
-def codec_in(data: bytes) -> str | None:
-    """Return the compression of the first batch of Arrow, by its magic number; None for none in these bytes."""
-    return next((codec for magic, codec in CODECS.items() if magic in data), None)
+    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> GroupWriter:
+        """Return a writer with the same schema and compression; the output may be the other Arrow format."""
+        del drops
+        fmt = style.format if style.format in BEGINNINGS.values() else self.format
+        how: dict[str, Any] = {}  # arguments of pyarrow's writer
+        if fmt == self.format == "arrow":
+            how = {"compression": self.codec}
+        elif fmt == self.format and self.reader.metadata.num_row_groups:
+            group = self.reader.metadata.row_group(0)
+            stored = [group.column(at) for at in range(group.num_columns)]
+            codecs = {each.path_in_schema: each.compression.replace("UNCOMPRESSED", "NONE") for each in stored}
+            how = {
+                "compression": codecs,
+                "use_dictionary": [each.path_in_schema for each in stored if _repeats(each)],
+                "use_deprecated_int96_timestamps": any(each.physical_type == "INT96" for each in stored),
+                "use_compliant_nested_type": not any(OLD_LIST in each.path_in_schema for each in stored),
+                "store_schema": OWN_SCHEMA in (self.reader.metadata.metadata or {}),
+            }
+        return GroupWriter(fmt, columns, self.schema, how)
 
 
 def _repeats(column: Any) -> bool:
@@ -338,12 +309,21 @@ class Collected(BytesIO):
 class GroupWriter:
     """Collects rows until a group is complete: one of Parquet, or a batch of Arrow."""
 
-    def __init__(self, fmt: str, columns: Sequence[OutColumn], of_input: Any | None, how: dict[str, Any]) -> None:
+    def __init__(self, fmt: str, columns: Sequence[OutColumn], of_input: Any, how: dict[str, Any]) -> None:
         """Store the columns of the result, the schema of the input if it has one, and its encoding."""
         self.pa = require_pyarrow("Arrow")
         self.format, self.columns, self.how = fmt, columns, how
         self.sink = Collected()
-        fields = [self._field(column, of_input) for column in columns]
+        fields = []
+        for column in columns:
+            own = [] if column.passed is None else [column.passed]
+            if of_input is not None and not own:  # it may replace one
+                own = of_input.get_all_field_indices(column.name)
+            if own:
+                fields.append(of_input.field(own[0]))
+            else:
+                kind = self.pa.string() if column.kind is None else self.pa.from_numpy_dtype(column.kind)
+                fields.append(self.pa.field(column.name, kind, metadata=IS_JSON if column.is_json else None))
         self.schema = self.pa.schema(fields, metadata=None if of_input is None else of_input.metadata)
         self.writer: Any = None
         self.waiting: list[Any] = []
@@ -351,11 +331,18 @@ class GroupWriter:
 
     def of_rows(self, batch: Any, rows: Ints | None, made: Sequence[Made]) -> bytes:
         """Return the bytes written once a group of rows is complete."""
-        new = self._rows(batch, rows, made)
-        self.waiting.append(new)
-        self.size += bytes_of(new)
-        self.count += new.num_rows
-        self.read += new.num_rows if batch is None else batch.size
+        new, arrays = iter(made), []
+        for column, field in zip(self.columns, self.schema, strict=True):
+            if column.passed is None or batch is None:
+                arrays.append(self._made(next(new), field))
+            else:
+                passed = batch.rows.column(column.passed)
+                arrays.append(passed if rows is None else passed.take(self.pa.array(rows)))
+        found = self.pa.RecordBatch.from_arrays(arrays, schema=self.schema)
+        self.waiting.append(found)
+        self.size += bytes_of(found)
+        self.count += found.num_rows
+        self.read += found.num_rows if batch is None else batch.size
         ends = batch.ends_group if batch is not None else self.count >= NEW_GROUP
         if ends or self.size > sizes.GROUP:
             self._write_group()
@@ -367,27 +354,6 @@ class GroupWriter:
             self._write_group()
         self.writer.close()
         yield self.sink.taken()
-
-    def _field(self, column: OutColumn, of_input: Any | None) -> Any:
-        """Return the field of a column: that of the input if it is unchanged or replaced."""
-        if of_input is not None:
-            replaced = of_input.get_all_field_indices(column.name) if column.passed is None else [column.passed]
-            if replaced:
-                return of_input.field(replaced[0])
-        kind = self.pa.string() if column.kind is None else self.pa.from_numpy_dtype(column.kind)
-        return self.pa.field(column.name, kind, metadata=IS_JSON if column.is_json else None)
-
-    def _rows(self, batch: ArrowBatch | None, rows: Ints | None, made: Sequence[Made]) -> Any:
-        """Return some rows of a batch as a RecordBatch, with the new columns."""
-        new = iter(made)
-        arrays = []
-        for column, field in zip(self.columns, self.schema, strict=True):
-            if column.passed is None or batch is None:
-                arrays.append(self._made(next(new), field))
-            else:
-                passed = batch.rows.column(column.passed)
-                arrays.append(passed if rows is None else passed.take(self.pa.array(rows)))
-        return self.pa.RecordBatch.from_arrays(arrays, schema=self.schema)
 
     def _made(self, made: Made, field: Any) -> Any:
         """Return a new column; raises ValueInvalid for a null that the schema does not allow."""
@@ -405,36 +371,24 @@ class GroupWriter:
         table = self.pa.Table.from_batches(self.waiting, self.schema)
         np.empty(HEADROOM * self.size + LEAST_ROOM, np.uint8)  # raises MemoryError, while pyarrow would end the process
         if self.writer is None:
-            self.writer = self._opened()
+            file, how = self.pa.PythonFile(self.sink, mode="w"), self.how
+            if self.format == "arrow":
+                ipc = require_pyarrow("Arrow", "ipc")
+                self.writer = ipc.new_file(file, self.schema, options=ipc.IpcWriteOptions(**how))
+            else:
+                if codecs := how.get("compression"):  # new columns are compressed as most columns of the input
+                    usual = Counter(codecs.values()).most_common(1)[0][0]
+                    how = {**how, "compression": {field.name: usual for field in self.schema} | codecs}
+                self.writer = require_pyarrow("Parquet", "parquet").ParquetWriter(file, self.schema, **how)
         if self.count or (self.waiting and not self.read):
             for batch in table.combine_chunks().to_batches() or [empty_rows(self.schema)]:
                 self.writer.write_batch(batch, *[max(batch.num_rows, 1)] * (self.format == "parquet"))
         self.waiting, self.size, self.count, self.read = [], 0, 0, 0
 
-    def _opened(self) -> Any:
-        """Return pyarrow's writer; in Parquet new columns are compressed as most columns of the input."""
-        file = self.pa.PythonFile(self.sink, mode="w")
-        if self.format == "arrow":
-            ipc = require_pyarrow("Arrow", "ipc")
-            return ipc.new_file(file, self.schema, options=ipc.IpcWriteOptions(**self.how))
-        how = self.how
-        if codecs := how.get("compression"):
-            usual = Counter(codecs.values()).most_common(1)[0][0]
-            how = {**how, "compression": {field.name: usual for field in self.schema} | codecs}
-        return require_pyarrow("Parquet", "parquet").ParquetWriter(file, self.schema, **how)
-
-
-def open_columns(file: InputFile) -> ArrowFile:
-    """Open a file of either format; raises FileProblem without pyarrow, FormatError for a broken file."""
-    require_pyarrow(file.name)
-    head = file.head()
-    fmt = next((fmt for begin, fmt in BEGINNINGS.items() if head.startswith(begin)), "")
-    if not fmt:
-        found = f"it begins with {shown(head[:8])}" if head else "it is empty"
-        raise file.error(f"neither Parquet (PAR1) nor Arrow (ARROW1): {found}")
-    return ArrowFile(file, fmt)
-
 
 def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> GroupWriter:
     """Return a writer for new rows."""
     return GroupWriter(style.format, columns, None, {})
+
+
+open_columns = ArrowFile

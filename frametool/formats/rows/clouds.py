@@ -14,12 +14,11 @@ Metres, in the frame of the lidar.  The file does not state which of the two it 
 from __future__ import annotations
 
 from functools import partial
-from itertools import chain
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
+from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.formats.rows import column_file
 from frametool.formats.table import FORMATS
 from frametool.grammar.readers import NORMALS
@@ -27,16 +26,17 @@ from frametool.text.cells import Cells, split_blank
 from frametool.text.lines import read_blocks
 from frametool.text.numbers import explain_number
 from frametool.text.parse import parse_floats
-from frametool.text.spans import MARGIN, Ints, Spans, framed, join
+from frametool.text.spans import MARGIN, Spans, framed, join
 from frametool.text.write import fixed_spans, rounded_to_single, shortest_spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-    from typing import BinaryIO
 
     from frametool.documents.source import InputFile
+    from frametool.errors import FormatError
     from frametool.formats.rows.column_file import Kind, Made, OutColumn
     from frametool.grammar.result import Style
+    from frametool.text.spans import Floats, Ints
 
 Code = TypeVar("Code")
 
@@ -47,48 +47,81 @@ _SINGLE = np.dtype("<f4")
 
 
 class CloudFile(column_file.RecordFile):
-    """The points of a file whose header has been read."""
+    """The points of a file whose header has been read: records, or rows of text.
+
+    at: in text, the positions of its columns among the `cells` numbers of a row; None for records
+    line: that of the next row of text, from 1
+    behind: what was read after the last point
+    header: from columns and a count to the header with changes, and everything before the points; raises ValueInvalid
+    record_with: from columns to the type of a point with these; raises ValueInvalid for what the format cannot hold
+    """
 
     vectors = NORMALS
     what = "points"  # in messages
-    text: TextRows | None = None
     is_last = True  # nothing follows the points
+    at: Sequence[int] | None = None
+    cells = line = 0
     behind = b""
     names: tuple[str, ...]
+    header: Callable[[Sequence[OutColumn], int], bytes]
+    record_with: Callable[[Sequence[OutColumn]], Kind]
 
     def batches(self) -> Iterator[column_file.Batch]:
         """Yield the points; raises FormatError if the file ends too early, or has more."""
-        if self.text is not None:
-            yield from self.text.batches()
-            self.behind = self.text.check_end() if self.is_last else b""
+        yield from super().batches() if self.at is None else self._rows_of_text(self.at)
+        if not self.is_last:
             return
-        yield from super().batches()
-        self.behind = self.file.stream.read(self.record.itemsize) if self.is_last else b""
-        if self.behind and len(self.behind) == self.record.itemsize:
-            raise self.file.error(f"the header says {self.count} {self.what}, more follow")
+        if self.at is None:
+            self.behind = self.file.stream.read(self.record.itemsize)
+            if self.behind and len(self.behind) == self.record.itemsize:
+                raise self.file.error(f"the header says {self.count} {self.what}, more follow")
+            return
+        blanks = [self.behind]
+        while not blanks[-1].strip() and (piece := self.file.stream.read(column_file.PIECE)):
+            blanks.append(piece)
+        if blanks[-1].strip():
+            more = f"the header says {self.count} points, more rows follow; correct the header"
+            raise self.file.error(more, self.line)
+        self.behind = b"".join(blanks)
+
+    def _rows_of_text(self, at: Sequence[int]) -> Iterator[TextBatch]:
+        """Yield the rows; raises FormatError for a row of another width, or if the file ends too early."""
+        left = self.count
+        for block in read_blocks(self.file.stream) if left else ():  # type: ignore[arg-type]
+            cells = split_blank(block, self.cells, comment=b"")
+            filled = np.flatnonzero(cells.counts)
+            if len(filled) > left:
+                end = int(cells.line_ends[filled[left - 1]]) - MARGIN
+                self.behind = block[end:]
+                cells = split_blank(block[:end], self.cells, comment=b"")
+            wrong = np.flatnonzero((cells.counts != self.cells) & (cells.counts != 0))
+            if wrong.size:
+                columns = " ".join(self.names[:8]) + " .." * (self.cells > 8)
+                found = f"expected {self.cells} numbers ({columns}), found {int(cells.counts[wrong[0]])}"
+                raise self.file.error(found, self.line + int(wrong[0]))
+            yield TextBatch(cells, self, at)
+            self.line += len(cells.counts)
+            left -= len(cells.rows)
+            if not left:
+                return
+        if left:
+            raise self.file.error(f"the header says {self.count} points, the file holds {self.count - left}")
 
     def rest(self) -> Iterator[bytes]:
         """Yield the rest of the file after the points."""
-        return iter((self.behind,))
-
-    def header(self, columns: Sequence[OutColumn], count: int) -> bytes:
-        """Return the header with changes, and everything before the points; raises ValueInvalid."""
-        raise NotImplementedError
-
-    def record_with(self, columns: Sequence[OutColumn]) -> Kind:
-        """Return the type of a point with other columns; raises ValueInvalid for what the format cannot hold."""
-        raise NotImplementedError
+        yield self.behind
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> column_file.CountedWriter:
         """Return a writer for a cloud of the same format."""
-        head, count = partial(self.header, columns), None if drops else self.count
-        if self.text is None:
+        encode: column_file.Encode = partial(encode_text, columns, style)
+        own, new = columns[: self.width], columns[self.width :]
+        if self.at is None:
             kind = self.record if same_columns(columns, self.width) else self.record_with(columns)
-            return column_file.CountedWriter(partial(column_file.encode_records, columns, kind), head, count, self.rest)
-        beyond = columns[self.width :]
-        if not same_columns(columns[: self.width], self.width) or any(column.passed is not None for column in beyond):
+            encode = partial(column_file.encode_records, columns, kind)
+        elif not same_columns(own, self.width) or any(column.passed is not None for column in new):
             raise ValueInvalid("columns of an ascii cloud stay as they are; -f csv writes others")
-        return column_file.CountedWriter(partial(encode_text, columns, style), head, count, self.rest)
+        head, count = partial(self.header, columns), None if drops else self.count
+        return column_file.CountedWriter(encode, head, count, self.rest)
 
 
 def same_columns(columns: Sequence[OutColumn], width: int) -> bool:
@@ -96,29 +129,27 @@ def same_columns(columns: Sequence[OutColumn], width: int) -> bool:
     return len(columns) == width and all(column.passed in (None, at) for at, column in enumerate(columns))
 
 
-def head_lines(
-    stream: BinaryIO, text: list[bytes], fail: Callable[[str], FormatError], last: str
-) -> Iterator[list[str]]:
+def head_lines(file: InputFile, text: list[bytes], last: str) -> Iterator[list[str]]:
     """Yield the words of a header's lines, which are added to the text; raises FormatError if it does not end.
 
     last: the line that ends it
     """
     size = sum(map(len, text))
     while True:
-        text.append(line := stream.readline(LONGEST_HEAD))
+        text.append(line := file.stream.readline(LONGEST_HEAD))
         size += len(line)
         if not line:
-            raise fail(f"the header ends before its {last} line; is the file whole?")
+            raise file.error(f"the header ends before its {last} line; is the file whole?", len(text))
         if size > LONGEST_HEAD:
-            raise fail(f"no {last} line in the first megabyte; is it a header?")
+            raise file.error(f"no {last} line in the first megabyte; is it a header?", len(text))
         if words := line.decode("latin-1").split():
             yield words
 
 
-def count_in(word: str, what: str, fail: Callable[[str], FormatError]) -> int:
+def count_in(word: str, what: str, file: InputFile, line: int) -> int:
     """Read a count of items, which an error calls `what`; raises FormatError."""
     if not (word.isascii() and word.isdecimal()) or len(word) > 19 or int(word) > _MOST_POINTS:
-        raise fail(f"{what} is not a count")
+        raise file.error(f"{what} is not a count", line)
     return int(word)
 
 
@@ -140,83 +171,21 @@ def type_in(fmt: str, codes: Mapping[str, Code], column: OutColumn, taken: Colle
     return codes[column.kind.str[1:]]
 
 
-# --- points as lines of text ---
-
-
-class TextRows:
-    """The rows of a stream of text, in batches, and what follows them.
-
-    line: that of the next row, from 1
-    """
-
-    def __init__(self, cloud: CloudFile, at: Sequence[int], width: int, line: int) -> None:
-        """Store the positions of a cloud's columns among the `width` cells of a row."""
-        self.cloud, self.at, self.width, self.line = cloud, at, width, line
-        self._rest = b""
-
-    def problem(self, message: str, line: int = 0) -> FormatError:
-        """Return the error for a line, or for the file."""
-        return self.cloud.file.error(message, line)
-
-    def batches(self) -> Iterator[TextBatch]:
-        """Yield the rows; raises FormatError for a row of another width, or if the file ends too early."""
-        done, count = 0, self.cloud.count
-        for block in read_blocks(self.cloud.file.stream) if count else ():  # type: ignore[arg-type]
-            batch = self._batch(block, count - done)
-            done += batch.size
-            yield batch
-            self.line += len(batch.cells.counts)
-            if done == count:
-                return
-        if done < count:
-            raise self.problem(f"the header says {count} points, the file holds {done}")
-
-    def _batch(self, block: bytes, most: int) -> TextBatch:
-        """Split a block into cells, and keep what follows the last row."""
-        cells = split_blank(block, self.width, comment=b"")
-        filled = np.flatnonzero(cells.counts)
-        if len(filled) > most:
-            end = int(cells.line_ends[filled[most - 1]]) - MARGIN
-            self._rest = block[end:]
-            cells = split_blank(block[:end], self.width, comment=b"")
-        wrong = np.flatnonzero((cells.counts != self.width) & (cells.counts != 0))
-        if wrong.size:
-            columns = " ".join(self.cloud.names[:8]) + " .." * (self.width > 8)
-            found = int(cells.counts[wrong[0]])
-            raise self.problem(f"expected {self.width} numbers ({columns}), found {found}", self.line + int(wrong[0]))
-        return TextBatch(cells, self)
-
-    def behind(self) -> Iterator[bytes]:
-        """Yield what follows the last row."""
-        return chain((self._rest,), column_file.pieces(self.cloud.file.stream))
-
-    def check_end(self) -> bytes:
-        """Return the blanks after the last row; raises FormatError if more rows follow."""
-        blanks: list[bytes] = []
-        for piece in self.behind():
-            if piece.strip():
-                count = self.cloud.count
-                raise self.problem(f"the header says {count} points, more rows follow; correct the header", self.line)
-            blanks.append(piece)
-        return b"".join(blanks)
-
-
 class TextBatch(column_file.Batch):
-    """Rows; a number that is not finite means a missing number."""
+    """Rows of text; a number that is not finite means a missing number."""
 
-    def __init__(self, cells: Cells, table: TextRows) -> None:
-        """Store the cells of the next rows of a table."""
-        self.cells, self.table = cells, table
-        self.line = table.line
+    def __init__(self, cells: Cells, cloud: CloudFile, at: Sequence[int]) -> None:
+        """Store the cells of the next rows of a cloud, and the positions of its columns among them."""
+        self.cells, self.cloud, self.at, self.line = cells, cloud, at, cloud.line
         self.size = len(cells.rows)
         self.bytes_read = len(cells.data) - 2 * MARGIN
 
     def _problem(self, row: int, place: int, reason: str) -> FormatError:
-        return self.table.problem(f"{self.table.cloud.names[place]}: {reason}", self.line + int(self.cells.rows[row]))
+        return self.cloud.file.error(f"{self.cloud.names[place]}: {reason}", self.line + int(self.cells.rows[row]))
 
-    def numbers(self, place: int) -> column_file.ColumnNumbers:
+    def numbers(self, place: int) -> tuple[Floats, None]:
         """Return a column as floats; raises FormatError for a cell that is not a number."""
-        column = self.cells.column(self.table.at[place])
+        column = self.cells.column(self.at[place])
         values, bad = parse_floats(column)
         for row in bad.tolist():
             text = column.text(row).decode("utf-8", "replace")
@@ -224,16 +193,16 @@ class TextBatch(column_file.Batch):
             if known is None:
                 raise self._problem(row, place, explain_number(text))
             values[row] = -known if text.startswith("-") else known
-        return column_file.ColumnNumbers(values)
+        return values, None
 
     def texts(self, place: int) -> list[str]:
         """Return a column as texts."""
-        column = self.cells.column(self.table.at[place])
+        column = self.cells.column(self.at[place])
         return [column.text(row).decode("utf-8", "replace") for row in range(self.size)]
 
     def column(self, place: int) -> Any:
         """Return a column as numbers of its type; raises FormatError for a number that does not fit it."""
-        kind, values = self.table.cloud.record[place], self.numbers(place).values
+        kind, values = self.cloud.record[place], self.numbers(place)[0]
         if kind.kind not in column_file.WHOLE:
             return values.astype(kind)
         numbers = []
@@ -248,7 +217,10 @@ class TextBatch(column_file.Batch):
 def encode_text(
     columns: Sequence[OutColumn], style: Style, batch: TextBatch, rows: Ints | None, made: Sequence[Made]
 ) -> bytes:
-    """Return rows with new numbers in place of their cells, or after them in further columns."""
+    """Return rows with new numbers in place of their cells, or after them in further columns.
+
+    They are the shortest text of their type, or have fixed decimals.
+    """
     cells = batch.cells
     chosen = np.arange(batch.size) if rows is None else rows
     if not len(chosen):
@@ -262,28 +234,22 @@ def encode_text(
     for place, column in enumerate(columns):
         if column.passed is not None:
             continue
-        written = _written(next(new).values, column, style)
-        if place < len(batch.table.at):
-            cell = batch.table.at[place]
-            end = cells.ends[chosen, cell]
-            parts += [Spans(cells.data, at, cells.starts[chosen, cell]), written]
+        if column.kind is None:
+            raise ValueInvalid(f"column {column.name} holds texts; the rows of a cloud are numbers")
+        values = np.asarray(next(new).values, np.float64).reshape(-1, 1)
+        if style.precision is not None:
+            spans = fixed_spans(values, style.precision, b" ")
+        else:
+            spans = shortest_spans(rounded_to_single(values) if column.kind == _SINGLE else values, b" ")
+        written = Spans(spans.data, spans.starts[:, 0], spans.ends[:, 0] - 1)
+        if place < len(batch.at):
+            end = cells.ends[chosen, batch.at[place]]
+            parts += [Spans(cells.data, at, cells.starts[chosen, batch.at[place]]), written]
         else:
             end, blank = cells.ends[chosen, -1], np.full(len(chosen), MARGIN)
             parts += [Spans(cells.data, at, end), Spans(framed(b" "), blank, blank + 1), written]
         at = end
     return join([*parts, Spans(cells.data, at, ends)])
-
-
-def _written(numbers: Any, column: OutColumn, style: Style) -> Spans:
-    """Write numbers as the shortest text of their type, or with fixed decimals."""
-    if column.kind is None:
-        raise ValueInvalid(f"column {column.name} holds texts; the rows of a cloud are numbers")
-    values = np.asarray(numbers, np.float64).reshape(-1, 1)
-    if style.precision is not None:
-        spans = fixed_spans(values, style.precision, b" ")
-    else:
-        spans = shortest_spans(rounded_to_single(values) if column.kind == _SINGLE else values, b" ")
-    return Spans(spans.data, spans.starts[:, 0], spans.ends[:, 0] - 1)
 
 
 # --- points without a header ---

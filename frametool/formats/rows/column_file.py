@@ -47,13 +47,6 @@ BATCH_BYTES = 1 << 21
 MOST_ROWS = 1 << 15  # of a batch; it and its results stay in cache
 
 
-class ColumnNumbers(NamedTuple):
-    """Numbers of a column: (n,) of float64 or its own type, nan for null, and the null mask (None: no nulls)."""
-
-    values: Floats
-    nulls: Flags | None = None
-
-
 class OutColumn(NamedTuple):
     """A column of the output.
 
@@ -92,10 +85,10 @@ class Batch(Protocol):
     def column(self, place: int) -> Any:
         """Return a column unchanged: an array of the file's type, or texts."""
 
-    def numbers(self, place: int) -> ColumnNumbers:
-        """Return a column as floats; a null may be any number."""
+    def numbers(self, place: int) -> tuple[Floats, Flags | None]:
+        """Return a column as floats, and the null mask (None: no nulls); a null may be any number."""
         with np.errstate(invalid="ignore"):  # a signalling nan
-            return ColumnNumbers(self.column(place).astype(np.float64))
+            return self.column(place).astype(np.float64), None
 
     def stamps(self, place: int, *, in_ns: int) -> tuple[Ints, dict[int, str]]:
         """Return a column as nanoseconds, and why rows have none; in_ns: as in `whole_stamps`.

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from frametool.formats.rows.column_file import Made, OutColumn
     from frametool.geometry.types import Components
     from frametool.grammar.result import Style
-    from frametool.text.spans import Floats, Ints
+    from frametool.text.spans import Ints
 
 XYZ, WHOLE = column_file.XYZ, column_file.WHOLE
 STORED = ("X", "Y", "Z")
@@ -193,7 +193,7 @@ class LasWriter:
             self.writer = writer(self.kept, self.header, do_compress=self.packed, closefd=False)
 
     def _points(self, batch: LasBatch | None, rows: Ints | None, new: dict[str, Any]) -> Any:
-        """Return points as a record of the library."""
+        """Return points as a record of the library; raises FormatError for numbers that do not fit."""
         kind = _laspy(self.name).ScaleAwarePointRecord
         if batch is None:
             points = kind.zeros(len(new["x"]), header=self.header)
@@ -201,29 +201,26 @@ class LasWriter:
             array = batch.points.array.copy() if rows is None else batch.points.array[rows]
             points = kind(array, batch.points.point_format, self.header.scales, self.header.offsets)
         for name, values in new.items():
-            if name in XYZ:
-                points.array[name.upper()] = self._stored(values, XYZ.index(name))
-            else:
+            if name not in XYZ:
                 points[name] = values
                 stored = np.asarray(points[name])
                 same = stored == values
                 if stored.dtype.kind in WHOLE and not same.all():
                     value = values[int(np.argmin(same))]
                     raise FormatError(f"{name} {value:g}: las holds small whole numbers there", source=self.name)
+                continue
+            axis = XYZ.index(name)
+            scale, offset = float(self.header.scales[axis]), float(self.header.offsets[axis])
+            with np.errstate(all="ignore"):
+                stored = np.rint((values - offset) / scale)
+            bad = ~((stored >= LIMITS.min) & (stored <= LIMITS.max))
+            if bad.any():
+                row = int(np.argmax(bad))
+                found = f"point {self.count + row + 1}: {name} = {values[row]:g}"
+                problem = f"{found} does not fit 32 bits of {scale:g} m around {offset:g}"
+                raise FormatError(f"{problem}; give the file a coarser scale, or write -f npy", source=self.name)
+            points.array[name.upper()] = stored.astype(np.int32)
         return points
-
-    def _stored(self, values: Floats, axis: int) -> Ints:
-        """Return coordinates as stored integers; raises FormatError for one that does not fit."""
-        scale, offset = float(self.header.scales[axis]), float(self.header.offsets[axis])
-        with np.errstate(all="ignore"):
-            stored = np.rint((values - offset) / scale)
-        bad = ~((stored >= LIMITS.min) & (stored <= LIMITS.max))
-        if bad.any():
-            row = int(np.argmax(bad))
-            found = f"point {self.count + row + 1}: {XYZ[axis]} = {values[row]:g}"
-            problem = f"{found} does not fit 32 bits of {scale:g} m around {offset:g}"
-            raise FormatError(f"{problem}; give the file a coarser scale, or write -f npy", source=self.name)
-        return stored.astype(np.int32)
 
     def end(self) -> Iterator[bytes]:
         """Yield the bytes of the file."""

@@ -31,40 +31,34 @@ ALIGNED = 64  # bytes, as numpy pads its headers
 UTF8 = b"\x03"  # version of headers with names that are not ASCII
 
 
-def read_header(file: InputFile) -> tuple[Kind, tuple[int, ...], bool]:
-    """Return the type of an element, the shape, and whether it is in column-major order; raises FormatError."""
-    head = file.stream.read(len(MAGIC) + 4)
-    if not head.startswith(MAGIC):
-        raise file.error("no NPY file: it does not begin with \\x93NUMPY")
-    version = head[len(MAGIC) : len(MAGIC) + 1]
-    is_long = version > b"\x01"
-    head += file.stream.read(2 * is_long)
-    size = int.from_bytes(head[len(MAGIC) + 2 :], "little")
-    if size > MOST_HEADER:
-        raise file.error(f"the header says that it has {size} bytes; it is damaged")
-    read = npy.read_array_header_2_0 if is_long else npy.read_array_header_1_0
-    with column_file.translated(file.name, "the header cannot be read: {}"):
-        shape, by_columns, kind = read(BytesIO(head[len(MAGIC) + 2 :] + file.stream.read(size)), MOST_HEADER)
-        if version == UTF8 and kind.names is not None:
-            kind.names = tuple(name.encode("latin-1").decode() for name in kind.names)
-    if min(shape, default=0) < 0:
-        raise file.error(f"the header has the shape {shape}")
-    if kind.hasobject:
-        raise file.error("it holds Python objects, which are never unpickled; save plain numbers")
-    return kind, shape, by_columns
-
-
 class NpyFile(column_file.RecordFile):
     """An array whose rows are read in batches."""
 
     def __init__(self, file: InputFile) -> None:
-        """Read the header; raises FormatError if it is not a table of numbers."""
-        kind, self.shape, self.by_columns = read_header(file)
-        columns, problem = prod(self.shape[1:]), ""
-        if not self.shape:
+        """Read the header; raises FormatError if it is not that of a table of numbers."""
+        head = file.stream.read(len(MAGIC) + 4)
+        if not head.startswith(MAGIC):
+            raise file.error("no NPY file: it does not begin with \\x93NUMPY")
+        version = head[len(MAGIC) : len(MAGIC) + 1]
+        is_long = version > b"\x01"
+        head += file.stream.read(2 * is_long)
+        size = int.from_bytes(head[len(MAGIC) + 2 :], "little")
+        if size > MOST_HEADER:
+            raise file.error(f"the header says that it has {size} bytes; it is damaged")
+        read = npy.read_array_header_2_0 if is_long else npy.read_array_header_1_0
+        with column_file.translated(file.name, "the header cannot be read: {}"):
+            shape, self.by_columns, kind = read(BytesIO(head[len(MAGIC) + 2 :] + file.stream.read(size)), MOST_HEADER)
+            if version == UTF8 and kind.names is not None:
+                kind.names = tuple(name.encode("latin-1").decode() for name in kind.names)
+        columns, problem = prod(shape[1:]), ""
+        if min(shape, default=0) < 0:
+            problem = f"the header has the shape {shape}"
+        elif kind.hasobject:
+            problem = "it holds Python objects, which are never unpickled; save plain numbers"
+        elif not shape:
             problem = "it holds a single value; wanted are rows: an array n x 3, or one with fields"
-        elif kind.names is not None and len(self.shape) > 1:
-            problem = f"records in {len(self.shape)} axes; wanted is one row of them"
+        elif kind.names is not None and len(shape) > 1:
+            problem = f"records in {len(shape)} axes; wanted is one row of them"
         elif kind.names is None and not column_file.is_number(kind):
             problem = f"it holds {kind}; wanted are numbers, or fields"
         elif columns > MOST_COLUMNS or columns * kind.itemsize > MOST_BYTES:
@@ -72,7 +66,8 @@ class NpyFile(column_file.RecordFile):
         if problem:
             raise file.error(problem)
         record = kind if kind.names is not None else column_file.record_of([kind] * columns)
-        super().__init__(file, kind.names, record, self.shape[0])
+        super().__init__(file, kind.names, record, shape[0])
+        self.shape: tuple[int, ...] = shape
         column_file.check_declared(file, self.count, record.itemsize, "rows", last=True)
 
     def batches(self) -> Iterator[Batch]:

@@ -28,17 +28,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
+from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.formats.rows import column_file
-from frametool.formats.rows.clouds import CloudFile, TextRows, count_in, head_lines, misfit_of, same_columns, type_in
+from frametool.formats.rows.clouds import CloudFile, count_in, head_lines, misfit_of, same_columns, type_in
 from frametool.geometry import floats, placed, quaternion
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from typing import BinaryIO
 
     from frametool.documents.source import InputFile
+    from frametool.errors import FormatError
     from frametool.formats.rows.column_file import Batch, Kind, OutColumn
     from frametool.geometry.types import Components, Rigid
     from frametool.grammar.result import Style
@@ -67,16 +67,11 @@ class PcdField(NamedTuple):
         return f"<{self.kind.lower()}{self.size}"
 
 
-class PcdLayout(NamedTuple):
-    """The columns of a cloud, one per value, without padding: names, cells in a row, and the type of a point."""
+def layout_of(fields: Sequence[PcdField]) -> tuple[list[str], list[int], Kind]:
+    """Return the columns of fields, one per value: names, cells in a row, and the type of a point.
 
-    names: list[str]
-    cells: list[int]
-    record: Kind
-
-
-def layout_of(fields: Sequence[PcdField]) -> PcdLayout:
-    """Return the columns of fields; padding has none, but occupies bytes."""
+    Padding is no column, but occupies bytes.
+    """
     values = [(field, place) for field in fields for place in range(field.values)]
     offsets = [0, *accumulate(field.size for field, _ in values)]
     used = [(at, field, place) for at, (field, place) in enumerate(values) if field.name != PADDING]
@@ -87,7 +82,7 @@ def layout_of(fields: Sequence[PcdField]) -> PcdLayout:
         "itemsize": offsets[-1],
     })  # fmt: skip
     names = [field.name if field.values == 1 else f"{field.name}_{place}" for _, field, place in used]
-    return PcdLayout(names, [at for at, _, _ in used], record)
+    return names, [at for at, _, _ in used], record
 
 
 class PcdHead:
@@ -98,112 +93,79 @@ class PcdHead:
     viewpoint: seven numbers; None if there are none
     """
 
-    def __init__(self, stream: BinaryIO, source: str) -> None:
+    def __init__(self, file: InputFile) -> None:
         """Read a header, up to the data; raises FormatError with line, value and remedy."""
-        self.source = source
+        self.file, text = file, list[bytes]()
         self.words: dict[str, list[str]] = {}
         self.lines: dict[str, int] = {}
-        self._read(stream)
+        for words in head_lines(file, text, "DATA"):
+            if words[0].startswith("#"):
+                continue
+            if (key := words[0].upper()) not in _KEYS:
+                raise file.error(f"{shown(words[0])} is not a key of a PCD header; keys: {listing(_KEYS)}", len(text))
+            if (key := "FIELDS" if key == "COLUMNS" else key) in self.lines:
+                raise file.error(f"{key} appears twice, first on line {self.lines[key]}", len(text))
+            self.lines[key], self.words[key] = len(text), words[1:]
+            if key == "DATA":
+                break
+        self.text = b"".join(text)
         missing = [key for key in ("FIELDS", "SIZE", "TYPE") if key not in self.lines]
         if "POINTS" not in self.lines and not {"WIDTH", "HEIGHT"} <= set(self.lines):
             missing.append("POINTS")
         if missing:
             raise self.problem("DATA", f"the header has no {', '.join(missing)}")
         self.fields = self._fields()
-        self.points = self._points()
+        counts = {}
+        for key in [key for key in ("WIDTH", "HEIGHT", "POINTS") if key in self.words]:
+            if len(words := self.words[key]) != 1:
+                raise self.problem(key, f"{key} has {len(words)} values, expected 1")
+            counts[key] = count_in(words[0], f"{key} {shown(words[0])}", file, self.lines[key])
+        if {"WIDTH", "HEIGHT"} <= counts.keys():
+            points = counts["WIDTH"] * counts["HEIGHT"]
+            if counts.setdefault("POINTS", points) != points:
+                both = f"WIDTH {counts['WIDTH']} times HEIGHT {counts['HEIGHT']} is {points}"
+                raise self.problem("POINTS", f"POINTS is {counts['POINTS']}, {both}; correct the one that is wrong")
+        self.points = counts["POINTS"]
         self.data = " ".join(self.words["DATA"]).lower()
         if self.data not in DATA:
             raise self.problem("DATA", f"DATA {shown(self.data)} is not known; known: {', '.join(DATA)}")
-        self.viewpoint = self._viewpoint()
-
-    def _read(self, stream: BinaryIO) -> None:
-        """Read up to the line of DATA."""
-        text: list[bytes] = []
-
-        def fail(message: str) -> FormatError:
-            return FormatError(message, source=self.source, line=len(text))
-
-        for words in head_lines(stream, text, fail, "DATA"):
-            if words[0].startswith("#"):
-                continue
-            if (key := words[0].upper()) not in _KEYS:
-                raise fail(f"{shown(words[0])} is not a key of a PCD header; keys: {listing(_KEYS)}")
-            if (key := "FIELDS" if key == "COLUMNS" else key) in self.lines:
-                raise fail(f"{key} appears twice, first on line {self.lines[key]}")
-            self.lines[key], self.words[key] = len(text), words[1:]
-            if key == "DATA":
-                break
-        self.text = b"".join(text)
+        self.viewpoint: tuple[float, ...] | None = None
+        if (sensor := self.words.get("VIEWPOINT")) is not None:
+            if len(sensor) != 7:
+                found = f"VIEWPOINT has {len(sensor)} numbers, expected 7 (tx ty tz qw qx qy qz)"
+                raise self.problem("VIEWPOINT", found)
+            try:
+                self.viewpoint = tuple(map(parse_number, sensor))
+            except ValueInvalid as error:
+                raise self.problem("VIEWPOINT", f"VIEWPOINT: {error}") from None
 
     def problem(self, key: str, message: str) -> FormatError:
         """Return the error for a line."""
-        return FormatError(message, source=self.source, line=self.lines[key])
+        return self.file.error(message, self.lines.get(key, 0))
 
     def _fields(self) -> tuple[PcdField, ...]:
         """Return the fields of a point."""
-        names = self.words["FIELDS"]
-        found = []
-        for key in _EACH[1:]:
-            words = self.words.get(key, ["1"] * len(names))
+        names, fields = self.words["FIELDS"], list[PcdField]()
+        others = {key: self.words.get(key, ["1"] * len(names)) for key in _EACH[1:]}
+        for key, words in others.items():
             if len(words) != len(names):
                 raise self.problem(key, f"{key} has {len(words)} values for {len(names)} fields")
-            found.append(words)
         if not names:
             raise self.problem("FIELDS", "FIELDS names no field")
         for name, times in Counter(names).items():
             if name != PADDING and times > 1:
                 raise self.problem("FIELDS", f"field {shown(name)} appears twice")
-        fields = tuple(self._field(*words) for words in zip(names, *found, strict=True))
+        for name, size, letter, values in zip(names, *others.values(), strict=True):
+            of, kind = f" of field {shown(name)}", letter.upper()
+            if kind not in TYPES:
+                raise self.problem("TYPE", f"TYPE {shown(kind)}{of} is not known; known: F, I, U")
+            if size not in (known := [*map(str, TYPES[kind])]):
+                raise self.problem("SIZE", f"SIZE {shown(size)}{of}: TYPE {kind} has {', '.join(known)}")
+            count = count_in(values, f"COUNT {shown(values)}{of}", self.file, self.lines.get("COUNT", 0))
+            fields.append(PcdField(name, int(size), kind, count))
         if sum(field.values for field in fields) > _WIDEST:
             raise self.problem("COUNT", f"more than {_WIDEST} values a point")
-        return fields
-
-    def _field(self, name: str, size: str, kind: str, values: str) -> PcdField:
-        of, kind = f" of field {shown(name)}", kind.upper()
-        if kind not in TYPES:
-            raise self.problem("TYPE", f"TYPE {shown(kind)}{of} is not known; known: F, I, U")
-        if size not in map(str, TYPES[kind]):
-            known = ", ".join(map(str, TYPES[kind]))
-            raise self.problem("SIZE", f"SIZE {shown(size)}{of}: TYPE {kind} has {known}")
-        count = count_in(values, f"COUNT {shown(values)}{of}", partial(self.problem, "COUNT"))
-        return PcdField(name, int(size), kind, count)
-
-    def _points(self) -> int:
-        """Return the number of points; WIDTH, HEIGHT and POINTS have to agree."""
-        found = {}
-        for key in ("WIDTH", "HEIGHT", "POINTS"):
-            if (words := self.words.get(key)) is None:
-                continue
-            if len(words) != 1:
-                raise self.problem(key, f"{key} has {len(words)} values, expected 1")
-            found[key] = count_in(words[0], f"{key} {shown(words[0])}", partial(self.problem, key))
-        if not {"WIDTH", "HEIGHT"} <= found.keys():
-            return found["POINTS"]
-        points = found["WIDTH"] * found["HEIGHT"]
-        if found.get("POINTS", points) != points:
-            both = f"WIDTH {found['WIDTH']} times HEIGHT {found['HEIGHT']} is {points}"
-            raise self.problem("POINTS", f"POINTS is {found['POINTS']}, {both}; correct the one that is wrong")
-        return points
-
-    def _viewpoint(self) -> tuple[float, ...] | None:
-        if "VIEWPOINT" not in self.lines:
-            return None
-        words = self.words["VIEWPOINT"]
-        if len(words) != 7:
-            raise self.problem("VIEWPOINT", f"VIEWPOINT has {len(words)} numbers, expected 7 (tx ty tz qw qx qy qz)")
-        try:
-            return tuple(parse_number(word) for word in words)
-        except ValueInvalid as error:
-            raise self.problem("VIEWPOINT", f"VIEWPOINT: {error}") from None
-
-    def rewritten(self, words: dict[str, str]) -> bytes:
-        """Return the header with other values of some existing keys."""
-        lines = self.text.split(b"\n")
-        for key in words.keys() & self.lines.keys():
-            at = self.lines[key] - 1
-            first, last = re.match(rb"\s*\S+\s+", lines[at]), len(lines[at].rstrip())
-            lines[at] = lines[at][: first.end() if first else last] + words[key].encode() + lines[at][last:]
-        return b"\n".join(lines)
+        return tuple(fields)
 
 
 def _words_of(fields: Sequence[PcdField]) -> dict[str, str]:
@@ -232,44 +194,38 @@ def unpack(packed: bytes, size: int) -> bytearray:
     """
     if size > MOST * len(packed):
         raise ValueInvalid(f"{len(packed)} packed bytes cannot hold {size}")
-    out = bytearray()
+    out, at, end = bytearray(), 0, len(packed)
     try:
-        _unpack(packed, size, out)
+        while at < end and len(out) <= size:  # the hot loop
+            control = packed[at]
+            at += 1
+            if control < 32:
+                next_at = at + control + 1
+                out += packed[at:next_at]
+                at = next_at
+                continue
+            length = control >> 5
+            if length == 7:
+                length += packed[at]
+                at += 1
+            length += 2
+            distance = ((control & 31) << 8) + packed[at] + 1
+            at += 1
+            start = len(out) - distance
+            if start < 0:
+                raise ValueInvalid("it refers to bytes before its beginning")
+            if distance >= length:
+                out += out[start : start + length]
+            else:  # the run overlaps its own output
+                part = out[start:]
+                out += (part * (length // distance + 1))[:length]
     except IndexError:
-        raise ValueInvalid("it ends in the middle of a run") from None
+        at = end + 1
+    if at > end:
+        raise ValueInvalid("it ends in the middle of a run")
     if len(out) != size:
         raise ValueInvalid(f"it makes {'only' if len(out) < size else 'at least'} {len(out)} bytes, not {size}")
     return out
-
-
-def _unpack(packed: bytes, size: int, out: bytearray) -> None:
-    """Append runs until everything is read or too much is there; raises IndexError if truncated.  The hot loop."""
-    at, end = 0, len(packed)
-    while at < end and len(out) <= size:
-        control = packed[at]
-        at += 1
-        if control < 32:
-            next_at = at + control + 1
-            out += packed[at:next_at]
-            at = next_at
-            continue
-        length = control >> 5
-        if length == 7:
-            length += packed[at]
-            at += 1
-        length += 2
-        distance = ((control & 31) << 8) + packed[at] + 1
-        at += 1
-        start = len(out) - distance
-        if start < 0:
-            raise ValueInvalid("it refers to bytes before its beginning")
-        if distance >= length:
-            out += out[start : start + length]
-        else:  # the run overlaps its own output
-            part = out[start:]
-            out += (part * (length // distance + 1))[:length]
-    if at > end:
-        raise IndexError(at)
 
 
 class PcdFile(CloudFile):
@@ -277,14 +233,15 @@ class PcdFile(CloudFile):
 
     def __init__(self, file: InputFile) -> None:
         """Read the header and check it against the file; raises FormatError."""
-        head = self.head = PcdHead(file.stream, file.name)
+        head = self.head = PcdHead(file)
         names, cells, record = layout_of(head.fields)
         super().__init__(file, names, record, head.points)
         self.viewpoint = ""
         if head.data == "binary":
             column_file.check_declared(file, self.count, self.record.itemsize, self.what, last=True)
         elif head.data == "ascii":
-            self.text = TextRows(self, cells, sum(field.values for field in head.fields), head.text.count(b"\n") + 1)
+            self.at, self.cells = cells, sum(field.values for field in head.fields)
+            self.line = head.text.count(b"\n") + 1
 
     def moved_by(self, pose: Components | None) -> None:
         """Transform VIEWPOINT by the pose that transforms all points; None: there is no such pose."""
@@ -302,19 +259,15 @@ class PcdFile(CloudFile):
         self.viewpoint = viewpoint_words(placed.pose_of(moved))
 
     def batches(self) -> Iterator[Batch]:
-        """Yield the points; raises FormatError if the file ends too early, or has more."""
+        """Yield the points; raises FormatError if the file ends too early, or has more.
+
+        Packed columns are stored field by field, possibly with padding.
+        """
         if self.head.data != "binary_compressed":
             yield from super().batches()
-        elif self.count:
-            columns, step = self._unpacked(), column_file.rows_of_batch(self.record.itemsize)
-            for first in range(0, self.count, step):
-                rows = np.zeros(min(step, self.count - first), self.record)
-                for name, values in zip(self.record.names or (), columns, strict=True):
-                    rows[name] = values[first : first + step]
-                yield column_file.StructuredBatch(rows)
-
-    def _unpacked(self) -> list[Any]:
-        """Return the unpacked columns, which are stored field by field, possibly with padding."""
+            return
+        if not self.count:
+            return
         file, points, fields = self.file, self.count, self.head.fields
         packed_size, size = struct.unpack("<II", column_file.read_exactly(file, 8, "the sizes behind DATA"))
         if size != points * self.record.itemsize:
@@ -336,7 +289,12 @@ class PcdFile(CloudFile):
             if field.name != PADDING:
                 columns.extend(data[at:end].view(field.code).reshape(points, field.values).T)
             at = end
-        return columns
+        step = column_file.rows_of_batch(self.record.itemsize)
+        for first in range(0, points, step):
+            rows = np.zeros(min(step, points - first), self.record)
+            for name, values in zip(self.record.names or (), columns, strict=True):
+                rows[name] = values[first : first + step]
+            yield column_file.StructuredBatch(rows)
 
     def _fields(self, columns: Sequence[OutColumn]) -> tuple[PcdField, ...]:
         """Return the fields of an output: those of the input with new ones after them, or one for each column."""
@@ -345,7 +303,7 @@ class PcdFile(CloudFile):
 
     def record_with(self, columns: Sequence[OutColumn]) -> Kind:
         """Return the type of a point with other columns."""
-        return layout_of(self._fields(columns)).record
+        return layout_of(self._fields(columns))[2]
 
     def header(self, columns: Sequence[OutColumn], count: int) -> bytes:
         """Return the header with changes."""
@@ -358,7 +316,12 @@ class PcdFile(CloudFile):
             words |= _words_of(fields)
         if count != self.count:
             words |= {"WIDTH": str(count), "HEIGHT": "1", "POINTS": str(count)}
-        return self.head.rewritten(words)
+        lines = self.head.text.split(b"\n")
+        for key in words.keys() & self.head.lines.keys():
+            at = self.head.lines[key] - 1
+            first, last = re.match(rb"\s*\S+\s+", lines[at]), len(lines[at].rstrip())
+            lines[at] = lines[at][: first.end() if first else last] + words[key].encode() + lines[at][last:]
+        return b"\n".join(lines)
 
 
 def _new_field(column: OutColumn) -> PcdField:
@@ -389,7 +352,7 @@ def create(
         lines = "".join(f"{key} {each}\n" for key, each in words.items())
         return f"# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n{lines}".encode()
 
-    encode = partial(column_file.encode_records, columns, layout_of(fields).record)
+    encode = partial(column_file.encode_records, columns, layout_of(fields)[2])
     return column_file.CountedWriter(encode, head, count)
 
 

@@ -20,27 +20,24 @@ from __future__ import annotations
 
 import re
 from functools import partial
-from itertools import takewhile
+from itertools import chain, takewhile
 from math import log
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
+from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.formats.rows import clouds, column_file
 from frametool.geometry.rigid import EXACT, SCALED
 from frametool.grammar.readers import NORMALS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-    from typing import BinaryIO
+    from collections.abc import Iterator, Sequence
 
     from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Batch, Kind, OutColumn
     from frametool.geometry.types import Components
     from frametool.grammar.result import Style
-
-    Fail = Callable[[str], FormatError]
 
 FORMS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 TYPES = {
@@ -73,65 +70,50 @@ class PlyElement(NamedTuple):
         """Return the properties that are lists, whose size is not known beforehand."""
         return [name for name, (_, counted) in self.properties.items() if counted]
 
-    @property
-    def size(self) -> int:
-        """Return the size of one instance without list properties."""
-        return sum(int(code[1:]) for code, _ in self.properties.values())
 
-
-def read_head(stream: BinaryIO, source: str) -> tuple[bytes, str, list[PlyElement]]:
+def read_head(file: InputFile) -> tuple[bytes, str, list[PlyElement]]:
     """Read a header, up to the data; raises FormatError with line, value and remedy."""
-    if (first := stream.readline(64)).strip() != b"ply" or not first.endswith(b"\n"):
-        raise FormatError("the first line of a PLY file is `ply`, and it ends in a line feed", source=source, line=1)
+    if (first := file.stream.readline(64)).strip() != b"ply" or not first.endswith(b"\n"):
+        raise file.error("the first line of a PLY file is `ply`, and it ends in a line feed", 1)
     fmt, elements, text = "", dict[str, PlyElement](), [first]
-
-    def fail(message: str) -> FormatError:
-        return FormatError(message, source=source, line=len(text))
-
-    for words in clouds.head_lines(stream, text, fail, "`end_header`"):
-        match words[0]:
-            case "comment" | "obj_info":
+    for words in clouds.head_lines(file, text, "`end_header`"):
+        line, said = len(text), shown(" ".join(words))
+        match words:
+            case ["comment" | "obj_info", *_]:
                 continue
-            case "end_header":
+            case ["end_header", *_]:
                 break
-            case "format":
-                if fmt or len(words) != 3 or words[1] not in FORMS or words[2] != "1.0":
-                    raise fail(f"{shown(' '.join(words))}: expected one format: {', '.join(FORMS)}, and 1.0")
-                fmt = words[1]
-            case "element":
-                if len(words) != 3:
-                    raise fail(f"{shown(' '.join(words))}: expected element NAME COUNT")
-                count = clouds.count_in(words[2], f"{shown(words[2])} of element {shown(words[1])}", fail)
-                element = PlyElement(words[1], count, len(text), {})
-                if elements.setdefault(element.name, element) is not element:
-                    raise fail(f"element {shown(element.name)} appears twice")
-            case "property":
-                if not elements:
-                    raise fail("a property before the first element")
-                _add_property(element, words, fail)
-            case word:
+            case ["format", form, "1.0"] if form in FORMS and not fmt:
+                fmt = form
+            case ["format", *_]:
+                raise file.error(f"{said}: expected one format: {', '.join(FORMS)}, and 1.0", line)
+            case ["element", name, number]:
+                count = clouds.count_in(number, f"{shown(number)} of element {shown(name)}", file, line)
+                element = PlyElement(name, count, line, {})
+                if elements.setdefault(name, element) is not element:
+                    raise file.error(f"element {shown(name)} appears twice", line)
+            case ["element", *_]:
+                raise file.error(f"{said}: expected element NAME COUNT", line)
+            case ["property", *_] if not elements:
+                raise file.error("a property before the first element", line)
+            case ["property", *types, name] if len(types) == (3 if types[:1] == ["list"] else 1):
+                types = types[-2:]  # of a list that of its count too
+                if unknown := [each for each in types if each not in TYPES]:
+                    raise file.error(f"{shown(unknown[0])} is not a type; types: {', '.join(TYPES)}", line)
+                if name in element.properties:
+                    raise file.error(f"property {shown(name)} of {shown(element.name)} appears twice", line)
+                *counted, code = (TYPES[each] for each in types)
+                if counted and counted[0][0] == "f":
+                    raise file.error(f"{shown(types[0])} counts the values of a list; it has to be an integer", line)
+                element.properties[name] = code, "".join(counted)
+            case ["property", *_]:
+                raise file.error(f"{said}: expected property TYPE NAME, or property list TYPE TYPE NAME", line)
+            case [word, *_]:
                 known = "format, element, property, comment, obj_info, end_header"
-                raise fail(f"{shown(word)} is not a key of a PLY header; keys: {known}")
+                raise file.error(f"{shown(word)} is not a key of a PLY header; keys: {known}", line)
     if not fmt:
-        raise fail(f"the header has no format; formats: {', '.join(FORMS)}")
+        raise file.error(f"the header has no format; formats: {', '.join(FORMS)}", len(text))
     return b"".join(text), FORMS[fmt], list(elements.values())
-
-
-def _add_property(element: PlyElement, words: Sequence[str], fail: Fail) -> None:
-    """Read `property TYPE NAME` or `property list TYPE TYPE NAME`."""
-    is_list = words[1:2] == ["list"]
-    types, name = words[1 + is_list : -1], words[-1]
-    if len(words) != (5 if is_list else 3):
-        raise fail(f"{shown(' '.join(words))}: expected property TYPE NAME, or property list TYPE TYPE NAME")
-    for each in types:
-        if each not in TYPES:
-            raise fail(f"{shown(each)} is not a type; types: {', '.join(TYPES)}")
-    if name in element.properties:
-        raise fail(f"property {shown(name)} of {shown(element.name)} appears twice")
-    codes = [TYPES[each] for each in types]
-    if is_list and codes[0][0] == "f":
-        raise fail(f"{shown(types[0])} counts the values of a list; it has to be an integer")
-    element.properties[name] = codes[-1], codes[0] if is_list else ""
 
 
 class PlyFile(clouds.CloudFile):
@@ -141,40 +123,42 @@ class PlyFile(clouds.CloudFile):
     what = "vertices"
 
     def __init__(self, file: InputFile) -> None:
-        """Read the header and everything before the vertices; raises FormatError."""
-        self.head, self.order, elements = read_head(file.stream, file.name)
+        """Read the header and everything before the vertices; raises FormatError, also for lists on the way to them."""
+        self.head, self.order, elements = read_head(file)
         at = next((at for at, each in enumerate(elements) if each.name == VERTEX), None)
         if at is None:
             names = listing(each.name for each in elements) or "none"
             raise file.error(f"no element {VERTEX!r}; elements: {names}")
         before, vertex, self.after = elements[:at], elements[at], elements[at + 1 :]
         self.others = before + self.after
-        _check_lists(before, vertex, self.order, file.name)
+        if vertex.lists:
+            message = f"the list {shown(vertex.lists[0])} within {VERTEX!r} is not read"
+            raise file.error(f"{message}; write it as an element of its own, or leave it out", vertex.line)
+        for each in before:
+            if self.order and each.lists and each.instances:
+                message = f"element {shown(each.name)} with the list {shown(each.lists[0])} is before {VERTEX!r}"
+                raise file.error(f"{message}; write {VERTEX!r} first, or the file as ascii", each.line)
         self.codes = {name: code for name, (code, _) in vertex.properties.items()}
         record = column_file.record_of((self.order or "<") + code for code in self.codes.values())
         super().__init__(file, self.codes, record, vertex.instances)
-        self.line = vertex.line
+        self.own_line = vertex.line
         self.is_last = not self.after
         self.turn: tuple[float, ...] | None = None
         if self.order:
-            size = sum(each.instances * each.size for each in before)
-            self.before = column_file.read_exactly(file, size, "the elements before the vertices")
+            sizes = (each.instances * sum(int(code[1:]) for code, _ in each.properties.values()) for each in before)
+            self.before = column_file.read_exactly(file, sum(sizes), "the elements before the vertices")
             column_file.check_declared(file, self.count, record.itemsize, self.what, last=self.is_last)
-        else:
-            self.before = self._lines(sum(each.instances for each in before))
-            if not self.width:
-                raise file.error(f"the {self.count} vertices have no properties")
-            self.text = clouds.TextRows(self, range(self.width), self.width, (self.head + self.before).count(b"\n") + 1)
-
-    def _lines(self, count: int) -> bytes:
-        """Read the lines of the elements before the vertices."""
-        lines: list[bytes] = []
-        while count and (line := self.file.stream.readline()):
+            return
+        lines, count = list[bytes](), sum(each.instances for each in before)
+        while count and (line := file.stream.readline()):
             lines.append(line)
             count -= bool(line.strip())
         if count:
-            raise self.file.error(f"the file ends before its vertices, {count} lines early")
-        return b"".join(lines)
+            raise file.error(f"the file ends before its vertices, {count} lines early")
+        if not self.width:
+            raise file.error(f"the {self.count} vertices have no properties")
+        self.before = b"".join(lines)
+        self.at, self.cells, self.line = range(self.width), self.width, (self.head + self.before).count(b"\n") + 1
 
     def moved_by(self, pose: Components | None) -> None:
         """Rotate splats by the pose that transforms all points; None: there is no such pose."""
@@ -184,7 +168,7 @@ class PlyFile(clouds.CloudFile):
         turns = pose is None or pose[6] * pose[6] < 1.0
         if not turns or not set(SPLAT) <= set(self.names):
             return
-        if pose is None or self.text is not None or any(self.codes[each][0] != "f" for each in SPLAT):
+        if pose is None or self.at is not None or any(self.codes[each][0] != "f" for each in SPLAT):
             why = "not all points are moved by the same pose" if pose is None else "only binary files are turned"
             warn(f"{name}: rot_0 .. rot_3, the rotations of splats, are left as they are: {why}")
             return
@@ -193,40 +177,37 @@ class PlyFile(clouds.CloudFile):
             warn(f"{name}: f_rest_*, spherical harmonics, are left as they are: colours keep to the old axes")
 
     def batches(self) -> Iterator[Batch]:
-        """Yield the vertices; raises FormatError if the file ends too early, or has more."""
+        """Yield the vertices; raises FormatError if the file ends too early, or has more.
+
+        Rotations of splats are multiplied from the left: the Hamilton product, which preserves their norms.
+        """
         for batch in super().batches():
             if self.turn is not None:
-                self._turn_splats(batch, self.turn)
+                columns = [batch.column(self.names.index(name)) for name in SPLAT]
+                bx, by, bz, bw = (column.astype(np.float64) for column in columns)
+                ax, ay, az, aw = self.turn
+                turned = (
+                    aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
+                    aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz,
+                )  # fmt: skip
+                for column, values in zip(columns, turned, strict=True):
+                    column[:] = values
             yield batch
 
-    def _turn_splats(self, batch: Batch, turn: Sequence[float]) -> None:
-        """Multiply rotations from the left, in place: the Hamilton product, which preserves their norms."""
-        columns = [batch.column(self.names.index(name)) for name in SPLAT]
-        bx, by, bz, bw = (column.astype(np.float64) for column in columns)
-        ax, ay, az, aw = turn
-        turned = (
-            aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz,
-        )  # fmt: skip
-        for column, values in zip(columns, turned, strict=True):
-            column[:] = values
-
     def rest(self) -> Iterator[bytes]:
-        """Yield everything after the vertices; binary data are copied unchecked."""
-        if self.is_last:
-            return iter((self.behind,))
-        return column_file.pieces(self.file.stream) if self.text is None else self._counted(self.text)
+        """Yield everything after the vertices; binary data are copied unchecked.
 
-    def _counted(self, text: clouds.TextRows) -> Iterator[bytes]:
-        """Yield the lines of the other elements; raises FormatError if their number differs from the header's."""
-        expected = sum(each.instances for each in self.after)
+        Raises FormatError if there are more or fewer lines than the header says.
+        """
         lines, begun = 0, b""
-        for piece in text.behind():
+        for piece in chain((self.behind,), () if self.is_last else column_file.pieces(self.file.stream)):
             yield piece
-            *whole, begun = (begun + piece).split(b"\n")
-            lines += sum(map(bool, map(bytes.strip, whole)))
+            if self.at is not None:
+                *whole, begun = (begun + piece).split(b"\n")
+                lines += sum(map(bool, map(bytes.strip, whole)))
         lines += bool(begun.strip())
-        if lines != expected:
+        expected = sum(each.instances for each in self.after)
+        if self.at is not None and lines != expected:
             said = f"after the vertices there are {lines} lines, the header says {expected}; correct the header"
             raise self.file.error(said)
 
@@ -245,22 +226,11 @@ class PlyFile(clouds.CloudFile):
         if not clouds.same_columns(columns, self.width):
             lines = text.splitlines(keepends=True)
             end = b"\r\n" if lines[0].endswith(b"\r\n") else b"\n"
-            own = list(takewhile(lambda line: line.split()[:1] in OWN_LINES, lines[self.line :]))
+            own = list(takewhile(lambda line: line.split()[:1] in OWN_LINES, lines[self.own_line :]))
             others = [line for line in own if line.split()[:1] != [b"property"]]
             made = [_property_line(column) + end for column in columns]
-            text = b"".join([*lines[: self.line], *made, *others, *lines[self.line + len(own) :]])
+            text = b"".join([*lines[: self.own_line], *made, *others, *lines[self.own_line + len(own) :]])
         return text + self.before
-
-
-def _check_lists(before: Sequence[PlyElement], vertex: PlyElement, order: str, source: str) -> None:
-    """Raise FormatError if lists prevent access to the vertices."""
-    if vertex.lists:
-        message = f"the list {shown(vertex.lists[0])} within {VERTEX!r} is not read; write it as an element of its own"
-        raise FormatError(f"{message}, or leave it out", source=source, line=vertex.line)
-    for each in before:
-        if order and each.lists and each.instances:
-            message = f"element {shown(each.name)} with the list {shown(each.lists[0])} is before {VERTEX!r}"
-            raise FormatError(f"{message}; write {VERTEX!r} first, or the file as ascii", source=source, line=each.line)
 
 
 def _type_of(column: OutColumn) -> str:
