@@ -96,18 +96,13 @@ def _apply(plan: DerivationStyle, *operands: Any, at_ns: int | None = None, kind
     else:
         pose, record = operands
         way = _pose(pose, degrees=degrees)
-    return derive_record(plan, way, _record(record, kind), RowOptions(kind=kind, degrees=degrees))
-
-
-def _record(value: Any, kind: str) -> Source:
-    """Return the text of a record: three numbers, a mapping, or its text."""
-    if isinstance(value, (str, dict)):
-        return _source(value)
-    try:
-        x, y, z = map(float, value)
-    except (TypeError, ValueError):
-        raise ValueInvalid(f"expected three numbers or a mapping, found {shown(value)}") from None
-    return _source({kind or "point": [x, y, z]})
+    if not isinstance(record, (str, dict)):
+        try:
+            x, y, z = map(float, record)
+        except (TypeError, ValueError):
+            raise ValueInvalid(f"expected three numbers or a mapping, found {shown(record)}") from None
+        record = {kind or "point": [x, y, z]}
+    return derive_record(plan, way, _source(record), RowOptions(kind=kind, degrees=degrees))
 
 
 def _follow(plan: DerivationStyle, steps: Any) -> Explanation:

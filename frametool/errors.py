@@ -61,16 +61,9 @@ class FrametoolError(Exception):
         """Return the facts in addition to the kind and the message."""
         return self.fields
 
-    def __reduce__(self) -> tuple[Callable[..., FrametoolError], tuple[object, ...]]:
+    def __reduce__(self) -> tuple[Callable[..., FrametoolError], tuple[object, ...], dict[str, object]]:
         """Allow pickling an error, whatever its arguments."""
-        return _rebuilt, (type(self), self.args, self.__dict__)
-
-
-def _rebuilt(kind: type[FrametoolError], message: tuple[object, ...], state: dict[str, object]) -> FrametoolError:
-    error = kind.__new__(kind, *message)
-    error.args = message
-    error.__dict__.update(state)
-    return error
+        return type(self).__new__, (type(self),), {**self.__dict__, "args": self.args}
 
 
 class ValueInvalid(FrametoolError, ValueError):
@@ -245,9 +238,18 @@ def did_you_mean(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str
 
 def _closest(name: str, known: list[str], count: int, cutoff: float) -> list[str]:
     """Return the most similar names, the best first."""
+    from bisect import bisect
     from difflib import get_close_matches
 
-    return get_close_matches(name[:LONGEST_NAME], _likely(name[:LONGEST_NAME], known), n=count, cutoff=cutoff)
+    name = name[:LONGEST_NAME]
+    if len(known) > MOST_COMPARED:  # of many those next to it in alphabetical order, read forwards and backwards
+        near: dict[str, None] = {}
+        for step in (1, -1):
+            texts = sorted(each[::step] for each in known)
+            at = bisect(texts, name[::step])
+            near |= dict.fromkeys(each[::step] for each in texts[max(at - NEIGHBOURS, 0) : at + NEIGHBOURS])
+        known = [*near]
+    return get_close_matches(name, known, n=count, cutoff=cutoff)
 
 
 def nearest(name: str, known: Iterable[str]) -> list[str]:
@@ -264,20 +266,6 @@ def any_near(name: str, known: Iterable[str], otherwise: str) -> str:
     """Return `; did you mean 'x' or 'y'?` for all near names, or else a hint."""
     near = nearest(name, known)
     return f"; did you mean {' or '.join(map(shown, near))}?" if near else f"; {otherwise}"
-
-
-def _likely(name: str, known: list[str]) -> list[str]:
-    """Return the names to compare: of many those next to it in alphabetical order, read forwards and backwards."""
-    if len(known) <= MOST_COMPARED:
-        return known
-    from bisect import bisect
-
-    near: dict[str, None] = {}
-    for step in (1, -1):
-        texts = sorted(each[::step] for each in known)
-        at = bisect(texts, name[::step])
-        near |= dict.fromkeys(each[::step] for each in texts[max(at - NEIGHBOURS, 0) : at + NEIGHBOURS])
-    return [*near]
 
 
 def alternatives(name: str, known: Iterable[str], label: str) -> str:

@@ -188,9 +188,15 @@ def _read(file: InputFile) -> Found:
 
 def _in_document(value: Any, file: InputFile) -> Found:
     """Yield the cameras of one document."""
-    if isinstance(value, list):
-        is_table = any(isinstance(each, dict) and "camera_intrinsic" in each for each in value)
-        yield from _nuscenes(value, file) if is_table else _ours(value, "")
+    if isinstance(value, list) and any(isinstance(each, dict) and "camera_intrinsic" in each for each in value):
+        from frametool.formats.trees.calibrations import read
+
+        for edge in read(file, _options(file)):  # calibrated_sensor.json of nuScenes, by the names of the frames
+            record = value[edge.path[-1]] if edge.parent is not None else {}  # type: ignore[index]
+            if record.get("camera_intrinsic"):
+                yield edge.child, {"model": "pinhole", "K": numbers_of(record["camera_intrinsic"])}
+    elif isinstance(value, list):
+        yield from _ours(value, "")
     elif not isinstance(value, dict):
         return
     elif "fl_x" in value or ANGLE in value:
@@ -312,7 +318,7 @@ def _nerf(value: dict[str, Any]) -> dict[str, Any]:
     return {"colmap": model, "numbers": [{**usual, **known}.get(each, 0.0) for each in names], "size": size}
 
 
-# ---------------------------------------------------------------- KITTI, nuScenes
+# ---------------------------------------------------------------- KITTI
 
 
 def _kitti(file: InputFile) -> Found:
@@ -335,16 +341,6 @@ def _kitti(file: InputFile) -> Found:
                 fields["shift"] = [c - sum(turn[3 * i + k] * t[k] for k in range(3)) for i, c in enumerate(centre)]
             if p:
                 yield read.named(name), fields
-
-
-def _nuscenes(records: list[dict[str, Any]], file: InputFile) -> Found:
-    """Yield the cameras of calibrated_sensor.json by the names of their frames."""
-    from frametool.formats.trees.calibrations import read
-
-    for edge in read(file, _options(file)):
-        record = records[edge.path[-1]] if edge.parent is not None else {}  # type: ignore[index]
-        if record.get("camera_intrinsic"):
-            yield edge.child, {"model": "pinhole", "K": numbers_of(record["camera_intrinsic"])}
 
 
 def _options(file: InputFile) -> Options:

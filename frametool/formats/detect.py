@@ -71,7 +71,7 @@ class Beginning:
         """Return the first line that is not a comment; a comment with commas or tabs, like the rows, is a header."""
         lines = [line.strip("\r") for line in self.text.split("\n") if line.strip()]
         plain = next((line for line in lines if not line.startswith("#")), "")
-        if lines and lines[0].startswith("#") and (not plain or _has_delimiter(plain)) and _has_delimiter(lines[0]):
+        if lines and re.match("#.*[,\t]", lines[0]) and (not plain or re.search("[,\t]", plain)):
             return lines[0]
         return plain or "".join(lines[:1])
 
@@ -166,10 +166,6 @@ class Beginning:
 _YAML_KEY = r"""(["']?)([A-Za-z_][\w./-]*)\1[ \t]*:"""
 
 
-def _has_delimiter(line: str) -> bool:
-    return "," in line or "\t" in line
-
-
 _NO_NAME = r"header|transform|pose|point|vector|twist|wrench|force|linear|angular|child_frame_id|name|parent|samples"
 
 
@@ -224,7 +220,8 @@ def _count(keys: set[str], pattern: str) -> int:
 def _fitting(begin: Beginning, tests: dict[str, Shows], names: tuple[str, ...]) -> tuple[list[str], str]:
     """Return the formats that match a sign of the strongest matching kind, and that kind."""
     for kind, shows in tests.items():
-        found = [name for name in names if any(kind == of and shows(begin, what) for of, what in _signs(name))]
+        signs = ((name, *sign) for name in names for sign in (UNSUPPORTED.get(name) or FORMATS[name]).magic)
+        found = list(dict.fromkeys(name for name, of, what in signs if kind == of and shows(begin, what)))
         if found and kind == "yaml key":  # weaker than nested keys
             found += _fitting(begin, {"yaml inner": tests["yaml inner"]}, names)[0]
         if found:
@@ -232,31 +229,21 @@ def _fitting(begin: Beginning, tests: dict[str, Shows], names: tuple[str, ...]) 
     return [], ""
 
 
-def _signs(fmt: str) -> tuple[tuple[str, str | bytes], ...]:
-    return (UNSUPPORTED[fmt] if fmt in UNSUPPORTED else FORMATS[fmt]).magic
-
-
 def by_sign(head: bytes | Beginning, *reads: str, name: str = "") -> str | None:
     """Return the format, among those from which `reads` is read, that matches the first bytes; None if none does.
 
     Supported formats have priority.  Raises FormatError if two formats fit, or an unsupported one.
     """
-    begin = head if isinstance(head, Beginning) else Beginning(head)
-    fitting, kind = _fitting(begin, _STRONG, (*readers(*reads), *UNSUPPORTED, *readers("drawing")))
+    begin, known = head if isinstance(head, Beginning) else Beginning(head), readers(*reads)
+    fitting, kind = _fitting(begin, _STRONG, (*known, *UNSUPPORTED, *readers("drawing")))
     if fitting and kind != "magic" and not begin.head.startswith(UTF16) and not_text(begin.head):
         return None  # bytes that resemble a line of some format by chance
-    found = [fmt for fmt in fitting if not _is_unread(fmt, reads)] or fitting
-    if not found:
-        return None
-    if _is_unread(found[0], reads):
-        raise not_read(found[0], name)
+    found = [fmt for fmt in fitting if fmt in known]
+    if fitting and not found:
+        raise not_read(fitting[0], name)
     if len(found) > 1:
         raise FormatError(f"fits {' and '.join(found)}; give --in {'|'.join(found)}", source=name or "stdin")
-    return found[0]
-
-
-def _is_unread(fmt: str, reads: tuple[str, ...]) -> bool:
-    return fmt in UNSUPPORTED or set(reads).isdisjoint(FORMATS[fmt].reads)
+    return found[0] if found else None
 
 
 _NO_POSES = "no poses in it (frametool tree shows the frames); give what it was made from, as a bag of /tf, /tf_static"

@@ -203,22 +203,13 @@ class TreeBuilder:
         self.earth, self._one_earth = self.rules.earth, False  # the Earth's name; warned of an edge to itself
         self.tree = FrameTree(name)
         self.buffer: TransformBuffer | None = None
-        self._first: dict[str, tuple[str, Rigid, EdgePlace]] = {}  # child -> its first definition
+        self.first: dict[str, tuple[str, Rigid, EdgePlace]] = {}  # child -> its first definition
         self._replaced: list[tuple[str, str, EdgePlace]] = []  # samples that replaced another one at the same stamp
         self._stamps: dict[str, int] = {}  # child -> its only stamp, while it has no other
         self._moves: set[str] = set()
         self._late: set[str] = set()  # children with a warning that their samples go back in time
         self.covariances: dict[str, Components] = {}  # child -> the covariance of its edge
         self.files: list[FrameFile] = []  # those that were read
-
-    @property
-    def places(self) -> dict[str, EdgePlace]:
-        """Return the place where each frame was first defined with its parent."""
-        return {child: place for child, (_, _, place) in self._first.items()}
-
-    def add_root(self, frame: str) -> None:
-        """Add a frame that has no parent (yet)."""
-        (self.tree if self.buffer is None else self.buffer).add_root(frame)
 
     def one_name(self, frame: str) -> str:
         """Return a name; for the Earth's frame that of its two names which was used first."""
@@ -231,48 +222,48 @@ class TreeBuilder:
         """Return True if names include the second of the two names of the Earth's frame."""
         return any(self.one_name(name) != name for name in names)
 
-    def add_edge(self, edge: Edge, place: EdgePlace) -> None:
-        """Add an edge, or a root; an edge between the two names of the Earth's frame must be the identity."""
-        parent, child = edge.parent and self.one_name(edge.parent), self.one_name(edge.child)
-        if parent is None:
-            self.add_root(child)
-        elif parent != child or edge.parent == edge.child:
-            self.add(parent, child, edge.components, edge.stamp_ns, place)
-        elif any(edge.components[:6]):
-            what = "'earth' and 'ecef' are one frame, this edge puts one elsewhere in the other; rename one"
-            raise place.error(what, BadTopology)
-        else:
-            if not self._one_earth:
-                warn(f"{self.name}: 'earth' and 'ecef' are one frame; the edge between them is left out")
-            self._one_earth = True
-            self.add_root(child)
-
-    def add(self, parent: str, child: str, components: Rigid, stamp_ns: int | None, place: EdgePlace) -> None:
-        """Add one edge, or one sample of it.
+    def add(self, place: EdgePlace) -> None:
+        """Add an edge, one sample of it, or a root; an edge between the names of the Earth's frame is the identity.
 
         Raises BadTopology and FormatError with the place.
         """
+        edge, components, stamp_ns = place.edge, place.edge.components, place.edge.stamp_ns
+        parent, child = edge.parent and self.one_name(edge.parent), self.one_name(edge.child)
+        if parent == child and edge.parent != edge.child:
+            if any(components[:6]):
+                what = "'earth' and 'ecef' are one frame, this edge puts one elsewhere in the other; rename one"
+                raise place.error(what, BadTopology)
+            if not self._one_earth:
+                warn(f"{self.name}: 'earth' and 'ecef' are one frame; the edge between them is left out")
+            self._one_earth, parent = True, None
+        if parent is None:
+            (self.tree if self.buffer is None else self.buffer).add_root(child)
+            return
         try:
             if self.buffer is None and stamp_ns is None:
-                self._first.setdefault(child, (parent, components, place))
+                self.first.setdefault(child, (parent, components, place))
                 self.tree.add_components(parent, child, components)
             else:
-                self._record(self._moving(), parent, child, components, stamp_ns, place)
+                buffer = self._moving()
+                track = buffer.track(child)
+                settled = track is not None and child not in self._moves and (track.is_static or stamp_ns is None)
+                # else it is a duplicate, once with and once without a stamp
+                if track is None or not settled or (track.parent, track.components) != (parent, components):
+                    self.first.setdefault(child, (parent, components, place))
+                    if stamp_ns is not None and self._stamps.setdefault(child, stamp_ns) != stamp_ns:
+                        self._moves.add(child)
+                    if buffer.insert_components(parent, child, components, stamp_ns) and stamp_ns is not None:
+                        self._replaced.append((parent, child, place))
         except BadTopology as error:
             raise self._placed(error, parent, child, place) from None
         except ValueInvalid as error:
             raise place.error(str(error), FormatError) from None
-        if place.edge.covariance is not None or child in self.covariances:
-            self._keep_covariance(parent, child, place)
-
-    def _keep_covariance(self, parent: str, child: str, place: EdgePlace) -> None:
-        """Store the covariance of an edge; raises BadTopology with both places if it differs from the previous one."""
-        first = self._first[child][2]
-        if place.edge.covariance != first.edge.covariance:
-            error = topology.two_covariances(parent, child, first.edge.covariance, place.edge.covariance)
-            raise self._placed(error, parent, child, place)
-        if place.edge.covariance is not None:
-            self.covariances[child] = place.edge.covariance
+        if edge.covariance is not None or child in self.covariances:
+            known = self.first[child][2].edge.covariance
+            if edge.covariance is None or edge.covariance != known:
+                twice = topology.two_covariances(parent, child, known, edge.covariance)
+                raise self._placed(twice, parent, child, place)
+            self.covariances[child] = edge.covariance
 
     def add_samples(self, file: FrameFile, samples: Samples) -> None:
         """Add the poses of one frame: in one piece if their order is known to be correct, else one by one."""
@@ -285,7 +276,7 @@ class TreeBuilder:
                 self._moving().insert_many(parent, child, stamps_ns, components)
             except BadTopology as error:
                 raise self._placed(error, parent, child, place) from None
-            self._first.setdefault(child, (parent, components[0], place))
+            self.first.setdefault(child, (parent, components[0], place))
             self._stamps.setdefault(child, stamps_ns[0])
             self._moves.add(child)
             return
@@ -293,7 +284,7 @@ class TreeBuilder:
             self._late.add(child)
             warn(f"{file.name}: stamps of {shown(child)} are out of order; sorted")
         for edge in samples.edges():
-            self.add(parent, child, edge.components, edge.stamp_ns, EdgePlace(file, edge))
+            self.add(EdgePlace(file, edge))
 
     def add_columns(self, file: FrameFile, columns: EdgeColumns) -> None:
         """Add edges: samples of known frames in bulk, frame by frame, the others one by one."""
@@ -309,7 +300,7 @@ class TreeBuilder:
             self.add_samples(file, samples)
         for pair, edge in zip(pairs, columns.edges(), strict=True) if len(whole) < len(found) else ():
             if pair not in whole:
-                self.add(*pair, edge.components, edge.stamp_ns, EdgePlace(file, edge))
+                self.add(EdgePlace(file, edge))
 
     def _goes_on(self, parent: str, child: str) -> bool:
         """Return True if a frame is known to move and is in this parent now."""
@@ -322,7 +313,7 @@ class TreeBuilder:
             return False
         track = None if self.buffer is None else self.buffer.track(samples.child)
         if track is None:
-            follows = samples.child not in self._first
+            follows = samples.child not in self.first
         else:
             goes_on = self._goes_on(samples.parent, samples.child)
             follows = goes_on and track.last_ns < samples.stamps_ns[0]  # type: ignore[union-attr]
@@ -330,16 +321,7 @@ class TreeBuilder:
 
     def finish(self) -> FrameTree | TransformBuffer:
         """Return the tree, or the buffer if anything moves."""
-        made: FrameTree | TransformBuffer = self.tree
-        if self.buffer is not None:
-            made = self.buffer
-            single = (track.child for track in made.tracks() if not track.is_static and track.child not in self._moves)
-            static = set() if self.rules.moving else set(single)
-            for child in static:
-                made.make_static(child)
-            self._warn_replaced(static)
-            tree = self._static_tree(made)
-            made = made if made.moves else tree
+        made = self.tree if self.buffer is None else self._settled(self.buffer)
         made.covariances |= self.covariances
         held: list[FrameFile] = []  # files of other formats that may hold cameras, read on demand
         for file in self.files:
@@ -360,41 +342,30 @@ class TreeBuilder:
             self.buffer = TransformBuffer(keep_ns=self.rules.keep_ns, name=self.name)
             for frame in self.tree.frames:
                 self.buffer.add_root(frame)
-            for child, (parent, components, _) in self._first.items():
+            for child, (parent, components, _) in self.first.items():
                 self.buffer.insert_components(parent, child, components)
         return self.buffer
 
-    def _record(
-        self, buffer: TransformBuffer, parent: str, child: str, components: Rigid, stamp_ns: int | None,
-        place: EdgePlace,
-    ) -> None:
-        """Add a sample, or a static edge next to samples."""
-        track = buffer.track(child)
-        settled = track is not None and child not in self._moves and (track.is_static or stamp_ns is None)
-        if track is not None and settled and (track.parent, track.components) == (parent, components):
-            return  # a duplicate, once with and once without a stamp
-        self._first.setdefault(child, (parent, components, place))
-        if stamp_ns is not None and self._stamps.setdefault(child, stamp_ns) != stamp_ns:
-            self._moves.add(child)
-        if buffer.insert_components(parent, child, components, stamp_ns) and stamp_ns is not None:
-            self._replaced.append((parent, child, place))
+    def _settled(self, buffer: TransformBuffer) -> FrameTree | TransformBuffer:
+        """Return a buffer, or the tree of its static edges if nothing moves; a frame with one stamp is static.
 
-    def _warn_replaced(self, static: set[str]) -> None:
-        """Refuse static frames with two values; warn about moving ones with two poses at one stamp."""
-        from frametool.frames.stamps import format_stamp
-
+        Refuses static frames with two values; warns about moving ones with two poses at one stamp.
+        """
+        single = {track.child for track in buffer.tracks() if not track.is_static and track.child not in self._moves}
+        static = set() if self.rules.moving else single
+        for child in static:
+            buffer.make_static(child)
         for parent, child, place in self._replaced:
             if child in static:
                 raise self._placed(topology.two_poses(child, parent), parent, child, place)
         if self._replaced:
+            from frametool.frames.stamps import format_stamp
+
             _, child, place = self._replaced[0]
             ((name, line),) = lines_of([place])
             what = f"frame {shown(child)} has two poses at {format_stamp(place.edge.stamp_ns or 0)}; the last one holds"
             warn(f"{name}:{line}: {what}{more_like_it(len(self._replaced))}")
-
-    def _static_tree(self, buffer: TransformBuffer) -> FrameTree:
-        """Return all static edges as a tree, which checks its rules."""
-        tree = FrameTree(self.name)
+        tree = FrameTree(self.name)  # which checks its rules
         for frame in buffer.frames:
             tree.add_root(frame)
         for track in buffer.tracks():
@@ -402,12 +373,12 @@ class TreeBuilder:
                 try:
                     tree.add_components(track.parent, track.child, track.components)
                 except BadTopology as error:
-                    raise self._first[track.child][2].error(str(error), BadTopology) from None
-        return tree
+                    raise self.first[track.child][2].error(str(error), BadTopology) from None
+        return buffer if buffer.moves else tree
 
     def _placed(self, error: BadTopology, parent: str, child: str, place: EdgePlace) -> FormatError:
         """Return the error for a place; if it contradicts an earlier definition, both places are named."""
-        known = self._first.get(child)
+        known = self.first.get(child)
         if error.rule in ("cycle", "self") or known is None or known[2] is place:
             return place.error(str(error), BadTopology)
         places = known[2].seen_from(place), place.seen_from(place)
@@ -492,7 +463,7 @@ def load_sources(
     finally:
         close_all(sources)
     if places is not None:
-        places |= builder.places
+        places |= {child: place for child, (_, _, place) in builder.first.items()}
     return tree
 
 
@@ -522,7 +493,7 @@ def _add(builder: TreeBuilder, file: FrameFile) -> None:
             builder.add_columns(file, piece)
         else:
             for edge in (piece,) if isinstance(piece, Edge) else piece.edges():
-                builder.add_edge(edge, EdgePlace(file, edge))
+                builder.add(EdgePlace(file, edge))
     if piece is None:
         raise file.error("no frames in it")
     builder.files.append(file)

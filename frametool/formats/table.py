@@ -89,12 +89,6 @@ _MESSAGES = "frametool.ros.message_stream"
 BAG = "frametool.recordings.messages"
 
 
-def _drawing(summary: str, **fields: Any) -> Format:
-    """Return the row of a format with edges but without poses."""
-    about = {"reads": ("drawing",), "writes": ("tree",), "conventions": "parent -> child, no poses", **fields}
-    return Format(summary, reader=_DRAWINGS, writer=_DRAWINGS, **about)
-
-
 def _arrays(
     summary: str, module: str, *, writes: tuple[str, ...] = ("poses", "points", "arrays"), **fields: Any
 ) -> Format:
@@ -105,12 +99,6 @@ def _arrays(
 def _messages(summary: str, *magic: tuple[str, str | bytes], reader: str = _MESSAGES, **fields: Any) -> Format:
     """Return the row of a format of messages."""
     return _read_tree(summary, reader, magic=magic, required_options=("frames",), **fields)
-
-
-def _recording(summary: str, suffix: str, *magic: tuple[str, str | bytes]) -> Format:
-    """Return the row of a format of recorded messages."""
-    written = {"writes": ("poses", "points", "tree", "recording"), "writer": "frametool.recordings.write"}
-    return _messages(summary, *magic, reader=BAG, reads=_CAMERAS, suffixes=(suffix,), **written)
 
 
 _CAMERAS = ("tree", "cameras")
@@ -161,6 +149,10 @@ _EUROC = (
 # formats that differ only in their names and magic
 _ECHO = Format("", writes=("poses", "points", "tree"), writer="frametool.ros.echo_format")
 _CALLS = Format("", writes=("poses", "tree"), writer="frametool.ros.publisher")
+_RECORDING = _messages(
+    "", reader=BAG, reads=_CAMERAS, writes=("poses", "points", "tree", "recording"), writer="frametool.recordings.write"
+)
+_DRAWN = _tree("", _DRAWINGS, reads=("drawing",), conventions="parent -> child, no poses")
 _LAS = _arrays("", "frametool.formats.rows.las", writes=("points", "arrays"), conventions="metres")
 _BIN = _arrays(
     "", "frametool.formats.rows.clouds", writes=("points", "arrays"),
@@ -233,19 +225,22 @@ FORMATS = {
             ("line", r"[-+]?[\d.]+\s(?:\S+\s+){5,6}(?!-?[\d.])\S+\s+\S+\s*\d*\s*&?$"),
         ),
     ),
-    "bag1": _recording("ROS 1 bag", ".bag", ("magic", rb"#ROSBAG V2\.0\n(?:..\0\0|.{0,3}\Z)")),
-    "bag2": _recording(
-        "ROS 2 bag: sqlite3, or a folder", ".db3", ("magic", rb"SQLite format 3\0"), ("folder", "metadata.yaml")
+    "bag1": _RECORDING._replace(
+        summary="ROS 1 bag", suffixes=(".bag",), magic=(("magic", rb"#ROSBAG V2\.0\n(?:..\0\0|.{0,3}\Z)"),)
     ),
-    "mcap": _recording("MCAP file", ".mcap", ("magic", rb"\x89MCAP0\r\n")),
+    "bag2": _RECORDING._replace(
+        summary="ROS 2 bag: sqlite3, or a folder", suffixes=(".db3",),
+        magic=(("magic", rb"SQLite format 3\0"), ("folder", "metadata.yaml")),
+    ),
+    "mcap": _RECORDING._replace(summary="MCAP file", suffixes=(".mcap",), magic=(("magic", rb"\x89MCAP0\r\n"),)),
     "ros1": _ECHO._replace(summary="messages as `rostopic echo` prints them"),
     "ros2": _ECHO._replace(summary="messages as `ros2 topic echo` prints them"),
     "foxglove": _ECHO._replace(summary="FrameTransform as JSON, one a line", writes=("poses", "tree")),
     "static1": _CALLS._replace(summary="static_transform_publisher of ROS 1"),
     "static2": _CALLS._replace(summary="static_transform_publisher of ROS 2"),
-    "tf2": _drawing("the listing of tf2's all_frames_as_yaml", magic=(("yaml inner", "broadcaster"),)),
-    "dot": _drawing(
-        "graphviz", suffixes=(".dot", ".gv"),
+    "tf2": _DRAWN._replace(summary="the listing of tf2's all_frames_as_yaml", magic=(("yaml inner", "broadcaster"),)),
+    "dot": _DRAWN._replace(
+        summary="graphviz", suffixes=(".dot", ".gv"),
         magic=(("text", r"\A\ufeff?(?:\s|//[^\n]*\n)*(?:strict\s+)?digraph\b"),),
     ),
     "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer=_DRAWINGS),

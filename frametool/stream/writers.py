@@ -21,14 +21,13 @@ from frametool.formats.rows.pose_rows import (
     DroppedFields,
     Numbers,
     RowForm,
-    field,
     image_name,
     is_turned,
     rows_of,
     turned,
 )
 from frametool.formats.table import FORMATS
-from frametool.frames.stamps import BILLION
+from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import arrays, floats, quaternion, rigid
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import SCALE, Pose
@@ -179,8 +178,10 @@ class TextWriter(SingleWriter):
                 texts = [image_name(*each).encode() for each in zip(known, times, strict=True)]
             elif piece == "seconds" and min(times) >= 0:
                 texts = [b"%d.%09d" % divmod(time, BILLION) for time in times]
+            elif piece == "seconds":
+                texts = [format_stamp(time).encode() for time in times]
             else:
-                texts = [field(piece, *each).encode() for each in zip(times, numbers, strict=True)]
+                texts = [b"%d" % each for each in (times if piece == "nanoseconds" else numbers)]
             pieces.append(In(len(parts)))
             parts.append(spans_of(texts))
         written = number_spans(np.ascontiguousarray(values), self.style.precision, separators(pieces))

@@ -63,42 +63,6 @@ def write_poses(results: Iterable[Result | dict[str, Any]], style: Style) -> str
 write_points = write_poses
 
 
-def _pose_cells(result: Result, style: Style) -> dict[str, Any]:
-    """Return a pose's cells by column name.
-
-    An extra that a notation contains (the angle of an axis) is omitted; raises ValueInvalid if two
-    notations need one column.
-    """
-    pose = result.pose
-    cells: dict[str, Any] = {
-        key: name for key, name in (("name", pose.name), ("parent", pose.parent)) if name is not None
-    }
-    if style.place is not None and not isinstance(result, NoResult):
-        from frametool.grammar.place import placed_cells
-
-        placed, pose = placed_cells(pose, style.place)
-        if style.place.origin is not None:  # the columns state its axes
-            cells.pop("parent", None)
-        cells |= placed
-    elif pose.position is not None and not any(each.representation.whole for each in style.notations):
-        cells |= zip("xyz", pose.position, strict=True)
-    for notation in style.notations if pose.rotation is not None else ():
-        whole = notation.representation.whole if pose.position is not None else None
-        columns = whole.columns if whole else notation.columns_in(degrees=style.degrees)
-        rotation = dict(zip(columns, pose_numbers(pose, notation, style), strict=True))
-        if twice := [name for name in rotation if cells.get(name, rotation[name]) != rotation[name]]:
-            raise ValueInvalid(f"columns {', '.join(twice)} would appear twice; write json or yaml, or a single --to")
-        cells |= rotation
-    if isinstance(result, NoResult):
-        cells |= dict.fromkeys(cells.keys() - NAMES)
-    extras = {
-        name: cell
-        for key, value in in_columns(result.said(style)).items()
-        for name, cell in (_record_cells({key: value}) if key in SIX else ((key, value),))
-    }
-    return cells | {key: value for key, value in extras.items() if key not in cells}
-
-
 def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
     """Yield the cells of a record: three for each vector; other values that are not scalar are one cell of JSON."""
     for key, value in in_columns(record).items():
@@ -115,8 +79,37 @@ def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def cells_of(value: Result | dict[str, Any], style: Style) -> dict[str, Any]:
-    """Return the cells of a result by column name."""
-    return _pose_cells(value, style) if isinstance(value, Result) else dict(_record_cells(value))
+    """Return the cells of a result by column name.
+
+    An extra that a notation contains (the angle of an axis) is omitted; raises ValueInvalid if two
+    notations need one column.
+    """
+    if not isinstance(value, Result):
+        return dict(_record_cells(value))
+    pose, extras = value.pose, dict[str, Any]()
+    names = ("name", pose.name), ("parent", pose.parent)
+    cells: dict[str, Any] = {key: name for key, name in names if name is not None}
+    if style.place is not None and not isinstance(value, NoResult):
+        from frametool.grammar.place import placed_cells
+
+        placed, pose = placed_cells(pose, style.place)
+        if style.place.origin is not None:  # the columns state its axes
+            cells.pop("parent", None)
+        cells |= placed
+    elif pose.position is not None and not any(each.representation.whole for each in style.notations):
+        cells |= zip("xyz", pose.position, strict=True)
+    for notation in style.notations if pose.rotation is not None else ():
+        whole = notation.representation.whole if pose.position is not None else None
+        columns = whole.columns if whole else notation.columns_in(degrees=style.degrees)
+        rotation = dict(zip(columns, pose_numbers(pose, notation, style), strict=True))
+        if twice := [name for name in rotation if cells.get(name, rotation[name]) != rotation[name]]:
+            raise ValueInvalid(f"columns {', '.join(twice)} would appear twice; write json or yaml, or a single --to")
+        cells |= rotation
+    if isinstance(value, NoResult):
+        cells |= dict.fromkeys(cells.keys() - NAMES)
+    for key, each in in_columns(value.said(style)).items():
+        extras |= _record_cells({key: each}) if key in SIX else {key: each}
+    return cells | extras | cells
 
 
 def row(cells: Iterable[Any], style: Style) -> str:

@@ -139,15 +139,6 @@ def is_turned(style: Style) -> bool:
     return bool(axes and style.axes and axes != style.axes)
 
 
-def field(name: str, stamp_ns: int, number: int) -> str:
-    """Return the text of a field of a row."""
-    if name == "seconds":
-        return format_stamp(stamp_ns)
-    if name == "nanoseconds":
-        return str(stamp_ns)
-    return str(number)
-
-
 def image_name(image: str | None, stamp_ns: int) -> str:
     """Return the name of an image, without characters that JSON and rows cannot hold; else its stamp."""
     if image is None:
@@ -289,44 +280,33 @@ def blocks(file: InputFile, options: Options, *, named: bool = True) -> Iterator
     """
     import numpy as np
 
+    from frametool.geometry.batch_validation import read_rotations
+
     spec, rows = form_of(file, options), READERS[file.format](file, options)
     stamps = StampFile(options.answers.stamps) if options.answers.stamps else None
     count = 0
     while some := list(islice(rows, BLOCK)):
-        good, poses = _checked(some, spec, file, options)
-        times = [stamps.at(count + at) if stamps else _counted(some[at], file) for at in range(len(some))]
+        columns = np.array([row.numbers for row in some], np.float64).T
+        found = read_rotations(notation(spec.rotation), list(columns[3:]), normalize=options.normalize)
+        for at, reason in sorted(found.reasons.items()):
+            options.report(error_at(file, some[at], reason))
+        if spec.rotation == "matrix":
+            options.tally.projected = max(options.tally.projected, found.off)
+        else:
+            options.tally.rough += [some[at].line for at in found.mended.tolist()]
+        poses: Components = (*columns[:3], *found.quaternions)
+        if spec.inverse:
+            poses = rigid.inverse(*poses)
+        for row in some if stamps is None else ():
+            if row.number >= NUMBERED:
+                raise error_at(file, row, f"{row.number} is too large to count seconds; give --stamps FILE")
+        times = [stamps.at(count + at) if stamps else row.number * BILLION for at, row in enumerate(some)]
+        good = [at for at in range(len(some)) if at not in found.reasons]
         count += len(some)
         yield PoseBlock(tuple(part[good] for part in poses), np.array(times, np.int64)[good], [some[at] for at in good])
     if stamps:
         stamps.finish(count, file.name)
     describe(options, spec, count, named=named)
-
-
-def _checked(some: Sequence[Written], spec: Rows, file: InputFile, options: Options) -> tuple[list[int], Components]:
-    """Return the valid rows, and the poses of the body in the world."""
-    import numpy as np
-
-    from frametool.geometry.batch_validation import read_rotations
-
-    columns = np.array([row.numbers for row in some], np.float64).T
-    found = read_rotations(notation(spec.rotation), list(columns[3:]), normalize=options.normalize)
-    for at, reason in sorted(found.reasons.items()):
-        options.report(error_at(file, some[at], reason))
-    if spec.rotation == "matrix":
-        options.tally.projected = max(options.tally.projected, found.off)
-    else:
-        options.tally.rough += [some[at].line for at in found.mended.tolist()]
-    poses: Components = (*columns[:3], *found.quaternions)
-    if spec.inverse:
-        poses = rigid.inverse(*poses)
-    return [at for at in range(len(some)) if at not in found.reasons], poses
-
-
-def _counted(row: Written, file: InputFile) -> int:
-    """Return the number of a pose as seconds."""
-    if row.number >= NUMBERED:
-        raise error_at(file, row, f"{row.number} is too large to count seconds; give --stamps FILE")
-    return row.number * BILLION
 
 
 def error_at(file: InputFile, row: Written, message: str) -> FormatError:
@@ -369,38 +349,34 @@ def _colmap(file: InputFile, _options: Options) -> Iterator[Written]:
     comments, lines = True, text_lines(file)
     of_frames = False
     numbered = set[bool]()  # whether names of images begin with a number and a blank
-    for number, line in lines:
-        bare = line.strip()
+    for line, text in lines:
+        bare = text.strip()
         if not bare or bare.startswith("#"):
             of_frames |= comments and "Frame list" in bare
             continue
         comments = False
-        pose = _colmap_pose(file, number, bare, of_frame=of_frames)
-        numbered.add(re.match(NUMBER_BEFORE, pose.image) is not None)
+        words = bare.split(maxsplit=9)  # the name of an image may contain blanks
+        data = bare.split()[9:] if of_frames else []  # a count, and three words per item
+        expected = FRAME_LINE if of_frames else f"10 words ({IMAGE_LINE})"
+        if len(words) < 10 - of_frames:
+            raise file.error(f"expected {expected}, found {len(words)} words", line)
+        number = whole_in(file, line, words[0], "an id")
+        whole_in(file, line, *((words[1], "RIG_ID") if of_frames else (words[8], "CAMERA_ID")))
+        if data and len(data) != 1 + 3 * whole_in(file, line, data[0], "NUM_DATA_IDS"):
+            raise file.error(f"expected {expected}, three words of each, found {len(data)}", line)
+        w, x, y, z, *position = numbers_in(file, line, words[1 + of_frames : 8 + of_frames])
+        image = "" if of_frames else words[9]
+        numbered.add(re.match(NUMBER_BEFORE, image) is not None)
         if len(numbered) > 1:
-            message = f"only some pictures are called as {shown(pose.image)}; a number too many or too few in the line?"
-            raise file.error(message, number)
-        yield pose
+            message = f"only some pictures are called as {shown(image)}; a number too many or too few in the line?"
+            raise file.error(message, line)
+        yield Written((*position, w, x, y, z), number, line, image)
         if not of_frames:
             below, points = next(lines, (0, ""))
             words = points.split()
             if len(words) % 3 or not all(re.fullmatch("-1|[0-9]+", word) for word in words[2::3]):
                 message = f"expected points (X Y POINT3D_ID each) or an empty line, found {len(words)} words"
                 raise file.error(message, below)
-
-
-def _colmap_pose(file: InputFile, line: int, text: str, *, of_frame: bool) -> Written:
-    words = text.split(maxsplit=9)  # the name of an image may contain blanks
-    data = text.split()[9:] if of_frame else []  # a count, and three words per item
-    expected = FRAME_LINE if of_frame else f"10 words ({IMAGE_LINE})"
-    if len(words) < 9 or (len(words) < 10 and not of_frame):
-        raise file.error(f"expected {expected}, found {len(words)} words", line)
-    number = whole_in(file, line, words[0], "an id")
-    whole_in(file, line, *((words[1], "RIG_ID") if of_frame else (words[8], "CAMERA_ID")))
-    if data and len(data) != 1 + 3 * whole_in(file, line, data[0], "NUM_DATA_IDS"):
-        raise file.error(f"expected {expected}, three words of each, found {len(data)}", line)
-    w, x, y, z, *position = numbers_in(file, line, words[1 + of_frame : 8 + of_frame])
-    return Written((*position, w, x, y, z), number, line, "" if of_frame else words[9])
 
 
 # --- g2o ---
@@ -420,40 +396,32 @@ def _g2o(file: InputFile, options: Options) -> Iterator[Written]:
     kinds, others = (MEASURED, VERTICES) if edges else (VERTICES, MEASURED)
     only_others = 0
     unknown: dict[str, int] = {}  # tag -> its first line
-    for number, line in text_lines(file):
-        words = line.split()
-        if not words or words[0].startswith("#"):
-            continue
-        if words[0] in others:
-            only_others = only_others or number
-        elif words[0] in kinds:
-            only_others = -1
-            yield _g2o_pose(file, number, words, kinds[words[0]], ids=1 + edges)
-        elif not words[0][0].isupper():
-            raise file.error(f"expected a tag as {next(iter(kinds))}, found {shown(words[0])}", number)
-        elif not re.fullmatch(NO_POSE, words[0]):
-            unknown.setdefault(words[0], number)
+    for line, text in text_lines(file):
+        tag, *words = text.split() or ["#"]
+        if tag in others:
+            only_others = only_others or line
+        elif tag in kinds:
+            only_others, layout = -1, kinds[tag]
+            expected = f"{'i j' if edges else 'id'} {layout}"
+            size = len(expected.split())
+            if len(words) != size and (not edges or len(words) != size + INFORMATION[layout]):
+                raise file.error(f"expected {tag} {expected}, found {len(words) + 1} words", line)
+            number, *_ = (whole_in(file, line, word, "the id of a vertex") for word in words[: 1 + edges])
+            numbers = numbers_in(file, line, words[1 + edges : size])
+            if layout == IN_PLANE:
+                x, y, theta = numbers
+                numbers = [x, y, 0.0, *euler.to_quaternion(0.0, 0.0, theta, "sxyz", floats)]
+            yield Written(tuple(numbers), number, line, names=(words[0], words[1]) if edges else None)
+        elif not tag[0].isupper() and tag[0] != "#":
+            raise file.error(f"expected a tag as {next(iter(kinds))}, found {shown(tag)}", line)
+        elif tag[0] != "#" and not re.fullmatch(NO_POSE, tag):
+            unknown.setdefault(tag, line)
     if unknown:
         options.tally.note(f"lines of unknown tags left out: {listing(unknown, 3)}", min(unknown.values()))
     if only_others > 0:
         as_poses = "edges in it, which measure and are no tree; as poses: frametool convert FILE --edges"
         found = "vertices in it; leave --edges out" if edges else as_poses
         raise file.error(f"only {found}", only_others)
-
-
-def _g2o_pose(file: InputFile, line: int, words: list[str], layout: str, *, ids: int) -> Written:
-    """Read a vertex with its id, or an edge with its two vertices and its information matrix."""
-    expected = f"{'id' if ids == 1 else 'i j'} {layout}"
-    size = len(expected.split())
-    kind, *rest = words
-    if len(rest) != size and (ids == 1 or len(rest) != size + INFORMATION[layout]):
-        raise file.error(f"expected {kind} {expected}, found {len(words)} words", line)
-    number, *_ = (whole_in(file, line, word, "the id of a vertex") for word in rest[:ids])
-    numbers = numbers_in(file, line, rest[ids:size])
-    if layout == IN_PLANE:
-        x, y, theta = numbers
-        numbers = [x, y, 0.0, *euler.to_quaternion(0.0, 0.0, theta, "sxyz", floats)]
-    return Written(tuple(numbers), number, line, names=(rest[0], rest[1]) if ids > 1 else None)
 
 
 # --- NeRF ---
