@@ -227,7 +227,7 @@ class TreeBuilder:
 
         Raises BadTopology and FormatError with the place.
         """
-        edge, components, stamp_ns = place.edge, place.edge.components, place.edge.stamp_ns
+        edge, components = place.edge, place.edge.components
         parent, child = edge.parent and self.one_name(edge.parent), self.one_name(edge.child)
         if parent == child and edge.parent != edge.child:
             if any(components[:6]):
@@ -240,20 +240,11 @@ class TreeBuilder:
             (self.tree if self.buffer is None else self.buffer).add_root(child)
             return
         try:
-            if self.buffer is None and stamp_ns is None:
+            if self.buffer is None and edge.stamp_ns is None:
                 self.first.setdefault(child, (parent, components, place))
                 self.tree.add_components(parent, child, components)
             else:
-                buffer = self._moving()
-                track = buffer.track(child)
-                settled = track is not None and child not in self._moves and (track.is_static or stamp_ns is None)
-                # else it is a duplicate, once with and once without a stamp
-                if track is None or not settled or (track.parent, track.components) != (parent, components):
-                    self.first.setdefault(child, (parent, components, place))
-                    if stamp_ns is not None and self._stamps.setdefault(child, stamp_ns) != stamp_ns:
-                        self._moves.add(child)
-                    if buffer.insert_components(parent, child, components, stamp_ns) and stamp_ns is not None:
-                        self._replaced.append((parent, child, place))
+                self._record(parent, child, place)
         except BadTopology as error:
             raise self._placed(error, parent, child, place) from None
         except ValueInvalid as error:
@@ -264,6 +255,19 @@ class TreeBuilder:
                 twice = topology.two_covariances(parent, child, known, edge.covariance)
                 raise self._placed(twice, parent, child, place)
             self.covariances[child] = edge.covariance
+
+    def _record(self, parent: str, child: str, place: EdgePlace) -> None:
+        """Add a sample, or a static edge next to samples, unless it is a duplicate, once with and once without a stamp."""
+        buffer, components, stamp_ns = self._moving(), place.edge.components, place.edge.stamp_ns
+        track = buffer.track(child)
+        settled = track is not None and child not in self._moves and (track.is_static or stamp_ns is None)
+        if track is not None and settled and (track.parent, track.components) == (parent, components):
+            return
+        self.first.setdefault(child, (parent, components, place))
+        if stamp_ns is not None and self._stamps.setdefault(child, stamp_ns) != stamp_ns:
+            self._moves.add(child)
+        if buffer.insert_components(parent, child, components, stamp_ns) and stamp_ns is not None:
+            self._replaced.append((parent, child, place))
 
     def add_samples(self, file: FrameFile, samples: Samples) -> None:
         """Add the poses of one frame: in one piece if their order is known to be correct, else one by one."""

@@ -79,17 +79,20 @@ def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def cells_of(value: Result | dict[str, Any], style: Style) -> dict[str, Any]:
-    """Return the cells of a result by column name.
+    """Return the cells of a result by column name."""
+    return _pose_cells(value, style) if isinstance(value, Result) else dict(_record_cells(value))
+
+
+def _pose_cells(result: Result, style: Style) -> dict[str, Any]:
+    """Return a pose's cells by column name.
 
     An extra that a notation contains (the angle of an axis) is omitted; raises ValueInvalid if two
     notations need one column.
     """
-    if not isinstance(value, Result):
-        return dict(_record_cells(value))
-    pose, extras = value.pose, dict[str, Any]()
+    pose, extras = result.pose, dict[str, Any]()
     names = ("name", pose.name), ("parent", pose.parent)
     cells: dict[str, Any] = {key: name for key, name in names if name is not None}
-    if style.place is not None and not isinstance(value, NoResult):
+    if style.place is not None and not isinstance(result, NoResult):
         from frametool.grammar.place import placed_cells
 
         placed, pose = placed_cells(pose, style.place)
@@ -105,9 +108,9 @@ def cells_of(value: Result | dict[str, Any], style: Style) -> dict[str, Any]:
         if twice := [name for name in rotation if cells.get(name, rotation[name]) != rotation[name]]:
             raise ValueInvalid(f"columns {', '.join(twice)} would appear twice; write json or yaml, or a single --to")
         cells |= rotation
-    if isinstance(value, NoResult):
+    if isinstance(result, NoResult):
         cells |= dict.fromkeys(cells.keys() - NAMES)
-    for key, each in in_columns(value.said(style)).items():
+    for key, each in in_columns(result.said(style)).items():
         extras |= _record_cells({key: each}) if key in SIX else {key: each}
     return cells | extras | cells
 

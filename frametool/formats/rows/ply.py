@@ -83,8 +83,8 @@ def read_head(file: InputFile) -> tuple[bytes, str, list[PlyElement]]:
                 continue
             case ["end_header", *_]:
                 break
-            case ["format", form, "1.0"] if form in FORMS and not fmt:
-                fmt = form
+            case ["format", name, "1.0"] if name in FORMS and not fmt:
+                fmt = name
             case ["format", *_]:
                 raise file.error(f"{said}: expected one format: {', '.join(FORMS)}, and 1.0", line)
             case ["element", name, number]:
