@@ -257,7 +257,7 @@ class TreeBuilder:
             self.covariances[child] = edge.covariance
 
     def _record(self, parent: str, child: str, place: EdgePlace) -> None:
-        """Add a sample, or a static edge next to samples, unless it is a duplicate, once with and once without a stamp."""
+        """Add a sample, or a static edge next to samples; not a duplicate, once with and once without a stamp."""
         buffer, components, stamp_ns = self._moving(), place.edge.components, place.edge.stamp_ns
         track = buffer.track(child)
         settled = track is not None and child not in self._moves and (track.is_static or stamp_ns is None)
