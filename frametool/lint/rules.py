@@ -1,4 +1,8 @@
-"""The rules of `check`: mistakes in single entries, which do not hide others, then the shape of the tree and motion."""
+"""The rules of `check`: mistakes in single entries, which do not hide others, then the shape of the tree and motion.
+
+Findings are written as compilers do:
+    robot.yaml:9:17: error: quaternion 0 0 0 0.9 has norm 0.9; .. [denormalized]
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import locate_many, parse_documents
+from frametool.documents.json import dump
 from frametool.errors import BadTopology, Finding, FormatError, Unanswered, first_of, shown
 from frametool.formats.detect import by_sign
 from frametool.formats.load import FrameFile, refuse_unknown_joints
@@ -22,10 +27,105 @@ if TYPE_CHECKING:
     from frametool.documents.source import Source
     from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Edge
     from frametool.grammar.readers import Misfit
 
     Find = Callable[[Finding], None]
+
+# rule -> (level, description); an error fails, a warning fails under --strict, a note never
+RULES = {
+    "syntax": ("error", "text that cannot be read, or lacks a part"),
+    "empty": ("warning", "a file without any transform"),
+    "no-frames": ("warning", "a file of something else, among those of --each"),
+    "denormalized": ("error", "a quaternion or matrix that is not a rotation"),
+    "rounded": ("warning", "a rotation off by 1e-6 to 1e-3: normalised"),
+    "mirrored": ("error", "a left-handed matrix"),
+    "not-finite": ("error", "NaN or infinity"),
+    "degrees": ("warning", "bare angles beyond a full turn: degrees?"),
+    "w-first": ("warning", "x = 1 of x, y, z, w: the identity with w first?"),
+    "identity": ("warning", "an entry with neither position nor rotation"),
+    "slash": ("warning", "a frame name that begins with /"),
+    "no-alt": ("note", "a place on the Earth without its height"),
+    "band-s": ("warning", "a zone of UTM with S, which is south"),
+    "noise": ("note", "lines that a tool printed between messages"),
+    "topics": ("note", "the topics that transforms came by"),
+    "two-topics": ("error", "a frame that comes by the topics of two robots"),
+    "limit": ("warning", "the value of a joint beyond its limits"),
+    "odd": ("warning", "anything else suspicious while reading"),
+    "self": ("error", "a frame that is its own parent"),
+    "cycle": ("error", "frames that form a cycle"),
+    "two-parents": ("error", "a static frame with two parents"),
+    "two-poses": ("error", "a static frame with two poses in its parent"),
+    "static-and-moving": ("error", "a frame that is static in one place and moves in another"),
+    "several-roots": ("note", "frames that hang in more than one tree"),
+    "repeated": ("note", "the same sample twice"),
+    "repeated-stamp": ("warning", "two different samples of a frame at one stamp"),
+    "backward": ("warning", "samples of a frame that come after later ones"),
+    "gap": ("warning", "a pause more than 5 times the usual one"),
+    "jump": ("warning", "a step 10 times the usual one, and 0.1 m or 0.2 rad"),
+    "disagreement": ("error", "a frame that jumps to and fro: two publishers?"),
+    "reparented": ("note", "a frame whose parent changes once or twice"),
+    "loop": ("warning", "a measurement (--measured) that the tree does not agree with"),
+    "flicker": ("error", "a parent that goes to and fro: two publishers?"),
+}
+
+
+MOST_LINES = 5  # of the further places of a finding
+
+
+def level(finding: Finding) -> str:
+    """Return error, warning or note."""
+    return RULES[finding.rule][0]
+
+
+def write_text(findings: Iterable[Finding]) -> str:
+    """Return one line per finding, as compilers do; findings of a file with equal words are combined."""
+    alike: dict[tuple[str, str, str], list[Finding]] = {}
+    for each in findings:
+        alike.setdefault((each.source, each.rule, each.message), []).append(each)
+    text = ""
+    for each, *more in alike.values():
+        place = ":".join(str(part) for part in (each.source, each.line, each.column) if part)
+        lines = list(dict.fromkeys(other.line for other in more if other.line))
+        named = ", ".join(map(str, lines[:MOST_LINES])) + ", .." * (len(lines) > MOST_LINES)
+        where = f": line{'s' * (len(lines) > 1)} {named}" * bool(lines)
+        further = f" (and {len(more)} more{where})" if more else ""
+        text += f"{place}: {level(each)}: {each.message} [{each.rule}]{further}\n"
+    return text
+
+
+def write_json(findings: Iterable[Finding]) -> str:
+    """Return one object per line."""
+    text = ""
+    for each in findings:
+        place = {"file": each.source, "line": each.line or None, "column": each.column or None}
+        text += f"{dump(place | {'level': level(each), 'rule': each.rule, 'message': each.message})}\n"
+    return text
+
+
+def write_github(findings: Iterable[Finding]) -> str:
+    """Return workflow commands, which GitHub shows at the lines of a pull request."""
+    text = ""
+    for each in findings:
+        kind, place = level(each).replace("note", "notice"), {"line": each.line, "col": each.column}
+        text += github_command(kind, each.message, file=each.source, **place, title=each.rule)
+    return text
+
+
+def github_command(kind: str, message: str, **place: str | int) -> str:
+    """Return one workflow command: `error`, `warning` or `notice`; unknown parts of the place are omitted."""
+    properties = ",".join(f"{key}={_escaped(str(value), ',:')}" for key, value in place.items() if value)
+    return f"::{kind} {properties}::{_escaped(message)}\n"
+
+
+def _escaped(text: str, more: str = "") -> str:
+    """Escape characters that would end a workflow command or one of its properties."""
+    for character in "%\r\n" + more:
+        text = text.replace(character, f"%{ord(character):02X}")
+    return text
+
+
+WRITERS = {"text": write_text, "json": write_json, "github": write_github}
+
 
 WRITTEN_XYZW = frozenset(("quaternion", "xyzw", "rotation", "orientation", "transform"))
 
@@ -54,14 +154,9 @@ class Statement(NamedTuple):
         return self.finding(error.rule, error.message + places)
 
 
-def read_all(recording: FrameFile, find: Find, *, normalize: bool = False) -> Iterator[Statement]:
-    """Read everything that can be read from a file, and report errors."""
-    if not recording.holds_samples:
-        return _read_tree(recording.source, find, normalize=normalize)
-    return _read_recording(recording, find, normalize=normalize)
-
-
 def _read_recording(recording: FrameFile, find: Find, *, normalize: bool) -> Iterator[Statement]:
+    """Read everything that can be read from a recording, and report errors."""
+
     def report(error: FormatError) -> None:
         find(error.finding)
 
@@ -71,25 +166,22 @@ def _read_recording(recording: FrameFile, find: Find, *, normalize: bool) -> Ite
             if edge.path:
                 in_documents.append(edge)
             elif edge.parent is not None:
-                yield _stated(edge, recording.name, edge.line, 1 if edge.line else 0)
+                place = recording.name, edge.line, 1 if edge.line else 0
+                yield Statement(edge.parent, *edge[1:4], *place, looks_w_first(edge.components))
     except Unanswered:
         raise
     except FormatError as error:  # nothing after it can be read
         report(error)
     places = locate_many(recording.text, [edge.path for edge in in_documents]) if in_documents else []
-    for edge, (line, column) in zip(in_documents, places, strict=True):
+    for edge, place in zip(in_documents, places, strict=True):
         if edge.parent is not None:
             # formats with matrices or angles, and with quaternions by name or always w first
-            yield _stated(edge, recording.name, line, column)._replace(looks_w_first=False)
+            yield Statement(edge.parent, *edge[1:4], recording.name, *place, looks_w_first=False)
     if counts := recording.topics.counts:
         listed = ", ".join(f"{topic} ({count})" for topic, count in counts.items())
         find(Finding("topics", f"transforms on {listed}", recording.name, 1, 1))
     for note in recording.tally.findings():
         find(note._replace(source=recording.name, column=1))
-
-
-def _stated(edge: Edge, source: str, line: int, column: int) -> Statement:
-    return Statement(edge.parent or "", *edge[1:4], source, line, column, looks_w_first(edge.components))
 
 
 def looks_w_first(components: Rigid) -> bool:
@@ -108,23 +200,21 @@ def _read_tree(source: Source, find: Find, *, normalize: bool) -> Iterator[State
     values = {each.index: each.value for each in documents}
     notes: list[Finding] = []
     faults: list[Misfit] = []
-    edges = [
-        (edge, looks_w_first(edge.components) and _written_xyzw(values, edge))
-        for edge in edges_of(documents, read_edges, notes, faults, normalize=normalize) if edge.parent is not None
-    ]  # fmt: skip
+    edges = []
+    for edge in edges_of(documents, read_edges, notes, faults, normalize=normalize):
+        if edge.parent is not None:
+            value: Any = values
+            for step in edge.path:
+                value = value[step]
+            written = value if type(value) is dict and not any(map(may_be_on_earth, value)) else {}
+            # as a quaternion, not as angles
+            edges.append((edge, not WRITTEN_XYZW.isdisjoint(written) and looks_w_first(edge.components)))
     for fault, line, column in located(faults, source):
         find(Finding(fault.rule or "syntax", str(fault), source.name, line, column))
     for note, (line, column) in zip(notes, locate_many(source.text, [note.path for note in notes]), strict=True):
         find(note._replace(source=source.name, line=line, column=column))
     for (edge, w_first), place in zip(edges, locate_many(source.text, [edge.path for edge, _ in edges]), strict=True):
         yield Statement(edge.parent or "", *edge[1:4], source.name, *place, w_first)
-
-
-def _written_xyzw(value: Any, edge: Edge) -> bool:
-    """Return True if an edge's rotation was written as a quaternion, not as angles, in documents by their index."""
-    for step in edge.path:
-        value = value[step]
-    return type(value) is dict and not WRITTEN_XYZW.isdisjoint(value) and not any(map(may_be_on_earth, value))
 
 
 FLICKER = 3  # this many changes of parent are not a pick-and-place
@@ -162,7 +252,10 @@ def _statements(
         before = len(findings)
         may_be_other = others and by_sign(file.head(), "tree") is None
         statement = None
-        for statement in read_all(file, findings.append, normalize=normalize):
+        read = _read_recording(file, findings.append, normalize=normalize)
+        if not file.holds_samples:
+            read = _read_tree(file.source, findings.append, normalize=normalize)
+        for statement in read:
             yield statement
         if statement is None and may_be_other:
             findings[before:] = [Finding("no-frames", "no frames in it", file.name, 1, 1)]
@@ -187,11 +280,6 @@ class Child:
         self.again: list[Statement] = []
         self.clashes: list[Statement] = []
         self.backward: list[Statement] = []
-
-    @property
-    def is_static(self) -> bool:
-        """Return True for a frame at one time, or with one pose at all times."""
-        return len(self.stamps) + (self.static is not None) < 2 or not (self.changes or self.other_pose)
 
     def add(self, seen: Statement, number: int) -> None:
         """Add one more."""
@@ -228,12 +316,18 @@ def lint(everything: Iterable[Statement], tree: FrameTree | None = None) -> Iter
             yield seen.finding("w-first", message)
         child.add(seen, number)
     for child in children.values():
-        if tree is not None and child.is_static:
+        stamps = len(child.stamps) + (child.static is not None)
+        if tree is not None and (stamps < 2 or not (child.changes or child.other_pose)):  # it has one pose
             with suppress(BadTopology):  # which a rule reports
                 tree.add_components(*child.first[:3])
         yield from _child(child)
     yield from _cycles(children)
-    yield from _roots(children)
+    roots = {
+        child.newest.parent: child.first for child in reversed(children.values()) if child.newest.parent not in children
+    }
+    if len(roots) > 1:  # at the first edge of the second
+        names = sorted(roots)
+        yield roots[names[1]].finding("several-roots", f"{len(roots)} roots: {first_of(names, 10, quote=repr)}")
 
 
 def _child(child: Child) -> Iterator[Finding]:
@@ -308,16 +402,6 @@ def _cycles(children: dict[str, Child]) -> Iterator[Finding]:
             _, last = max(children[each].since for each in circle)
             at = circle.index(last.parent)
             yield last.broken(topology.cycle([*circle[at:], *circle[:at], last.parent]))
-
-
-def _roots(children: dict[str, Child]) -> Iterator[Finding]:
-    """Report more than one root, at the first edge of the second."""
-    roots = {
-        child.newest.parent: child.first for child in reversed(children.values()) if child.newest.parent not in children
-    }
-    if len(roots) > 1:
-        names = sorted(roots)
-        yield roots[names[1]].finding("several-roots", f"{len(roots)} roots: {first_of(names, 10, quote=repr)}")
 
 
 def _at(seen: Statement) -> str:

@@ -185,12 +185,13 @@ def diff(
     the nearest frame to it that is in both.  tolerance: metres and radians that do not count.
     Raises UnknownFrame for a `seen_from` that is not in both.
     """
-    pair = _Pair(a, b, at_ns, Tolerance(*tolerance))
-    if seen_from is not None:
-        for tree in (a, b):
-            tree.require(seen_from)
-    pair.see(seen_from)
-    found = [*pair.only(), *(each for frame in pair.common for each in pair.about(frame)), *pair.cameras()]
+    pair = _Pair(a, b, at_ns, Tolerance(*tolerance), seen_from)
+    common = frozenset(pair.common)
+    found = [
+        Difference(kind, frame, pair.a.parent(frame), pair.b.parent(frame))
+        for kind, side in (("only-in-a", a), ("only-in-b", b)) for frame in side.frames if frame not in common
+    ]  # fmt: skip
+    found += [*(each for frame in pair.common for each in pair.about(frame)), *pair.cameras()]
     order = {kind: number for number, kind in enumerate((*KINDS, SAME))}
     limit = pair.tolerance
 
@@ -199,10 +200,23 @@ def diff(
         return order[each.kind], -own, -limit.times(each.seen)
 
     found.sort(key=rank)
+    if at_ns is None and (a.moves or b.moves):
+        newest = [
+            f"{name} {format_stamp(max(track.last_ns for track in tree.tracks() if not track.is_static))}"
+            for name, tree in (("A", a), ("B", b))
+            if tree.moves
+        ]
+        also = ", and sample by sample" if a.moves and b.moves else ""
+        pair.notes.append(
+            f"what moves is compared at its latest ({' and '.join(newest)}){also}; --at TIME compares at one time"
+        )
+    both = [child for child in dict.fromkeys([*a.covariances, *b.covariances]) if a.track(child) and b.track(child)]
+    if others := [child for child in both if a.covariances.get(child) != b.covariances.get(child)]:
+        pair.notes.append(f"covariances are not compared; those of {listing(others, 8)} differ")
     return TreeComparison(
         [each for each in found if each.kind != SAME],
         [each for each in found if each.kind == SAME],
-        [*pair.notes, *_times(a, b, at_ns), *_covariances(a, b)],
+        pair.notes,
         [frame for frame in pair.common if frame in pair.a.without_data and frame in pair.b.without_data],
     )
 
@@ -210,47 +224,34 @@ def diff(
 class _Pair:
     """Two trees at one time, side by side."""
 
-    def __init__(self, a: Frames, b: Frames, at_ns: int | None, tolerance: Tolerance) -> None:
-        """Get both at that time."""
+    def __init__(self, a: Frames, b: Frames, at_ns: int | None, tolerance: Tolerance, start: str | None) -> None:
+        """Get both at that time; compare all frames relative to `start`, or each part relative to its own frame."""
         self.a, self.b = Snapshot(a, at_ns), Snapshot(b, at_ns)
         self.tolerance = tolerance
         in_b = frozenset(b.frames)
         self.common = [frame for frame in a.frames if frame in in_b]
         self.notes = [] if self.common else ["no frame is in both A and B"]
         self.seen: dict[str, tuple[str, Apart]] = {}  # frame -> reference frame, displacement
-        self.start: str | None = None  # the reference frame of all frames, if it was named
-
-    # --- relative to one frame ---
-
-    def see(self, start: str | None) -> None:
-        """Compare all frames relative to `start`, or each part of the trees relative to its own frame."""
+        self.start = start  # the reference frame of all frames, if it was named
+        starts = []
         if start is not None:
-            self.start = start
-            self._see_from(start)
-            return
-        parts: dict[tuple[str, str], set[str]] = {}
-        for frame in self.common:
-            parts.setdefault((self.a.roots[frame], self.b.roots[frame]), set()).add(frame)
-        for (root, _), frames in parts.items():
-            if len(frames) > 1:
-                self._see_from(next(frame for frame in self.a.below(root) if frame in frames))
-
-    def _see_from(self, start: str) -> None:
-        in_a, in_b = self.a.seen_from(start), self.b.seen_from(start)
-        reach = max((abs(part) for seen in (in_a, in_b) for pose in seen.values() for part in pose[:3]), default=0.0)
-        for frame in self.common:
-            if frame != start and frame in in_a and frame in in_b and frame not in self.seen:
-                apart = _apart(in_a[frame], in_b[frame])
-                self.seen[frame] = start, apart._replace(rounding=ROUNDING * max(reach, 1.0))
-
-    # --- differences ---
-
-    def only(self) -> Iterator[Difference]:
-        """Yield the frames that are only in one tree."""
-        common = frozenset(self.common)
-        for kind, side in (("only-in-a", self.a), ("only-in-b", self.b)):
-            for frame in (each for each in side.tree.frames if each not in common):
-                yield Difference(kind, frame, self.a.parent(frame), self.b.parent(frame))
+            a.require(start)
+            b.require(start)
+            starts.append(start)
+        else:
+            parts: dict[tuple[str, str], set[str]] = {}
+            for frame in self.common:
+                parts.setdefault((self.a.roots[frame], self.b.roots[frame]), set()).add(frame)
+            for (root, _), frames in parts.items():
+                if len(frames) > 1:
+                    starts.append(next(frame for frame in self.a.below(root) if frame in frames))
+        for each in starts:
+            in_a, in_b = self.a.seen_from(each), self.b.seen_from(each)
+            poses = [*in_a.values(), *in_b.values()]
+            reach = max(1.0, *(abs(part) for pose in poses for part in pose[:3]))
+            for frame in self.common:
+                if frame != each and frame in in_a and frame in in_b and frame not in self.seen:
+                    self.seen[frame] = each, _apart(in_a[frame], in_b[frame])._replace(rounding=ROUNDING * reach)
 
     def about(self, frame: str) -> Iterator[Difference]:
         """Yield the differences of a common frame; `same` if there are none."""
@@ -278,7 +279,7 @@ class _Pair:
     def cameras(self) -> Iterator[Difference]:
         """Yield the common frames whose intrinsics differ; note what cannot be compared."""
         try:
-            in_a, in_b = (_cameras(side.tree) for side in (self.a, self.b))
+            in_a, in_b = ({**side.tree.read_cameras(), **side.tree.cameras} for side in (self.a, self.b))
         except FrametoolError as error:
             self.notes.append(f"intrinsics are not compared: {error}")
             return
@@ -321,10 +322,6 @@ def _apart(a: Rigid, b: Rigid) -> Apart:
     return Apart(*rigid.distance(*a, *b, floats))
 
 
-def _cameras(tree: Frames) -> dict[str, Camera | Callable[..., Camera]]:
-    return {**tree.read_cameras(), **tree.cameras}
-
-
 def _intrinsics(known: Camera | Callable[..., Camera]) -> dict[str, str]:
     """Return what a camera has, by name, as text without digits that may be rounding."""
     camera = known() if callable(known) else known
@@ -343,24 +340,3 @@ def _plain(value: Any) -> str:
 def _covered(track: MovingTrack) -> str:
     first, last = map(format_stamp, track.span)
     return f"{track.count} sample{'s' * (track.count != 1)} {first} .. {last}"
-
-
-def _covariances(a: Frames, b: Frames) -> Iterator[str]:
-    """Return the frames of both whose covariances differ, which does not make their poses different."""
-    known = dict.fromkeys([*a.covariances, *b.covariances])
-    both = [child for child in known if a.track(child) and b.track(child)]
-    if others := [child for child in both if a.covariances.get(child) != b.covariances.get(child)]:
-        yield f"covariances are not compared; those of {listing(others, 8)} differ"
-
-
-def _times(a: Frames, b: Frames, at_ns: int | None) -> Iterator[str]:
-    """Return the times at which the two are compared, if anything moves and no time was set."""
-    if at_ns is not None or not (a.moves or b.moves):
-        return
-    newest = [
-        f"{name} {format_stamp(max(track.last_ns for track in tree.tracks() if not track.is_static))}"
-        for name, tree in (("A", a), ("B", b))
-        if tree.moves
-    ]
-    also = ", and sample by sample" if a.moves and b.moves else ""
-    yield f"what moves is compared at its latest ({' and '.join(newest)}){also}; --at TIME compares at one time"

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from frametool.grammar.result import Style
-from frametool.lint.findings import RULES
+from frametool.lint.rules import RULES
 from frametool.ros.echo_format import message_text
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from frametool.cli.output import Output
 from frametool.cli.sink import folded, in_colour, say, say_error, say_first, writing
 from frametool.cli.trees import FRAME, frame_name, load_sides, opened, state
 from frametool.errors import Finding, FormatError, listing, warn
-from frametool.lint.findings import RULES, WRITERS, github_command, level
+from frametool.lint.rules import RULES, WRITERS, check, github_command, level
 from frametool.lint.tree_diff import Tolerance, diff, entry, parse_tolerance
 
 if TYPE_CHECKING:
@@ -101,8 +101,6 @@ def _with_loops(
     files: Sequence[FrameFile], rows: Sequence[Measurement], tolerance: Tolerance | None, *, normalize: bool
 ) -> list[Finding]:
     """Return what is wrong with files, then the measurements that do not agree; report what was not compared."""
-    from frametool.lint.rules import check
-
     if not rows:
         return check(files, normalize=normalize)
     from frametool.fit.measured_tree import loops
