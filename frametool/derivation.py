@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.source import Source
 from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.explain import derive
-from frametool.explain.derive import DerivationStyle
-from frametool.explain.operations import WrittenPose
+from frametool.explain.derive import DerivationStyle, WrittenPose
 from frametool.explain.run import DIGITS
 from frametool.frames.lookups import Frames
 from frametool.geometry.representations import notation, notations

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Sequence
 
     from frametool.cli.command import Adds
-    from frametool.explain.derive import DerivationStyle
-    from frametool.explain.operations import WrittenPose
+    from frametool.explain.derive import DerivationStyle, WrittenPose
     from frametool.explain.render import Explanation
     from frametool.grammar.edges import Diagnostics
     from frametool.stream.request import Request

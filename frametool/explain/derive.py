@@ -1,22 +1,26 @@
-"""The derivation of each operation on poses and records: from the input as written to the result of the command.
+"""Derivations of the operations on poses and records: from the input as written to the result of the command.
 
-Every derivation ends with the command's own result, after a check that it leads to it.
+The lines are those of `sheets.txt`; this module passes the numbers in.  Every derivation ends with the command's own
+result, after a check that it leads to it.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
+from bisect import bisect_right
 from functools import reduce
+from itertools import pairwise
+from operator import itemgetter
+from string import ascii_lowercase
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FrametoolError, ValueInvalid, printable, shown
-from frametool.explain import operations
-from frametool.explain.operations import OtherAxes, WrittenPose, chain, frames_of
 from frametool.explain.render import Explanation
-from frametool.explain.run import DIGITS, Row, Sheet
+from frametool.explain.run import DIGITS, ENTRIES, Row, Sheet
 from frametool.frames.lookups import Frames
-from frametool.geometry import floats, quaternion, representations
+from frametool.frames.stamps import BILLION, format_stamp
+from frametool.geometry import euler, floats, quaternion, representations
+from frametool.geometry.rigid import IDENTITY
 from frametool.grammar import pose_algebra
 from frametool.grammar.pose_algebra import Lookups, looked_up_across
 from frametool.grammar.result import Result, Style, pose_numbers
@@ -24,9 +28,294 @@ from frametool.grammar.result import Result, Style, pose_numbers
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from frametool.explain.run import Values
+    from frametool.frames.track import Track
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Rigid
     from frametool.grammar.pose import Pose
+    from frametool.grammar.readers import Quaternion, Vector
+
+    Edge = tuple[str, str, Rigid]  # parent, child, parent_from_child
+
+ANGLES, ROLL_PITCH_YAW, ROTATION = "a1 a2 a3", "roll pitch yaw", " ".join(ENTRIES)
+BLOCKS = {  # the names of a representation's numbers in its two sheets, as written and as found
+    "quaternion": ("x y z w", "x y z w"),
+    "xyzw": ("x y z w", "x y z w"),
+    "wxyz": ("w x y z", "w x y z"),
+    "rpy": (ROLL_PITCH_YAW, ROLL_PITCH_YAW),
+    "euler": (ANGLES, ANGLES),
+    "axis_angle": ("ax ay az angle", "vx vy vz angle"),
+    "rotvec": ("rx ry rz", "rx ry rz"),
+    "matrix": (ROTATION, ROTATION),
+    "mrp": ("px py pz", "px py pz"),
+    "six_d": ("ax ay az bx by bz", "r11 r21 r31 r12 r22 r32"),
+    "rpy_unreal": (ROLL_PITCH_YAW, ROLL_PITCH_YAW),
+    "euler_unity": ("a2 a3 a1", "a2 a3 a1"),
+}
+AXES_OF = {"rpy": "sxyz", "rpy_unreal": "sxyz", "euler_unity": "szxy"}  # Euler angles under another name
+PLAIN = ("quaternion", "xyzw")
+
+
+def names_of(notation: Notation, found: int, *, degrees: bool) -> list[str]:
+    """Return the names of a notation's numbers, as written or as found; raises ValueInvalid if it has no sheets."""
+    representation = notation.representation
+    if representation.name not in BLOCKS:
+        raise ValueInvalid(f"there is no derivation of {shown(representation.name)}; derived are {', '.join(BLOCKS)}")
+    names = enumerate(BLOCKS[representation.name][found].split())
+    return [f"{name}_deg" if degrees and at in representation.angles else name for at, name in names]
+
+
+def to_quaternion(sheet: Sheet, numbers: Sequence[float], notation: Notation, *, degrees: bool) -> Quaternion:
+    """Add the derivation of the quaternion from the numbers of a notation."""
+    values: Values = dict(zip(names_of(notation, 0, degrees=degrees), numbers, strict=True))
+    words, name = _units(degrees=degrees), notation.representation.name
+    if name.startswith("euler"):
+        axes = AXES_OF.get(name) or notation.bound_axes()
+        first, third = "31" if axes[0] == "s" else "13"
+        words |= _axes(axes, values) | {"first": first, "third": third}
+        words |= {"A": axes[int(first)], "B": axes[2], "C": axes[int(third)]}
+    return quaternion_of(sheet.play(f"{name} to", values, **words))
+
+
+def from_quaternion(
+    sheet: Sheet, q: Quaternion, notation: Notation, *, degrees: bool, keep_sign: bool
+) -> Sequence[float]:
+    """Add the derivation of a notation from the quaternion; return its numbers."""
+    names, (x, y, z, w) = names_of(notation, 1, degrees=degrees), q
+    values = named("", q) | {"degrees": float(degrees), "negative": float((w or x or y or z) < 0.0)}
+    values["signed"] = 0.0 if keep_sign else values["negative"]
+    words, name = _units(degrees=degrees), notation.representation.name
+    if name in ("euler", *AXES_OF):
+        axes = AXES_OF.get(name) or notation.bound_axes()
+        values["locked"] = float(euler.locked(*q, axes))
+        shown_as = ANGLES if name.startswith("euler") else ROLL_PITCH_YAW
+        words |= _axes(axes, values) | dict(zip(ANGLES.split(), shown_as.split(), strict=True))
+    sheet.play(f"{name} from", values, **words)
+    return [values[each] for each in names]
+
+
+def _units(*, degrees: bool) -> dict[str, str]:
+    return {"deg": "_deg" * degrees, "unit": "deg" if degrees else "rad"}
+
+
+def _axes(axes: str, values: Values) -> dict[str, str]:
+    """Add the kind of axes of a convention; return their names for the sheets."""
+    i, j, k, parity, symmetric, fixed = euler.AXES[axes]
+    values |= {"odd": float(parity < 0.0), "symmetric": float(symmetric), "fixed": float(fixed)}
+    return {"axes": axes, "turns": ", then ".join(axes[1:]), "i": "xyz"[i], "j": "xyz"[j], "k": "xyz"[k]}
+
+
+def named(prefix: str, numbers: Sequence[float]) -> Values:
+    """Return the numbers of a vector or a quaternion by name."""
+    return {f"{prefix}{name}": number for name, number in zip("xyzw", numbers, strict=False)}
+
+
+def posed(letter: str, pose: Rigid) -> Values:
+    """Return the numbers of a pose by name: position t and the letter, rotation by the letter."""
+    return named(f"t{letter}", pose[:3]) | named(letter, pose[3:])
+
+
+def vector_of(values: Values, prefix: str) -> Vector:
+    """Return a vector by the name of its numbers."""
+    x, y, z = (values[prefix + each] for each in "xyz")
+    return x, y, z
+
+
+def quaternion_of(values: Values, prefix: str = "") -> Quaternion:
+    """Return a quaternion by the name of its numbers."""
+    return *vector_of(values, prefix), values[f"{prefix}w"]
+
+
+def product(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str]) -> Rigid:
+    """Multiply two poses: `frames` are those of a_from_b and b_from_c, in this order."""
+    words = dict(zip(("first", "middle", "last"), frames, strict=True))
+    values = sheet.play("compose", posed("a", a) | posed("b", b), **words)
+    return *vector_of(values, "t"), *quaternion_of(values, "c")
+
+
+def inverse(sheet: Sheet, pose: Rigid, target: str, source: str) -> Rigid:
+    """Invert target_from_source."""
+    values = sheet.play("inverse", posed("", pose), target=target, source=source)
+    return *vector_of(values, "t"), *quaternion_of(values)
+
+
+def between(sheet: Sheet, a: Rigid, b: Rigid, fraction: float) -> Rigid:
+    """Interpolate two poses: linearly and by slerp."""
+    sheet.stretch = max(sheet.stretch, abs(fraction))
+    line = sheet.play("line", {"f": fraction} | named("a", a[:3]) | named("b", b[:3]))
+    arc = sheet.play("slerp", {"f": fraction} | named("a", a[3:]) | named("b", b[3:]))
+    return *vector_of(line, "t"), *quaternion_of(arc, "q")
+
+
+def moved(sheet: Sheet, kind: str, pose: Rigid, numbers: Sequence[float], target: str, source: str) -> Vector:
+    """Transform a point or a vector from one frame to another."""
+    values = named("t", pose[:3]) | named("q", pose[3:]) | named(kind[0], numbers)
+    sheet.play(kind, values, target=target, source=source)
+    return vector_of(values, kind[0])
+
+
+class OtherAxes(NamedTuple):
+    """A change of axes: the names and rotations of its sides, None if unchanged, and whether it is a reflection."""
+
+    world: tuple[str, Quaternion] | None = None
+    axes: tuple[str, Quaternion] | None = None
+    mirrors: bool = False
+
+
+def with_other_axes(sheet: Sheet, pose: Rigid, change: OtherAxes) -> Rigid:
+    """Add the steps from a pose to the same with other axes, on its left side, then on its right."""
+    (world, turned), (axes, body) = change.world or ("", IDENTITY[3:]), change.axes or ("", IDENTITY[3:])
+    values = named("t", pose[:3]) | named("q", pose[3:]) | named("W", turned) | named("B", body)
+    values |= {"world": float(bool(world)), "axes": float(bool(axes)), "mirrors": float(change.mirrors)}
+    sheet.play("other axes", values, world_axes=world, body_axes=axes)
+    return *vector_of(values, "t"), *quaternion_of(values, "q")
+
+
+class WrittenPose(NamedTuple):
+    """A pose as it was written.
+
+    pose: its value, as every command reads it
+    notation: that of its rotation; None if there is none
+    numbers: of the rotation, in column order; degrees: whether its angles are degrees
+    position: x, y, z in metres as written, before `inverse: true`
+    inverse: whether the inverse was written
+    """
+
+    pose: Pose
+    notation: Notation | None = None
+    numbers: Sequence[float] = ()
+    degrees: bool = False
+    position: Sequence[float] = (0.0, 0.0, 0.0)
+    inverse: bool = False
+
+    def quaternion(self, sheet: Sheet) -> Quaternion:
+        """Add the derivation of the quaternion from the numbers as written."""
+        if self.notation is None:
+            sheet.play("no rotation", {})
+            return IDENTITY[3:]
+        return to_quaternion(sheet, self.numbers, self.notation, degrees=self.degrees)
+
+    def components(self, sheet: Sheet, target: str, source: str) -> Rigid:
+        """Add the derivation of target_from_source from the numbers as written."""
+        name = self.notation.representation.name if self.notation else ""
+        if not name or (name in PLAIN and abs(sum(x * x for x in self.numbers) - 1.0) <= 1e-12):
+            qx, qy, qz, qw = self.numbers or IDENTITY[3:]
+        else:
+            with sheet.about(self._named(target, source)):
+                qx, qy, qz, qw = self.quaternion(sheet)
+        x, y, z = self.position
+        found: Rigid = (x, y, z, qx, qy, qz, qw)
+        return inverse(sheet, found, source, target) if self.inverse else found
+
+    def _named(self, target: str, source: str) -> str:
+        return f"{source}_from_{target}" if self.inverse else f"{target}_from_{source}"
+
+    def turned(self) -> WrittenPose:
+        """Return the inverse: the written numbers are unchanged, the pose and its frames are inverted."""
+        return self._replace(pose=pose_algebra.inverse(self.pose), inverse=not self.inverse)
+
+    def say(self, sheet: Sheet, target: str, source: str) -> None:
+        """List the pose of target_from_source as written."""
+        sheet.reached(self.position)
+        line = f"{self._named(target, source)}: xyz {sheet.numbers(self.position)} m"
+        if self.notation is not None:
+            name, axes = self.notation.representation.name, self.notation.axes
+            if self.notation.representation.angles:
+                name += ("_deg" if self.degrees else "_rad") + (f":{axes}" if axes else "")
+            line += f", {'xyzw' if name == 'quaternion' else name} {sheet.numbers(self.numbers)}"
+        sheet.say(line + (f"; its inverse is {target}_from_{source}" if self.inverse else ""))
+
+
+def frames_of(poses: Sequence[Pose]) -> list[str]:
+    """Return the frames along a chain of poses, each by the name in its neighbours, else by a letter."""
+    taken = {name for pose in poses for name in (pose.name, pose.parent) if name}
+    letters = (each for each in (*ascii_lowercase, *(f"f{n}" for n in range(len(poses) + 2))) if each not in taken)
+    sides = zip((None, *(pose.name for pose in poses)), (*(pose.parent for pose in poses), None), strict=True)
+    return [printable(before or after or next(letters)) for before, after in sides]
+
+
+def chain(sheet: Sheet, frames: Frames, target: str, source: str, at_ns: int | None) -> Rigid:
+    """Derive target_from_source at a time, None for the latest; the lookup itself has succeeded."""
+    words = {"target": printable(target), "source": printable(source)}
+    if target == source:
+        sheet.play("same frame", {}, **words)
+        return IDENTITY
+    at_ns = frames.latest(target, source) if at_ns is None else at_ns
+    down, up = frames.between(target, source, at_ns)
+    tracks = {track.child: track for track in frames.way(target, source, at_ns)}
+    parents = {child: str(frames.parent(child, at_ns)) for child in tracks}
+    left, right = (" @ ".join(_named(parents[child], child) for child in branch) for branch in (down, up[::-1]))
+    words["formula"] = " @ ".join(filter(None, [left and f"({left})^-1", right]))
+    words["top"] = printable(parents[[*down, *reversed(up)][0]])
+    words["path"] = " <- ".join(map(printable, frames.path(target, source, at_ns)))
+    sheet.play("way", {"down": float(len(down)), "up": float(len(up))}, **words)
+    moving = [track for child in (*down, *up) if not (track := tracks[child]).is_static]
+    if moving and at_ns is not None:
+        ends = ", ".join(f"{printable(track.child)} {format_stamp(track.last_ns)}" for track in moving)
+        values = {"latest": float(at_ns == min(track.last_ns for track in moving)), "count": float(len(moving))}
+        sheet.play("way of moving edges", values, at=format_stamp(at_ns), ends=ends)
+    for child in (*down, *reversed(up)):
+        if (track := tracks[child]).is_static:
+            sheet.reached(track.components[:3])
+            sheet.say(f"{_named(track.parent, child)}: {_line(sheet, track.components)}")
+    edges = {child: _edge(sheet, tracks[child], at_ns or 0) for child in (*down, *up)}
+    return _joined(sheet, [edges[each] for each in down], [edges[each] for each in reversed(up)])
+
+
+def _line(sheet: Sheet, pose: Rigid) -> str:
+    return f"xyz {sheet.numbers(pose[:3])} m, xyzw {sheet.numbers(pose[3:])}"
+
+
+def _named(parent: str, child: str) -> str:
+    return f"{printable(parent)}_from_{printable(child)}"
+
+
+def _edge(sheet: Sheet, track: Track, at_ns: int) -> Edge:
+    """Return an edge at a time, with its steps if it moves.
+
+    It is between the last sample that is not after the time, else the first one, and the next one, if there is one.
+    """
+    parent, child = printable(track.parent), printable(track.child)
+    if track.is_static:
+        return parent, child, track.components
+    samples = list(track.walk())
+    at = max(bisect_right(samples, at_ns, key=itemgetter(0)), 1)
+    begin_ns, seen_in, a = samples[at - 1]
+    end_ns, other, b = samples[at] if at < len(samples) else samples[at - 1]
+    sheet.reached(a[:3])
+    edge, is_between = _named(seen_in, track.child), end_ns != begin_ns != at_ns
+    words = dict(zip(("begin", "end", "at"), map(format_stamp, (begin_ns, end_ns, at_ns)), strict=True))
+    if not is_between or other != seen_in:
+        changes = {"changes": float(is_between)}
+        sheet.play("sample", changes, edge=edge, pose=_line(sheet, a), other=printable(other), **words)
+        return printable(seen_in), child, a
+    sheet.reached(b[:3])
+    with sheet.about(edge):
+        values = sheet.play(
+            "two samples", spans(begin_ns, end_ns, at_ns), a=_line(sheet, a), b=_line(sheet, b), **words
+        )
+        return printable(seen_in), child, between(sheet, a, b, values["f"])
+
+
+def spans(begin_ns: int, end_ns: int, at_ns: int) -> Values:
+    """Return the time after the first of two samples, and the interval between them, in seconds."""
+    return {"past": (at_ns - begin_ns) / BILLION, "gap": (end_ns - begin_ns) / BILLION}
+
+
+def _joined(sheet: Sheet, to_target: list[Edge], to_source: list[Edge]) -> Rigid:
+    """Multiply both branches, topmost edges first, and join them; without one to the target nothing is inverted."""
+    products = []
+    for edges in filter(None, (to_target, to_source)):
+        top, here, pose = edges[0]
+        for _, child, edge in edges[1:]:
+            pose, here = product(sheet, pose, edge, (top, here, child)), child
+        products.append((top, here, pose))
+    top, end, pose = products[0]
+    if to_target:
+        pose = inverse(sheet, pose, top, end)
+    if len(products) > 1:
+        pose = product(sheet, pose, products[1][2], (end, top, products[1][1]))
+    return pose
 
 
 METRES, RADIANS, DEGREES = "m", "rad", "deg"
@@ -87,7 +376,7 @@ def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationSty
     target = quaternion.unit(*pose.components[3:], floats)
     for each in plan.notations:
         degrees, whole, angles = each.in_degrees(style.degrees), each.representation.whole, each.representation.angles
-        ends = operations.from_quaternion(sheet, derived[3:], each, degrees=degrees, keep_sign=style.keep_sign)
+        ends = from_quaternion(sheet, derived[3:], each, degrees=degrees, keep_sign=style.keep_sign)
         found = each.to_quaternion(tuple(ends), floats, degrees=degrees)
         off = quaternion.distance(*quaternion.normalized(*found, floats), *target, floats) if any(found) else math.inf
         if not off <= CLOSE * sheet.stretch:
@@ -133,8 +422,8 @@ def convert(
         x, y, z = pose.position
         found: Rigid = (x, y, z, *pose.quaternion(sheet))
         if pose.inverse:
-            found = operations.inverse(sheet, found, "child", "parent")
-        return found if change is None else operations.with_other_axes(sheet, found, change)
+            found = inverse(sheet, found, "child", "parent")
+        return found if change is None else with_other_axes(sheet, found, change)
 
     title = "identity" if pose.notation is None else pose.notation.spec
     return derived_pose(
@@ -156,12 +445,12 @@ def compose(plan: DerivationStyle, *poses: WrittenPose) -> Explanation:
         raise ValueInvalid("compose takes at least one pose")
     own = Result(reduce(pose_algebra.product, [each.pose for each in poses]))
     names = frames_of([each.pose for each in poses])
-    labels = list(itertools.pairwise(names))
+    labels = list(pairwise(names))
 
     def way(sheet: Sheet) -> Rigid:
         pose, *factors = derived_from(sheet, poses, labels)
         for factor, (middle, last) in zip(factors, labels[1:], strict=True):
-            pose = operations.compose(sheet, pose, factor, (names[0], middle, last))
+            pose = product(sheet, pose, factor, (names[0], middle, last))
         return pose
 
     return derived_pose(plan, f"{names[0]}_from_{names[-1]}", own, way)
@@ -174,7 +463,7 @@ def invert(plan: DerivationStyle, pose: WrittenPose) -> Explanation:
 
     def way(sheet: Sheet) -> Rigid:
         (found,) = derived_from(sheet, [pose], [(target, source)])
-        return operations.inverse(sheet, found, target, source)
+        return inverse(sheet, found, target, source)
 
     return derived_pose(plan, f"{source}_from_{target}", own, way)
 
@@ -186,10 +475,13 @@ def relative(plan: DerivationStyle, a: WrittenPose, b: WrittenPose) -> Explanati
 
     def way(sheet: Sheet) -> Rigid:
         one, other = derived_from(sheet, [a, b], labels)
-        pose = operations.relative(sheet, one, other, frames)
-        values = sheet.play("extent", operations.posed("", pose), frame=frames[1])
-        for name, found in zip(pose_algebra.RELATIVE_EXTRAS, ("d", "angle", "angle_deg"), strict=True):
-            value = values[found]
+        words = dict(zip(("world", "first", "second"), frames, strict=True))
+        turns = named("A", one[3:]) | named("B", other[3:])
+        found = sheet.play("relative", named("a", one[:3]) | named("b", other[:3]) | turns, **words)
+        pose: Rigid = (*vector_of(found, "t"), *quaternion_of(found, "c"))
+        values = sheet.play("extent", posed("", pose), frame=frames[1])
+        for name, key in zip(pose_algebra.RELATIVE_EXTRAS, ("d", "angle", "angle_deg"), strict=True):
+            value = values[key]
             if abs(value - own.extras[name]) > 100.0 * CLOSE * sheet.reach:
                 raise DerivationWrong(f"the derived {name} is {value!r}, not {own.extras[name]!r}; {REPORT}")
         return pose
@@ -205,7 +497,7 @@ def interpolate(plan: DerivationStyle, a: WrittenPose, b: WrittenPose, fraction:
 
     def way(sheet: Sheet) -> Rigid:
         one, other = derived_from(sheet, [a, b], labels)
-        return operations.between(sheet, one, other, fraction)
+        return between(sheet, one, other, fraction)
 
     return derived_pose(plan, f"{frames[1]} to {frames[2]} at {fraction!r}", own, way)
 
@@ -237,6 +529,6 @@ def lookup(
         with sheet.about("where the source was"):
             second = chain(sheet, tree, fixed, source, source_at_ns)
         sheet.play("across", {})
-        return operations.compose(sheet, first, second, (printable(target), printable(fixed), printable(source)))
+        return product(sheet, first, second, (printable(target), printable(fixed), printable(source)))
 
     return derived_pose(plan, f"{printable(target)}_from_{printable(source)}", own, way)

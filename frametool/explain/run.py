@@ -319,19 +319,17 @@ class Sheet:
         if transposed:
             matrix = [list(column) for column in zip(*matrix, strict=True)]
         arm, *shift = ([values[each + axis] for axis in "xyz"] for each in vectors if each)
-        found = [self.inner(row, arm, *(each[at] for each in shift)) for at, row in enumerate(matrix)]
-        found = [0.0 - entry for entry in found] if minus else found
+        found = []
+        for at, row in enumerate(matrix):  # the sum of products in their order, then of the vector added
+            first, *others = [*(a * b for a, b in zip(row, arm, strict=True)), *(each[at] for each in shift)]
+            entry = self.settled(sum(others, first), max(map(abs, (first, *others))))
+            found.append(0.0 - entry if minus else entry)
         parts: list[str | Matrix] = [minus] if minus else []
         parts += [matrix, _column(arm)]
         for each in shift:
             parts += ["+", _column(each)]
         self.grid(name, formula, [*parts, "=", _column(found)], unit)
         values.update(zip((name.rstrip("'") + axis for axis in "xyz"), found, strict=True))
-
-    def inner(self, row: Sequence[float], column: Sequence[float], *more: float) -> float:
-        """Return the sum of products in their order, and of further terms: an entry of a product of matrices."""
-        terms = [*(a * b for a, b in zip(row, column, strict=True)), *more]
-        return self.settled(sum(terms[1:], terms[0]), max(map(abs, terms)))
 
     def result(self, text: str, rows: Sequence[Row]) -> None:
         """End with the result."""
@@ -403,12 +401,9 @@ def _each(pattern: str) -> Sequence[str]:
     return [pattern]
 
 
-def _parts(text: str) -> tuple[str, str, str]:
+def _parts(text: str) -> tuple[str, ...]:
     """Return name, formula and unit of a step."""
-    found = STEP.fullmatch(text)
-    if found is None:
-        raise ValueError(text)
-    return found[1], found[2], found[3] or ""
+    return STEP.fullmatch(text).groups("")  # type: ignore[union-attr]
 
 
 def rows(entries: Sequence[float]) -> Matrix:

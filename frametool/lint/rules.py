@@ -166,17 +166,17 @@ def _read_recording(recording: FrameFile, find: Find, *, normalize: bool) -> Ite
             if edge.path:
                 in_documents.append(edge)
             elif edge.parent is not None:
-                place = recording.name, edge.line, 1 if edge.line else 0
-                yield Statement(edge.parent, *edge[1:4], *place, looks_w_first(edge.components))
+                column, w_first = 1 if edge.line else 0, looks_w_first(edge.components)
+                yield Statement(edge.parent, *edge[1:4], recording.name, edge.line, column, w_first)
     except Unanswered:
         raise
     except FormatError as error:  # nothing after it can be read
         report(error)
     places = locate_many(recording.text, [edge.path for edge in in_documents]) if in_documents else []
-    for edge, place in zip(in_documents, places, strict=True):
+    w_first = False  # formats with matrices or angles, and with quaternions by name or always w first
+    for edge, (line, column) in zip(in_documents, places, strict=True):
         if edge.parent is not None:
-            # formats with matrices or angles, and with quaternions by name or always w first
-            yield Statement(edge.parent, *edge[1:4], recording.name, *place, looks_w_first=False)
+            yield Statement(edge.parent, *edge[1:4], recording.name, line, column, w_first)
     if counts := recording.topics.counts:
         listed = ", ".join(f"{topic} ({count})" for topic, count in counts.items())
         find(Finding("topics", f"transforms on {listed}", recording.name, 1, 1))

@@ -246,12 +246,11 @@ class _Pair:
                 if len(frames) > 1:
                     starts.append(next(frame for frame in self.a.below(root) if frame in frames))
         for each in starts:
-            in_a, in_b = self.a.seen_from(each), self.b.seen_from(each)
-            poses = [*in_a.values(), *in_b.values()]
-            reach = max(1.0, *(abs(part) for pose in poses for part in pose[:3]))
+            one, other = self.a.seen_from(each), self.b.seen_from(each)
+            reach = max(1.0, *(abs(part) for pose in (*one.values(), *other.values()) for part in pose[:3]))
             for frame in self.common:
-                if frame != each and frame in in_a and frame in in_b and frame not in self.seen:
-                    self.seen[frame] = each, _apart(in_a[frame], in_b[frame])._replace(rounding=ROUNDING * reach)
+                if frame != each and frame in one and frame in other and frame not in self.seen:
+                    self.seen[frame] = each, _apart(one[frame], other[frame])._replace(rounding=ROUNDING * reach)
 
     def about(self, frame: str) -> Iterator[Difference]:
         """Yield the differences of a common frame; `same` if there are none."""
@@ -279,7 +278,7 @@ class _Pair:
     def cameras(self) -> Iterator[Difference]:
         """Yield the common frames whose intrinsics differ; note what cannot be compared."""
         try:
-            in_a, in_b = ({**side.tree.read_cameras(), **side.tree.cameras} for side in (self.a, self.b))
+            in_a, in_b = (_cameras(side.tree) for side in (self.a, self.b))
         except FrametoolError as error:
             self.notes.append(f"intrinsics are not compared: {error}")
             return
@@ -320,6 +319,10 @@ class _Pair:
 
 def _apart(a: Rigid, b: Rigid) -> Apart:
     return Apart(*rigid.distance(*a, *b, floats))
+
+
+def _cameras(tree: Frames) -> dict[str, Camera | Callable[..., Camera]]:
+    return {**tree.read_cameras(), **tree.cameras}
 
 
 def _intrinsics(known: Camera | Callable[..., Camera]) -> dict[str, str]:

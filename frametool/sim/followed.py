@@ -8,8 +8,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, printable
-from frametool.explain.derive import CLOSE, METRES, REPORT, DerivationStyle, DerivationWrong, explained, row
-from frametool.explain.operations import spans
+from frametool.explain.derive import CLOSE, METRES, REPORT, DerivationStyle, DerivationWrong, explained, row, spans
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.sim.drivers import ARRIVED, frame_of
 from frametool.sim.simulate import IssuedCommand, simulate

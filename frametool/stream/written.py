@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, printable, shown
-from frametool.explain import derive, operations
-from frametool.explain.operations import WrittenPose
+from frametool.explain import derive
+from frametool.explain.derive import WrittenPose
 from frametool.geometry import floats
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
@@ -84,18 +84,18 @@ def derive_record(
         if isinstance(way, WrittenPose):
             (pose,) = derive.derived_from(sheet, [way], [(into, out_of)])
         else:
-            pose = operations.chain(sheet, way.frames, target, origin, at_ns)
+            pose = derive.chain(sheet, way.frames, target, origin, at_ns)
         derive.check_vector(sheet, pose[:3], mover[:3])
         if written is None:
             sheet.reached(start)
-            derive.check_vector(sheet, operations.moved(sheet, shape.kind, pose, start, into, out_of), result)
+            derive.check_vector(sheet, derive.moved(sheet, shape.kind, pose, start, into, out_of), result)
             unit = derive.METRES if shape.kind == POINT else ""
             sheet.result(f"in {into}", [derive.row(shape.kind, "xyz", result, unit)])
             return
         name = printable(written.pose.name or "it")
         sheet.heading("The record")
         written.say(sheet, out_of, name)
-        found = operations.compose(sheet, pose, written.components(sheet, out_of, name), (into, out_of, name))
+        found = derive.product(sheet, pose, written.components(sheet, out_of, name), (into, out_of, name))
         derive.end_with_pose(sheet, found, Result(Pose.of(result, written.pose.name, target)), plan)
 
     return derive.explained(plan, f"{shape.kind} in {into} of a {shape.kind} in {out_of}", write)

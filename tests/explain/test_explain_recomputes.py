@@ -10,7 +10,7 @@ from written import ALL, HOSTILE, ROTATIONS, SPECS, pose, record, rotation, seed
 
 import frametool
 from frametool import TransformBuffer, explain
-from frametool.explain.operations import BLOCKS
+from frametool.explain.derive import BLOCKS
 from frametool.geometry.representations import ROTATIONS as TABLE
 
 if TYPE_CHECKING:

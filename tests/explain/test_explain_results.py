@@ -11,9 +11,8 @@ from recheck import recheck
 from written import HOSTILE, ROTATIONS, SPECS, rotation, seeded
 
 import frametool
-from frametool.explain import operations
-from frametool.explain.derive import DerivationWrong
-from frametool.explain.operations import BLOCKS
+from frametool.explain import derive
+from frametool.explain.derive import BLOCKS, DerivationWrong
 from frametool.explain.run import sheets
 from frametool.geometry import euler
 
@@ -149,7 +148,7 @@ def test_a_derivation_that_leads_elsewhere_is_never_printed(monkeypatch: pytest.
 
 
 def test_a_representation_without_a_block_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch, run: Callable[..., Outcome]) -> None:
-    monkeypatch.setattr(operations, "BLOCKS", {name: block for name, block in BLOCKS.items() if name != "mrp"})
+    monkeypatch.setattr(derive, "BLOCKS", {name: block for name, block in BLOCKS.items() if name != "mrp"})
     outcome = run("convert", "--from", "mrp", "0.1", "0", "0", "--explain")
     assert (outcome.status, outcome.out) == (1, "")
     assert outcome.err.startswith("frametool: there is no derivation of 'mrp'; derived are quaternion, xyzw, wxyz, rpy")

@@ -12,7 +12,7 @@ from recheck import recheck
 import frametool
 from frametool import TransformBuffer, explain
 from frametool.explain import derive
-from frametool.explain.operations import BLOCKS
+from frametool.explain.derive import BLOCKS
 from frametool.explain.run import sheets
 from frametool.sim import followed
 

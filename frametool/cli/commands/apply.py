@@ -31,8 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from frametool.cli.streaming import PoseTask
-    from frametool.explain.derive import DerivationStyle
-    from frametool.explain.operations import WrittenPose
+    from frametool.explain.derive import DerivationStyle, WrittenPose
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Components
     from frametool.recordings.messages import PointCloud

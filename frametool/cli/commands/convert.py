@@ -23,7 +23,7 @@ from frametool.text.numbers import parse_angle, parse_number
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.explain.operations import OtherAxes
+    from frametool.explain.derive import OtherAxes
     from frametool.stream.request import Operation
 
 
@@ -160,7 +160,7 @@ def _change_of_axes(
 
 def _named_change(axes: str | None, world: str | None, operation: Operation) -> OtherAxes | None:
     """Return the change of axes for a derivation, None without one."""
-    from frametool.explain.operations import OtherAxes
+    from frametool.explain.derive import OtherAxes
 
     left = (world, operation.left[3:]) if world and operation.left else None
     right = (axes, operation.right[0][3:]) if axes and operation.right else None
