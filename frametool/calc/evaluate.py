@@ -22,17 +22,9 @@ from frametool.documents.document import parse_documents
 from frametool.documents.source import Source, error_at
 from frametool.errors import FormatError, FrametoolError, did_you_mean, shown, warn
 from frametool.geometry import floats
+from frametool.geometry.representations import EARTH_FRAMES
 from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose, read_pose
-from frametool.grammar.readers import (
-    EARTH_FRAMES,
-    Misfit,
-    Reading,
-    kind,
-    may_be_on_earth,
-    read_numbers,
-    slash_note,
-    within,
-)
+from frametool.grammar.readers import Misfit, Reading, kind, may_be_on_earth, read_numbers, slash_note, within
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -95,8 +95,14 @@ def tokens_of(text: str) -> list[Token]:
     while (at := blank.match(text, at).end()) < len(text):  # type: ignore[union-attr]
         first = text[at]
         if first == "{":
-            close = closing_brace(text, at)
-            token = Token("pose", text[at:close], at, close)
+            depth = 0  # of braces; those in quotes do not count
+            for brace in re.compile(_BRACES).finditer(text, at):
+                depth += (brace[0] == "{") - (brace[0] == "}")
+                if brace["unclosed"] or not depth:
+                    break
+            if depth:
+                raise CalcError("a { is not closed", at)
+            token = Token("pose", text[at : brace.end()], at, brace.end())
         elif tokens and tokens[-1].text == "in" and (frame := re.compile(_FRAME).match(text, at)):
             token = Token("frame", frame[0], at, frame.end())
         elif found := _TOKEN.match(text, at):
@@ -109,18 +115,6 @@ def tokens_of(text: str) -> list[Token]:
         tokens.append(token)
         at = token.end
     return [*tokens, Token("end", "", at, at)]
-
-
-def closing_brace(text: str, at: int) -> int:
-    """Return the position after the brace that closes the one at a position; braces in quotes do not count."""
-    depth = 0
-    for found in re.compile(_BRACES).finditer(text, at):
-        if found["unclosed"]:
-            break
-        depth += (found[0] == "{") - (found[0] == "}")
-        if not depth:
-            return found.end()
-    raise CalcError("a { is not closed", at)
 
 
 def frame_text(name: str | None) -> str:

@@ -65,16 +65,26 @@ def names_of(notation: Notation, found: int, *, degrees: bool) -> list[str]:
     return [f"{name}_deg" if degrees and at in representation.angles else name for at, name in names]
 
 
+def _words(notation: Notation, values: Values, *, degrees: bool) -> dict[str, str]:
+    """Return the words of a notation for its two sheets; add the kind of its axes to the values."""
+    words = {"deg": "_deg" * degrees, "unit": "deg" if degrees else "rad"}
+    if (name := notation.representation.name) not in ("euler", *AXES_OF):
+        return words
+    axes = AXES_OF.get(name) or notation.bound_axes()
+    i, j, k, parity, symmetric, fixed = euler.AXES[axes]
+    values |= {"odd": float(parity < 0.0), "symmetric": float(symmetric), "fixed": float(fixed)}
+    first, third = "31" if fixed else "13"
+    words |= {"axes": axes, "turns": ", then ".join(axes[1:]), "i": "xyz"[i], "j": "xyz"[j], "k": "xyz"[k]}
+    return words | {
+        "first": first, "third": third, "A": axes[int(first)], "B": axes[2], "C": axes[int(third)],
+    }  # fmt: skip
+
+
 def to_quaternion(sheet: Sheet, numbers: Sequence[float], notation: Notation, *, degrees: bool) -> Quaternion:
     """Add the derivation of the quaternion from the numbers of a notation."""
     values: Values = dict(zip(names_of(notation, 0, degrees=degrees), numbers, strict=True))
-    words, name = _units(degrees=degrees), notation.representation.name
-    if name.startswith("euler"):
-        axes = AXES_OF.get(name) or notation.bound_axes()
-        first, third = "31" if axes[0] == "s" else "13"
-        words |= _axes(axes, values) | {"first": first, "third": third}
-        words |= {"A": axes[int(first)], "B": axes[2], "C": axes[int(third)]}
-    return quaternion_of(sheet.play(f"{name} to", values, **words))
+    words = _words(notation, values, degrees=degrees)
+    return quaternion_of(sheet.play(f"{notation.representation.name} to", values, **words))
 
 
 def from_quaternion(
@@ -84,25 +94,13 @@ def from_quaternion(
     names, (x, y, z, w) = names_of(notation, 1, degrees=degrees), q
     values = named("", q) | {"degrees": float(degrees), "negative": float((w or x or y or z) < 0.0)}
     values["signed"] = 0.0 if keep_sign else values["negative"]
-    words, name = _units(degrees=degrees), notation.representation.name
-    if name in ("euler", *AXES_OF):
-        axes = AXES_OF.get(name) or notation.bound_axes()
-        values["locked"] = float(euler.locked(*q, axes))
+    words, name = _words(notation, values, degrees=degrees), notation.representation.name
+    if "axes" in words:
+        values["locked"] = float(euler.locked(*q, words["axes"]))
         shown_as = ANGLES if name.startswith("euler") else ROLL_PITCH_YAW
-        words |= _axes(axes, values) | dict(zip(ANGLES.split(), shown_as.split(), strict=True))
+        words |= dict(zip(ANGLES.split(), shown_as.split(), strict=True))
     sheet.play(f"{name} from", values, **words)
     return [values[each] for each in names]
-
-
-def _units(*, degrees: bool) -> dict[str, str]:
-    return {"deg": "_deg" * degrees, "unit": "deg" if degrees else "rad"}
-
-
-def _axes(axes: str, values: Values) -> dict[str, str]:
-    """Add the kind of axes of a convention; return their names for the sheets."""
-    i, j, k, parity, symmetric, fixed = euler.AXES[axes]
-    values |= {"odd": float(parity < 0.0), "symmetric": float(symmetric), "fixed": float(fixed)}
-    return {"axes": axes, "turns": ", then ".join(axes[1:]), "i": "xyz"[i], "j": "xyz"[j], "k": "xyz"[k]}
 
 
 def named(prefix: str, numbers: Sequence[float]) -> Values:
@@ -139,7 +137,7 @@ def inverse(sheet: Sheet, pose: Rigid, target: str, source: str) -> Rigid:
     return *vector_of(values, "t"), *quaternion_of(values)
 
 
-def between(sheet: Sheet, a: Rigid, b: Rigid, fraction: float) -> Rigid:
+def between(sheet: Sheet, a: Rigid, b: Rigid, *, fraction: float) -> Rigid:
     """Interpolate two poses: linearly and by slerp."""
     sheet.stretch = max(sheet.stretch, abs(fraction))
     line = sheet.play("line", {"f": fraction} | named("a", a[:3]) | named("b", b[:3]))
@@ -160,15 +158,6 @@ class OtherAxes(NamedTuple):
     world: tuple[str, Quaternion] | None = None
     axes: tuple[str, Quaternion] | None = None
     mirrors: bool = False
-
-
-def with_other_axes(sheet: Sheet, pose: Rigid, change: OtherAxes) -> Rigid:
-    """Add the steps from a pose to the same with other axes, on its left side, then on its right."""
-    (world, turned), (axes, body) = change.world or ("", IDENTITY[3:]), change.axes or ("", IDENTITY[3:])
-    values = named("t", pose[:3]) | named("q", pose[3:]) | named("W", turned) | named("B", body)
-    values |= {"world": float(bool(world)), "axes": float(bool(axes)), "mirrors": float(change.mirrors)}
-    sheet.play("other axes", values, world_axes=world, body_axes=axes)
-    return *vector_of(values, "t"), *quaternion_of(values, "q")
 
 
 class WrittenPose(NamedTuple):
@@ -294,7 +283,7 @@ def _edge(sheet: Sheet, track: Track, at_ns: int) -> Edge:
         values = sheet.play(
             "two samples", spans(begin_ns, end_ns, at_ns), a=_line(sheet, a), b=_line(sheet, b), **words
         )
-        return printable(seen_in), child, between(sheet, a, b, values["f"])
+        return printable(seen_in), child, between(sheet, a, b, fraction=values["f"])
 
 
 def spans(begin_ns: int, end_ns: int, at_ns: int) -> Values:
@@ -414,7 +403,7 @@ def convert(
 ) -> Explanation:
     """Derive one pose or rotation in the requested notations.
 
-    own: the command's result.  change: of its axes.
+    own: the command's result.  change: of its axes, on the left side of the pose, then on its right.
     """
 
     def way(sheet: Sheet) -> Rigid:
@@ -423,12 +412,17 @@ def convert(
         found: Rigid = (x, y, z, *pose.quaternion(sheet))
         if pose.inverse:
             found = inverse(sheet, found, "child", "parent")
-        return found if change is None else with_other_axes(sheet, found, change)
+        if change is None:
+            return found
+        (world, left), (axes, right) = (side or ("", IDENTITY[3:]) for side in (change.world, change.axes))
+        values = named("t", found[:3]) | named("q", found[3:]) | named("W", left) | named("B", right)
+        values |= {"world": float(bool(world)), "axes": float(bool(axes)), "mirrors": float(change.mirrors)}
+        sheet.play("other axes", values, world_axes=world, body_axes=axes)
+        return *vector_of(values, "t"), *quaternion_of(values, "q")
 
-    title = "identity" if pose.notation is None else pose.notation.spec
-    return derived_pose(
-        plan, f"{title} to {', '.join(notation.spec for notation in plan.notations)}", Result(own or pose.pose), way
-    )
+    begin = pose.notation.spec if pose.notation else "identity"
+    title = f"{begin} to {', '.join(notation.spec for notation in plan.notations)}"
+    return derived_pose(plan, title, Result(own or pose.pose), way)
 
 
 def derived_from(sheet: Sheet, poses: Sequence[WrittenPose], labels: Sequence[tuple[str, str]]) -> list[Rigid]:
@@ -496,8 +490,7 @@ def interpolate(plan: DerivationStyle, a: WrittenPose, b: WrittenPose, fraction:
     frames, labels = _three_frames(a, b)
 
     def way(sheet: Sheet) -> Rigid:
-        one, other = derived_from(sheet, [a, b], labels)
-        return between(sheet, one, other, fraction)
+        return between(sheet, *derived_from(sheet, [a, b], labels), fraction=fraction)
 
     return derived_pose(plan, f"{frames[1]} to {frames[2]} at {fraction!r}", own, way)
 

@@ -140,26 +140,19 @@ LONGEST = FURTHEST_NS // BILLION  # seconds: the range of the buffer's stamps
 FLAGS = {"true": "1", "false": "0"}  # as in turtlesim's services
 
 
-def text_reader(parse: Callable[[str], Value], what: str) -> Callable[[Any], Value]:
-    """Return the reader of values for a parser of text; `what` is the expected value in errors."""
-
-    def read(value: Any) -> Value:
-        if type(value) is not str:
-            raise Misfit(f"expected {what}, found {kind(value)}")
-        return parse(value)
-
-    return read
+def read_as(value: Any, parse: Callable[[str], Value], what: str) -> Value:
+    """Read a text; `what` is the expected value in errors."""
+    if type(value) is not str:
+        raise Misfit(f"expected {what}, found {kind(value)}")
+    return parse(value)
 
 
-def one_of(names: Collection[str]) -> Callable[[Any], str]:
-    """Return the reader of one of several words."""
-
-    def parse(text: str) -> str:
-        if text not in names:
-            raise ValueInvalid(f"unknown {shown(text)}{alternatives(text, names, 'choices')}")
-        return text
-
-    return text_reader(parse, f"one of {', '.join(names)}")
+def one_of(value: Any, names: Collection[str]) -> str:
+    """Read one of several words."""
+    word = read_as(value, str, f"one of {', '.join(names)}")
+    if word not in names:
+        raise ValueInvalid(f"unknown {shown(word)}{alternatives(word, names, 'choices')}")
+    return word
 
 
 def known_keys(value: Any, keys: Collection[str], what: str) -> dict[str, Any]:
@@ -178,22 +171,21 @@ def _time(text: str) -> int:
     return stamp_ns
 
 
+def _duration(text: str) -> int | None:
+    return None if text in ("inf", ".inf") else _time(text)
+
+
 def _whole(text: str, most: int) -> int:
     if not re.fullmatch(r"[0-9]{1,30}", text) or int(text) > most:
         raise ValueInvalid(f"expected a whole number 0 .. {most}, found {shown(text)}")
     return int(text)
 
 
-read_byte = text_reader(partial(_whole, most=255), "a whole number 0 .. 255")
-read_angle = text_reader(partial(read_number_or_angle, degrees=False), "an angle in radians, or like 90deg")
-read_time = text_reader(_time, "a time in seconds")
-read_duration = text_reader(
-    lambda text: None if text in ("inf", ".inf") else _time(text), "a duration in seconds, or inf"
+read_angle = partial(
+    read_as, parse=partial(read_number_or_angle, degrees=False), what="an angle in radians, or like 90deg"
 )
-read_flag = text_reader(lambda text: parse_number(FLAGS.get(text, text)), "true or false")
-read_seed = text_reader(partial(_whole, most=1 << 64), "a whole number")
-
-
+read_time = partial(read_as, parse=_time, what="a time in seconds")
+read_flag = partial(read_as, parse=lambda text: parse_number(FLAGS.get(text) or text), what="true or false")
 def read_place(value: Any) -> Place:
     """Read [x, y] or [x, y, theta]: metres, radians; the angle may have a unit."""
     if type(value) is not list or len(value) not in (2, 3):
@@ -387,14 +379,14 @@ def _name(value: Any) -> str:
 
 # key, also of a service's argument -> its reader; others are numbers
 READERS: dict[str, Callable[[Any], Any]] = {
-    "duration": read_duration,
-    "turtlesim": one_of(VARIANTS),
+    "duration": partial(read_as, parse=_duration, what="a duration in seconds, or inf"),
+    "turtlesim": partial(one_of, names=VARIANTS),
     "holonomic": read_flag,
-    "seed": read_seed,
+    "seed": partial(read_as, parse=partial(_whole, most=1 << 64), what="a whole number"),
     "spawn": read_place,
     "follow": _name,
-    "law": one_of(LAWS),
-    "target": one_of(TARGETS),
+    "law": partial(one_of, names=LAWS),
+    "target": partial(one_of, names=TARGETS),
     "delay": read_time,
     "t": read_time,
     "turtle": _name,
@@ -402,7 +394,9 @@ READERS: dict[str, Callable[[Any], Any]] = {
     "theta": read_angle,
     "angular": read_angle,
     "off": read_flag,
-    **dict.fromkeys(("r", "g", "b", "width"), read_byte),
+    **dict.fromkeys(
+        ("r", "g", "b", "width"), partial(read_as, parse=partial(_whole, most=255), what="a whole number 0 .. 255")
+    ),
 }
 
 
@@ -432,7 +426,13 @@ def _scene(value: Any, source: Source, seed: int | None) -> Scene:
         raise Misfit(f"no turtles; expected {', '.join(SCENE_KEYS)}")
     own = _field(scene, "seed", "0")
     variant, holonomic = _field(scene, "turtlesim", "ros1"), bool(_field(scene, "holonomic", "false"))
-    calls = within(("events",), _calls, scene.get("events") or [], source)
+    events = scene.get("events") or []
+    if type(events) is not list:
+        raise Misfit(f"expected a list of {{t: .., SERVICE: {{..}}}}, found {kind(events)}", ("events",))
+    calls = [
+        within(("events", at), _call, entry)._replace(place=f"{source.name}, event {at + 1}")
+        for at, entry in enumerate(events)
+    ]
     entries = within(("turtles",), as_mapping, scene["turtles"], "the turtles by name")
     turtles = [
         within(("turtles", name), _turtle, name, entry or {}, source, own if seed is None else seed)
@@ -449,11 +449,18 @@ def _turtle(name: str, value: Any, source: Source, seed: int) -> SceneTurtle:
     if "follow" in entry and "leader" in entry:
         raise Misfit("a turtle has a leader script or follows another, not both", ("leader",), key=True)
     if "follow" in entry:
-        return SceneTurtle(name, spawn, _follow(name, entry))
+        if (leader := _field(entry, "follow")) == name:
+            raise Misfit(f"{name} cannot follow itself", ("follow",))
+        law = _field(entry, "law", "ros1")
+        numbers = {key: _field(entry, key) for key in CONTROLLER_KEYS if key in entry}
+        for key, number in numbers.items():
+            within((key,), FollowController, law, **{key: number})
+        target, delay_ns = _field(entry, "target", "leader"), _field(entry, "delay", "0")
+        return SceneTurtle(name, spawn, Follow(leader, FollowController(law, **numbers), target, delay_ns))
     if stray := [key for key in entry if key in FOLLOW_KEYS]:
         raise Misfit(f"{stray[0]} says how to follow; add follow: NAME", (stray[0],), key=True)
-    leader = within(("leader",), _leader, entry["leader"], source, seed) if "leader" in entry else None
-    return SceneTurtle(name, spawn, leader)
+    drive = within(("leader",), _leader, entry["leader"], source, seed) if "leader" in entry else None
+    return SceneTurtle(name, spawn, drive)
 
 
 def _leader(value: Any, source: Source, seed: int) -> MakeLeader:
@@ -470,26 +477,6 @@ def _leader(value: Any, source: Source, seed: int) -> MakeLeader:
     return scripted(read_script(Source(path, read_text(path))))
 
 
-def _follow(name: str, entry: Mapping[str, Any]) -> Follow:
-    """Read the follower settings of a turtle."""
-    leader = _field(entry, "follow")
-    if leader == name:
-        raise Misfit(f"{name} cannot follow itself", ("follow",))
-    law = _field(entry, "law", "ros1")
-    numbers = {key: _field(entry, key) for key in CONTROLLER_KEYS if key in entry}
-    for key, number in numbers.items():
-        within((key,), FollowController, law, **{key: number})
-    target, delay_ns = _field(entry, "target", "leader"), _field(entry, "delay", "0")
-    return Follow(leader, FollowController(law, **numbers), target, delay_ns)
-
-
-def _calls(value: Any, source: Source) -> list[ServiceCall]:
-    if type(value) is not list:
-        raise Misfit(f"expected a list of {{t: .., SERVICE: {{..}}}}, found {kind(value)}")
-    calls = [within((index,), _call, entry) for index, entry in enumerate(value)]
-    return [call._replace(place=f"{source.name}, event {number}") for number, call in enumerate(calls, 1)]
-
-
 def _call(value: Any) -> ServiceCall:
     """Read {t: .., SERVICE: {..}}; kill also takes only the name."""
     entry = known_keys(value, ("t", *SERVICES), "an event {t: .., SERVICE: {..}}")
@@ -500,12 +487,7 @@ def _call(value: Any) -> ServiceCall:
     arguments = entry[service]
     if service == "kill" and type(arguments) is str:
         arguments = {"name": arguments}
-    read = within((service,), _arguments, service, arguments or {})
+    known = within((service,), known_keys, arguments or {}, SERVICES[service], f"the arguments of {service}")
+    read = {key: within((service,), _field, known, key) for key in known}
+    within((service,), complete, service, read)
     return ServiceCall(_field(entry, "t"), service, read)
-
-
-def _arguments(service: str, value: Any) -> dict[str, float | str]:
-    """Read a service's arguments and check that none is missing."""
-    arguments = {key: _field(value, key) for key in known_keys(value, SERVICES[service], f"the arguments of {service}")}
-    complete(service, arguments)
-    return arguments

@@ -3,6 +3,13 @@
 Followers see everything through tf. At equal times: tick, then carrots, service calls, leaders, controllers. Commands
 and calls act at the first tick strictly later. Poses enter the buffer as float32, the stamp is the tick's time, without
 delay.
+
+Steps are written as velocity commands, poses or transforms, in every format; a transform is the pose of the child in
+its parent.
+
+    linear: {x: ..}, angular: {..}                                  YAML: messages as `ros2 topic echo` prints them
+    {"t": 0.1, "turtle": "turtle2", "linear": {"x": ..}, "angular": {"z": ..}}             JSON: one object per line
+    t,turtle,linear_x,angular_z,distance,leader_x,leader_y,leader_theta,x,y,theta          CSV
 """
 
 from __future__ import annotations
@@ -10,23 +17,31 @@ from __future__ import annotations
 import math
 from heapq import heapify, heappop, heapreplace
 from itertools import count
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from frametool.documents.json import dump
 from frametool.errors import LookupFailed, ValueInvalid, printable
+from frametool.formats.rows.csv import row
 from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import BILLION
+from frametool.grammar.pose import Pose
+from frametool.grammar.result import Result, Style
+from frametool.ros.echo_format import message_text, transform_stamped
 from frametool.sim.drivers import CARROT_NS, EndOfRun, Heading, frame_of, offset, planar
 from frametool.sim.scene import Follow, Scene, ServiceCall
 from frametool.sim.turtle import TICK_NS, Pen, ServiceRefused, TurtlePose, TurtleState, Twist, WallHit, World
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from frametool.geometry.transform import Transform
     from frametool.sim.drivers import MakeLeader
 
     Process = Iterator[int]  # yields the nanoseconds at which it is to be resumed; ends when it has finished
     Watch = Callable[["SimulationStep"], object]
+    Record = dict[str, Any]
+    # an event of a step: cells by column, for text and CSV; the ROS message, for YAML and JSON; what that does not say
+    Emission = tuple[Record, Record, Record]
 
 WORLD = "world"
 CACHE_NS = 10 * BILLION  # tf's own default
@@ -303,3 +318,97 @@ def event_log(say: Callable[[str], None]) -> Watch:
             at_wall.update(hit.turtle for hit in step.walls)
 
     return watch
+
+
+FORMS = ("text", "yaml", "json", "csv")
+EMITS = ("commands", "poses", "tf")
+# of steps in text, whose lines must fit a terminal: millimetres and milliradians, with short names
+STEP_DECIMALS = 3
+SHORT = {
+    "linear_x": "linear", "angular_z": "turning", "distance": "away",
+    "leader_x": "lead_x", "leader_y": "lead_y", "leader_theta": "lead_th",
+    "linear_velocity": "linear", "angular_velocity": "turning",
+}  # fmt: skip
+
+
+class StepWriter:
+    """Writes the contents of steps: emit is one of EMITS, style.form one of FORMS.
+
+    leaders: the commands of leaders too, not only of followers.  labelled: name the turtle in a comment of a YAML
+    message.
+    """
+
+    def __init__(self, emit: str, style: Style, *, leaders: bool = False, labelled: bool = False) -> None:
+        """Store what is written and how."""
+        self._emissions = _EMISSIONS["all commands" if leaders and emit == "commands" else emit]
+        self._style = style
+        self._labelled = labelled
+        self._headed = False
+
+    def write(self, step: SimulationStep) -> Iterator[str]:
+        """Yield each record of a step, the first one below the header if the format has one."""
+        style = self._style
+        digits = STEP_DECIMALS if style.precision is None else style.precision
+        for cells, message, labels in self._emissions(step, style):
+            if not self._headed and style.format in ("text", "csv"):
+                names = {name: SHORT.get(name, name) for name in cells}
+                yield row(cells, style) if style.format == "csv" else _aligned(names)
+            self._headed = True
+            match style.format:
+                case "yaml":
+                    head = f"# {printable(labels['turtle'])} at {labels['t']} s\n" if self._labelled and labels else ""
+                    yield head + message_text(message, style)
+                case "json":
+                    yield f"{dump(labels | message, style.number)}\n"
+                case "csv":
+                    yield row(cells.values(), style)
+                case _:
+                    texts = {}  # rounded for display; zero has no sign
+                    for name, cell in cells.items():
+                        text = "-" if cell is None else printable(str(cell))
+                        texts[name] = f"{round(cell, digits) + 0.0:.{digits}f}" if isinstance(cell, float) else text
+                    yield _aligned(texts | {"t": f"{cells['t']:.3f}"})
+
+def _aligned(texts: Record) -> str:
+    """Format a line, each cell right-aligned in its column."""
+    wide = ("turtle", "parent", "child")
+    widths = {name: 7 if name in wide else max(6, len(SHORT.get(name, name))) for name in texts}
+    return " ".join(f"{text:>{widths[name]}}" for name, text in texts.items()) + "\n"
+
+
+def _commands(commands: Iterable[IssuedCommand]) -> Iterator[Emission]:
+    """Yield commands, as geometry_msgs/Twist."""
+    for command in commands:
+        ahead, turning, aside = command.twist
+        labels = {"t": command.t_ns / BILLION, "turtle": command.turtle}
+        seen = zip(("leader_x", "leader_y", "leader_theta"), command.leader or (None, None, None), strict=True)
+        cells = {"linear_x": ahead, "angular_z": turning, "distance": command.distance, **dict(seen)}
+        message = {"linear": {"x": ahead, "y": aside, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": turning}}
+        yield labels | cells | command.state._asdict(), message, labels
+
+
+def _poses(step: SimulationStep, _: Style) -> Iterator[Emission]:
+    """Yield the poses of a tick, as turtlesim/Pose; turtles at time 0 have not moved yet."""
+    for name, pose in step.poses.items() if step.t_ns else ():
+        if not all(map(math.isfinite, pose)):
+            when = f"{name} at {step.t_ns / BILLION:g} s"
+            raise ValueInvalid(f"{when}: its speed does not fit the float32 of a pose message")
+        labels, message = {"t": step.t_ns / BILLION, "turtle": name}, pose._asdict()
+        yield labels | message, message, labels
+
+
+def _transforms(step: SimulationStep, style: Style) -> Iterator[Emission]:
+    """Yield the transforms that were published, as geometry_msgs/TransformStamped."""
+    for stamp_ns, parent, child, transform in step.broadcasts:
+        numbers = zip(("x", "y", "z", "qx", "qy", "qz", "qw"), transform.components, strict=True)
+        cells = {"t": stamp_ns / BILLION, "parent": parent, "child": child, **dict(numbers)}
+        result = Result(Pose.of(transform.components, child, parent), {"stamp_ns": stamp_ns})
+        yield cells, transform_stamped(result, style), {}
+
+
+_EMISSIONS: dict[str, Callable[[SimulationStep, Style], Iterator[Emission]]] = {
+    "commands": lambda step, _: _commands(step.commands),
+    "all commands": lambda step, _: _commands([*step.led, *step.commands]),
+    "poses": _poses,
+    "tf": _transforms,
+}

@@ -13,8 +13,7 @@ from frametool.errors import FormatError, ValueInvalid
 from frametool.grammar.result import Style
 from frametool.sim.drivers import scripted
 from frametool.sim.scene import read_scene, tutorial
-from frametool.sim.simulate import simulate
-from frametool.sim.step_writer import FORMS, StepWriter
+from frametool.sim.simulate import FORMS, StepWriter, simulate
 from frametool.sim.turtle import FASTEST_TURN, Turtle, Twist, World
 from frametool.view.pictures import ticks
 

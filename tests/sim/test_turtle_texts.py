@@ -13,8 +13,7 @@ from frametool.errors import FormatError
 from frametool.grammar.result import Style
 from frametool.sim.drivers import KEYS, FollowController, scripted
 from frametool.sim.scene import Follow, read_commands, read_scene, read_script, tutorial
-from frametool.sim.simulate import RunSummary, simulate
-from frametool.sim.step_writer import EMITS, SHORT, StepWriter
+from frametool.sim.simulate import EMITS, SHORT, RunSummary, StepWriter, simulate
 from frametool.sim.turtle import CENTRE, Twist
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from frametool.cli.output import Output
 from frametool.cli.sink import folded, in_colour, say, say_error, say_first, writing
 from frametool.cli.trees import FRAME, frame_name, load_sides, opened, state
 from frametool.errors import Finding, FormatError, listing, warn
-from frametool.lint.rules import RULES, WRITERS, check, github_command, level
+from frametool.lint.rules import RULES, WRITERS, check, clocks_differ, github_command, level, monitor
 from frametool.lint.tree_diff import Tolerance, diff, entry, parse_tolerance
 
 if TYPE_CHECKING:
@@ -206,8 +206,6 @@ def monitor_command(inputs: Inputs) -> int:
     of parent; gaps are pauses 5 times the median one. length_m is that of the path, speed_mean and speed_max metres a
     second from stamp to stamp. A jump is a step 10 times the median one and longer than 0.1 m or 0.2 rad.
     """
-    from frametool.lint.monitor_report import clocks_differ, monitor
-
     frames = inputs.frames
     refuse(len(frames) not in (0, 2), f"name TARGET and SOURCE, or neither; found {len(frames)} frames")
     output = Output(inputs, "report")

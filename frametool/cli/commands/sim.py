@@ -25,8 +25,7 @@ from frametool.errors import FileProblem, alternatives, shown
 from frametool.frames.stamps import BILLION
 from frametool.sim import drivers
 from frametool.sim.scene import duration_ns, parse_spawn, read_scene, read_script, read_stream, tutorial
-from frametool.sim.simulate import RunSummary, event_log, simulate
-from frametool.sim.step_writer import EMITS, FORMS, StepWriter
+from frametool.sim.simulate import EMITS, FORMS, RunSummary, StepWriter, event_log, simulate
 from frametool.sim.turtle import VARIANTS
 from frametool.text.numbers import parse_number
 
