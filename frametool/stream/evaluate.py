@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import partial
-from operator import attrgetter, itemgetter
+from itertools import accumulate, zip_longest
+from operator import itemgetter
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -17,8 +18,7 @@ from frametool.geometry.batch_validation import read_rotations
 from frametool.geometry.representations import UPPER_ROWS, BatchRule
 from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
 from frametool.grammar.pose import FEW_DIGITS
-from frametool.stream.faults import DEGREES, NULL, STOP, Fault, RowNote
-from frametool.stream.layout import Const, In, Instead, Out, Piece, Word
+from frametool.stream.faults import DEGREES, NULL, Fault, RowNote
 from frametool.stream.request import PAIR, START, Request, no_step, thing_pose
 from frametool.stream.row_layout import (
     FLAT,
@@ -32,16 +32,26 @@ from frametool.stream.row_layout import (
     doubt,
     wrong_tail,
 )
-from frametool.stream.rows import Block, assemble, chosen, coded, number_spans, read_each, separators, texts_as_rows
-from frametool.stream.stamp_columns import by_frame, by_time
+from frametool.stream.rows import (
+    Block,
+    assemble,
+    chosen,
+    coded,
+    number_spans,
+    numbered,
+    read_each,
+    separators,
+    texts_as_rows,
+)
 from frametool.text.numbers import parse_number, read_number_or_angle
 from frametool.text.parse import half_units, parse_floats
 from frametool.text.spans import Flags, Floats, Ints, Spans
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from frametool.geometry.types import Components, Rigid
+    from frametool.stream.layout import Piece
     from frametool.stream.row_layout import Target
 
 COLUMNS_REMEDY = "give --deg, or name the columns _deg"
@@ -89,29 +99,34 @@ class Run:
     reasons: row -> column and why it is bad; rows: those that have a result
     columns, moved: the numbers read, and the components of the results; results, locked: the numbers that are written
         of all rows, and 1 where angles are not unique
+    things: each shape of the rows, where its numbers begin among all, and these
     mended: rows whose rotation was off and normalised; off: by how much the worst was
-    doubted: the first row with an angle that looks like degrees; notes: warnings
+    doubted: whether a row had an angle that looks like degrees; notes: warnings
+    outside: rows without numbers, and those before the first or after the last time that is wanted
+    lone: the very first row of velocities, which has none
     """
 
     def __init__(self, plan: Plan, block: Block, state: State) -> None:
         """Read, transform and check every row of the block."""
-        self.plan, self.block = plan, block
+        self.plan, self.block, self.state = plan, block, state
         self.request, self.operation = plan.request, plan.request.operation
         self.reasons: dict[int, tuple[str, str | FrametoolError]] = dict(block.bad)
         self.mended: list[int] = []
         self.notes: list[RowNote] = []
-        self.doubted = set[int]()
-        self.off = 0.0
+        self.doubted, self.off = False, 0.0
         self.count = len(block.places)
         self.columns = [*np.ascontiguousarray(self._read().T)]
-        if any(map(attrgetter("covariance"), plan.shapes)):
-            self._check_covariances()
-        is_cut = self.count and (self.request.window or block.gone is not None)
-        self.outside = self._outside() if is_cut else set[int]()
+        firsts = accumulate([shape.size for shape in plan.shapes], initial=0)
+        starts = zip(plan.shapes, firsts, strict=False)
+        self.things = [(shape, first, (*self.columns[first : first + shape.size],)) for shape, first in starts]
+        self._check_covariances()
+        self.outside = set[int]() if block.gone is None else {*block.gone.tolist()}
+        if self.count and self.request.window:
+            (first, last), times = self.request.window, block.stamps[0]
+            self.outside |= {*np.flatnonzero((times < first) | (times > last)).tolist()} - {*self.reasons}
         self.lone = set[int]()
         with np.errstate(all="ignore"):
-            self.moved = self._compute(state)
-            self._doubt_turns()
+            self.moved = self._compute()
             self.results, self.locked = self._results()
         weights = block.stamps[0] if self.request.weighs and self.count else None
         if weights is not None and weights.dtype == np.float64:  # labels may be any
@@ -128,8 +143,12 @@ class Run:
             kept = np.isin(np.arange(self.count), self.rows)
             for shape, parts in zip(plan.shapes, self.moved, strict=False):
                 self.request.gathered.take(shape, parts, kept, weights, block.line_of)
-        if self.request.results.unwrap and len(self.rows):
-            _unwrap(self.results, self.rows, plan.targets[0].angle_columns(), state)
+        for column, period in plan.targets[0].angle_columns() if self.request.results.unwrap and len(self.rows) else ():
+            values = self.results[self.rows, column]  # full turns are added, so that no step is larger than half a turn
+            before = np.concatenate([[state.angles.get(column, values[0])], values[:-1]])
+            turns = state.turns.get(column, 0.0) - np.cumsum(np.rint((values - before) / period))
+            self.results[self.rows, column] = values + period * turns
+            state.angles[column], state.turns[column] = float(values[-1]), float(turns[-1])
 
     def _blame(self, row: int, column: str, reason: str | FrametoolError) -> None:
         """Keep the first reason why a row is bad."""
@@ -143,38 +162,37 @@ class Run:
 
     def _read(self) -> Floats:
         """Read all numbers; those that are none are nan."""
-        cells, names = self.block.numbers, self.plan.names
+        cells, plan = self.block.numbers, self.plan
         if not isinstance(cells, Spans):
             return cells
         numbers, bad = parse_floats(cells)
-        width = max(len(names), 1)
-        read = lambda at: self._read_one(cells.text(*divmod(at, width)).decode("utf-8", "replace"), at % width)  # noqa: E731
+        width = max(len(plan.names), 1)
+
+        def read(at: int) -> float:
+            """Read an angle, or a length where metres are wanted, which may say its own unit; words are read below."""
+            text, column = cells.text(*divmod(at, width)).decode("utf-8", "replace").strip(" \t"), at % width
+            if column in plan.words:
+                return 0.0
+            if column in plan.marked:
+                return plan.marked[column](text)
+            for shape in plan.shapes:
+                if column < shape.size:
+                    return read_number_or_angle(text, shape.in_degrees(column), metres=shape.in_metres(column))
+                column -= shape.size
+            return parse_number(text)
+
         for at, reason in read_each(numbers.reshape(-1), bad.tolist(), read).items():
-            self._blame(at // width, names[at % width], reason)
-        for column, word in self.plan.words.items() if self.count else ():  # also those that look like numbers
+            self._blame(at // width, plan.names[at % width], reason)
+        for column, word in plan.words.items() if self.count else ():  # also those that look like numbers
             own = coded(Spans(cells.data, cells.starts[:, column], cells.ends[:, column]))
             numbers[:, column], reasons = own.numbers(word)
             for row, reason in reasons.items():
-                self._blame(row, names[column], reason)
+                self._blame(row, plan.names[column], reason)
         return numbers
-
-    def _read_one(self, text: str, column: int) -> float:
-        """Read an angle, or a length where metres are wanted, which may say its own unit; words are read elsewhere."""
-        text = text.strip(" \t")
-        if column in self.plan.words:
-            return 0.0
-        if column in self.plan.marked:
-            return self.plan.marked[column](text)
-        for shape in self.plan.shapes:
-            if column < shape.size:
-                return read_number_or_angle(text, shape.in_degrees(column), metres=shape.in_metres(column))
-            column -= shape.size
-        return parse_number(text)
 
     def _check_covariances(self) -> None:
         """Refuse rows whose covariance is invalid; sigmas cannot be negative."""
-        first = 0
-        for shape in self.plan.shapes:
+        for shape, first, _ in self.things:
             at = first + shape.own_size
             for size in shape.covariance if not shape.multiple else ():
                 own = self.columns[at : at + size]
@@ -186,14 +204,23 @@ class Run:
                     for row, reason in uncertainty.problems(np.stack(own, axis=1)).items():
                         self._blame(row, self.plan.names[at], reason)
                 at += size
-            first += shape.size
 
     def _note_block(self) -> None:
-        """Warn of what holds for the block, and of its zones of UTM: of a southern one that looks like a band too."""
+        """Warn of what holds for the block: names and covariances of its results, and zones of UTM."""
         line_of, shapes, targets, lost = self.block.line_of, self.plan.shapes, self.plan.targets, self.block.names.lost
         self.notes += map(RowNote.of_lost_name, map(line_of, lost), lost.values())
         if shapes and shapes[0].notation is UPPER_ROWS and self.off > PROJECTED_IN_SILENCE:
             self.notes.append(RowNote(line_of(0), "projected", projection(self.off)))
+        for shape, parts in zip(shapes or (Shape(POSE),), self.moved, strict=False):
+            if len(self.operation.carried(shape)) < 36 or self.operation.uncertain or not self.count:
+                continue
+            columns = [np.broadcast_to(np.asarray(part), self.count) for part in parts[-36:]]
+            with np.errstate(all="ignore"):
+                wide = np.flatnonzero(columns[21] + columns[28] + columns[35] > uncertainty.WIDE**2)
+            for row in wide.tolist():  # the first whose turn is too uncertain for the first order
+                if message := uncertainty.doubt([float(column[row]) for column in columns]):
+                    self.notes.append(RowNote(line_of(row), uncertainty.WIDE_RULE, message))
+                    break
         if shapes and (shapes[0].place or (targets and targets[0].place)):
             from frametool.stream.earth_columns import doubt_band, zone_notes
 
@@ -202,82 +229,80 @@ class Run:
             if (place := targets[0].place) is not None and len(self.rows):
                 self.notes += zone_notes(place, [*self.results[self.rows].T], lambda at: line_of(int(self.rows[at])))
 
-    def _doubt_turns(self) -> None:
-        """Warn of the first row whose turn is too uncertain for the first order."""
-        operation = self.operation
-        for shape, parts in zip(self.plan.shapes or (Shape(POSE),), self.moved, strict=False):
-            if len(operation.carried(shape)) < 36 or operation.uncertain or not self.count:
-                continue
-            columns = [np.broadcast_to(np.asarray(part), self.count) for part in parts[-36:]]
-            for row in np.flatnonzero(columns[21] + columns[28] + columns[35] > uncertainty.WIDE**2).tolist():
-                if message := uncertainty.doubt([float(column[row]) for column in columns]):
-                    self.notes.append(RowNote(self.block.line_of(row), uncertainty.WIDE_RULE, message))
-                    break
-
     def _mover(self, at: int) -> Rigid | None:
-        """Return the pose that moves one of the points or poses of the rows: of its frame, at its time, or none."""
-        plan, timed, formula = self.plan, self.request.timed, self.operation.formula
-        if not self.count or (formula is not None and not self.operation.shown):
-            return None
-        frames = self.block.frames[at]
-        if timed is not None and len(self.block.stamps) > at and self.block.stamps[at] is not None:
-            rows = np.delete(np.arange(self.count), [*self.reasons])
-            return by_time(timed, self._times(at), rows, frames, self._blame, plan.frame_column)
-        if plan.edge_of is None:
-            return None
-        if len(frames) == self.count:
-            return by_frame(plan.edge_of, frames, self._blame, plan.frame_column)
-        return plan.edge_of(frames[0])
+        """Return the pose that moves one of the points or poses of the rows: of its frame, at its time, or none.
 
-    def _compute(self, state: State) -> list[Components]:
+        A row whose frame has none, or none at its time, is bad.
+        """
+        plan, timed, formula, count = self.plan, self.request.timed, self.operation.formula, self.count
+        if not count or (formula is not None and not self.operation.shown):
+            return None
+        frames, stamps = self.block.frames[at], self.block.stamps
+        times = stamps[at] if timed is not None and len(stamps) > at else None
+        if times is None and (plan.edge_of is None or len(frames) != count):
+            return plan.edge_of and plan.edge_of(frames[0])
+        known, codes = numbered(frames)
+        if timed is None or times is None:
+            edges = []
+            for name, code in known.items():
+                try:
+                    edges.append(plan.edge_of(name))  # type: ignore[misc]
+                except FrametoolError as error:
+                    edges.append(NOWHERE)
+                    for row in np.flatnonzero(codes == code).tolist():
+                        self._blame(row, plan.frame_column, error)
+            columns = zip_longest(*edges, fillvalue=0.0)
+            return tuple(np.array(each)[codes] for each in columns)  # type: ignore[return-value]
+        good, poses = np.delete(np.arange(count), [*self.reasons]), np.full((timed.width, count), np.nan)
+        for frame, code in known.items():  # one a row, or one for all
+            some = good if len(known) == 1 else good[codes[good] == code]
+            try:
+                poses[:, some] = timed.many(frame, times[some])
+            except FrametoolError as error:
+                for row in some.tolist():
+                    self._blame(row, plan.frame_column, error)
+                continue
+            for row in some[np.isnan(poses[6, some])].tolist():  # asked singly, it says why
+                try:
+                    timed.one(frame, int(times[row]))
+                    self._blame(row, timed.column, "no data")
+                except FrametoolError as error:
+                    self._blame(row, timed.column, error)
+        return tuple(poses)  # type: ignore[return-value]
+
+    def _compute(self) -> list[Components]:
         """Apply the operation to each point or pose of the rows."""
-        shapes, operation = self.plan.shapes, self.operation
-        if operation.of == PAIR or not shapes:
-            poses = [thing_pose(shape, own[: shape.own_size], turn) for shape, own, turn in self._things()]
+        operation = self.operation
+        if operation.of == PAIR or not self.things:
+            poses = [
+                thing_pose(shape, own[: shape.own_size], partial(self._rotation, shape, first))
+                for shape, first, own in self.things
+            ]
             return [operation.pose(poses or [NOWHERE], self._mover(0), arrays)]
         needs_time = operation.formula is not None and operation.formula.needs_time
         found, mover = [], None
-        for at, (shape, numbers, rotation) in enumerate(self._things()):
+        for at, (shape, first, numbers) in enumerate(self.things):
             if at < len(self.block.frames):  # the rows of a table have one stamp and one frame for all their points
                 mover = self._mover(at)
             parts = operation.result(
-                shape, numbers, mover, arrays, rotation=rotation,
-                compared=lambda pose: self._with_before(pose, state) if operation.looks_back else [pose],
-                seconds=lambda: self._seconds(state), times_ns=self._times(at) if needs_time else None,
+                shape, numbers, mover, arrays, rotation=partial(self._rotation, shape, first),
+                compared=self._with_before, seconds=self._seconds,
+                times_ns=self.block.stamps[at] if needs_time else None,
             )  # fmt: skip
             if operation.formula is not None:  # what an expression makes of no row is that of each
                 parts = tuple(np.full(self.count, part) if type(part) is float else part for part in parts)
             found.append(parts)
         return found
 
-    def _things(self) -> Iterator[tuple[Shape, Components, Callable[[Components], Components]]]:
-        """Yield each shape of the rows with its columns, and what reads and checks its rotation."""
-        first = 0
-        for shape in self.plan.shapes:
-            yield shape, tuple(self.columns[first : first + shape.size]), partial(self._rotation, shape, first)
-            first += shape.size
-
-    def _times(self, at: int = 0) -> Ints:
-        """Return the stamps of the rows."""
-        times: Ints = self.block.stamps[at]
-        return times
-
-    def _outside(self) -> set[int]:
-        """Return the rows without numbers, and those before the first or after the last time that is wanted."""
-        gone = set[int]() if self.block.gone is None else {*self.block.gone.tolist()}
-        if self.request.window is None:
-            return gone
-        first, last = self.request.window
-        times = self._times()
-        return gone | ({*np.flatnonzero((times < first) | (times > last)).tolist()} - {*self.reasons})
-
     def _good(self) -> Ints:
         """Return the rows that have a result as far as is known."""
         return np.array([row for row in range(self.count) if row not in self.reasons and row not in self.outside], int)
 
-    def _with_before(self, pose: Rigid, state: State) -> list[Any]:
+    def _with_before(self, pose: Rigid) -> list[Any]:
         """Return the good row before each row, or the first of all, and the row; the very first row's is itself."""
-        good = self._good()
+        if not self.operation.looks_back:
+            return [pose]
+        good, state = self._good(), self.state
         if not len(good):
             return [pose, pose]
         full = np.stack([np.broadcast_to(np.asarray(part, np.float64), self.count) for part in pose])
@@ -290,13 +315,12 @@ class Run:
             state.previous = full[:, good[-1]]
         return [tuple(earlier), tuple(full)]
 
-    def _seconds(self, state: State) -> Floats:
+    def _seconds(self) -> Floats:
         """Return the time since the good row before each; the very first row has no velocity and no result."""
-        seconds = np.ones(self.count)
-        good = self._good()
+        seconds, good, known = np.ones(self.count), self._good(), self.state.stamp_ns
         if not len(good):
             return seconds
-        at, known = self._times()[good], state.stamp_ns
+        at = self.block.stamps[0][good]
         before = np.concatenate([[at[0] - BILLION if known is None else known], at[:-1]])
         steps = at - before
         for index in np.flatnonzero(steps <= 0).tolist():
@@ -304,17 +328,18 @@ class Run:
             self._blame(int(good[index]), self.request.rows.extra_column or "", reason)
         seconds[good] = np.where(steps > 0, steps, BILLION) / BILLION
         self.lone = {int(good[0])} if known is None else set()
-        state.stamp_ns = int(at[-1])
+        self.state.stamp_ns = int(at[-1])
         return seconds
 
     def _rotation(self, shape: Shape, first: int, numbers: Components) -> Components:
         """Return the checked quaternions of a shape whose numbers begin at the column `first`."""
         if shape.notation is None:
             return IDENTITY
-        values = list(shape.rotation(numbers))
-        names = self.plan.names[first : first + shape.size]
-        if shape.joined:
-            self._check_tail(numbers, names, shape.joined.tail)
+        values, names = list(shape.rotation(numbers)), self.plan.names[first : first + shape.size]
+        tail = shape.joined.tail if shape.joined else ()  # the last row of a 4x4 matrix is 0 0 0 1
+        last = numbers[len(numbers) - len(tail) :]
+        for row in {row for at, each in enumerate(tail) for row in np.flatnonzero(last[at] != each).tolist()}:
+            self._blame(row, names[-len(tail)], wrong_tail(tail, [number[row] for number in last]))
         read = partial(read_rotations, shape.notation, degrees=shape.degrees, normalize=self.request.rows.normalize)
         found = read(values)
         rule = shape.notation.representation.batch
@@ -330,7 +355,13 @@ class Run:
                 self._note(row, first + shape.rotation_at[0], about, sentence)
         self.mended += found.mended.tolist()
         self.off = max(self.off, found.off)
-        self._doubt(shape, values, first)
+        angles = shape.bare_angles
+        beyond = np.flatnonzero(np.max([abs(values[at]) for at in angles], axis=0) > TURN) if angles else np.empty(0)
+        if beyond.size and not self.doubted:
+            self.doubted, row = True, int(beyond[0])
+            at = max(angles, key=lambda at: abs(values[at][row]))
+            remedy = self.plan.remedies[self.plan.shapes.index(shape)] if self.plan.remedies else COLUMNS_REMEDY
+            self._note(row, first + shape.number_at(at), DEGREES, doubt(shape, values[at][row], remedy))
         return found.quaternions
 
     def _take_as_meant(self, rule: BatchRule, values: list[Floats], places: Sequence[int], rough: set[int]) -> None:
@@ -347,24 +378,6 @@ class Run:
         for at, numbers in enumerate(rule.repair(*own, arrays)):
             values[at] = values[at].copy()
             values[at][rows] = np.where(meant, numbers, own[at])
-
-    def _doubt(self, shape: Shape, values: Sequence[Floats], first: int) -> None:
-        """Wonder about the first row with a bare angle beyond a full turn."""
-        angles = shape.bare_angles
-        beyond = np.flatnonzero(np.max([abs(values[at]) for at in angles], axis=0) > TURN) if angles else np.empty(0)
-        if beyond.size and not self.doubted:
-            row = int(beyond[0])
-            self.doubted.add(row)
-            at = max(angles, key=lambda at: abs(values[at][row]))
-            remedy = self.plan.remedies[self.plan.shapes.index(shape)] if self.plan.remedies else COLUMNS_REMEDY
-            self._note(row, first + shape.number_at(at), DEGREES, doubt(shape, values[at][row], remedy))
-
-    def _check_tail(self, numbers: Components, names: Sequence[str], tail: Sequence[float]) -> None:
-        """Refuse rows whose last numbers are not what they always are: 0 0 0 1 of a 4x4 matrix."""
-        first = len(numbers) - len(tail)
-        wrong = {row for at, each in enumerate(tail) for row in np.flatnonzero(numbers[first + at] != each).tolist()}
-        for row in wrong:
-            self._blame(row, names[first], wrong_tail(tail, [number[row] for number in numbers[first:]]))
 
     def _results(self) -> tuple[Floats, Ints]:
         """Return the results as rows of numbers, and where angles are not unique; what is not finite is bad."""
@@ -390,20 +403,19 @@ class Run:
 
     def _why_not_finite(self, row: int) -> tuple[str, str | FrametoolError]:
         """Return the column and the reason why a row has no finite result."""
-        operation, first, column = self.operation, 0, ""
+        operation, column = self.operation, ""
         try:
-            for at, (shape, columns, _) in enumerate(self._things()):
+            for at, (shape, first, columns) in enumerate(self.things):
                 own = tuple(float(each[row]) for each in columns)
                 if operation.formula:  # for one row alone, it says so itself
                     operation.result(
                         shape, own, None, floats, compared=lambda pose: [pose], seconds=float,
-                        times_ns=int(self._times(at)[row]) if operation.formula.needs_time else None,
+                        times_ns=int(self.block.stamps[at][row]) if operation.formula.needs_time else None,
                         rotation=partial(_checked, shape),
                     )  # fmt: skip
                 elif shape.place is not None:
                     column = self.plan.names[first]
                     shape.place.check(own[: shape.place.size])
-                first += shape.size
             column = ""
             for target, parts in zip(self.plan.targets, self.moved, strict=True):
                 if target.place is not None and not operation.formula:
@@ -427,36 +439,27 @@ class Run:
         rows = np.array(sorted({*self.rows.tolist(), *gone, *nulls}), np.int64)
         return rows, np.where(np.isin(rows, self.rows)[:, None], self.results[rows], np.nan)
 
-    def first_fault(self) -> int | None:
-        """Return the place of the first bad row, if the run stops there."""
-        if self.request.on_error != STOP or not (self.reasons or self.block.broken):
-            return None
-        return int(min([*self.block.places[[*self.reasons]].tolist(), *(place for place, _ in self.block.broken)]))
-
     def groups(self, end: int | None) -> list[tuple[Ints, list[Spans]]]:
         """Return what is written before place `end`: results, rows without one, and what passes."""
-        places, unchanged = self.block.places, list(self.block.unchanged)
+        plan, parts, places, unchanged = self.plan, self.block.parts, self.block.places, [*self.block.unchanged]
         if end is not None:
             self.rows = self.rows[places[self.rows] < end]
             unchanged = [(place, text) for place, text in unchanged if place < end]
-        groups = [] if self.request.gathered or not len(self.rows) else [(places[self.rows], self._written())]
+        groups = []
+        if len(self.rows) and not self.request.gathered:
+            results, locked, values = self.results, self.locked, None
+            if len(self.rows) < self.count:  # else nothing is copied
+                results, locked = results[self.rows], locked[self.rows]
+                parts = [chosen(part, self.rows) for part in parts]
+            if after := separators(plan.pieces):
+                shown = results[:, : len(after)]
+                values = number_spans(shown, self.request.results.precision, after, yaml=plan.yaml, null=plan.null)
+            groups.append((places[self.rows], assemble(plan.pieces, parts, values, locked, results)))
         if self.request.on_error == NULL and self.reasons:
             rows = np.array(sorted(self.reasons), np.int64)
-            pieces = [_without_result(piece, self.plan.null) for piece in self.plan.pieces]
-            groups.append((places[rows], assemble(pieces, self._parts(rows), None, np.zeros_like(rows))))
+            parts = [chosen(part, rows) for part in self.block.parts]
+            groups.append((places[rows], assemble(plan.pieces, parts, None, np.zeros_like(rows), null=plan.null)))
         return [*groups, texts_as_rows(unchanged)] if unchanged else groups
-
-    def _parts(self, rows: Ints) -> Sequence[Spans]:
-        return self.block.parts if len(rows) == self.count else [chosen(part, rows) for part in self.block.parts]
-
-    def _written(self) -> list[Spans]:
-        """Return the text of the results."""
-        plan, values = self.plan, None
-        results = self.results if len(self.rows) == self.count else self.results[self.rows]
-        if after := separators(plan.pieces):
-            shown = results[:, : len(after)]
-            values = number_spans(shown, self.request.results.precision, after, yaml=plan.yaml, null=plan.null)
-        return assemble(plan.pieces, self._parts(self.rows), values, self.locked[self.rows], results)
 
     def parts_of(self, row: int) -> list[tuple[float, ...]]:
         """Return the components of what became of each point or pose of a row."""
@@ -474,22 +477,3 @@ class Run:
 def _checked(shape: Shape, own: Components) -> Components:
     """Return the quaternion of one row's numbers, which was checked before."""
     return checked_rotation(shape, own, normalize=True)[0]
-
-
-def _without_result(piece: Piece, null: bytes) -> Piece:
-    """Return what is in a row without a result: nulls for its numbers, the input for what was put in its place."""
-    if isinstance(piece, Out):
-        return Const(piece.between.join([null] * (piece.last - piece.first)))
-    if isinstance(piece, Word):
-        return Const(null)
-    return In(piece.part) if isinstance(piece, Instead) else piece
-
-
-def _unwrap(results: Floats, rows: Ints, angles: Sequence[tuple[int, float]], state: State) -> None:
-    """Add full turns to the angles of rows, in place, so that no step is larger than half a turn."""
-    for column, period in angles:
-        values = results[rows, column]
-        before = np.concatenate([[state.angles.get(column, values[0])], values[:-1]])
-        turns = state.turns.get(column, 0.0) - np.cumsum(np.rint((values - before) / period))
-        results[rows, column] = values + period * turns
-        state.angles[column], state.turns[column] = float(values[-1]), float(turns[-1])

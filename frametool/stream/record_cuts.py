@@ -11,10 +11,9 @@ from frametool.stream.evaluate import Plan
 from frametool.stream.faults import NULL, SKIP, Fault
 from frametool.stream.layout import In, Renamed
 from frametool.stream.record import KEYS_REMEDY
-from frametool.stream.rows import Block
+from frametool.stream.rows import Block, read_extra
 from frametool.stream.splice import column_in, quoted_name
 from frametool.stream.splitter import DOCUMENTS, LINES, Part, Splitter
-from frametool.stream.stamp_columns import read_extra
 from frametool.stream.template import Template
 from frametool.text.cells import without_quotes
 from frametool.text.spans import MARGIN, Bytes, Ints, Spans, framed

@@ -23,7 +23,7 @@ from frametool.stream.record_text import Answer
 from frametool.stream.record_values import SPELLED, stamp_key, unit_of, values_of_unit
 from frametool.stream.row_layout import POINT, POSE, ROTATION, VECTOR, Target
 from frametool.stream.row_poses import RowPoses
-from frametool.stream.stamp_columns import read_stamps
+from frametool.stream.rows import read_stamps
 from frametool.stream.text_rows import LEAF, MORE_NUMBERS, NAME, NUMBERS, PARENT, STAMP_NS, AlikeRows, Marked, leaf_mark
 from frametool.text.spans import MARGIN, Bytes, Spans
 

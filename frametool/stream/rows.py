@@ -1,6 +1,7 @@
-"""A block of rows: numbers in, the operation, numbers out, and the text put together again around them.
+"""A block of rows: what a format found in it, names and stamps read in bulk, and the text of the results around them.
 
-Knows no syntax: what a format found is spans of text, what it wants written is a list of pieces.
+Knows no syntax: what a format found is spans of text, what it wants written is a list of pieces.  Stamps are decimal
+seconds or nanoseconds, read as integer nanoseconds, never through a float.
 """
 
 from __future__ import annotations
@@ -12,10 +13,25 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from frametool.errors import FrametoolError, ValueInvalid
+from frametool.frames.stamps import BILLION, nanoseconds_each, tell_size
+from frametool.grammar.readers import in_nanoseconds
 from frametool.stream.layout import Const, IfLocked, In, Instead, Out, Piece, Word
+from frametool.stream.row_poses import NO_STAMP, texts_of
+from frametool.stream.stamp_source import read_header_stamp, read_stamp
 from frametool.text.cells import without_quotes
-from frametool.text.spans import MARGIN, Floats, Ints, Spans, framed, join
-from frametool.text.write import fixed_spans, replaced, shortest_spans
+from frametool.text.numbers import parse_number
+from frametool.text.parse import LOWEST, parse_floats, trimmed
+from frametool.text.spans import MARGIN, Bytes, Flags, Floats, Ints, Spans, Words, framed, join, windows
+from frametool.text.write import (
+    TENS,
+    ZEROS,
+    first_point,
+    fixed_spans,
+    not_digits,
+    read_eight_digits,
+    replaced,
+    shortest_spans,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -23,6 +39,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from frametool.stream.faults import Fault
+    from frametool.stream.request import Request
 
 
 class BlockNames(NamedTuple):
@@ -106,8 +123,10 @@ def read_each(values: NDArray[Any], places: Iterable[int], read: Callable[[int],
 def coded(cells: Spans) -> Coded:
     """Read cells (n,), not none, as texts; where all are the same, as frames often are, that is one text."""
     column, rows = without_quotes(cells), len(cells.starts)
-    if _is_constant(column):
-        return Coded([_text(column.text(0))], np.zeros(rows, np.int64))
+    first = column.text(0)
+    is_alike = len(first) <= MARGIN and not (column.ends - column.starts != len(first)).any()
+    if is_alike and all((column.data[column.starts + at] == byte).all() for at, byte in enumerate(first)):
+        return Coded([_text(first)], np.zeros(rows, np.int64))
     data = column.data.tobytes()
     spans = zip(column.starts.tolist(), column.ends.tolist(), strict=True)
     return coded_texts([data[start:end] for start, end in spans], _text)
@@ -129,15 +148,6 @@ def _text(cell: bytes) -> str:
     return cell.decode("utf-8", "replace").strip().replace('""', '"')
 
 
-def _is_constant(column: Spans) -> bool:
-    """Return True if all cells hold the same bytes."""
-    length = int(column.ends[0] - column.starts[0])
-    if length > MARGIN or (column.ends - column.starts != length).any():
-        return False
-    first = column.data[column.starts[0] : column.ends[0]]
-    return all(bool((column.data[column.starts + offset] == byte).all()) for offset, byte in enumerate(first))
-
-
 def number_spans(
     values: Floats, precision: int | None, separators: bytes, *, yaml: bool = False, null: bytes = b"nan"
 ) -> Spans:
@@ -151,13 +161,10 @@ def number_spans(
     if precision is not None:
         return fixed_spans(values, precision, separators)
     spans = shortest_spans(values, separators)
-    return _with_points(spans, values, separators) if yaml else spans
-
-
-def _with_points(spans: Spans, values: Floats, separators: bytes) -> Spans:
-    """Write 1e-05 as 1.0e-05."""
+    if not yaml:
+        return spans
     size, shape = abs(values), values.shape
-    far = np.flatnonzero(((size < 1e-4) & (size > 0.0)) | (size >= 1e16))
+    far = np.flatnonzero(((size < 1e-4) & (size > 0.0)) | (size >= 1e16))  # 1e-05 is written as 1.0e-05
     texts = [text if "." in text else text.replace("e", ".0e") for text in map(repr, values.ravel()[far].tolist())]
     ended = [text + chr(separators[place % len(separators)]) for text, place in zip(texts, far.tolist(), strict=True)]
     data, starts, ends = replaced(Spans(spans.data, spans.starts.ravel(), spans.ends.ravel()), far, ended)
@@ -175,44 +182,42 @@ def separators(pieces: Iterable[Piece]) -> bytes:
 
 
 def assemble(
-    pieces: Sequence[Piece], parts: Sequence[Spans], values: Spans | None, locked: Ints, results: Floats | None = None
-) -> list[Spans]:
+    pieces: Sequence[Piece], parts: Sequence[Spans], values: Spans | None, locked: Ints, results: Floats | None = None,
+    null: bytes = b"",
+) -> list[Spans]:  # fmt: skip
     """Return the spans, in order, that make up the rows.
 
     values: the texts of the results; locked: (n,) 1 where angles are not unique
+    results: those numbers; without values and results each of them is null, and names stay as they are read
     """
     found = []
+    size, has_none = len(locked), values is None and results is None
     for piece in pieces:
         if isinstance(piece, (In, Instead)):
-            found.append(parts[piece.part if isinstance(piece, In) else piece.new])
+            found.append(parts[piece.part if isinstance(piece, In) or has_none else piece.new])
         elif isinstance(piece, Out) and values is not None:
-            found += _numbers(values, piece)
+            own = slice(piece.first, piece.last)
+            starts, ends = values.starts[:, own], values.ends[:, own].copy()
+            if len(piece.between) == 1:
+                ends[:, -1] -= 1
+                found.append(Spans(values.data, starts, ends))
+                continue
+            each = [Spans(values.data, start, end) for start, end in zip(starts.T, ends.T - 1, strict=True)]
+            found.append(each[0])
+            for number in each[1:]:
+                found += [constant(piece.between, size), number]
         elif isinstance(piece, Word) and results is not None:
-            found.append(worded(results[:, piece.number], piece))
+            codes, of_row = np.unique(results[:, piece.number], return_inverse=True)
+            found.append(chosen(spans_of([*map(piece.text, codes.tolist())]), of_row))
+        elif isinstance(piece, Out):
+            found.append(constant(piece.between.join([null] * (piece.last - piece.first)), size))
+        elif isinstance(piece, Word):
+            found.append(constant(null, size))
         else:
-            text = constant(piece.text if isinstance(piece, (Const, IfLocked)) else b"", len(locked))
+            text = constant(piece.text if isinstance(piece, (Const, IfLocked)) else b"", size)
             shown = text.starts + locked * (text.ends - text.starts) if isinstance(piece, IfLocked) else text.ends
             found.append(text._replace(ends=shown))
     return found
-
-
-def _numbers(values: Spans, piece: Out) -> list[Spans]:
-    """Return the spans of neighbouring numbers, with what is between them."""
-    own = slice(piece.first, piece.last)
-    starts, ends = values.starts[:, own], values.ends[:, own].copy()
-    if len(piece.between) == 1:
-        ends[:, -1] -= 1
-        return [Spans(values.data, starts, ends)]
-    between = constant(piece.between, len(ends))
-    each = [Spans(values.data, start, end) for start, end in zip(starts.T, ends.T - 1, strict=True)]
-    return [each[0], *(part for number in each[1:] for part in (between, number))]
-
-
-def worded(numbers: Floats, piece: Word) -> Spans:
-    """Return the words that numbers (n,) stand for."""
-    counts = type(piece) is Word
-    found, of_row = (np.arange(len(piece.words)), numbers) if counts else np.unique(numbers, return_inverse=True)
-    return chosen(spans_of([*map(piece.text, found.tolist())]), of_row.astype(np.int64))
 
 
 def constant(text: bytes, size: int) -> Spans:
@@ -244,7 +249,14 @@ def written(groups: Sequence[tuple[Ints, list[Spans]]]) -> bytes:
     if len(groups) < 2:
         return join(groups[0][1]) if groups else b""
     places = np.concatenate([each for each, _ in groups])
-    rows = [_finished(spans) for _, spans in groups]
+    rows = []
+    for _, spans in groups:
+        if len(spans) == 1 and spans[0].starts.ndim == 1:
+            rows.append(spans[0])
+            continue
+        lengths = sum((part.ends - part.starts).reshape(len(part.starts), -1).sum(axis=1) for part in spans)
+        ends = np.cumsum(lengths) + MARGIN
+        rows.append(Spans(framed(join(spans)), ends - lengths, ends))
     offsets = np.cumsum([0, *(len(each.data) for each in rows)])[:-1].tolist()
     order = np.argsort(places, kind="stable")
     starts = np.concatenate([each.starts + offset for each, offset in zip(rows, offsets, strict=True)])
@@ -252,10 +264,89 @@ def written(groups: Sequence[tuple[Ints, list[Spans]]]) -> bytes:
     return join([Spans(np.concatenate([each.data for each in rows]), starts[order], ends[order])])
 
 
-def _finished(spans: list[Spans]) -> Spans:
-    """Join the spans of each row, and give the rows as spans of the joined text."""
-    if len(spans) == 1 and spans[0].starts.ndim == 1:
-        return spans[0]
-    lengths = sum((part.ends - part.starts).reshape(len(part.starts), -1).sum(axis=1) for part in spans)
-    ends = np.cumsum(lengths) + MARGIN
-    return Spans(framed(join(spans)), ends - lengths, ends)
+# --- stamps and weights ---
+
+_WORDS = 3
+_LONGEST = 8 * _WORDS
+_MOST = (1 << 63) - 1
+_MOST_SECONDS = _MOST // BILLION
+_MOST_UPPER = (1 << 63) // 10**16
+_NINE = 9  # decimals of a second in nanoseconds
+
+
+def read_extra(cells: Sequence[Spans], request: Request, name: str) -> tuple[Any, dict[int, tuple[str, str]]]:
+    """Read the stamps of rows, or the weights or labels of those that are gathered; give also which rows have none.
+
+    cells: as for `read_stamps`, or () for none; name: that of their column or key
+    """
+    if not cells:
+        return None, {}
+    values: Any
+    if not request.weighs:
+        values, reasons = read_stamps(cells, in_ns=in_nanoseconds(name) if len(cells) == 1 else 0)
+        values[[*reasons]] = NO_STAMP
+    elif request.gathered is not None and request.gathered.labelled:
+        return np.array(texts_of(cells[0]), object), {}
+    else:
+        values, bad = parse_floats(cells[0])
+        texts = {row: cells[0].text(row).decode("utf-8", "replace").strip(" \t\"'") for row in bad.tolist()}
+        reasons = read_each(values, texts, lambda row: parse_number(texts[row]))
+    return values, {row: (name, reason) for row, reason in reasons.items()}
+
+
+def read_stamps(cells: Sequence[Spans], *, in_ns: int) -> tuple[Ints, dict[int, str]]:
+    """Read one column (n,) as nanoseconds, or two of whole seconds and nanoseconds.
+
+    in_ns: how many nanoseconds a whole number of one column is; 0 are decimal seconds, and what ends in `ns` is some
+    Gives the stamps, and why a row has none; what is not plainly written is read one by one.
+    """
+    parsed = [_parse_plain(each.data, *trimmed(*each), in_ns=in_ns if len(cells) == 1 else 1) for each in cells]
+    stamps, sure = parsed[0]
+    if len(cells) == 2:
+        stamps, sure = stamps * BILLION + parsed[1][0], sure & parsed[1][1] & (stamps < _MOST_SECONDS)
+
+
+    def read(row: int) -> int:
+        texts = [each.text(row).decode("utf-8", "replace") for each in cells]
+        return read_header_stamp(*texts) if len(texts) == 2 else read_stamp(texts[0], in_ns=in_ns)
+
+    return stamps, read_each(stamps, np.flatnonzero(~sure).tolist(), read)
+
+
+def _parse_plain(data: Bytes, starts: Ints, ends: Ints, *, in_ns: int) -> tuple[Ints, Flags]:
+    """Read digits with at most a point among them; give the nanoseconds and which of them are sure."""
+    suffixed = (data.take(ends - 1) == ord("s")) & (data.take(ends - 2) == ord("n")) & (ends - starts > 2)
+    ends = ends - 2 * suffixed
+    characters = windows(data, _LONGEST)[starts].view("<u8").reshape(-1, _WORDS)
+    before = first_point(characters[:, _WORDS - 1])
+    for word in reversed(range(_WORDS - 1)):
+        here = first_point(characters[:, word])
+        before = np.where(here < 8, here, before + 8)
+    points = starts + np.minimum(before, ends - starts)  # all characters are before the point that is not there
+    whole, sure = _integer(data, points, points - starts)
+    decimals = np.maximum(ends - points - 1, 0)
+    digits, fine = _integer(data, ends, decimals)
+    finer = TENS.take(decimals - _NINE, mode="clip")  # what is finer than a nanosecond must be 0
+    below = digits // finer * TENS.take(_NINE - decimals, mode="clip")
+    sure &= fine & (digits % finer == 0) & (ends - starts <= _LONGEST) & (ends - starts > (points < ends))
+    is_whole = points == ends
+    each = np.where(suffixed, 1, in_ns or np.where(is_whole, nanoseconds_each(whole), BILLION))
+    sure &= (is_whole | ~(suffixed | bool(in_ns))) & (whole < _MOST // each)
+    by_size = np.flatnonzero(sure & (each != BILLION) & ~suffixed) if not in_ns else ()
+    for row in by_size[:1]:
+        tell_size(int(whole[row]), int(each[row]))
+    return whole * each + below, sure
+
+
+def _integer(data: Bytes, ends: Ints, length: Ints) -> tuple[Ints, Flags]:
+    """Read so many digits before `ends`, not above 63 bits."""
+    characters = windows(data, _LONGEST)[ends - _LONGEST].view("<u8").reshape(-1, _WORDS)
+    words, wrong = [], np.zeros(len(ends), np.uint64)
+    for word in range(_WORDS):
+        digits = characters[:, word] ^ ZEROS
+        digits &= ~LOWEST.take(8 * (_WORDS - word) - length, mode="clip")
+        wrong |= not_digits(digits)
+        words.append(read_eight_digits(digits))
+    upper, middle, lower = words
+    total: Words = (upper * np.uint64(10**8) + middle) * np.uint64(10**8) + lower
+    return total.view(np.int64), (wrong == 0) & (upper < _MOST_UPPER)

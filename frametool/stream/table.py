@@ -21,8 +21,7 @@ from frametool.grammar.readers import EARTH_FRAMES, in_nanoseconds, stamp_column
 from frametool.stream.faults import Fault
 from frametool.stream.header import Columns, PoseColumns, has_pose_column
 from frametool.stream.layout import ADDED, NAMED, Layout, quoted
-from frametool.stream.rows import Block, BlockNames, Coded, coded, spans_of
-from frametool.stream.stamp_columns import read_extra, read_stamps
+from frametool.stream.rows import Block, BlockNames, Coded, coded, read_extra, read_stamps, spans_of
 from frametool.stream.stamp_source import replaced, stamp_text
 from frametool.text.cells import Cells, split_blank, split_delimited, torn_record, without_quotes
 from frametool.text.spans import MARGIN, Ints, Spans

@@ -13,7 +13,7 @@ from frametool.errors import FormatError, FrametoolError, Misused, listing
 from frametool.formats.table import FORMATS
 from frametool.grammar.readers import NORMALS, stamp_places
 from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import Fault, Outcome, RowNote
+from frametool.stream.faults import STOP, Fault, Outcome, RowNote
 from frametool.stream.header import listed
 from frametool.stream.layout import New
 from frametool.stream.request import VELOCITIES
@@ -52,7 +52,10 @@ def run_table(
     yield Outcome(rows.table.opening(rows.layout), lines=rows.lines, size=rows.taken)
     for text in rows.texts:
         run, outcome, _ = rows.of_text(text)
-        yield outcome._replace(text=written(run.groups(run.first_fault())))
+        end, broken = None, [place for place, _ in run.block.broken]
+        if request.on_error == STOP and (run.reasons or broken):  # what is before the first bad row is written
+            end = min([*run.block.places[[*run.reasons]].tolist(), *broken])
+        yield outcome._replace(text=written(run.groups(end)))
 
 
 def _first_rows(blocks: Iterator[bytes]) -> bytes | None:

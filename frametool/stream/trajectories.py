@@ -26,13 +26,13 @@ from frametool.grammar.pose_algebra import sample_stamps
 from frametool.grammar.readers import in_nanoseconds, stamp_column, stamp_places
 from frametool.grammar.result import Result, Style
 from frametool.ros.messages import body_of
-from frametool.stream import stamp_columns
 from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows, Outcome, run
 from frametool.stream.header import listed
 from frametool.stream.record_stream import run_records
 from frametool.stream.request import Operation, Request, RowOptions
 from frametool.stream.row_poses import RowPoses, block_of, objects, plain_cells
+from frametool.stream.rows import read_stamps as read_columns
 from frametool.stream.table import open_table
 from frametool.text.cells import without_quotes
 
@@ -159,7 +159,7 @@ def read_stamps(path: str, report: Report) -> list[int]:
     lines = cells.rows + text.count(b"\n", 0, len(text) - len(rest)) + 1
     in_ns = 1 if fmt == "euroc" else in_nanoseconds(named[at])
     parts = tuple(without_quotes(cells.column(place)) for place in (at, below) if place is not None)
-    stamps, reasons = stamp_columns.read_stamps(parts, in_ns=in_ns)
+    stamps, reasons = read_columns(parts, in_ns=in_ns)
     found = []
     for row, stamp in enumerate(stamps.tolist()):
         reason = reasons.get(row, "")
