@@ -296,7 +296,7 @@ class Stream:
             from frametool.stream.record_stream import run_records
 
             return run_records(stream, fmt, request, source=self.name), fmt, None
-        from frametool.stream.table_stream import run_table
+        from frametool.stream.table import run_table
 
         return run_table(stream, fmt, request, source=self.name, header=self.inputs.header), fmt, None
 

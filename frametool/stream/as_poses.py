@@ -44,8 +44,7 @@ from frametool.stream.request import Request, RowOptions
 from frametool.stream.row_layout import POINT, POSE, Shape, Target
 from frametool.stream.row_poses import RowPoses, kept
 from frametool.stream.rows import Block, spans_of
-from frametool.stream.table import rename_of
-from frametool.stream.table_stream import PlannedRows, TableRows
+from frametool.stream.table import PlannedRows, TableRows
 from frametool.stream.writers import LEARNED, RowsWriter, SingleWriter, TextWriter
 
 if TYPE_CHECKING:
@@ -252,7 +251,7 @@ class FormatConverter:
         file, options = self._opened(stream)
         fmt: Rows = module.form_of(file, options)
         self.placed, self.shape, plan, state = True, Shape(POSE, 1.0, QUATERNION), _plan_listed(request), State()
-        rename = rename_of(request) or (lambda parent, name: (parent, name))
+        rename = request.renaming or (lambda parent, name: (parent, name))
         for each in module.blocks(file, options._replace(report=report), named=False):
             lines = [row.line - 1 for row in each.rows]
             stamps = [each.stamps_ns + request.offset_ns]
@@ -299,47 +298,35 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
         raise FormatError(what, source=file.name)
     request = Request(rows=RowOptions(normalize=options.normalize))
     converter = FormatConverter(file.format, request, file.name, answers=options.answers)
-    line = count = 0
+    named, line, count = dict[int, str](), 0, 0
     for block, outcome in converter.steps(cast("ByteStream", file.stream)):
         if not line:
+            rows, line = converter.rows, 1
             if converter.shape.kind != POSE:  # positions on the Earth
-                raise FormatError(NO_ROTATION.format(converter.rows.columns), source=file.name, line=1)
-            _check(converter.rows, fmt, file, options)
+                raise FormatError(NO_ROTATION.format(rows.columns), source=file.name, line=1)
+            named = {role: rows.table.name(at) for role, at in enumerate(rows.naming.places) if at is not None}
+            lacking = ", ".join(name for role, name in enumerate(("parent", "name")) if role not in named)
+            if lacking and rows.layout.time is None and not (fmt.counted or options.answers.stamps):
+                wanted = "frames that stand still have parent and name, one that moves stamp or stamp_ns"
+                missing = f"no column {lacking} nor stamp among {rows.columns}; {wanted}, or --stamps FILE"
+                raise FormatError(missing, source=file.name, line=1)
             fmt = fmt if converter.shape.place is None else fmt._replace(frames=(EARTH_FRAMES[0], *fmt.frames[1:]))
-            line = 1
-        for fault in outcome.faults:
-            options.report(BadRow(fault._replace(line=line + fault.line), fault.reason, source=file.name))
-        for row, column in _nameless(block, converter.rows).items():
-            fault = Fault(line + int(block.lines[row]), column, "no name of a frame")
+        nameless = {
+            row: Fault(line + int(block.lines[row]), column, "no name of a frame")
+            for role, column in named.items()
+            for row, name in enumerate(block.for_each((block.parents, block.names)[role]))
+            if not name
+        }
+        for fault in [*(each._replace(line=line + each.line) for each in outcome.faults), *nameless.values()]:
             options.report(BadRow(fault, fault.reason, source=file.name))
         yield from _pieces(block, line, fmt, options)
         line, count = line + outcome.lines, count + len(block.numbers)
-    rows = converter.rows
-    if len(rows.roles) < 2:
+    if len(named) < 2:
         describe(options, fmt, count)
     if fmt.rotation == "matrix":
-        options.tally.projected = rows.off
+        options.tally.projected = converter.rows.off
     else:
-        options.tally.rough += [1] * rows.mended
-
-
-def _check(rows: PlannedRows, fmt: Rows, file: InputFile, options: Options) -> None:
-    """Refuse poses without time and names."""
-    if rows.layout.time is None and not fmt.counted and not options.answers.stamps and len(rows.roles) < 2:
-        lacking = ", ".join(name for role, name in enumerate(("parent", "name")) if role not in rows.roles)
-        wanted = "frames that stand still have parent and name, one that moves stamp or stamp_ns, or --stamps FILE"
-        raise FormatError(f"no column {lacking} nor stamp among {rows.columns}; {wanted}", source=file.name, line=1)
-
-
-def _nameless(block: RowPoses, rows: PlannedRows) -> dict[int, str]:
-    """Return the rows in which the cell of the parent (0) or of the name (1) is empty, and the name of its column."""
-    found: dict[int, str] = {}
-    for role in rows.roles:
-        names = block.for_each((block.parents, block.names)[role])
-        if not all(names):
-            column = rows.table.name(rows.naming.places[role] or 0)
-            found |= {row: column for row, name in enumerate(names) if not name}
-    return found
+        options.tally.rough += [1] * converter.rows.mended
 
 
 def _pieces(block: RowPoses, line: int, fmt: Rows, options: Options) -> Iterator[Edge | Samples]:

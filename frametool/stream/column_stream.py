@@ -24,8 +24,7 @@ from frametool.stream.layout import Fixed, Kept, Named, New, quoted
 from frametool.stream.request import VELOCITIES, Operation, Request
 from frametool.stream.row_poses import RowPoses, objects, taken
 from frametool.stream.rows import Block, coded_texts
-from frametool.stream.table import Table
-from frametool.stream.table_stream import PlannedRows
+from frametool.stream.table import PlannedRows, Table
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Sequence
@@ -130,7 +129,7 @@ class ColumnRows(PlannedRows):
             with np.errstate(over="ignore"):  # bad rows, no infinities
                 run.refuse(~np.isfinite(run.results[:, number].astype(kind)), f"the result is too large for {kind}")
         self.faults = run.faults()
-        self.notes = self.notes_of(run)
+        self.notes = run.notes
         first, targets = 0, self.plan.targets
         for flags, target in zip(absent, targets, strict=False):
             last = first + target.size if len(targets) > 1 else None

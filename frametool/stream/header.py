@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from copy import copy
-from functools import lru_cache, partial
+from functools import lru_cache
 from itertools import product
 from os.path import commonprefix
 from typing import TYPE_CHECKING, NamedTuple
@@ -111,21 +111,19 @@ class Header:
         self.found: dict[str, dict[tuple[str, str], dict[str, Spot]]] = {}
         self.affixes: dict[tuple[str, str], tuple[str, str]] = {}
         for place, name in enumerate(names):
-            self._take_apart(place, name.lstrip("# ") if place == 0 else name)
-
-    def _take_apart(self, place: int, name: str) -> None:
-        bracket = re.search(BRACKETS, name)
-        bare = name[: bracket.start()] if bracket else name
-        folded = bare.lower() if bare.isascii() else bare
-        for token in TOKEN.finditer(folded):
-            for word in BY_TOKEN.get(token[0], ()):
-                end = token.start() + len(word)
-                if not folded.startswith(word, token.start()) or folded[end : end + 1].isalnum():
+            own = name.lstrip("# ") if place == 0 else name
+            bracket = re.search(BRACKETS, own)
+            bare = own[: bracket.start()] if bracket else own
+            folded = bare.lower() if bare.isascii() else bare
+            tokens = [(token.start(), word) for token in TOKEN.finditer(folded) for word in BY_TOKEN.get(token[0], ())]
+            for start, word in tokens:
+                end = start + len(word)
+                if not folded.startswith(word, start) or folded[end : end + 1].isalnum():
                     continue
                 said = UNITS.match(folded, end)
                 behind = said.end() if said else end
-                key = folded[: token.start()], folded[behind:]
-                self.affixes.setdefault(key, (bare[: token.start()], bare[behind:]))
+                key = folded[:start], folded[behind:]
+                self.affixes.setdefault(key, (bare[:start], bare[behind:]))
                 unit = _unit(bracket, said) or "rad" * word.startswith("rvec_")
                 by_key = self.found.setdefault(COLUMN_WORDS.get(word, word), {})
                 by_key.setdefault(key, {}).setdefault(unit, (place, unit))
@@ -221,7 +219,16 @@ def find_rotations(header: Header, expected: Notation | None) -> list[Columns]:
         for place in each.places:
             best[place] = min(best.get(place, each.spread), each.spread)
     nearest = [each for each in found.values() if each.spread <= min(map(best.__getitem__, each.places))]
-    return nearest or [each for row in rows for each in _standing_alone(row, header, expected)]
+    if nearest:
+        return nearest
+    alone = []  # columns that say a rotation by themselves, where none of the others is there: `yaw`, `theta`
+    for row in rows:
+        others = {(each.prefix, each.suffix) for each in header.match(row.columns, partly=True) if any(each.spots[:-1])}
+        for match in [each for word in row.alone for each in header.match((word,), (0,))]:
+            if header.is_plain(match) and (match.prefix, match.suffix) not in others:
+                spots = (*[None] * (len(row.columns) - 1), *match.spots)
+                alone.append(_rotation(match._replace(spots=spots), row, expected))
+    return alone
 
 
 SEARCHED = {frozenset(row.columns): row for row in reversed(ROTATIONS.values()) if row.searched}
@@ -239,17 +246,6 @@ def _named_maps(header: Header, *, bare: bool = False) -> Iterator[Columns]:
     for match in header.match(words):
         if bare or match.prefix or match.suffix or len(header.names) == len(words):
             yield match
-
-
-def _standing_alone(row: Representation, header: Header, expected: Notation | None) -> Iterator[Columns]:
-    """Find the column that says a rotation by itself, where none of the others is there: `yaw`, `theta`."""
-    absent = (None,) * (len(row.columns) - 1)
-    for word in row.alone:
-        for match in header.match((word,), (0,)):
-            partly = header.match(row.columns, partly=True)
-            others = ((each.prefix, each.suffix) for each in partly if any(each.spots[:-1]))
-            if header.is_plain(match) and (match.prefix, match.suffix) not in others:
-                yield _rotation(match._replace(spots=(*absent, *match.spots)), row, expected)
 
 
 def _rotation(columns: Columns, row: Representation, expected: Notation | None) -> Columns:
@@ -278,15 +274,24 @@ def find_poses(names: Sequence[str], expected: Notation | None, count: int, sour
         if not (positions or rotations or reason):
             reason = f"no columns of a point or pose among: {listed(names)}; name them with --columns"
         if reason:
-            raise _refusal(reason, source)
+            raise FormatError(reason, source=source, line=1)
         return [_joined(header, positions, rotations)]
-    poses = _paired(positions, rotations) if max(len(positions), len(rotations)) <= count else []
-    if len(poses) == count:
-        return poses
+    poses, left = list[PoseColumns](), list(positions)
+    for rotation in rotations:  # each with the position that shares most of its affixes
+        near = max(
+            () if rotation.whole else left, default=None,
+            key=lambda at: (at.suffix == rotation.suffix, len(commonprefix([at.prefix, rotation.prefix]))),  # noqa: RUF071
+        )  # fmt: skip
+        left = [each for each in left if each is not near]
+        poses.append(PoseColumns(near, rotation))
+    poses += [PoseColumns(each, None) for each in left]
+    if len(poses) == count and max(len(positions), len(rotations)) <= count:
+        return sorted(poses, key=lambda pose: pose.places[0])
     wanted = "one pose" if count == 1 else "two poses"
     candidates = "; ".join(each.shown for each in (*positions, *rotations)[:MOST_SHOWN])
     found = candidates or f"none among {listed(names)}"
-    raise _refusal(f"columns of {wanted} are wanted, found {found}; choose with --columns", source)
+    reason = f"columns of {wanted} are wanted, found {found}; choose with --columns"
+    raise FormatError(reason, source=source, line=1)
 
 
 @lru_cache(maxsize=256)  # records of one kind have the same keys
@@ -313,12 +318,21 @@ def _joined(header: Header, positions: Sequence[Columns], rotations: Sequence[Co
     rotation = rotations[0] if rotations else None
     if rotation is None or rotation.whole:
         return PoseColumns(positions[0] if positions and rotation is None else None, rotation)
-    apart = [each for each in positions if not {*rotation.places}.intersection(each.places)]
-    return PoseColumns(apart[0] if apart else _half_position(header, rotation), rotation)
-
-
-def _refusal(reason: str, source: str) -> FormatError:
-    return FormatError(reason, source=source, line=1)
+    for each in positions:
+        if not {*rotation.places}.intersection(each.places):
+            return PoseColumns(each, rotation)
+    affixes = ((rotation.prefix, rotation.suffix), ("", ""))
+    for base in POSITIONS:
+        for match in header.match(base, partly=True):
+            if len(match.places) < len(base) - 1 or (match.prefix, match.suffix) not in affixes:
+                continue
+            at = match.spots.index(None)
+            columns = _position(match)._replace(absent=(at,))
+            if not rotation.absent or base[at] != base[-1]:  # no x, y with a turn about z: wrong if they are used
+                missing = f"half a position: {columns.shown} without {match.prefix}{base[at]}{match.suffix}"
+                columns = columns._replace(wrong=f"{missing}; add what is missing, or choose with --columns")
+            return PoseColumns(columns, rotation)
+    return PoseColumns(None, rotation)
 
 
 def listed(names: Sequence[str]) -> str:
@@ -346,14 +360,9 @@ def _half_rotation(header: Header, expected: Notation | None) -> str:
                 missing = ", ".join(f"{match.prefix}{word}{match.suffix}" for word in absent)
                 half = f"half a rotation: {match.shown} without {missing}"
                 return f"{half}; add what is missing, or choose with --columns"
-    return _other_names(header) if expected is None else ""
-
-
-def _other_names(header: Header) -> str:
-    """Recognise four columns that are a quaternion under names nobody has agreed upon: `ox oy oz ow`, `q0 .. q3`."""
-    folded = {name.lower(): name for name in reversed(header.names)}
+    folded = {name.lower(): name for name in reversed(header.names)} if expected is None else {}
     stems = [name[:-1] for name in folded if name[-1:] == "w" and len(name) > 1] + ["q", "q_"]
-    for stem, letters in product(stems, ("xyzw", "0123", "1234")):
+    for stem, letters in product(stems, ("xyzw", "0123", "1234")):  # names that nobody has agreed upon: ox oy oz ow
         found = [folded[stem + letter] for letter in letters if stem + letter in folded]
         if len(found) == len(letters) and (stem, letters) != ("q", "xyzw"):
             return (
@@ -361,37 +370,6 @@ def _other_names(header: Header) -> str:
                 f"add --columns x,y,z,{','.join(found)} --from xyzw (or wxyz)"
             )
     return ""
-
-
-def _half_position(header: Header, rotation: Columns) -> Columns | None:
-    """Return x, y with a turn about z, a pose in the plane; other parts of a position are wrong if they are used."""
-    affixes = ((rotation.prefix, rotation.suffix), ("", ""))
-    for base in POSITIONS:
-        for match in header.match(base, partly=True):
-            if len(match.places) < len(base) - 1 or (match.prefix, match.suffix) not in affixes:
-                continue
-            at = match.spots.index(None)
-            columns = _position(match)._replace(absent=(at,))
-            if rotation.absent and base[at] == base[-1]:
-                return columns
-            missing = f"half a position: {columns.shown} without {match.prefix}{base[at]}{match.suffix}"
-            return columns._replace(wrong=f"{missing}; add what is missing, or choose with --columns")
-    return None
-
-
-def _paired(positions: Sequence[Columns], rotations: Sequence[Columns]) -> list[PoseColumns]:
-    """Put each rotation with the position that shares most of its affixes."""
-    poses, left = [], list(positions)
-    for rotation in rotations:
-        near = max(left, key=partial(_kinship, rotation), default=None) if not rotation.whole else None
-        left = [each for each in left if each is not near]
-        poses.append(PoseColumns(near, rotation))
-    poses += [PoseColumns(each, None) for each in left]
-    return sorted(poses, key=lambda pose: pose.places[0])
-
-
-def _kinship(rotation: Columns, position: Columns) -> tuple[bool, int]:
-    return position.suffix == rotation.suffix, len(commonprefix([position.prefix, rotation.prefix]))  # noqa: RUF071
 
 
 def find_six(names: Sequence[str], kind: str) -> Columns | None:
@@ -485,9 +463,11 @@ def _chosen_rotation(header: Header, places: Sequence[int], expected: Notation |
     """Return how many of the chosen columns, from the last, are a rotation, and which: by name, as set, by count."""
     size = len(places)
     for count in (size, size - 3, size - 2):
-        found = _by_names(header, places[-count:], expected) if count > 0 else None
-        if found is not None and (count != size - 2 or found.absent):
-            return count, found
+        last = places[-count:] if count > 0 else []
+        named = Header([header.names[place] for place in last])
+        for each in [each for own in dict.fromkeys((expected, None)) for each in find_rotations(named, own)]:
+            if each.places == tuple(range(count)) and (count != size - 2 or each.absent):
+                return count, each._replace(places=tuple(last), prefix="", suffix="")
     if expected is None and size == len(XYZ):
         return 0, None
     for notation in wholes_of(expected):
@@ -503,30 +483,22 @@ def _chosen_rotation(header: Header, places: Sequence[int], expected: Notation |
     return size, _rotation(_chosen(header, places[-size:]), expected.representation, expected)
 
 
-def _by_names(header: Header, places: Sequence[int], expected: Notation | None) -> Columns | None:
-    """Return the rotation whose columns these are, in their order."""
-    chosen = Header([header.names[place] for place in places])
-    for each in [each for own in dict.fromkeys((expected, None)) for each in find_rotations(chosen, own)]:
-        if each.places == tuple(range(len(places))):
-            return each._replace(places=tuple(places), prefix="", suffix="")
-    return None
-
-
 def places_named(spec: str, names: Sequence[str] | None, width: int) -> tuple[Sequence[str], list[int]]:
     """Return what columns are called, and the places of those that are chosen by names, numbers or ranges from 1."""
     numbers = {name: place for place, name in reversed([*enumerate(names or ())])}
-    places = [place for word in spec.split(",") for place in _places(word.strip(), numbers, width)]
+    places = list[int]()
+    for word in map(str.strip, spec.split(",")):
+        first, dash, last = word.partition("-")
+        is_range = first.isdecimal() and (last.isdecimal() if dash else not last) and len(word) < LONGEST_RANGE
+        low, high = (int(first), int(last or first)) if is_range else (0, 0)
+        if word in numbers:
+            places.append(numbers[word])
+        elif not is_range:
+            near = did_you_mean(word, numbers)
+            known = listing(numbers, near=word) or f"1-{width}"
+            raise Misused(f"--columns: no column {shown(word)}{near}; columns: {known}")
+        elif 1 <= low <= high <= width:
+            places += range(low - 1, high)
+        else:
+            raise Misused(f"--columns: {word} is not within 1-{width}")
     return names or [f"column {place + 1}" for place in range(width)], places
-
-
-def _places(word: str, numbers: dict[str, int], width: int) -> list[int]:
-    if word in numbers:
-        return [numbers[word]]
-    first, dash, last = word.partition("-")
-    if first.isdecimal() and (last.isdecimal() if dash else not last) and len(word) < LONGEST_RANGE:
-        low, high = int(first), int(last or first)
-        if 1 <= low <= high <= width:
-            return list(range(low - 1, high))
-        raise Misused(f"--columns: {word} is not within 1-{width}")
-    near = did_you_mean(word, numbers)
-    raise Misused(f"--columns: no column {shown(word)}{near}; columns: {listing(numbers, near=word) or f'1-{width}'}")

@@ -5,7 +5,7 @@ One `Operation` serves floats and arrays alike.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import placed, quaternion, rigid
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from frametool.stream.gathering import Gathered
     from frametool.stream.layout import Word
     from frametool.stream.stamp_source import Timed
+
+    Rename: TypeAlias = Callable[[str | None, str | None], tuple[str | None, str | None]]
 
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
 START, PREVIOUS, VELOCITIES = "start", "previous", "velocities"  # what a row is compared with that comes before it
@@ -402,7 +404,7 @@ class Request(NamedTuple):
     results: ResultOptions = ResultOptions()
     pose_from_frame: Callable[[str | None], Rigid] | None = None
     timed: Timed | None = None
-    rename: Callable[[str | None, str | None], tuple[str | None, str | None]] | None = None
+    rename: Rename | None = None
     gathered: Gathered | None = None
     on_error: str = STOP
     earth: Earth | None = None
@@ -425,6 +427,18 @@ class Request(NamedTuple):
             return rename(name, parent) if rename else (name, parent)
 
         return self._replace(operation=operation._replace(inverse=not operation.inverse), rename=renamed)
+
+    @property
+    def renaming(self) -> Rename | None:
+        """Return what turns the (parent, name) of a row of a table into those of its result; None where they stay."""
+        operation = self.operation
+        if self.rename is not None:
+            return self.rename
+        if operation.moves:
+            return lambda _parent, name: (None, name)
+        if operation.looks_back:
+            return lambda _parent, name: (name, name)
+        return (lambda _parent, _name: (None, None)) if operation.of == PAIR else None
 
     @property
     def weighs(self) -> bool:

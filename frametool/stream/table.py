@@ -3,167 +3,49 @@
 id,x,y,z,tag                            1305031102.1758 1.34 0.62 1.65 0.657 0.612 -0.295 -0.311
 007,1.0,2.0,3.0,"a,b"                   (TUM: t x y z qx qy qz qw; s, m; the pose of the body in the world)
 
-Knows how a table is written, which frames its rows name, and which columns a trajectory has by its format.
+Knows how a table is written, which frames its rows name, and which columns a trajectory has by its format; reads its
+head once, then block after block.
 """
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from itertools import chain
+from shlex import quote
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import FormatError, FrametoolError
+from frametool.errors import FormatError, FrametoolError, Misused, listing
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import UPPER_ROWS, notation
-from frametool.grammar.readers import EARTH_FRAMES, in_nanoseconds, stamp_column
-from frametool.stream.faults import Fault
-from frametool.stream.header import Columns, PoseColumns, has_pose_column
-from frametool.stream.layout import ADDED, NAMED, Layout, quoted
-from frametool.stream.rows import Block, BlockNames, Coded, coded, read_extra, read_stamps, spans_of
+from frametool.grammar.readers import EARTH_FRAMES, NORMALS, in_nanoseconds, stamp_column, stamp_places
+from frametool.stream.evaluate import Run, State
+from frametool.stream.faults import STOP, Fault, Outcome, RowNote
+from frametool.stream.header import Columns, PoseColumns, has_pose_column, listed
+from frametool.stream.layout import ADDED, NAMED, Layout, New, quoted
+from frametool.stream.request import VELOCITIES
+from frametool.stream.row_layout import NORMAL, POSE, RATE, Shape
+from frametool.stream.row_poses import RowPoses, taken
+from frametool.stream.rows import Block, BlockNames, Coded, coded, read_extra, read_stamps, spans_of, written
 from frametool.stream.stamp_source import replaced, stamp_text
-from frametool.text.cells import Cells, split_blank, split_delimited, torn_record, without_quotes
+from frametool.stream.table_plan import plan_table
+from frametool.text.cells import Cells, RecordEnds, split_blank, split_delimited, torn_record, without_quotes
+from frametool.text.lines import read_blocks, whole_lines
 from frametool.text.spans import MARGIN, Ints, Spans
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Generator, Iterator, Sequence
 
     from frametool.stream.request import Request
-    from frametool.stream.row_layout import Shape
-    Names = tuple[str | None, str | None]  # parent, name
-    Texts = tuple[str, str]
+    from frametool.text.lines import ByteStream
+    from frametool.text.spans import Floats
+
     Bad = dict[int, tuple[str, str | FrametoolError]]
-    Rename = Callable[[str | None, str | None], Names]
 
 COUNTER = "frame"  # such a column often counts pictures
-
-
-class Naming:
-    """What a run does with the names in a table; remembers the frame of the rows before."""
-
-    def __init__(self, table: Table, layout: Layout, request: Request, shape: Shape) -> None:
-        """Take from the request what it does to names; shape: what a row is."""
-        self.layout, self.delimiter = layout, table.delimiter
-        self.earth = EARTH_FRAMES[0] if shape.place is not None else None
-        self.places = (layout.frames[0] if layout.frames else None, layout.name) if request.rows.poses else (None, None)
-        named = self.places[self.places[0] is None]
-        self.column = "" if named is None else table.name(named)
-        may_count = layout.frames and table.name(layout.frames[0]) == COUNTER and COUNTER not in request.rows.frames
-        self.counts = request.counts if may_count else lambda _: False
-        self.rename = rename_of(request)
-        self.consecutive = request.operation.looks_back
-        self.before: str | None = None
-
-    def of_rows(self, size: int, column: Callable[[int], Coded]) -> tuple[Sequence[str | None], BlockNames, Bad]:
-        """Read the names of so many rows: return their frames, the names of the results, and the rows that do not fit.
-
-        column: returns the texts of a column
-        """
-        if self.places == (None, None) or not size:
-            texts = [column(place).each() for place in self.layout.frames] if size else []
-            return [*map("\0".join, zip(*texts, strict=True))] or [self.earth], BlockNames(), {}
-        none = Coded([""], np.zeros(size, np.int64))
-        parents, names = (none if place is None else column(place) for place in self.places)
-        count = len(names.texts)
-        found, of_row = np.unique(parents.codes * count + names.codes, return_inverse=True)
-        pairs = [(parents.texts[code // count], names.texts[code % count]) for code in found.tolist()]
-        results, lost = list(pairs), dict[int, str]()
-        bad: Bad = {}
-        for at, pair in enumerate(pairs):
-            try:
-                results[at] = self._result(*pair)
-            except FrametoolError as error:
-                bad |= dict.fromkeys(np.flatnonzero(of_row == at).tolist(), (self.column, error))
-            for place, old, new in zip(self.places, pair, results[at], strict=True):
-                if place is not None and old and not new:  # a cell named a frame, and the result does not
-                    lost.setdefault(int((of_row == at).argmax()), old)
-        for row, parent in enumerate(parents.each() if self.consecutive else ()):
-            self.before = parent if self.before is None else self.before
-            if parent != self.before:
-                bad[row] = self.column, f"given in another frame than {self.before!r}, as the rows before are"
-        known = [None if not text or self.counts(text) else text for text in parents.texts]
-        frames = [self.earth] if self.earth else [known[code] for code in parents.codes.tolist()]
-        return frames, BlockNames(pairs, results, of_row, dict(sorted(lost.items())[:1])), bad
-
-    def texts(self, names: BlockNames, rows: Ints) -> list[list[str | None]]:
-        """Return the parents of the results of rows, and what these are the poses of: one a row, or one for all.
-
-        Where rows name none, the frames of what is placed on the Earth are known, and those of an expression.
-        """
-        unnamed = (self.earth, None) if self.rename is None else self.rename(self.earth, None)
-        known = zip(self.places, unnamed, strict=True)
-        return [[name] if place is None else names.texts(role, rows) for role, (place, name) in enumerate(known)]
-
-    def _result(self, parent: str, name: str) -> Texts:
-        """Return the texts of a result's names; a counter stays, and what is not known is left empty."""
-        if self.rename is None:
-            return parent, name
-        counter = self.counts(parent)
-        new = self.rename(None if counter else parent or None, name or None)
-        return parent if counter else new[0] or "", new[1] or ""
-
-    def spans(self, cells: Cells, role: int, names: BlockNames) -> Spans:
-        """Write names as cells; one that does not change stays as it is written."""
-        place, of_row = self.places[role] or 0, names.of_row
-        new = spans_of([quoted(result[role], self.delimiter) for result in names.results])
-        starts, ends = new.starts[of_row], new.ends[of_row]
-        pairs = zip(names.pairs, names.results, strict=True)
-        same = np.array([old[role] == result[role] for old, result in pairs])[of_row]
-        if not same.any():
-            return Spans(new.data, starts, ends)
-        data, behind = np.concatenate([new.data, cells.data]), len(new.data)
-        starts = np.where(same, cells.starts[:, place] + behind, starts)
-        return Spans(data, starts, np.where(same, cells.ends[:, place] + behind, ends))
-
-
-def rename_of(request: Request) -> Rename | None:
-    """Return what an operation does to the names of a row; None where they stay."""
-    if request.rename is not None:
-        return request.rename
-    if request.operation.moves:
-        return lambda _parent, name: (None, name)
-    if request.operation.looks_back:
-        return lambda _parent, name: (name, name)
-    return (lambda _parent, _name: (None, None)) if request.operation.of == "pair" else None
-
-
-def as_trajectory(table: Table, fmt: str, request: Request, source: str) -> Table:
-    """Set the columns of a trajectory, unless --from or --columns do; eight numbers without names are TUM.
-
-    Raises FormatError for a count of columns that the format does not have.
-    """
-    row = FORMATS[fmt].rows
-    if request.rows.given or request.rows.columns:
-        return table
-    if row.widths and table.width not in row.widths and (fmt == "kitti" or not table.names):
-        wanted = " or ".join(map(str, row.widths))
-        line = table.head.count(b"\n") + 1
-        raise FormatError(f"expected {wanted} numbers a line, found {table.width}", source=source, line=line)
-    if fmt == "kitti":
-        places = tuple(range(len(row.columns)))
-        rows = Columns(places, row.columns, unit=1.0, notation=UPPER_ROWS, degrees=(None,) * 9, whole=True)
-        return table._replace(names=row.columns, pose=PoseColumns(None, rows))
-    if fmt == "euroc":
-        names = table.names or row.columns[: table.width]
-        if (at := stamp_column(names)) is not None and not in_nanoseconds(names[at]):
-            names = (*names[:at], f"{names[at]} [ns]", *names[at + 1 :])  # whatever the file calls them
-        return table._replace(names=names, pose=_euroc(names, row.columns, source))
-    tum = FORMATS["tum"].rows.columns
-    columns = row.columns or (tum if table.width == len(tum) else ())
-    return table if table.names or not columns else table._replace(names=columns, width=len(columns))
-
-
-def _euroc(names: Sequence[str], known: Sequence[str], source: str) -> PoseColumns:
-    """Find EuRoC's columns by the words their names begin with."""
-    bare, wanted = ([name.split("[")[0].strip() for name in each] for each in (names, known[1:8]))
-    if missing := [name for name in wanted if name not in bare]:
-        raise FormatError(f"no column {', '.join(missing)}", source=source, line=1)
-    places = tuple(map(bare.index, wanted))
-    called = tuple(names[at] for at in places)
-    rotation = Columns(places[3:], called[3:], notation=notation("wxyz"), degrees=(None,) * 4)
-    return PoseColumns(Columns(places[:3], called[:3], unit=1.0), rotation)
-
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 COMMENT = b"#"
@@ -226,7 +108,11 @@ def open_table(
     mark = BYTE_ORDER_MARK if block.startswith(BYTE_ORDER_MARK) else b""
     rest = without_comments(block[len(mark) :])
     comments = block[len(mark) : len(block) - len(rest)]
-    line = _first_record(rest, delimiter)
+    end = rest.find(b"\n") + 1 or len(rest)
+    if delimiter and b'"' in rest[:end]:  # a quoted cell may hold line ends
+        ends = split_delimited(rest, delimiter, 0).line_ends
+        end = int(ends[0]) - MARGIN if len(ends) else len(rest)
+    line = rest[:end]
     if delimiter and torn_record(line, delimiter) is not None:
         raise FormatError(UNCLOSED, source=source, line=1)
     cells = cells_of(line, delimiter)
@@ -242,9 +128,8 @@ def open_table(
             raise FormatError("the first line holds numbers and no names; give --no-header", source=source, line=1)
         return Table(delimiter, None, len(cells), mark + comments), rest
     title = line.rstrip(b"\r\n")
-    end = line[len(title) :] or b"\n"
-    table = Table(delimiter, tuple(map(_unquoted, cells)), len(cells), mark + comments, tuple(cells), title, end)
-    return table, rest[len(line) :]
+    names, line_end = tuple(map(_unquoted, cells)), line[len(title) :] or b"\n"
+    return Table(delimiter, names, len(cells), mark + comments, tuple(cells), title, line_end), rest[end:]
 
 
 def without_comments(text: bytes) -> bytes:
@@ -273,15 +158,6 @@ def _named_comment(comments: bytes, delimiter: bytes, width: int) -> Table | Non
     return Table(delimiter, names, len(cells), before, tuple(cells), words, behind)
 
 
-def _first_record(text: bytes, delimiter: bytes) -> bytes:
-    """Return the first line, its end included; a quoted cell may hold line ends."""
-    end = text.find(b"\n") + 1 or len(text)
-    if not delimiter or b'"' not in text[:end]:
-        return text[:end]
-    ends = split_delimited(text, delimiter, 0).line_ends
-    return text[: int(ends[0]) - MARGIN] if len(ends) else text
-
-
 def cells_of(line: bytes, delimiter: bytes) -> list[bytes]:
     """Return the raw cells of one line."""
     if not delimiter:
@@ -306,6 +182,111 @@ def _is_number(text: str) -> bool:
     return True
 
 
+class Naming:
+    """What a run does with the names in a table; remembers the frame of the rows before."""
+
+    def __init__(self, table: Table, layout: Layout, request: Request, shape: Shape) -> None:
+        """Take from the request what it does to names; shape: what a row is."""
+        self.layout, self.delimiter = layout, table.delimiter
+        self.earth = EARTH_FRAMES[0] if shape.place is not None else None
+        self.places = (layout.frames[0] if layout.frames else None, layout.name) if request.rows.poses else (None, None)
+        named = self.places[self.places[0] is None]
+        self.column = "" if named is None else table.name(named)
+        may_count = layout.frames and table.name(layout.frames[0]) == COUNTER and COUNTER not in request.rows.frames
+        self.counts = request.counts if may_count else lambda _: False
+        self.rename = request.renaming
+        self.consecutive = request.operation.looks_back
+        self.before: str | None = None
+
+    def of_rows(self, size: int, column: Callable[[int], Coded]) -> tuple[Sequence[str | None], BlockNames, Bad]:
+        """Read the names of so many rows: return their frames, the names of the results, and the rows that do not fit.
+
+        column: returns the texts of a column
+        """
+        if self.places == (None, None) or not size:
+            texts = [column(place).each() for place in self.layout.frames] if size else []
+            return [*map("\0".join, zip(*texts, strict=True))] or [self.earth], BlockNames(), {}
+        none = Coded([""], np.zeros(size, np.int64))
+        parents, names = (none if place is None else column(place) for place in self.places)
+        count = len(names.texts)
+        found, of_row = np.unique(parents.codes * count + names.codes, return_inverse=True)
+        pairs = [(parents.texts[code // count], names.texts[code % count]) for code in found.tolist()]
+        results, lost = list(pairs), dict[int, str]()
+        bad: Bad = {}
+        for at, pair in enumerate(pairs):
+            is_counter = self.counts(pair[0])
+            try:
+                old = None if is_counter else pair[0] or None, pair[1] or None
+                new = old if self.rename is None else self.rename(*old)
+                results[at] = pair[0] if is_counter else new[0] or "", new[1] or ""
+            except FrametoolError as error:
+                bad |= dict.fromkeys(np.flatnonzero(of_row == at).tolist(), (self.column, error))
+            for place, name, result in zip(self.places, pair, results[at], strict=True):
+                if place is not None and name and not result:  # a cell named a frame, and the result does not
+                    lost.setdefault(int((of_row == at).argmax()), name)
+        for row, parent in enumerate(parents.each() if self.consecutive else ()):
+            self.before = parent if self.before is None else self.before
+            if parent != self.before:
+                bad[row] = self.column, f"given in another frame than {self.before!r}, as the rows before are"
+        known = [None if not text or self.counts(text) else text for text in parents.texts]
+        frames = [self.earth] if self.earth else [known[code] for code in parents.codes.tolist()]
+        return frames, BlockNames(pairs, results, of_row, dict(sorted(lost.items())[:1])), bad
+
+    def texts(self, names: BlockNames, rows: Ints) -> list[list[str | None]]:
+        """Return the parents of the results of rows, and what these are the poses of: one a row, or one for all.
+
+        Where rows name none, the frames of what is placed on the Earth are known, and those of an expression.
+        """
+        unnamed = (self.earth, None) if self.rename is None else self.rename(self.earth, None)
+        known = zip(self.places, unnamed, strict=True)
+        return [[name] if place is None else names.texts(role, rows) for role, (place, name) in enumerate(known)]
+
+    def spans(self, cells: Cells, role: int, names: BlockNames) -> Spans:
+        """Write names as cells; one that does not change stays as it is written."""
+        place, of_row = self.places[role] or 0, names.of_row
+        new = spans_of([quoted(result[role], self.delimiter) for result in names.results])
+        starts, ends = new.starts[of_row], new.ends[of_row]
+        pairs = zip(names.pairs, names.results, strict=True)
+        same = np.array([old[role] == result[role] for old, result in pairs])[of_row]
+        if not same.any():
+            return Spans(new.data, starts, ends)
+        data, behind = np.concatenate([new.data, cells.data]), len(new.data)
+        starts = np.where(same, cells.starts[:, place] + behind, starts)
+        return Spans(data, starts, np.where(same, cells.ends[:, place] + behind, ends))
+
+
+def as_trajectory(table: Table, fmt: str, request: Request, source: str) -> Table:
+    """Set the columns of a trajectory, unless --from or --columns do; eight numbers without names are TUM.
+
+    Raises FormatError for a count of columns that the format does not have.
+    """
+    row = FORMATS[fmt].rows
+    if request.rows.given or request.rows.columns:
+        return table
+    if row.widths and table.width not in row.widths and (fmt == "kitti" or not table.names):
+        wanted = " or ".join(map(str, row.widths))
+        line = table.head.count(b"\n") + 1
+        raise FormatError(f"expected {wanted} numbers a line, found {table.width}", source=source, line=line)
+    if fmt == "kitti":
+        places = tuple(range(len(row.columns)))
+        rows = Columns(places, row.columns, unit=1.0, notation=UPPER_ROWS, degrees=(None,) * 9, whole=True)
+        return table._replace(names=row.columns, pose=PoseColumns(None, rows))
+    if fmt == "euroc":
+        names = table.names or row.columns[: table.width]
+        if (at := stamp_column(names)) is not None and not in_nanoseconds(names[at]):
+            names = (*names[:at], f"{names[at]} [ns]", *names[at + 1 :])  # whatever the file calls them
+        bare, ours = ([name.split("[")[0].strip() for name in each] for each in (names, row.columns[1:8]))
+        if missing := [name for name in ours if name not in bare]:
+            raise FormatError(f"no column {', '.join(missing)}", source=source, line=1)
+        places = tuple(map(bare.index, ours))
+        called = tuple(names[at] for at in places)
+        turn = Columns(places[3:], called[3:], notation=notation("wxyz"), degrees=(None,) * 4)
+        return table._replace(names=names, pose=PoseColumns(Columns(places[:3], called[:3], unit=1.0), turn))
+    tum = FORMATS["tum"].rows.columns
+    columns = row.columns or (tum if table.width == len(tum) else ())
+    return table if table.names or not columns else table._replace(names=columns, width=len(columns))
+
+
 def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming, request: Request) -> Block:
     """Find the rows of a block, their numbers, their names, and the stretches of text that pass."""
     places = layout.places
@@ -323,7 +304,15 @@ def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming, requ
     columns = [without_quotes(cells.column(place)) for place in times]
     stamps, late = read_extra(columns, request, table.name(times[0])) if times else (None, {})
     unchanged, broken = [], []
-    lines_before = _line_counter(cells)
+
+    @cache
+    def newlines() -> Ints:
+        return np.flatnonzero(cells.data == NEWLINE)
+
+    def lines_before(line: int) -> int:
+        """Count the line ends before a line: more than its index if cells hold line ends."""
+        return int(np.searchsorted(newlines(), cells.line_starts[line]))
+
     if len(cells.rows) < len(cells.counts):
         named = f" ({' '.join(table.names)})" if table.names and len(table.names) < 12 else ""
         for line in cells.odd_lines().tolist():
@@ -337,21 +326,6 @@ def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming, requ
     return Block(numbers, parts, cells.rows, lines, unchanged, broken, names, [stamps], late | bad, frames=[frames])
 
 
-def at_other_times(table: Table, layout: Layout, text: bytes, offset_ns: int) -> bytes:
-    """Return rows with so much added to their stamps; what is no stamp stays unchanged and is reported when read."""
-    cells, places = table.split(text), [place for place in (layout.time, layout.below) if place is not None]
-    columns = [without_quotes(cells.column(place)) for place in places]
-    in_ns = in_nanoseconds(table.name(places[0]))
-    stamps, reasons = read_stamps(tuple(columns), in_ns=in_ns)
-    edits = []
-    for row in sorted({*range(len(stamps))} - {*reasons}):
-        stamp = int(stamps[row]) + offset_ns
-        for column, part in zip(columns, divmod(stamp, BILLION), strict=False):
-            new = str(part) if len(columns) > 1 else stamp_text(column.text(row).decode(), stamp, in_ns=in_ns)
-            edits.append((int(column.starts[row]) - MARGIN, int(column.ends[row]) - MARGIN, new.encode()))
-    return replaced(text, edits)
-
-
 def _stretch(cells: Cells, first: int, last: int, begin: str, end: str) -> Spans:
     """Return the span from one cell to another in every row, with what is before or after."""
     if begin == "line":
@@ -363,13 +337,155 @@ def _stretch(cells: Cells, first: int, last: int, begin: str, end: str) -> Spans
     return Spans(cells.data, starts, cells.ends[:, last] if end == "cell" else cells.starts[:, last + 1])
 
 
-def _line_counter(cells: Cells) -> Callable[[int], int]:
-    """Return what counts the line ends before a line: more than its index if cells hold line ends."""
+def run_table(
+    stream: ByteStream, fmt: str, request: Request, *, source: str, header: bool = True
+) -> Generator[Outcome]:
+    """Yield the outcomes of a table's blocks, the first one its head."""
+    rows = TableRows(stream, fmt, request, source, header=header)
+    yield Outcome(rows.table.opening(rows.layout), lines=rows.lines, size=rows.taken)
+    for text in rows.texts:
+        run, outcome, _ = rows.of_text(text)
+        end, broken = None, [place for place, _ in run.block.broken]
+        if request.on_error == STOP and (run.reasons or broken):  # what is before the first bad row is written
+            end = min([*run.block.places[[*run.reasons]].tolist(), *broken])
+        yield outcome._replace(text=written(run.groups(end)))
 
-    @cache
-    def newlines() -> Ints:
-        return np.flatnonzero(cells.data == NEWLINE)
 
-    return lambda line: int(np.searchsorted(newlines(), cells.line_starts[line]))
+class PlannedRows:
+    """Rows that are planned: what is done with each, what it is called, and what one block leaves for the next.
+
+    A request for all numbers makes poses of them; its notations say which numbers come out.
+    off: how far the worst rotation was from one; mended: how many were normalised
+    inputs: the numbers of the last rows that became poses as read, a row a column
+    unasked: the column of stamps that no option names
+    """
+
+    def __init__(
+        self, table: Table, request: Request, source: str, normals: Sequence[tuple[str, ...]] = NORMALS, *,
+        stamped: bool = True,
+    ) -> None:  # fmt: skip
+        """Plan the rows of a table; raises FormatError or Misused where they do not fit what is asked for.
+
+        normals: the columns of vectors that turn with points; stamped: a column with the name of a stamp is one
+        """
+        timed, extra, operation = request.timed, request.rows.extra_column, request.operation
+        usual = "" if (at := stamp_places(table.names)[0]) is None else table.name(at)
+        is_cut = (request.window or request.offset_ns) and extra is None and not (timed and timed.name)
+        lacks_name, self.unasked = extra == "" or is_cut, None
+        of_formula = timed and not timed.name and operation.formula and not operation.shown
+        if not usual and (lacks_name or of_formula):
+            who = "a velocity" if operation.of == VELOCITIES else "--start, --stop, --time-offset"
+            known = f"; columns: {listing(table.names)}" if table.names else ""
+            message = f"no column looks like stamps; name it with --time-column{known}"
+            raise Misused(f"{who if lacks_name else '@ row'}: {message}", source=source, line=1)
+        if lacks_name:
+            request = request.with_rows(extra_column=usual)
+        if timed is not None and not timed.name:
+            named = timed._replace(name=usual)
+            request = request._replace(timed=named if of_formula else None)
+            self.unasked = named if usual and not of_formula else None
+        self.table, self.request = table, request
+        self.plan, self.layout = plan_table(table, request, source, normals, stamped=stamped)
+        self.shape = self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
+        self.naming = Naming(table, self.layout, request.for_kind(self.shape.kind), self.shape)
+        if request.gathered is not None:
+            request.gathered.stamped |= bool(usual)
+        self.state = State()
+        self.mended, self.off = 0, 0.0
+
+    @property
+    def columns(self) -> str:
+        """List the columns there are."""
+        return listed(self.table.names or ("columns without names",))
+
+    def ran(self, block: Block) -> Run:
+        """Return what becomes of a block, with its warnings in order."""
+        run = Run(self.plan, block, self.state)
+        self.mended += len(run.mended)
+        self.off = max(self.off, run.off)
+        for frame in {*block.frames[0]} if run.count else ():
+            with suppress(FrametoolError):  # rows of unknown frames say so themselves
+                if self.unasked is not None and self.unasked.moves(frame):
+                    remedy = f"give --time-column {quote(self.unasked.name)}, or --at TIME"
+                    ignored = f"column {self.unasked.name!r} is not looked at, rows move at the latest time; {remedy}"
+                    run.notes.append(RowNote(block.line_of(0), "latest", ignored))
+                    self.unasked = None
+        run.notes.sort()
+        return run
+
+    def poses_of(self, run: Run, rows: Ints, numbers: Floats, column: Callable[[int], Any], lines: Ints) -> RowPoses:
+        """Return the results of some rows of a block as poses; column: returns the cells of one for all rows."""
+        layout, block, plan = self.layout, run.block, self.plan
+        self.inputs = np.reshape(run.columns, (len(run.columns), run.count))[:, rows]
+        used = {layout.time, layout.below, *layout.places, *self.naming.places}
+        others = [place for place in range(self.table.width) if place not in used]
+        extras = {self.table.name(place): taken(column(place), rows) for place in others}
+        own = numbers.shape[1]
+        if plan.shapes and plan.shapes[-1].kind in (NORMAL, RATE):  # vectors that turn along come last
+            own -= 3 * (len(plan.targets) - 1)
+        extra = [each for each in layout.columns if isinstance(each, New) and each.number >= own]
+        extras |= {each.name: numbers[:, each.number] for each in extra}
+        stamps = None if layout.time is None else block.stamps[0][rows]
+        parents, names = self.naming.texts(block.names, rows)
+        return RowPoses(numbers[:, :own], stamps, lines, parents, names, extras)
 
 
+class TableRows(PlannedRows):
+    """The rows of a table, block by block.
+
+    texts: those of the blocks; taken, lines: how many bytes and lines the head had
+    """
+
+    def __init__(
+        self, stream: ByteStream, fmt: str, request: Request, source: str, *, header: bool = True
+    ) -> None:
+        """Read the head of a table in a format, and plan its rows; raises FormatError or Misused."""
+        delimiter = (FORMATS[fmt].rows.delimiter or "").encode()
+        blocks, first = read_blocks(stream, whole=RecordEnds(delimiter) if delimiter else whole_lines), b""
+        for block in blocks:  # up to one that holds more than comments
+            first += block
+            if without_comments(first.removeprefix(BYTE_ORDER_MARK)):
+                break
+        if not first:
+            raise FormatError("nothing in it", source=source)
+        known = request.rows.given or request.rows.given_place
+        table, rest = open_table(first, fmt, header=header, source=source, expected=known)
+        super().__init__(as_trajectory(table, fmt, request, source), request, source)
+        self.texts = chain((rest,) if rest else (), blocks)
+        self.taken = len(first) - len(rest)
+        self.lines = first.count(b"\n", 0, self.taken)
+
+    def of_text(self, text: bytes) -> tuple[Run, Outcome, Cells]:
+        """Return what becomes of a block, and its outcome; behind a quote that is not closed nothing is read."""
+        table, layout, offset_ns = self.table, self.layout, self.request.offset_ns
+        torn = torn_record(text, table.delimiter) if table.delimiter else None
+        cells = table.split(text[:torn])
+        if offset_ns and layout.time is not None:  # what is no stamp stays and is reported when it is read
+            places = [place for place in (layout.time, layout.below) if place is not None]
+            columns = [without_quotes(cells.column(place)) for place in places]
+            in_ns = in_nanoseconds(table.name(layout.time))
+            stamps, reasons = read_stamps(columns, in_ns=in_ns)
+            edits = []
+            for row in sorted({*range(len(stamps))} - {*reasons}):
+                stamp = int(stamps[row]) + offset_ns
+                for column, part in zip(columns, divmod(stamp, BILLION), strict=False):
+                    new = str(part) if len(columns) > 1 else stamp_text(column.text(row).decode(), stamp, in_ns=in_ns)
+                    edits.append((int(column.starts[row]) - MARGIN, int(column.ends[row]) - MARGIN, new.encode()))
+            cells = table.split(replaced(text[:torn], edits))
+        block = table_block(table, layout, cells, self.naming, self.request)
+        run = self.ran(block)
+        faults = run.faults()
+        if torn is not None:
+            faults.append(Fault(text.count(b"\n", 0, torn), "", UNCLOSED, final=True))
+        rows = len(block.places) + len(block.broken)
+        return run, Outcome(b"", faults, rows, text.count(b"\n"), len(run.mended), run.notes, len(text)), cells
+
+    def blocks(self) -> Iterator[tuple[RowPoses, Outcome]]:
+        """Yield the poses of all blocks."""
+        for text in self.texts:
+            run, outcome, cells = self.of_text(text)
+            rows, numbers = run.settled()
+            lines = run.block.places[rows]
+            if b'"' in text:  # a cell may hold line ends
+                lines = np.array([*map(run.block.line_of, rows.tolist())], np.int64)
+            yield self.poses_of(run, rows, numbers, cells.column, lines), outcome

@@ -34,12 +34,13 @@ from frametool.stream.header import (
 )
 from frametool.stream.layout import NAME, PARENT, Column, Fixed, Kept, Layout, Named, New, lay_out, refuse_repeated
 from frametool.stream.request import PAIR, PLAIN, Request, Shown
-from frametool.stream.row_layout import NORMAL, POINT, POSE, RATE, SIX, Shape, Target, place_of, six_names
-from frametool.stream.table import Table, rename_of
+from frametool.stream.row_layout import NORMAL, POINT, POSE, SIX, Shape, Target, place_of, six_names
 from frametool.text.numbers import number_or_none
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+
+    from frametool.stream.table import Table
 
 
 def plan_table(
@@ -207,12 +208,6 @@ def _turning_along(
     return [(PoseColumns(Columns(at, tuple(names[each] for each in at)), None), kind) for at, kind in found]
 
 
-def own_count(plan: Plan, width: int) -> int:
-    """Return how many of the numbers of a row's result are not those of vectors that turn along."""
-    has_vectors = plan.shapes and plan.shapes[-1].kind in (NORMAL, RATE)
-    return width - len(XYZ) * (len(plan.targets) - 1) if has_vectors else width
-
-
 def _without_position(pose: PoseColumns, request: Request, table: Table, source: str) -> PoseColumns:
     """Leave the position to pass as it is where only the rotation is rewritten."""
     if pose.rotation is None and request.results.by_default:
@@ -309,7 +304,7 @@ def _columns(
     ours: dict[int, list[Column]] = {place: [] for pose in poses for place in pose.places}
     adds = request.results.keep or request.operation.only_adds or not ours
     at: dict[int, list[Column]] = {}
-    for place, role in named.items() if not adds and rename_of(request) is not None else ():
+    for place, role in named.items() if not adds and request.renaming is not None else ():
         at[place] = [Named(place, role)]
     at |= ours
     added: list[Column] = []

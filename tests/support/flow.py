@@ -27,7 +27,7 @@ from frametool.stream.record_values import read_poses, results
 from frametool.stream.request import Operation, Request, ResultOptions, RowOptions
 from frametool.stream.rows import read_stamps
 from frametool.stream.stamp_source import read_stamp
-from frametool.stream.table_stream import run_table
+from frametool.stream.table import run_table
 from frametool.text.spans import MARGIN, Spans, framed
 
 if TYPE_CHECKING:
