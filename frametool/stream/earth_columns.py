@@ -75,6 +75,7 @@ if TYPE_CHECKING:
 
 ECEF_COLUMNS = POSITIONS[ECEF].columns
 STATUS, DATUM, EPSG, PARENT = "status", "datum", "epsg", "parent"
+STAYING = (STATUS, PARENT)  # read, and not rewritten
 OTHERS = ("easting", "northing", *ECEF_COLUMNS, ZONE, "heading", AXES,
           STATUS, DATUM, EPSG, PARENT)  # fmt: skip
 FIELDS = PLACE_FIELDS | {name: name for names in (OTHERS, *FLAT.values()) for name in names}
@@ -156,12 +157,11 @@ def _columns(kind: str, fields: dict[str, NamedColumn], spots: dict[str, NamedCo
             what = f"column {shown(spot.name)}: unknown unit {shown(spot.unit)} of a length here; known is m"
             raise ValueInvalid(what)
     refuse_not_read(spots)
-    staying = [name for name in (STATUS, PARENT) if name in spots]
-    fields = fields | {name: spots[name] for name in (AXES, *staying) if name in spots}
+    fields = fields | {name: spots[name] for name in (AXES, *STAYING) if name in spots}
     axes, origin = (earth.axes or kind, earth.origin) if kind in LOCAL else (earth.axes, None)
     place = Place(kind, (*fields,), axes, earth.zone if kind == UTM and ZONE not in fields else None, origin)
     places, names, _ = zip(*fields.values(), strict=True)
-    return Columns(places, names, unit=place, staying=len(staying))
+    return Columns(places, names, unit=place)
 
 
 def _in_radians(spot: NamedColumn) -> bool:
@@ -247,11 +247,12 @@ def _check_found(found: PoseColumns | None, names: Sequence[str], fields: Collec
 def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Request) -> PoseColumns:
     """Take the columns that --columns names for a place, as --from says, and a rotation behind it.
 
+    spec: "" for all columns of a table without names, behind a stamp or not
     Raises Misused for names that are not there, or a count that the place does not have.
     """
-    called, places = places_named(spec, names, width)
     kind, earth = request.rows.given_place, request.earth or Earth()
-    most = _count(kind, earth)
+    most = len(POSITIONS[kind].names) - (kind == UTM and earth.zone is not None)
+    called, places = places_named(spec or f"{1 + (width == most + 1)}-{width}", names, width)
     fields = POSITIONS[kind].names[-most:]
     own, behind = places[:most], places[most:]
     if len(own) < (kernels(kind).least or len(fields)) - (kind == UTM and earth.zone is not None):
@@ -265,16 +266,6 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
     if behind and len(turned) != 1:
         raise Misused(f"--columns: {', '.join(called[at] for at in behind)} are no rotation behind {kind}")
     return PoseColumns(position, turned[0] if turned else None)
-
-
-def of_width(width: int, request: Request) -> str:
-    """Return which columns of a table without names are a place: all of them, or those behind a stamp."""
-    return f"2-{width}" if width == _count(request.rows.given_place, request.earth or Earth()) + 1 else f"1-{width}"
-
-
-def _count(kind: str, earth: Earth) -> int:
-    """Count the numbers of a position, of UTM without the zone where that is held."""
-    return len(POSITIONS[kind].names) - (kind == UTM and earth.zone is not None)
 
 
 def along(
@@ -295,11 +286,16 @@ def along(
     return places, shape
 
 
-def readers_of(shape: Shape) -> tuple[dict[int, Reader], dict[int, Reader]]:
-    """Return what reads the words of a place, by the number's place, and what its angles with marks."""
+def readers_of(shape: Shape) -> tuple[dict[int, Reader], dict[int, Reader], int]:
+    """Return what reads the words of a place, by the number's place, and what its angles with marks.
+
+    And how many of the last numbers are read and stay as they are.
+    """
     fields = shape.place.fields if shape.place is not None else ()
     words = {at: WORDS[field] for at, field in enumerate(fields) if field in WORDS}
-    return words, {at: partial(coordinate, field=field) for at, field in enumerate(fields) if field in ("lat", "lon")}
+    angles = [(at, field) for at, field in enumerate(fields) if field in ("lat", "lon")]
+    marked: dict[int, Reader] = {at: partial(coordinate, field=field) for at, field in angles}
+    return words, marked, sum(field in STAYING for field in fields)
 
 
 def _axes(text: str) -> float:

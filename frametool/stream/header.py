@@ -56,7 +56,6 @@ class Columns(NamedTuple):
     absent: which numbers of a position or a rotation have no column
     kind: twist or wrench, of six columns
     wrong: what is wrong with the names, an error where the columns are used
-    staying: how many of the last ones are read and stay as they are: the status of a fix
     spots: place and unit for each word that was looked for, None where it has no column
     """
 
@@ -71,7 +70,6 @@ class Columns(NamedTuple):
     absent: tuple[int, ...] = ()
     kind: str = ""
     wrong: str = ""
-    staying: int = 0
     spots: tuple[Spot | None, ...] = ()
 
     @property

@@ -158,7 +158,11 @@ def lay_out(columns: Sequence[Column], width: int, delimiter: bytes) -> tuple[tu
     stretches: list[Stretch] = []
     groups: list[list[Column]] = []
     for column in columns:  # columns that follow one another, and numbers that do, go together
-        if groups and _goes_on(groups[-1][-1], column):
+        before = groups[-1][-1] if groups else None
+        goes_on = isinstance(before, Kept) and isinstance(column, Kept) and column.place == before.place + 1
+        if isinstance(before, New) and isinstance(column, New) and not (column.words or before.words):
+            goes_on = column.number == before.number + 1
+        if goes_on:
             groups[-1].append(column)
         else:
             groups.append([column])
@@ -186,14 +190,6 @@ def lay_out(columns: Sequence[Column], width: int, delimiter: bytes) -> tuple[tu
         stretches.append((width - 1, width - 1, "end", "line"))
         pieces.append(In(len(stretches) - 1))
     return tuple(pieces), tuple(stretches)
-
-
-def _goes_on(before: Column, column: Column) -> bool:
-    if isinstance(column, Kept):
-        return isinstance(before, Kept) and column.place == before.place + 1
-    if not (isinstance(column, New) and isinstance(before, New)) or column.words or before.words:
-        return False
-    return column.number == before.number + 1
 
 
 def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:

@@ -33,7 +33,7 @@ from frametool.stream.header import (
     wholes_of,
 )
 from frametool.stream.layout import NAME, PARENT, Column, Fixed, Kept, Layout, Named, New, lay_out, refuse_repeated
-from frametool.stream.request import PAIR, PLAIN, Request, Shown
+from frametool.stream.request import PAIR, PLAIN, Request
 from frametool.stream.row_layout import NORMAL, POINT, POSE, SIX, Shape, Target, place_of, six_names
 from frametool.text.numbers import number_or_none
 
@@ -61,7 +61,7 @@ def plan_table(
     if request.rows.poses == 1 and not on_earth and passes and request.keeps_position:
         poses = [_without_position(poses[0], request, table, source)]
     if wrong := next((each.wrong for pose in poses for each in pose if each and each.wrong), ""):
-        raise _refusal(wrong, source)
+        raise FormatError(wrong, source=source, line=1)
     asked = tuple(_place(name, _names_or_numbers(table), source) for name in request.operation.columns)
     kinded = zip(poses, request.rows.kinds or (request.rows.kind,) * len(poses), strict=True)
     shapes = tuple(row_shape(pose, request.with_rows(kind=kind)) for pose, kind in kinded)
@@ -92,10 +92,10 @@ def plan_table(
     moves_each = on_earth or request.rows.frames or (frames and request.operation.moves)
     edge_of = request.pose_from_frame if moves_each else None
     asked_at = range(shapes[0].own_size, shapes[0].size) if request.operation.shown else ()  # empty cells are not
-    words, marked = readers_of(shapes[0]) if on_earth else ({}, dict.fromkeys(asked_at, number_or_none))
+    words, marked, staying = readers_of(shapes[0]) if on_earth else ({}, dict.fromkeys(asked_at, number_or_none), 0)
     named = ({frames[0]: PARENT} if frames and request.rows.poses else {}) | ({} if name is None else {name: NAME})
-    if on_earth and (position := poses[0].position):  # what is read and stays as it is
-        position = position._replace(places=position.places[: len(position.places) - position.staying])
+    if on_earth and (position := poses[0].position):  # the status of a fix is read and stays as it is
+        position = position._replace(places=position.places[: len(position.places) - staying])
         poses = [poses[0]._replace(position=position)]
     written = _columns(table, poses, shapes, targets, request, named, extra)
     if table.header:
@@ -110,60 +110,38 @@ def plan_table(
 
 
 def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
-    """Find the columns of the poses, by --columns, by name, or by their number where there are no names."""
-    asked = request.rows
+    """Find the columns of the poses, by --columns, by name, or by their number where there are no names.
+
+    A table without names is a point, a whole pose, or what --from says, behind a stamp or not.
+    """
+    asked, width = request.rows, table.width
     if not asked.poses:
         return []
-    if asked.columns:
-        if len(asked.columns) != asked.poses:
-            raise Misused(f"--columns is given {len(asked.columns)} times, for {asked.poses} poses in a row")
-        kinds = asked.kinds or (asked.kind,) * asked.poses
-        return [_chosen(spec, table, request, kind) for spec, kind in zip(asked.columns, kinds, strict=True)]
-    if table.pose is not None and asked.given is None and asked.poses == 1:
+    specs, kinds = asked.columns, asked.kinds or (asked.kind,) * asked.poses
+    if specs and len(specs) != asked.poses:
+        raise Misused(f"--columns is given {len(specs)} times, for {asked.poses} poses in a row")
+    if not specs and asked.poses == 1 and table.pose is not None and asked.given is None:
         return [table.pose]
-    if table.names:
-        known = asked.extra_column
-        names = ["" if name == known or may_be_uncertain(name) else name for name in table.names]
+    if not specs and table.names:
+        names = ["" if name == asked.extra_column or may_be_uncertain(name) else name for name in table.names]
         return _find_named(names, request, source)
-    if spec := _by_width(table.width, request):
-        return [_chosen(spec, table, request, asked.kind)]
-    reason = f"{table.width} columns without names do not say what they are; give --from REP, or --columns"
-    if asked.poses == 1 and asked.given:
-        reason = f"{asked.given.counted}; found {table.width} columns without names; or give --columns"
-    raise _refusal(reason, source)
-
-
-def _refusal(reason: str, source: str) -> FormatError:
-    """Return the error that columns are not what is wanted; the first line names them."""
-    return FormatError(reason, source=source, line=1)
-
-
-def _chosen(spec: str, table: Table, request: Request, kind: str) -> PoseColumns:
-    """Return the columns of a point or pose that are chosen by name or number."""
-    if not request.rows.given_place:
-        return named_pose(spec, table.names, table.width, request, kind)
-    from frametool.stream.earth_columns import chosen_pose
-
-    return chosen_pose(spec, table.names, table.width, request)
-
-
-def _by_width(width: int, request: Request) -> str:
-    """Choose all columns of a table without names: a point, a whole pose, or what --from says, behind a stamp or not.
-
-    "" where they may be something else.
-    """
-    asked = request.rows
-    if asked.kind in SIX and width == len(six_names(asked.kind)):
-        return f"1-{width}"
-    if asked.poses > 1:
-        return ""
+    if not specs:
+        begin = int(width in (len(XYZ), *(each.counts[-1] for each in wholes_of(None))))
+        if (given := asked.given) is not None:
+            begin = 1 if width in given.counts else 2 * (width - 1 in given.counts[1:])
+        if asked.kind in SIX and width == len(six_names(asked.kind)):
+            begin = 1
+        elif asked.poses > 1 or not (begin or asked.given_place):
+            reason = f"{width} columns without names do not say what they are; give --from REP, or --columns"
+            if asked.poses == 1 and asked.given:
+                reason = f"{asked.given.counted}; found {width} columns without names; or give --columns"
+            raise FormatError(reason, source=source, line=1)
+        specs, kinds = ("" if asked.given_place else f"{begin}-{width}",), (asked.kind,)
     if asked.given_place:
-        from frametool.stream.earth_columns import of_width
+        from frametool.stream.earth_columns import chosen_pose
 
-        return of_width(width, request)
-    if (notation := asked.given) is None:
-        return f"1-{width}" if width in (len(XYZ), *(each.counts[-1] for each in wholes_of(None))) else ""
-    return f"1-{width}" if width in notation.counts else f"2-{width}" if width - 1 in notation.counts[1:] else ""
+        return [chosen_pose(spec, table.names, width, request) for spec in specs]
+    return [named_pose(spec, table.names, width, request, kind) for spec, kind in zip(specs, kinds, strict=True)]
 
 
 def _find_named(names: Sequence[str], request: Request, source: str) -> list[PoseColumns]:
@@ -172,8 +150,8 @@ def _find_named(names: Sequence[str], request: Request, source: str) -> list[Pos
     six = find_six(names, asked.kind if asked.kind in SIX else "")
     if asked.kind in SIX and six is None:
         wanted = " ".join(six_names(asked.kind))
-        found = f"no columns of a {asked.kind} ({wanted}) among: {listed(names)}"
-        raise _refusal(f"{found}; name them with --columns", source)
+        found = f"no columns of a {asked.kind} ({wanted}) among: {listed(names)}; name them with --columns"
+        raise FormatError(found, source=source, line=1)
     taken = () if six is None else six.places
     others = ["" if place in taken else name for place, name in enumerate(names)]
     if six is not None and (asked.kind in SIX or not has_pose_column(others)):
@@ -214,8 +192,8 @@ def _without_position(pose: PoseColumns, request: Request, table: Table, source:
         return pose
     if pose.rotation is None:
         wanted = "; give --from REP or --columns" if request.rows.given is None else ""
-        known = listed(table.names or ("columns without names",))
-        raise _refusal(f"no columns of a rotation among: {known}{wanted}", source)
+        found = f"no columns of a rotation among: {listed(table.names or ('columns without names',))}{wanted}"
+        raise FormatError(found, source=source, line=1)
     leaves_plane = pose.position and not pose.position.wrong and pose.position.absent and request.results.notations
     is_whole = len(request.results.notations) == 1 and request.results.notations[0].representation.whole is not None
     stays = not (is_whole or pose.rotation.whole or leaves_plane)
@@ -234,8 +212,8 @@ def _frame_columns(table: Table, request: Request, source: str, *, on_earth: boo
         return tuple(_place(name, names, source) for name in asked.frames)
     found = _first_called(PARENT_COLUMNS, table)
     if found is None and asked.frames:
-        remedy = "name SOURCE, or give --frame-column"
-        raise _refusal(f"rows do not say their frame; {remedy}; columns: {', '.join(names)}", source)
+        unsaid = "rows do not say their frame; name SOURCE, or give --frame-column; columns"
+        raise FormatError(f"{unsaid}: {', '.join(names)}", source=source, line=1)
     return () if found is None else (found,)
 
 
@@ -314,12 +292,14 @@ def _columns(
         shape, places = shapes[number] if shapes else Shape(POSE), pose.places or tuple(ours)
         several = len(targets) > 1 and (request.rows.poses > 1 or number > 0)
         first += request.result_size(shapes[number - 1], targets[number - 1]) if number else 0
-        position, rotation, extras = _new_columns(pose, target, request, shape, first, several=several)
+        notations = [each for each, _ in target.notations]
+        is_same = pose.rotation is not None and notations == [pose.rotation.notation]
+        position, rotation, extras = _new_columns(pose, target, request, shape, first, several=several, same=is_same)
         # whether each number of the result stands where one of the input does
-        is_alike = not target.notations or shape.notation is None or _same(pose, target)
+        is_alike = not target.notations or shape.notation is None or is_same
         is_alike = is_alike and (shape.unit is None) == (target.unit is None) and shape.place is target.place is None
         is_alike = is_alike and len(shape.absent) == len(target.absent) and shape.whole == target.whole
-        in_place = is_alike and (pose.position is not None or pose.rotation is not None)
+        in_place = is_alike and bool(pose.places)
         if several and (not in_place or (request.results.notations and request.rows.poses > 1)):
             raise Misused("several --columns are moved as they are written; for --to, or a rotation alone, give one")
         if adds:
@@ -329,50 +309,37 @@ def _columns(
             last = len(extras) - len(request.operation.carried(shape))
             at |= {place: extras[last:] if place == min(covariance) else [] for place in covariance}
             extras = extras[:last]
-        if in_place:
-            _put(at, places, [*position, *rotation])
-            at[max(places)] += extras
-        elif pose.position and pose.rotation and target.unit is not None:
-            places = pose.position.places
-            _put(at, places, [*map(Kept, places), *position[len(places) :]] if only_turned else position)
-            at[min(pose.rotation.places)] += [*rotation, *extras]
-        else:
-            at[min(places)] += [*position, *rotation, *extras]
-    if adds:
-        return _extra(table, columns, added, request.operation.shown or PLAIN)
+        own, new, last = places, [*position, *rotation], max(places)  # what is behind the last one comes after it
+        if not in_place and pose.position and pose.rotation and target.unit is not None:
+            own, last = pose.position.places, min(pose.rotation.places)
+            new = [*map(Kept, own), *position[len(own) :]] if only_turned else position
+            extras = [*rotation, *extras]
+        elif not in_place:
+            own, last = (min(places),), min(places)
+        for place, column in zip(own, new, strict=False):
+            at[place].append(column)
+        at[max(own)] += new[len(own) :]
+        at[last] += extras
+    if adds:  # behind those that stay, or in the place of those of their names
+        gives_way = (request.operation.shown or PLAIN).replaces
+        more = {getattr(each, "name", at) if gives_way else at: each for at, each in enumerate(added)}
+        mixed = [more.pop(name, kept) for name, kept in zip(_names_or_numbers(table), columns, strict=True)]
+        return [*mixed, *more.values()]
     return [column for place, old in enumerate(columns) for column in at.get(place, [old])]
 
 
-def _put(at: dict[int, list[Column]], places: Sequence[int], new: Sequence[Column]) -> None:
-    """Put new columns where others were, one for one; those that are left come behind the last."""
-    for place, column in zip(places, new, strict=False):
-        at[place].append(column)
-    at[max(places)] += new[len(places) :]
-
-
-def _extra(table: Table, columns: Sequence[Column], extras: Sequence[Column], shown: Shown) -> list[Column]:
-    """Put new columns behind those that stay, or in the place of those of their names."""
-    more = {getattr(each, "name", at) if shown.replaces else at: each for at, each in enumerate(extras)}
-    mixed = [more.pop(name, kept) for name, kept in zip(_names_or_numbers(table), columns, strict=True)]
-    return [*mixed, *more.values()]
-
-
-def _same(pose: PoseColumns, target: Target) -> bool:
-    """Return True if a rotation is written in the notation it was read in."""
-    return pose.rotation is not None and [notation for notation, _ in target.notations] == [pose.rotation.notation]
-
-
 def _new_columns(
-    pose: PoseColumns, target: Target, request: Request, shape: Shape, first: int, *, several: bool
+    pose: PoseColumns, target: Target, request: Request, shape: Shape, first: int, *, several: bool, same: bool
 ) -> list[list[Column]]:
     """Name the numbers of a result, from the one at `first`: position, rotation, what else there is.
 
     several: it is one of several, so that its names are those of its columns
+    same: its rotation is written in the notation it was read in
     """
     rotation, alone, prefix = pose.rotation, not request.results.prefix or several, request.results.prefix
     before, behind = (rotation.prefix, rotation.suffix) if rotation and alone else (prefix, "")
     turned = [before + name + behind for name in target.names]
-    if rotation and alone and _same(pose, target) and rotation.whole == target.whole:
+    if rotation and alone and same and rotation.whole == target.whole:
         turned = [prefix + name for name in rotation.names]
     moved = target.position_columns
     if pose.position and (target.plain or (moved and alone and target.place == shape.place)):
