@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 
 from frametool.errors import FrametoolError
-from frametool.frames.stamps import BILLION
+from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import arrays, floats, quaternion, uncertainty
 from frametool.geometry.batch_validation import read_rotations
 from frametool.geometry.representations import UPPER_ROWS, BatchRule
 from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
 from frametool.grammar.pose import FEW_DIGITS
 from frametool.stream.faults import DEGREES, NULL, Fault, RowNote
-from frametool.stream.request import PAIR, START, Request, no_step, thing_pose
+from frametool.stream.request import PAIR, START, Request, thing_pose
 from frametool.stream.row_layout import (
     FLAT,
     IDENTITY,
@@ -194,7 +194,7 @@ class Run:
         """Refuse rows whose covariance is invalid; sigmas cannot be negative."""
         for shape, first, _ in self.things:
             at = first + shape.own_size
-            for size in shape.covariance if not shape.multiple else ():
+            for size in () if self.operation.reads_scale(shape) else shape.covariance:
                 own = self.columns[at : at + size]
                 what = "sigma is negative: {:g}" if shape.sigma else "scale is {:g}; it must be positive"
                 for number, column in enumerate(own if shape.sigma or size == 1 else (), at):
@@ -324,7 +324,9 @@ class Run:
         before = np.concatenate([[at[0] - BILLION if known is None else known], at[:-1]])
         steps = at - before
         for index in np.flatnonzero(steps <= 0).tolist():
-            reason = no_step(int(before[index]), int(at[index]))
+            last, now = format_stamp(int(before[index])), format_stamp(int(at[index]))
+            what = "is that of the row before" if now == last else f"is before {last}, of the row before"
+            reason = f"stamp {now} {what}: there is no velocity"
             self._blame(int(good[index]), self.request.rows.extra_column or "", reason)
         seconds[good] = np.where(steps > 0, steps, BILLION) / BILLION
         self.lone = {int(good[0])} if known is None else set()

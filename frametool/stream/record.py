@@ -450,7 +450,7 @@ def _of_message(value: Any, place: RecordPlace, path: Path, reading: Reading, re
             return Record(path, Shape("", None), rotation=field)
     reading.degrees = request.rows.degrees
     within((field,), read_rotation, field, value[field], reading)
-    record = _with_rotation(value[field], field, Record(path, Shape(POSE, None)), (field,), reading, request)
+    record = _with_rotation(value[field], field, Record(path, Shape(POSE, None)), (field,), reading)
     return record._replace(shape=record.shape._replace(kind=kind))
 
 
@@ -461,7 +461,7 @@ def _bare_list(value: list[Any], path: Path, reading: Reading, request: Request)
     if type(value[0]) is list:
         if not request.operation.multiples:
             read_rotation("matrix", value, reading)  # for what is worth telling about it
-        return _with_rotation(value, "matrix", Record(path, Shape(POSE, None)), (), reading, request)
+        return _with_rotation(value, "matrix", Record(path, Shape(POSE, None)), (), reading)
     if len(value) != 3 or not request.operation.moves:
         raise _bare_numbers(value)
     return Record(path, Shape(_kind("", (), request)), *_three(value, path, 1.0))
@@ -510,7 +510,7 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
         row = ROTATION_KEYS.get(rotations[0])
         if not (request.operation.multiples and row and row.representation.whole):
             within((rotations[0],), read_rotation, rotations[0], value[rotations[0]], reading)
-        record = _with_rotation(value[rotations[0]], rotations[0], record, (rotations[0],), reading, request)
+        record = _with_rotation(value[rotations[0]], rotations[0], record, (rotations[0],), reading)
     if len(rotations) > 1 or len(positions) > 1:
         keys = (*rotations, *(positions if len(positions) > 1 else ()))
         read_pose({key: value[key] for key in value if key in keys}, reading)  # they have to say the same
@@ -562,7 +562,7 @@ def pose_of(record: Record, request: Request) -> Pose:
     shape, values = record.shape, record.values
     position = shape.position(values) if shape.whole or shape.unit is not None else None
     check = partial(checked_rotation, shape, normalize=request.rows.normalize)
-    if shape.multiple:
+    if request.operation.reads_scale(shape):
         from frametool.stream.extra_numbers import of_multiple
 
         whole = of_multiple(shape, values[: shape.own_size], lambda own: check(own)[0], floats)
@@ -744,7 +744,7 @@ def _three(
     return tuple((*below, axis) if axis in value else None for axis in XYZ), numbers
 
 
-def _with_rotation(value: Any, key: str, record: Record, below: Path, reading: Reading, request: Request) -> Record:
+def _with_rotation(value: Any, key: str, record: Record, below: Path, reading: Reading) -> Record:
     """Add the rotation's numbers."""
     notation, texts, places = shape_of(key, value)
     joined = notation.representation.whole
@@ -757,8 +757,7 @@ def _with_rotation(value: Any, key: str, record: Record, below: Path, reading: R
         above = (*record.path, *below)
         paths = tuple((*above, *each) if _is_there(value, each) else None for each in places[: len(texts)])
     # else the numbers say another unit than their key: the member is written anew
-    multiple = request.operation.multiples and joined is not None
-    shape = record.shape._replace(kind=POSE, notation=notation, degrees=degrees, whole=whole, multiple=multiple)
+    shape = record.shape._replace(kind=POSE, notation=notation, degrees=degrees, whole=whole)
     return record._replace(shape=shape, numbers=record.numbers + paths, values=(*record.values, *values), rotation=key)
 
 

@@ -53,8 +53,8 @@ class RecordRows:
         # few plain numbers, and no place on the Earth
         is_plain = template.regular and len({entry.record.path for entry in entries}) == len(entries) <= MOST_ENTRIES
         is_simple = is_plain and not any(
-            entry.record.shape.multiple or entry.record.shape.place or entry.record.placed or entry.target.place
-            or entry.target.scaled
+            self.request.operation.reads_scale(entry.record.shape) or entry.record.shape.place or entry.record.placed
+            or entry.target.place or entry.target.scaled
             for entry in entries
         )  # fmt: skip
         for at, entry in enumerate(entries if is_simple else ()):

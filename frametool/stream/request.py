@@ -148,7 +148,7 @@ class Operation(NamedTuple):
         if passes or shape.kind not in (POSE, POINT, VECTOR):
             return ()
         sizes = {*map(len, filter(None, (self.left, *self.right, self.fixed)))}
-        if SCALED in sizes or 1 in shape.covariance or shape.multiple:
+        if SCALED in sizes or 1 in shape.covariance or self.reads_scale(shape):
             return () if self.moves else (SCALE,)
         of_position = shape.kind == POSE and 9 in shape.covariance and not shape.rewritten  # it stays what it is
         if of_position or not (self.uncertain or shape.covariance or UNCERTAIN in sizes):
@@ -156,6 +156,10 @@ class Operation(NamedTuple):
         from frametool.grammar.covariance import columns
 
         return columns(36 if shape.kind == POSE else 9)
+
+    def reads_scale(self, shape: Shape) -> bool:
+        """Return True if the matrix of a shape may be a multiple of one of a rotation, whose scale counts."""
+        return self.multiples and shape.notation is not None and shape.notation.representation.whole is not None
 
     def result_kind(self, kind: str) -> str:
         """Return what a row of some kind becomes; "" for numbers alone."""
@@ -256,7 +260,7 @@ class Operation(NamedTuple):
             from frametool.stream.extra_numbers import in_full
 
             shape, extra = in_full(shape, own, extra)
-        if shape.multiple:
+        if self.reads_scale(shape):
             from frametool.stream.extra_numbers import of_multiple
 
             own = of_multiple(shape, own, rotation, xp)
@@ -269,22 +273,21 @@ class Operation(NamedTuple):
             parts = own if mover is None else rigid.apply(*mover, *own[:3]) if own else mover
             return self.formula.result(shape.kind, parts, extra, times_ns, xp)
         if shape.kind != POSE:
-            return self._with_place(shape, numbers, self.move(shape, own, extra, edge))
-        if shape.covariance:
-            from frametool.stream.extra_numbers import with_own
+            found = self.move(shape, own, extra, edge)
+        else:
+            if shape.covariance:
+                from frametool.stream.extra_numbers import with_own
 
-            own, extra = with_own(shape, own, extra, edge or self.left, mirrors=self.mirrors)
-        found = self.pose(compared(own), edge, xp)
-        if self.of == VELOCITIES:
-            last = EXACT + len(RELATIVE_EXTRAS)
-            found = (*_with_velocity(found[:last], seconds(), xp), *found[last:])
-        return self._with_place(shape, numbers, (*found, *extra))
-
-    def _with_place(self, shape: Shape, numbers: Components, found: Components) -> Components:
-        """Add to a result on the Earth that nothing moves the numbers that it was read as."""
+                own, extra = with_own(shape, own, extra, edge or self.left, mirrors=self.mirrors)
+            found = self.pose(compared(own), edge, xp)
+            if self.of == VELOCITIES:  # linear R_A' (p_B - p_A) / dt, angular the rotation vector of A^-1 B over dt
+                last, took = EXACT + len(RELATIVE_EXTRAS), seconds()
+                steps = (*found[:3], *quaternion.as_rotvec(found[3], found[4], found[5], found[6], xp))
+                found = (*found[:last], *(step / took for step in steps), *found[last:])
+            found = (*found, *extra)
         if shape.place is None or not self.keeps_frames:
             return found
-        from frametool.geometry.place import Spot, Unmoved
+        from frametool.geometry.place import Spot, Unmoved  # with what it was read as, where nothing moves it
 
         return Unmoved(found, Spot(shape.place, numbers[: shape.place.size]))
 
@@ -292,22 +295,21 @@ class Operation(NamedTuple):
         """Return the resulting pose, how far it goes if poses are compared, and its covariance or scale, if any."""
         result = poses[0]
         if self.inverse:
-            result = rigid.inverse(*result) if len(result) == EXACT else placed.inverse(result)
+            result = placed.inverse(result)
         if self.mirrors:
             result = rigid.mirrored(*result)
         left = edge or self.left
         if left is not None:
-            result = _product(left, result)
+            result = placed.compose(left, result)
         for right in self.right:
-            result = _product(result, right)
+            result = placed.compose(result, right)
         if self.moves and len(result) == SCALED:
             return result[:EXACT]  # a pose that is scaled is one
         if not self.of:
             return result
         others = poses[1:] if self.fixed is None else (self.fixed,)
         first, second = (*others, result) if self.of == "first" else (result, *others)
-        exact = len(first) == len(second) == EXACT
-        result = rigid.relative(*first, *second) if exact else placed.relative(first, second)
+        result = placed.relative(first, second)
         tx, ty, tz, x, y, z, w = result[:EXACT]
         metres, angle = rigid.extent(tx, ty, tz, x, y, z, w, xp)
         return (*result[:EXACT], metres, angle, angle * RADIAN, *result[EXACT:])
@@ -319,19 +321,6 @@ def _or_none(number: Number) -> Number | None:
 
 PLAIN = Shown({}, {})
 COMBINED = Operation(of="arguments")  # with each other, outside of here; they are only read
-
-
-def _with_velocity(parts: Components, seconds: Number, xp: Namespace) -> Components:
-    """Add the body twist that makes this step in so many seconds, seen in the first of the two frames.
-
-    Linear R_A' (p_B - p_A) / dt, angular the rotation vector of A^-1 B over dt: position and rotation on their own.
-    """
-    turned = quaternion.as_rotvec(parts[3], parts[4], parts[5], parts[6], xp)
-    return (*parts, *(part / seconds for part in (*parts[:3], *turned)))
-
-
-def _product(a: Components, b: Components) -> Components:
-    return rigid.compose(*a, *b) if len(a) == len(b) == EXACT else placed.compose(a, b)
 
 
 def thing_pose(shape: Shape, own: Components, rotation: Callable[[Components], Components]) -> Rigid:
@@ -469,10 +458,15 @@ class Request(NamedTuple):
             if asked.place is not None and kind != POINT:
                 raise ValueInvalid(f"a {kind} has no place on the Earth; leave --to {asked.place.name} out")
             return Target(self._unit(shape), (), three=True)
+        operation, by_row = self.operation, bool(self.rows.frames) or self.timed is not None  # which moves each its way
+        moves = (operation.left, *operation.right, operation.fixed)
+        shifts = by_row or operation.formula is not None or any(pose is not None and any(pose[:3]) for pose in moves)
         there = shape.whole or shape.unit is not None
-        placed = there or (self.shifts and kind == POSE)
+        placed = there or (shifts and kind == POSE)
         if asked.notations or shape.notation is None or shape.notation.representation is HEADING:
-            stays = shape.notation is None and self._only_turns_around and (asked.by_default or not asked.notations)
+            changed = operation.left or operation.right or operation.of or operation.formula
+            has_none = shape.notation is None and not by_row and bool(operation.turns or not changed)
+            stays = has_none and (asked.by_default or not asked.notations)
             notations = () if stays else asked.notations or (notation("quaternion"),)
             written = tuple((each, self.in_degrees(each)) for each in notations)
             whole = there and len(notations) == 1 and notations[0].representation.whole is not None
@@ -504,26 +498,6 @@ class Request(NamedTuple):
         in_place = 0 if shape.rewritten else sum(shape.covariance)
         return target.size + len(self.extras(shape)) + in_place
 
-    @property
-    def by_row(self) -> bool:
-        """Return True if each row has its own pose that moves it."""
-        return bool(self.rows.frames) or self.timed is not None
-
-    @property
-    def shifts(self) -> bool:
-        """Return True if things without a position may have one afterwards."""
-        operation = self.operation
-        fixed = (operation.left, *operation.right, operation.fixed)
-        by_row = self.by_row or operation.formula is not None
-        return by_row or any(pose is not None and any(pose[:3]) for pose in fixed)
-
-    @property
-    def _only_turns_around(self) -> bool:
-        """Return True if things without a rotation have none afterwards."""
-        operation = self.operation
-        changed = operation.left or operation.right or operation.of or operation.formula
-        return bool(operation.turns or not changed) and not self.by_row
-
     def for_kind(self, kind: str) -> Request:
         """Return what is asked of rows of one kind: how an expression names its result depends on it."""
         formula = self.operation.formula
@@ -538,11 +512,3 @@ class Request(NamedTuple):
     def in_degrees(self, notation: Notation) -> bool:
         """Return True if a notation's angles are degrees: its own word wins."""
         return self.rows.degrees if notation.degrees is None else notation.degrees
-
-
-def no_step(before: int, stamp_ns: int) -> str:
-    """Return the reason why there is no velocity between two stamps."""
-    from frametool.frames.stamps import format_stamp
-
-    what = "is that of the row before" if stamp_ns == before else f"is before {format_stamp(before)}, of the row before"
-    return f"stamp {format_stamp(stamp_ns)} {what}: there is no velocity"

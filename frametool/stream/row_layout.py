@@ -63,7 +63,6 @@ class Shape(NamedTuple):
     inverse: what is written is the inverse
     covariance: how many numbers each of the covariances has that come last; one is a scale
     rewritten: the first of them has no place of its own in the result, which names its entries anew
-    multiple: the matrix may be one of a rotation, whose scale counts
     sigma: of six independent axes, the place of each one's number among these, -1 for 0, and its unit
     radians_at: which of the rotation's numbers are radians where the others are degrees
     absent: which numbers have no column and count as 0
@@ -78,7 +77,6 @@ class Shape(NamedTuple):
     inverse: bool = False
     covariance: tuple[int, ...] = ()
     rewritten: bool = False
-    multiple: bool = False
     sigma: tuple[tuple[int, str], ...] = ()
     radians_at: tuple[int, ...] = ()
     absent: tuple[int, ...] = ()
