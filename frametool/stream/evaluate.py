@@ -230,18 +230,22 @@ class Run:
                 self.notes += zone_notes(place, [*self.results[self.rows].T], lambda at: line_of(int(self.rows[at])))
 
     def _mover(self, at: int) -> Rigid | None:
-        """Return the pose that moves one of the points or poses of the rows: of its frame, at its time, or none.
-
-        A row whose frame has none, or none at its time, is bad.
-        """
-        plan, timed, formula, count = self.plan, self.request.timed, self.operation.formula, self.count
+        """Return the pose that moves one of the points or poses of the rows: of its frame, at its time, or none."""
+        plan, formula, count, stamps = self.plan, self.operation.formula, self.count, self.block.stamps
         if not count or (formula is not None and not self.operation.shown):
             return None
-        frames, stamps = self.block.frames[at], self.block.stamps
-        times = stamps[at] if timed is not None and len(stamps) > at else None
+        frames = self.block.frames[at]
+        times = stamps[at] if self.request.timed is not None and len(stamps) > at else None
         if times is None and (plan.edge_of is None or len(frames) != count):
             return plan.edge_of and plan.edge_of(frames[0])
-        known, codes = numbered(frames)
+        return self._movers(frames, times)
+
+    def _movers(self, frames: Sequence[str | None], times: Ints | None) -> Rigid:
+        """Return the pose of each row by its frame's name, or at its stamp; a row that has none is bad.
+
+        frames: one a row; where there are times it may be one for all
+        """
+        plan, timed, count, (known, codes) = self.plan, self.request.timed, self.count, numbered(frames)
         if timed is None or times is None:
             edges = []
             for name, code in known.items():
@@ -254,7 +258,7 @@ class Run:
             columns = zip_longest(*edges, fillvalue=0.0)
             return tuple(np.array(each)[codes] for each in columns)  # type: ignore[return-value]
         good, poses = np.delete(np.arange(count), [*self.reasons]), np.full((timed.width, count), np.nan)
-        for frame, code in known.items():  # one a row, or one for all
+        for frame, code in known.items():
             some = good if len(known) == 1 else good[codes[good] == code]
             try:
                 poses[:, some] = timed.many(frame, times[some])
@@ -286,7 +290,7 @@ class Run:
                 mover = self._mover(at)
             parts = operation.result(
                 shape, numbers, mover, arrays, rotation=partial(self._rotation, shape, first),
-                compared=self._with_before, seconds=self._seconds,
+                compared=self._with_before if operation.looks_back else lambda pose: [pose], seconds=self._seconds,
                 times_ns=self.block.stamps[at] if needs_time else None,
             )  # fmt: skip
             if operation.formula is not None:  # what an expression makes of no row is that of each
@@ -300,8 +304,6 @@ class Run:
 
     def _with_before(self, pose: Rigid) -> list[Any]:
         """Return the good row before each row, or the first of all, and the row; the very first row's is itself."""
-        if not self.operation.looks_back:
-            return [pose]
         good, state = self._good(), self.state
         if not len(good):
             return [pose, pose]

@@ -274,6 +274,13 @@ def find_poses(names: Sequence[str], expected: Notation | None, count: int, sour
         if reason:
             raise FormatError(reason, source=source, line=1)
         return [_joined(header, positions, rotations)]
+    return _several(positions, rotations, count, names, source)
+
+
+def _several(
+    positions: Sequence[Columns], rotations: Sequence[Columns], count: int, names: Sequence[str], source: str
+) -> list[PoseColumns]:
+    """Put each rotation with the position that shares most of its affixes; raises FormatError for another count."""
     poses, left = list[PoseColumns](), list(positions)
     for rotation in rotations:  # each with the position that shares most of its affixes
         near = max(
@@ -319,6 +326,11 @@ def _joined(header: Header, positions: Sequence[Columns], rotations: Sequence[Co
     for each in positions:
         if not {*rotation.places}.intersection(each.places):
             return PoseColumns(each, rotation)
+    return PoseColumns(_half_position(header, rotation), rotation)
+
+
+def _half_position(header: Header, rotation: Columns) -> Columns | None:
+    """Return x, y with a turn about z, a pose in the plane; other parts of a position are wrong if they are used."""
     affixes = ((rotation.prefix, rotation.suffix), ("", ""))
     for base in POSITIONS:
         for match in header.match(base, partly=True):
@@ -326,11 +338,11 @@ def _joined(header: Header, positions: Sequence[Columns], rotations: Sequence[Co
                 continue
             at = match.spots.index(None)
             columns = _position(match)._replace(absent=(at,))
-            if not rotation.absent or base[at] != base[-1]:  # no x, y with a turn about z: wrong if they are used
+            if not rotation.absent or base[at] != base[-1]:
                 missing = f"half a position: {columns.shown} without {match.prefix}{base[at]}{match.suffix}"
                 columns = columns._replace(wrong=f"{missing}; add what is missing, or choose with --columns")
-            return PoseColumns(columns, rotation)
-    return PoseColumns(None, rotation)
+            return columns
+    return None
 
 
 def listed(names: Sequence[str]) -> str:

@@ -248,7 +248,11 @@ def written(groups: Sequence[tuple[Ints, list[Spans]]]) -> bytes:
     """Put the rows of all groups in the order of their places."""
     if len(groups) < 2:
         return join(groups[0][1]) if groups else b""
-    places = np.concatenate([each for each, _ in groups])
+    return _in_order(groups)
+
+
+def _in_order(groups: Sequence[tuple[Ints, list[Spans]]]) -> bytes:
+    """Join the spans of each row, and then the rows in the order of their places."""
     rows = []
     for _, spans in groups:
         if len(spans) == 1 and spans[0].starts.ndim == 1:
@@ -257,6 +261,7 @@ def written(groups: Sequence[tuple[Ints, list[Spans]]]) -> bytes:
         lengths = sum((part.ends - part.starts).reshape(len(part.starts), -1).sum(axis=1) for part in spans)
         ends = np.cumsum(lengths) + MARGIN
         rows.append(Spans(framed(join(spans)), ends - lengths, ends))
+    places = np.concatenate([each for each, _ in groups])
     offsets = np.cumsum([0, *(len(each.data) for each in rows)])[:-1].tolist()
     order = np.argsort(places, kind="stable")
     starts = np.concatenate([each.starts + offset for each, offset in zip(rows, offsets, strict=True)])

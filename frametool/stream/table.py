@@ -203,9 +203,13 @@ class Naming:
 
         column: returns the texts of a column
         """
-        if self.places == (None, None) or not size:
-            texts = [column(place).each() for place in self.layout.frames] if size else []
-            return [*map("\0".join, zip(*texts, strict=True))] or [self.earth], BlockNames(), {}
+        if self.places != (None, None) and size:
+            return self._renamed(size, column)
+        texts = [column(place).each() for place in self.layout.frames] if size else []
+        return [*map("\0".join, zip(*texts, strict=True))] or [self.earth], BlockNames(), {}
+
+    def _renamed(self, size: int, column: Callable[[int], Coded]) -> tuple[Sequence[str | None], BlockNames, Bad]:
+        """Return it of rows that name frames."""
         none = Coded([""], np.zeros(size, np.int64))
         parents, names = (none if place is None else column(place) for place in self.places)
         count = len(names.texts)
@@ -457,21 +461,11 @@ class TableRows(PlannedRows):
 
     def of_text(self, text: bytes) -> tuple[Run, Outcome, Cells]:
         """Return what becomes of a block, and its outcome; behind a quote that is not closed nothing is read."""
-        table, layout, offset_ns = self.table, self.layout, self.request.offset_ns
+        table, layout = self.table, self.layout
         torn = torn_record(text, table.delimiter) if table.delimiter else None
         cells = table.split(text[:torn])
-        if offset_ns and layout.time is not None:  # what is no stamp stays and is reported when it is read
-            places = [place for place in (layout.time, layout.below) if place is not None]
-            columns = [without_quotes(cells.column(place)) for place in places]
-            in_ns = in_nanoseconds(table.name(layout.time))
-            stamps, reasons = read_stamps(columns, in_ns=in_ns)
-            edits = []
-            for row in sorted({*range(len(stamps))} - {*reasons}):
-                stamp = int(stamps[row]) + offset_ns
-                for column, part in zip(columns, divmod(stamp, BILLION), strict=False):
-                    new = str(part) if len(columns) > 1 else stamp_text(column.text(row).decode(), stamp, in_ns=in_ns)
-                    edits.append((int(column.starts[row]) - MARGIN, int(column.ends[row]) - MARGIN, new.encode()))
-            cells = table.split(replaced(text[:torn], edits))
+        if self.request.offset_ns and layout.time is not None:
+            cells = table.split(self._at_other_times(text[:torn], cells, self.request.offset_ns))
         block = table_block(table, layout, cells, self.naming, self.request)
         run = self.ran(block)
         faults = run.faults()
@@ -479,6 +473,20 @@ class TableRows(PlannedRows):
             faults.append(Fault(text.count(b"\n", 0, torn), "", UNCLOSED, final=True))
         rows = len(block.places) + len(block.broken)
         return run, Outcome(b"", faults, rows, text.count(b"\n"), len(run.mended), run.notes, len(text)), cells
+
+    def _at_other_times(self, text: bytes, cells: Cells, offset_ns: int) -> bytes:
+        """Return rows with so much added to their stamps; what is no stamp stays and is reported when it is read."""
+        places = [place for place in (self.layout.time, self.layout.below) if place is not None]
+        columns = [without_quotes(cells.column(place)) for place in places]
+        in_ns = in_nanoseconds(self.table.name(places[0]))
+        stamps, reasons = read_stamps(columns, in_ns=in_ns)
+        edits = []
+        for row in sorted({*range(len(stamps))} - {*reasons}):
+            stamp = int(stamps[row]) + offset_ns
+            for column, part in zip(columns, divmod(stamp, BILLION), strict=False):
+                new = str(part) if len(columns) > 1 else stamp_text(column.text(row).decode(), stamp, in_ns=in_ns)
+                edits.append((int(column.starts[row]) - MARGIN, int(column.ends[row]) - MARGIN, new.encode()))
+        return replaced(text, edits)
 
     def blocks(self) -> Iterator[tuple[RowPoses, Outcome]]:
         """Yield the poses of all blocks."""

@@ -110,10 +110,7 @@ def plan_table(
 
 
 def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
-    """Find the columns of the poses, by --columns, by name, or by their number where there are no names.
-
-    A table without names is a point, a whole pose, or what --from says, behind a stamp or not.
-    """
+    """Find the columns of the poses, by --columns, by name, or by their number where there are no names."""
     asked, width = request.rows, table.width
     if not asked.poses:
         return []
@@ -126,22 +123,31 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
         names = ["" if name == asked.extra_column or may_be_uncertain(name) else name for name in table.names]
         return _find_named(names, request, source)
     if not specs:
-        begin = int(width in (len(XYZ), *(each.counts[-1] for each in wholes_of(None))))
-        if (given := asked.given) is not None:
-            begin = 1 if width in given.counts else 2 * (width - 1 in given.counts[1:])
-        if asked.kind in SIX and width == len(six_names(asked.kind)):
-            begin = 1
-        elif asked.poses > 1 or not (begin or asked.given_place):
-            reason = f"{width} columns without names do not say what they are; give --from REP, or --columns"
-            if asked.poses == 1 and asked.given:
-                reason = f"{asked.given.counted}; found {width} columns without names; or give --columns"
-            raise FormatError(reason, source=source, line=1)
-        specs, kinds = ("" if asked.given_place else f"{begin}-{width}",), (asked.kind,)
+        specs, kinds = (_by_width(width, request, source),), (asked.kind,)
     if asked.given_place:
         from frametool.stream.earth_columns import chosen_pose
 
         return [chosen_pose(spec, table.names, width, request) for spec in specs]
     return [named_pose(spec, table.names, width, request, kind) for spec, kind in zip(specs, kinds, strict=True)]
+
+
+def _by_width(width: int, request: Request, source: str) -> str:
+    """Choose all columns of a table without names: a point, a whole pose, or what --from says, behind a stamp or not.
+
+    "" for those of a place.
+    """
+    asked, given = request.rows, request.rows.given
+    begin = int(width in (len(XYZ), *(each.counts[-1] for each in wholes_of(None))))
+    if given is not None:
+        begin = 1 if width in given.counts else 2 * (width - 1 in given.counts[1:])
+    if asked.kind in SIX and width == len(six_names(asked.kind)):
+        begin = 1
+    elif asked.poses > 1 or not (begin or asked.given_place):
+        reason = f"{width} columns without names do not say what they are; give --from REP, or --columns"
+        if asked.poses == 1 and given:
+            reason = f"{given.counted}; found {width} columns without names; or give --columns"
+        raise FormatError(reason, source=source, line=1)
+    return "" if asked.given_place else f"{begin}-{width}"
 
 
 def _find_named(names: Sequence[str], request: Request, source: str) -> list[PoseColumns]:
