@@ -136,16 +136,16 @@ def _by_width(width: int, request: Request, source: str) -> str:
 
     "" for those of a place.
     """
-    asked, given = request.rows, request.rows.given
+    asked, said = request.rows, request.rows.given
     begin = int(width in (len(XYZ), *(each.counts[-1] for each in wholes_of(None))))
-    if given is not None:
-        begin = 1 if width in given.counts else 2 * (width - 1 in given.counts[1:])
+    if said is not None:
+        begin = 1 if width in said.counts else 2 * (width - 1 in said.counts[1:])
     if asked.kind in SIX and width == len(six_names(asked.kind)):
         begin = 1
     elif asked.poses > 1 or not (begin or asked.given_place):
         reason = f"{width} columns without names do not say what they are; give --from REP, or --columns"
-        if asked.poses == 1 and given:
-            reason = f"{given.counted}; found {width} columns without names; or give --columns"
+        if asked.poses == 1 and said:
+            reason = f"{said.counted}; found {width} columns without names; or give --columns"
         raise FormatError(reason, source=source, line=1)
     return "" if asked.given_place else f"{begin}-{width}"
 
