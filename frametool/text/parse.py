@@ -18,7 +18,7 @@ import numpy as np
 from frametool.frames.stamps import BILLION
 from frametool.text import write
 from frametool.text.numbers import half_unit
-from frametool.text.spans import Bytes, Flags, Floats, Ints, Spans, Words, windows
+from frametool.text.spans import Bytes, Flags, Floats, Ints, Spans, windows
 from frametool.text.write import TENS, ZEROS, halves, not_digits, product_error, read_eight_digits, shortest_decimals
 
 _NUMBER = re.compile(rb"[ \t]*[+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]+)?[ \t]*")
@@ -77,15 +77,11 @@ def parse_floats(cells: Spans) -> tuple[Floats, Ints]:
         with np.errstate(over="ignore", invalid="ignore"):
             values[rest], sure = _parse_decorated(cells.data, starts[rest], ends[rest])
         rest = rest[~sure]
-    single = [_parse_single(cells.data[starts[place] : ends[place]].tobytes()) for place in rest.tolist()]
+    texts = [cells.data[starts[place] : ends[place]].tobytes() for place in rest.tolist()]
+    single = np.array([float(text) if _NUMBER.fullmatch(text) else math.nan for text in texts])  # by Python's reader
+    single[np.isinf(single)] = math.nan
     values[rest] = single
     return values.reshape(cells.starts.shape), rest[np.isnan(single)]
-
-
-def _parse_single(text: bytes) -> float:
-    """Read one cell with Python's own reader; nan if it is not a plain finite number."""
-    value = float(text) if _NUMBER.fullmatch(text) else math.nan
-    return value if math.isfinite(value) else math.nan
 
 
 def _parse_plain(data: Bytes, starts: Ints, ends: Ints) -> tuple[Floats, Flags]:
@@ -164,7 +160,12 @@ def _read_mantissa(data: Bytes, starts: Ints, ends: Ints) -> tuple[_Mantissa, Fl
     after = length - before - 1
     most = int(after.max(initial=0))
     words = min(max(-(-most // 8), 1), _MOST_WORDS)
-    fraction = _fraction_digits(data, ends - after, after, words)
+    texts = windows(data, 8 * words)[ends - after].view("<u8").reshape(-1, words)
+    fraction = []  # words of digit values; those beyond the cell's end are 0
+    for word in range(words):
+        kept = LOWEST.take(after - 8 * word, mode="clip")
+        kept &= texts[:, word] ^ ZEROS
+        fraction.append(kept)
     wrong = not_digits(characters)
     for word in fraction:
         wrong |= not_digits(word)
@@ -172,26 +173,10 @@ def _read_mantissa(data: Bytes, starts: Ints, ends: Ints) -> tuple[_Mantissa, Fl
     if most > 8 * words:
         sure &= after <= 8 * words
     whole = read_eight_digits(characters) * np.uint64(10**8) + read_eight_digits(fraction[0])
-    return _Mantissa(whole.view(np.int64), _tail(fraction[1:]), words), sure
-
-
-def _fraction_digits(data: Bytes, starts: Ints, length: Ints, words: int) -> list[Words]:
-    """Return this many words of digit values; those beyond the cell's end are 0."""
-    characters = windows(data, 8 * words)[starts].view("<u8").reshape(-1, words)
-    digits = []
-    for word in range(words):
-        kept = LOWEST.take(length - 8 * word, mode="clip")
-        kept &= characters[:, word] ^ ZEROS
-        digits.append(kept)
-    return digits
-
-
-def _tail(words: list[Words]) -> Ints:
-    """Return the integer in the words after the first fraction word, below 10**16."""
-    total = np.zeros(1, np.uint64)
-    for word in words:
-        total = total * np.uint64(10**8) + read_eight_digits(word)
-    return total.view(np.int64)
+    tail = np.zeros(1, np.uint64)
+    for word_of_tail in fraction[1:]:
+        tail = tail * np.uint64(10**8) + read_eight_digits(word_of_tail)
+    return _Mantissa(whole.view(np.int64), tail.view(np.int64), words), sure
 
 
 def _scale(mantissa: _Mantissa, power: Floats, rest: Floats, sure: Flags) -> Floats:
@@ -247,17 +232,12 @@ def nanoseconds_of(seconds: Floats) -> tuple[Ints, Flags]:
     scale = np.abs(NINE - places)
     stamps = digits * TENS.take(scale, mode="clip")
     finer = np.flatnonzero(places > NINE)
-    stamps[finer] = _divided(digits[finer], scale[finer])
+    divisor, most = TENS.take(scale[finer], mode="clip"), scale[finer] < len(TENS)
+    divided = digits[finer] // divisor
+    twice = 2 * (digits[finer] - divided * divisor)
+    divided += (twice > divisor) | ((twice == divisor) & (divided % 2 == 1))
+    stamps[finer] = np.where(most, divided, 0)
     for row in unsure[size[unsure] != 0.0].tolist():
         stamps[row] = round(Decimal(repr(float(size[row]))) * BILLION)
     stamps[size == 0.0] = 0
     return np.where(seconds < 0.0, -stamps, stamps), none
-
-
-def _divided(digits: Ints, places: Ints) -> Ints:
-    """Divide by powers of ten and round, halves to even."""
-    divisor = TENS.take(places, mode="clip")
-    whole = digits // divisor
-    twice = 2 * (digits - whole * divisor)
-    whole += (twice > divisor) | ((twice == divisor) & (whole % 2 == 1))
-    return np.where(places < len(TENS), whole, 0)

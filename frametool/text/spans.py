@@ -51,47 +51,32 @@ def join(columns: Sequence[Spans]) -> bytes:
     Every span is copied as a window of one width, in order, so that each one overwrites what its predecessor wrote
     beyond its end; the few spans longer than MARGIN are then copied one by one.
     """
-    parts = [_as_columns(part) for part in columns]
-    lengths = np.concatenate([part.ends - part.starts for part in parts], axis=1)
+    parts = []
+    for data, starts, stops in columns:
+        shape = (len(starts), -1) if starts.size else (0, 1)
+        parts.append((data, starts.reshape(shape), stops.reshape(shape)))
+    lengths = np.concatenate([end - begin for _, begin, end in parts], axis=1)
     ends = np.cumsum(lengths).reshape(lengths.shape)
     total = int(ends[-1, -1]) if ends.size else 0
     out = np.empty(total + MARGIN, np.uint8)
     places = ends - lengths
     longest = int(lengths.max(initial=1))
     width = min(-(-longest // 8) * 8, MARGIN)
-    _copy_windows(out, places, parts, width)
-    if longest > width:
-        _copy_long(out, places, parts, width)
-    return out[:total].tobytes()
-
-
-def _as_columns(part: Spans) -> Spans:
-    shape = (len(part.starts), -1) if part.starts.size else (0, 1)
-    return Spans(part.data, part.starts.reshape(shape), part.ends.reshape(shape))
-
-
-def _copy_windows(out: Bytes, places: Ints, parts: Sequence[Spans], width: int) -> None:
     target = windows(out, width)
     rows = max(1, _BATCH_BYTES // (width * places.shape[1]))
     for first in range(0, len(places), rows):
         some = slice(first, first + rows)
-        target[places[some].ravel()] = _gather(parts, some, width).ravel()
-
-
-def _gather(parts: Sequence[Spans], some: slice, width: int) -> np.ndarray:
-    """Return a batch of rows of windows, one for each span."""
-    gathered = [windows(part.data, width)[part.starts[some]] for part in parts]
-    return gathered[0] if len(parts) == 1 else np.concatenate(gathered, axis=1)
-
-
-def _copy_long(out: Bytes, places: Ints, parts: Sequence[Spans], width: int) -> None:
-    first = 0
-    for part in parts:
-        for row, column in np.argwhere(part.ends - part.starts > width).tolist():
-            text = part.data[part.starts[row, column] : part.ends[row, column]]
-            place = int(places[row, first + column])
+        gathered = [windows(data, width)[begin[some]] for data, begin, _ in parts]
+        batch = gathered[0] if len(parts) == 1 else np.concatenate(gathered, axis=1)
+        target[places[some].ravel()] = batch.ravel()
+    column = 0
+    for data, begin, end in parts if longest > width else ():
+        for row, at in np.argwhere(end - begin > width).tolist():
+            text = data[begin[row, at] : end[row, at]]
+            place = int(places[row, column + at])
             out[place : place + len(text)] = text
-        first += part.starts.shape[1]
+        column += begin.shape[1]
+    return out[:total].tobytes()
 
 
 # make the C library keep freed memory instead of returning it to the system after every block: freeing one large

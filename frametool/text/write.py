@@ -185,22 +185,19 @@ def shortest_decimals(size: Floats) -> Decimals:
     if _are_short(size[:_PROBE]) and _are_short(size):
         digits = np.rint(size * 10.0**_SHORT_DECIMALS).astype(np.int64)
         return Decimals(digits, np.full(len(size), _SHORT_DECIMALS), np.empty(0, np.int64))
-    return _scaled_decimals(size)
-
-
-def _are_short(size: Floats) -> bool:
-    """Return True if all numbers have at most six decimals and fifteen digits."""
-    power = 10.0**_SHORT_DECIMALS
-    digits = np.rint(size * power)
-    return bool(((digits / power == size) & (digits < _GREATEST_SHORT)).all())
-
-
-def _scaled_decimals(size: Floats) -> Decimals:
     bits = size.view(np.int64)
     exponents = bits >> 52
     powers, rests, half_ulps, all_places = _tables()
     half_ulp = half_ulps.take(exponents)
-    number, fraction = _times_power(size, powers.take(exponents), rests.take(exponents))
+    # times a power of ten, the sum of two floats: an integer and a fraction from 0 to 1
+    power = powers.take(exponents)
+    product = size * power
+    fraction = product_error(halves(size), halves(power), product)
+    fraction += size * rests.take(exponents)
+    whole = np.floor(fraction)
+    fraction -= whole
+    number = product.astype(np.int64)
+    number += whole.astype(np.int64)
     tens = number // 10
     above_ten = (number - tens * 10) + fraction
     below_ten = 10.0 - above_ten
@@ -218,34 +215,27 @@ def _scaled_decimals(size: Floats) -> Decimals:
     return Decimals(nearest, all_places.take(exponents), np.flatnonzero(~sure))
 
 
-def _times_power(size: Floats, power: Floats, rest: Floats) -> tuple[Ints, Floats]:
-    """Multiply by the sum of two floats; return the product as an integer and a fraction from 0 to 1."""
-    product = size * power
-    error = product_error(halves(size), halves(power), product)
-    error += size * rest
-    whole = np.floor(error)
-    error -= whole
-    product_as_integer = product.astype(np.int64)
-    product_as_integer += whole.astype(np.int64)
-    return product_as_integer, error
+def _are_short(size: Floats) -> bool:
+    """Return True if all numbers have at most six decimals and fifteen digits."""
+    power = 10.0**_SHORT_DECIMALS
+    digits = np.rint(size * power)
+    return bool(((digits / power == size) & (digits < _GREATEST_SHORT)).all())
 
 
 @cache
 def _tables() -> tuple[Floats, Floats, Floats, Ints]:
     """Return tables by binary exponent: scaling power of ten, its error, half an ulp scaled, decimal places."""
-    rows = [_table_row(exponent) for exponent in range(2048)]
-    powers, rests, half_ulps, places = zip(*rows, strict=True)
-    return np.array(powers), np.array(rests), np.array(half_ulps), np.array(places, np.int64)
-
-
-def _table_row(exponent: int) -> tuple[float, float, float, int]:
-    binary = exponent - 1075
-    if not _SMALLEST < 2.0 ** min(max(binary + 52, -1000), 1000) < _LARGEST:
-        return 0.0, 0.0, float("nan"), 0
-    # floor(binary * log10(2)), exact in this range
-    places = -((binary * 315653) >> 20)
-    power, rest = power_of_ten(places)
-    return power, rest, 2.0 ** (binary - 1) * power, places
+    rows = []
+    for binary in range(-1075, 2048 - 1075):
+        if not _SMALLEST < 2.0 ** min(max(binary + 52, -1000), 1000) < _LARGEST:
+            rows.append((0.0, 0.0, float("nan"), 0))
+            continue
+        # floor(binary * log10(2)), exact in this range
+        places = -((binary * 315653) >> 20)
+        power, rest = power_of_ten(places)
+        rows.append((power, rest, 2.0 ** (binary - 1) * power, places))
+    powers, rests, half_ulps, decimals = zip(*rows, strict=True)
+    return np.array(powers), np.array(rests), np.array(half_ulps), np.array(decimals, np.int64)
 
 
 WIDTH = 40
@@ -289,7 +279,10 @@ class Fields:
         rest = fraction
         for left in range(digits, 0, -8):
             leading = rest if left <= 8 else rest // 10 ** (left - 8)
-            words.append(_left_digits(leading, min(left, 8)))
+            if left == 1:
+                words.append(leading.view(np.uint64) + ZEROS)
+            else:
+                words.append(eight_digits(leading * 10 ** (8 - left) if left < 8 else leading))
             self.words[:, 1 + len(words)] = words[-1]
             if left > 8:
                 rest = rest - leading * 10 ** (left - 8)
@@ -303,13 +296,6 @@ class Fields:
     def whole_starts(self, whole: Ints) -> Ints:
         """Return the offsets of the first digits of the whole parts in `data`."""
         return self.origins + POINT - count_digits(whole)
-
-
-def _left_digits(numbers: Ints, digits: int) -> Words:
-    """Return the characters of integers of this many digits, padded with 0 to eight."""
-    if digits == 1:
-        return numbers.view(np.uint64) + ZEROS
-    return eight_digits(numbers * 10 ** (8 - digits) if digits < 8 else numbers)
 
 
 def written(values: Floats, separators: bytes, write: Callable[[Floats], Spans]) -> Spans:
@@ -342,35 +328,56 @@ _MOST_DIGITS = 17
 _MOST_EXPONENT = 330
 
 
-class _Parts(NamedTuple):
-    """A number's whole part, its fraction as 17 digits, and the zeros before these."""
-
-    whole: Ints
-    fraction: Ints
-    zeros: Ints
-
-
 def shortest_spans(values: Floats, separators: bytes) -> Spans:
     """Write rows of floats as spans (n, c), each with its separator.
 
     values: (n, c); separators: c bytes, the one that follows each column.
     Nan and infinity become `nan` and `inf`, as in `repr`.
     """
-    return written(values, separators, _all_spans)
+    return written(values, separators, _shortest)
 
 
-def _all_spans(flat: Floats) -> Spans:
+def _shortest(flat: Floats) -> Spans:
+    """Write floats (n,), digit by digit for all at once; those that are not certain by Python."""
     size = np.abs(flat)
     decimals = shortest_decimals(size)
     powered, single = _unusual(size, decimals.unsure)
-    parts = _plain_parts(size, decimals)
-    exponents = _power_parts(parts, decimals, powered)
-    for part in parts:
-        part[single] = 0
+
+    # the whole part, the fraction as 17 digits, and the zeros before these; the whole part is never rounded up: an
+    # integer in reach would be the float itself
+    digits, places = decimals.digits, decimals.places
+    whole = size.astype(np.int64)
+    fraction = digits - whole * TENS.take(places, mode="clip")
+    fraction *= TENS.take(_MOST_DIGITS - places, mode="clip")
+    zeros = np.maximum(places - _MOST_DIGITS, 0)
+    # with an exponent there is one digit before the point
+    digits, places = digits[powered], places[powered]
+    behind = count_digits(digits) - 1
+    scale = TENS.take(behind)
+    whole[powered] = first = digits // scale
+    fraction[powered] = (digits - first * scale) * TENS.take(_MOST_DIGITS - behind)
+    zeros[powered] = 0
+    whole[single] = fraction[single] = zeros[single] = 0
+
     fields = Fields(len(flat))
-    starts, ends = _write(fields, parts)
+    fields.write_whole(whole)
+    shown = significant_digits(fields.write_fraction(fraction, _MOST_DIGITS))
+    starts = fields.whole_starts(whole)
+    ends = fields.origins + (POINT + 1) + np.maximum(shown, 1)
+    small = np.flatnonzero(zeros)
+    fields.words[small, 1] = _small_prefixes().take(zeros[small])
+    starts[small] -= zeros[small]
     starts = fields.write_sign(starts, np.signbit(flat))
-    _write_exponents(fields, ends, powered, exponents)
+
+    # exponents overwrite the point and the 0 after it if nothing else follows
+    rows, lengths = _exponent_texts()
+    begins, exponents = ends[powered], behind - places + _MOST_EXPONENT
+    is_whole = (begins == fields.origins[powered] + POINT + 2) & (fields.data[begins - 1] == ord("0"))
+    begins -= 2 * is_whole
+    texts = rows[exponents]
+    for offset in range(texts.shape[1]):
+        fields.data[begins + offset] = texts[:, offset]
+    ends[powered] = begins + lengths[exponents]
     return replaced(Spans(fields.data, starts, ends), single, [repr(value) for value in flat[single].tolist()])
 
 
@@ -385,51 +392,6 @@ def _unusual(size: Floats, unsure: Ints) -> tuple[Ints, Ints]:
     powered[single] = False
     by_python[single] = True
     return np.flatnonzero(powered), np.flatnonzero(by_python)
-
-
-def _plain_parts(size: Floats, decimals: Decimals) -> _Parts:
-    """Split numbers at the point. A whole part is never rounded up: an integer in reach would be the float itself."""
-    whole = size.astype(np.int64)
-    digits, places = decimals.digits, decimals.places
-    fraction = digits - whole * TENS.take(places, mode="clip")
-    fraction *= TENS.take(_MOST_DIGITS - places, mode="clip")
-    return _Parts(whole, fraction, np.maximum(places - _MOST_DIGITS, 0))
-
-
-def _power_parts(parts: _Parts, decimals: Decimals, powered: Ints) -> Ints:
-    """Convert numbers with an exponent to one digit before the point; return their exponents."""
-    digits, places = decimals.digits[powered], decimals.places[powered]
-    behind = count_digits(digits) - 1
-    scale = TENS.take(behind)
-    whole = digits // scale
-    parts.whole[powered] = whole
-    parts.fraction[powered] = (digits - whole * scale) * TENS.take(_MOST_DIGITS - behind)
-    parts.zeros[powered] = 0
-    return behind - places
-
-
-def _write(fields: Fields, parts: _Parts) -> tuple[Ints, Ints]:
-    """Write all parts; return the start of each number, without its sign, and its end."""
-    fields.write_whole(parts.whole)
-    shown = significant_digits(fields.write_fraction(parts.fraction, _MOST_DIGITS))
-    starts = fields.whole_starts(parts.whole)
-    ends = fields.origins + (POINT + 1) + np.maximum(shown, 1)
-    small = np.flatnonzero(parts.zeros)
-    fields.words[small, 1] = _small_prefixes().take(parts.zeros[small])
-    starts[small] -= parts.zeros[small]
-    return starts, ends
-
-
-def _write_exponents(fields: Fields, ends: Ints, powered: Ints, exponents: Ints) -> None:
-    """Append the exponents to their numbers; they overwrite the point and the 0 after it if nothing else follows."""
-    rows, lengths = _exponent_texts()
-    begins = ends[powered]
-    is_whole = (begins == fields.origins[powered] + POINT + 2) & (fields.data[begins - 1] == ord("0"))
-    begins -= 2 * is_whole
-    texts = rows[exponents + _MOST_EXPONENT]
-    for offset in range(texts.shape[1]):
-        fields.data[begins + offset] = texts[:, offset]
-    ends[powered] = begins + lengths[exponents + _MOST_EXPONENT]
 
 
 @cache
@@ -491,26 +453,25 @@ def fixed_spans(values: Floats, precision: int, separators: bytes) -> Spans:
     values: (n, c); separators: c bytes, the one that follows each column.
     Nan and infinity become `nan` and `inf`, as in `%`.
     """
-    return written(values, separators, lambda flat: _fixed_spans(flat, precision))
+    return written(values, separators, lambda flat: _fixed(flat, precision))
 
 
-def _fixed_spans(flat: Floats, precision: int) -> Spans:
-    limit = min(_GREATEST_SCALED, GREATEST_WHOLE * 10.0 ** min(precision, _MOST_DECIMALS))
-    size = np.abs(flat)
-    slow = _slow_places(size, precision, limit)
-    if slow.size:
-        size[slow] = 0.0
+def _fixed(flat: Floats, precision: int) -> Spans:
+    """Write floats (n,); large ones, and those with more decimals than can be exact, by Python."""
     decimals = min(precision, _MOST_DECIMALS)
+    limit = min(_GREATEST_SCALED, GREATEST_WHOLE * 10.0**decimals)
+    size = np.abs(flat)
+    by_python = np.arange(len(size)) if precision > decimals else np.flatnonzero(~(size * 10.0**precision < limit))
+    size[by_python] = 0.0
     numbers = _scaled(size, decimals)
-    spans = _write_fixed(numbers, np.signbit(flat) & (numbers != 0), decimals)
-    return replaced(spans, slow, [f"{value:z.{precision}f}" for value in flat[slow].tolist()])
-
-
-def _slow_places(size: Floats, precision: int, limit: float) -> Ints:
-    if precision > _MOST_DECIMALS:
-        return np.arange(len(size))
-    ordinary = size * 10.0**precision < limit
-    return np.empty(0, np.int64) if ordinary.all() else np.flatnonzero(~ordinary)
+    fields = Fields(len(numbers))
+    whole = numbers // 10**decimals if decimals else numbers
+    fields.write_whole(whole)
+    if decimals:
+        fields.write_fraction(numbers - whole * 10**decimals, decimals)
+    starts = fields.write_sign(fields.whole_starts(whole), np.signbit(flat) & (numbers != 0))
+    spans = Spans(fields.data, starts, fields.origins + (POINT + 1 + decimals if decimals else POINT))
+    return replaced(spans, by_python, [f"{value:z.{precision}f}" for value in flat[by_python].tolist()])
 
 
 def _scaled(size: Floats, precision: int) -> Ints:
@@ -522,27 +483,12 @@ def _scaled(size: Floats, precision: int) -> Ints:
     doubt = np.abs(product - nearest)
     doubt += product * _DOUBT
     near_half = np.flatnonzero(doubt >= 0.5)
-    if near_half.size:
-        numbers[near_half] = _round_exactly(size[near_half], product[near_half], power)
+    if near_half.size:  # the exact product is the rounded one and its error
+        size, product = size[near_half], product[near_half]
+        error = product_error(halves(size), halves(np.full_like(size, power)), product)
+        floor = np.floor(product)
+        excess = (product - floor - 0.5) + error
+        below: Ints = floor.astype(np.int64)
+        below += (excess > 0) | ((excess == 0) & (below % 2 == 1))
+        numbers[near_half] = below
     return numbers
-
-
-def _round_exactly(size: Floats, product: Floats, power: float) -> Ints:
-    """Round the exact product, which is the rounded one and its error, half to even."""
-    error = product_error(halves(size), halves(np.full_like(size, power)), product)
-    floor = np.floor(product)
-    excess = (product - floor - 0.5) + error
-    below: Ints = floor.astype(np.int64)
-    below += (excess > 0) | ((excess == 0) & (below % 2 == 1))
-    return below
-
-
-def _write_fixed(numbers: Ints, negative: Flags, precision: int) -> Spans:
-    fields = Fields(len(numbers))
-    whole = numbers // 10**precision if precision else numbers
-    fields.write_whole(whole)
-    if precision:
-        fields.write_fraction(numbers - whole * 10**precision, precision)
-    starts = fields.write_sign(fields.whole_starts(whole), negative)
-    length = POINT + 1 + precision if precision else POINT
-    return Spans(fields.data, starts, fields.origins + length)
