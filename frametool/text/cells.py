@@ -70,7 +70,25 @@ def split_delimited(block: bytes, delimiter: bytes, columns: int, *, comment: by
     """
     data, end = _closed(block)
     hidden = _inside_quotes(data, end, delimiter) if b'"' in block else _NOTHING_HIDDEN
-    found = _quoted_cells(block, data, delimiter) if hidden is None else _plain_cells(data, end, delimiter, hidden)
+    if hidden is None:  # one by one; the last match is the empty one at the end of the text
+        closed = block if block.endswith(b"\n") else block + b"\n"
+        places = [(cell.start(), cell.start(1), cell.end()) for cell in _cell_pattern(delimiter).finditer(closed)]
+        starts, ends, after = (np.array(places[:-1], np.int64).reshape(-1, 3) + MARGIN).T
+        ends = np.minimum(ends, MARGIN + len(block))
+        stops = np.flatnonzero((data[ends] == _NEWLINE) | (after == MARGIN + len(closed))) + 1
+        found = _Found(starts, ends, stops, after[stops - 1])
+    else:  # at every delimiter and line end, except hidden ones
+        text = data[MARGIN:end]
+        is_mark = (text == delimiter[0]) | (text == _NEWLINE)
+        if hidden.size:
+            is_mark &= ~hidden
+        marks = np.flatnonzero(is_mark)
+        marks += MARGIN
+        stops = np.flatnonzero(data.take(marks) == _NEWLINE) + 1
+        starts = np.empty_like(marks)
+        starts[:1] = MARGIN
+        starts[1:] = marks[:-1] + 1
+        found = _Found(starts, marks, stops, marks[stops - 1] + 1)
     if b"\r" in block:
         last = found.stops - 1
         found.ends[last] -= (data[found.ends[last] - 1] == _RETURN) & (found.ends[last] > found.starts[last])
@@ -160,49 +178,17 @@ def _closed(block: bytes) -> tuple[Bytes, int]:
     return data, end + 1
 
 
-def _plain_cells(data: Bytes, end: int, delimiter: bytes, hidden: Flags) -> _Found:
-    """Find cells with every delimiter and line end, except hidden ones."""
-    text = data[MARGIN:end]
-    is_mark = (text == delimiter[0]) | (text == _NEWLINE)
-    if hidden.size:
-        is_mark &= ~hidden
-    marks = np.flatnonzero(is_mark)
-    marks += MARGIN
-    stops = np.flatnonzero(data.take(marks) == _NEWLINE) + 1
-    starts = np.empty_like(marks)
-    starts[:1] = MARGIN
-    starts[1:] = marks[:-1] + 1
-    return _Found(starts, marks, stops, marks[stops - 1] + 1)
-
-
 def _inside_quotes(data: Bytes, end: int, delimiter: bytes) -> Flags | None:
     """Return which bytes are inside quotes; None if some quote neither opens, closes nor doubles another."""
     quotes = np.flatnonzero(data[:end] == _QUOTE)
     opening, closing = quotes[::2], quotes[1::2]
     before, after = data[opening - 1], data[closing + 1]
-    opens = _is_any(before, (delimiter[0], _NEWLINE, _QUOTE)) | (opening == MARGIN)
-    closes = _is_any(after, (delimiter[0], _NEWLINE, _QUOTE, _RETURN))
+    opens = (before == delimiter[0]) | (before == _NEWLINE) | (before == _QUOTE) | (opening == MARGIN)
+    closes = (after == delimiter[0]) | (after == _NEWLINE) | (after == _QUOTE) | (after == _RETURN)
     if len(quotes) % 2 or not opens.all() or not closes.all():
         return None
     inside: Flags = np.bitwise_xor.accumulate(data[MARGIN:end] == _QUOTE)
     return inside
-
-
-def _is_any(text: Bytes, characters: tuple[int, ...]) -> Flags:
-    same: Flags = text == characters[0]
-    for character in characters[1:]:
-        same |= text == character
-    return same
-
-
-def _quoted_cells(block: bytes, data: Bytes, delimiter: bytes) -> _Found:
-    closed = block if block.endswith(b"\n") else block + b"\n"
-    found = [(cell.start(), cell.start(1), cell.end()) for cell in _cell_pattern(delimiter).finditer(closed)]
-    # the last match is the empty one at the end of the text
-    starts, ends, after = (np.array(found[:-1], np.int64).reshape(-1, 3) + MARGIN).T
-    ends = np.minimum(ends, MARGIN + len(block))
-    stops = np.flatnonzero((data[ends] == _NEWLINE) | (after == MARGIN + len(closed))) + 1
-    return _Found(starts, ends, stops, after[stops - 1])
 
 
 @cache
@@ -220,23 +206,15 @@ def _select(data: Bytes, end: int, found: _Found, columns: int, comment: bytes) 
     counts = np.diff(found.stops, prepend=0)
     if len(found.ends):
         counts[found.ends[found.stops - 1] <= line_starts] = 0
-    if comment:
-        counts[_begins_with(data, line_starts, comment)] = 0
+    if comment:  # it is shorter than the margin
+        is_comment = np.ones(len(line_starts), np.bool_)
+        for offset, character in enumerate(comment):
+            is_comment &= data[line_starts + offset] == character
+        counts[is_comment] = 0
     rows = np.flatnonzero(counts == columns)
-    starts, ends = _rows_of(found, rows, columns)
-    return Cells(data, line_starts, line_ends, counts, rows, starts, ends)
-
-
-def _rows_of(found: _Found, rows: Ints, columns: int) -> tuple[Ints, Ints]:
     if len(rows) * columns == len(found.starts):
-        return found.starts.reshape(-1, columns), found.ends.reshape(-1, columns)
-    places = found.stops[rows][:, None] + np.arange(-columns, 0)
-    return found.starts[places], found.ends[places]
-
-
-def _begins_with(data: Bytes, places: Ints, text: bytes) -> Flags:
-    """Return at which offsets the text begins; it is shorter than the margin."""
-    same = np.ones(len(places), np.bool_)
-    for offset, character in enumerate(text):
-        same &= data[places + offset] == character
-    return same
+        starts, ends = found.starts.reshape(-1, columns), found.ends.reshape(-1, columns)
+    else:
+        places = found.stops[rows][:, None] + np.arange(-columns, 0)
+        starts, ends = found.starts[places], found.ends[places]
+    return Cells(data, line_starts, line_ends, counts, rows, starts, ends)

@@ -59,7 +59,7 @@ def parse_number(text: str) -> float:
         else:
             if -_INFINITE < value < _INFINITE:
                 return value
-    raise _refusal(text, explain_number(text))
+    raise _refusal(text, _reason(text))
 
 
 def parse_angle(text: str) -> Angle:
@@ -74,8 +74,19 @@ def parse_angle(text: str) -> Angle:
     if match := re.fullmatch(_WITH_UNIT, text):
         return parse_number(match[1]), _UNITS[match[2]]
     if (match := re.fullmatch(_MULTIPLE_OF_PI, text)) and not re.match(_BARE_STAR, text):
-        return _degrees_of_pi(text, match[1], match[2], match[3]), "deg"
-    raise _refusal(text, explain_angle(text))
+        divisor = parse_number(match[3] or "1")
+        if not divisor:
+            raise ValueInvalid(f"{shown(text)} divides by zero")
+        degrees = parse_number(match[2] or "1") * 180.0 / divisor  # multiplied first: 3pi/4 is 540 / 4, exact
+        if degrees == _INFINITE:
+            raise NotFinite(f"{shown(text)} is not finite")
+        return -degrees if match[1] == "-" else degrees, "deg"
+    reason = _reason(text)
+    if reason in {_UNKNOWN, _UNIT, _ANGLE} and re.search("deg|rad|pi|°|π", text, re.IGNORECASE):
+        reason = "is not an angle; write a number, 90deg, 1.57rad or pi/2"
+    elif reason == _UNIT:
+        reason = "is not an angle: the units are deg and rad"
+    raise _refusal(text, reason)
 
 
 def parse_length(text: str) -> float:
@@ -85,9 +96,9 @@ def parse_length(text: str) -> float:
     if match := re.fullmatch(_LENGTH, text):
         return parse_number(match[1]) / LENGTHS[match[2]]  # dividing rounds once: 0.02 from 2cm
     reason = _reason(text)
-    if not any(map(str.isdigit, text)):
-        raise _refusal(text, explain_number(text))
-    raise _refusal(text, f"{shown(text)} {_NO_LENGTH if reason in {_UNKNOWN, _UNIT, _ANGLE} else reason}")
+    if reason in {_UNKNOWN, _UNIT, _ANGLE} and any(map(str.isdigit, text)):
+        reason = _NO_LENGTH
+    raise _refusal(text, reason)
 
 
 def parse_share(text: str) -> float:
@@ -148,35 +159,14 @@ def read_number_or_angle(
     return math.degrees(value) if degrees else math.radians(value)
 
 
-def _refusal(text: str, message: str) -> ValueInvalid:
+def _refusal(text: str, reason: str) -> ValueInvalid:
     """Return NotFinite for nan, inf and numbers beyond doubles, ValueInvalid for anything else that is not a number."""
-    return NotFinite(message) if _reason(text) == _NOT_FINITE else ValueInvalid(message)
-
-
-def _degrees_of_pi(text: str, sign: str, factor: str | None, divisor: str | None) -> float:
-    """Return sign * factor * 180 / divisor, multiplied first: 3pi/4 is 540 / 4, exact."""
-    below = parse_number(divisor or "1")
-    if not below:
-        raise ValueInvalid(f"{shown(text)} divides by zero")
-    degrees = parse_number(factor or "1") * 180.0 / below
-    if degrees == _INFINITE:
-        raise NotFinite(f"{shown(text)} is not finite")
-    return -degrees if sign == "-" else degrees
+    return (NotFinite if reason == _NOT_FINITE else ValueInvalid)(f"{shown(text)} {reason}")
 
 
 def explain_number(text: str) -> str:
     """Return why a text is not a number, and what to write instead."""
     return f"{shown(text)} {_reason(text)}"
-
-
-def explain_angle(text: str) -> str:
-    """Return why a text is not an angle, and what to write instead."""
-    reason = _reason(text)
-    if reason in {_UNKNOWN, _UNIT, _ANGLE} and re.search("deg|rad|pi|°|π", text, re.IGNORECASE):
-        reason = "is not an angle; write a number, 90deg, 1.57rad or pi/2"
-    elif reason == _UNIT:
-        reason = "is not an angle: the units are deg and rad"
-    return f"{shown(text)} {reason}"
 
 
 _UNKNOWN = "is not a number"

@@ -83,19 +83,14 @@ def _text(kind: str, text: str, value_of: Callable[[str], str], *, begins: bool 
     if kind == "double":
         return _IN_QUOTES.sub(lambda each: _text(each.lastgroup or "", each[each.lastgroup or ""], value_of), text)
     if kind == "dollar":
-        return _dollar(text, value_of)
+        name = text[1:].removeprefix("{").removesuffix("}")
+        if re.fullmatch(NAME, name):
+            return value_of(name)
+        if text not in ("$", "$$"):
+            raise Misused(f"{text} names nothing: names are letters, digits and _; $$ is a dollar sign")
+        return "$"
     if kind == "special":
         raise Misused(f"{text} is for a shell: {_INSTEAD}; in quotes it is text")
     if kind == "quoted":  # a backslash in double quotes is literal before other characters
         return text if text in '$`"\\' else f"\\{text}"
     return os.path.expanduser(text) if kind == "plain" and begins and text.startswith("~/") else text
-
-
-def _dollar(text: str, value_of: Callable[[str], str]) -> str:
-    """Return the text for a dollar sign and what follows it."""
-    bare = text[1:].removeprefix("{").removesuffix("}")
-    if re.fullmatch(NAME, bare):
-        return value_of(bare)
-    if text not in ("$", "$$"):
-        raise Misused(f"{text} names nothing: names are letters, digits and _; $$ is a dollar sign")
-    return "$"
