@@ -69,6 +69,7 @@ _LINE_END = "\r\n|[\r\n\x85\u2028\u2029]"
 _WIDEST_SNIPPET = 74  # and three dots on either side
 
 LEAF, LIST, MAP, END = range(4)  # kinds of events
+TAG = "!"  # the key for the tag of a mapping of YAML: no plain key looks like it
 
 
 class Source(NamedTuple):

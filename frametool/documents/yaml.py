@@ -23,7 +23,7 @@ import yaml
 from yaml import AliasEvent, MappingStartEvent, ScalarEvent, SequenceStartEvent, StreamEndEvent
 
 from frametool import sizes
-from frametool.documents.source import END, LEAF, LIST, MAP, Source, error_at, line_of, paused_collector, too_much
+from frametool.documents.source import END, LEAF, LIST, MAP, TAG, Source, error_at, line_of, paused_collector, too_much
 from frametool.errors import FormatError
 from frametool.text.numbers import odd_characters
 
@@ -154,7 +154,6 @@ def _one_line(text: str) -> str:
     return " ".join(text.split()).lower()
 
 
-TAG = "!"  # the key for the tag of a mapping: no plain key of YAML looks like it
 MOST_ALIASES = 1000
 SPARE_COPIES = 10_000  # values that aliases may repeat, in addition to one per character of the text
 

@@ -27,7 +27,7 @@ from frametool.documents.document import parse_documents
 from frametool.documents.source import InputFile
 from frametool.errors import FormatError, ValueInvalid, alternatives, listing, shown, warn
 from frametool.formats.detect import of_folder
-from frametool.formats.trees.matrices import TAGS, made_ordinary
+from frametool.formats.trees.matrix_files import TAGS, made_ordinary
 from frametool.formats.trees.tree_reader import CAMERA_KEYS, camera_fields, numbers_of
 from frametool.geometry.camera import CAMERA_MODELS, Camera
 from frametool.grammar.edges import Answers, Diagnostics, Options, Topics

@@ -15,8 +15,7 @@ from frametool.stream.rows import Block, read_extra
 from frametool.stream.splice import column_in, quoted_name
 from frametool.stream.splitter import DOCUMENTS, LINES, Part, Splitter
 from frametool.stream.template import Template
-from frametool.text.cells import without_quotes
-from frametool.text.spans import MARGIN, Bytes, Ints, Spans, framed
+from frametool.text.spans import MARGIN, Bytes, Ints, Spans, framed, without_quotes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

@@ -18,8 +18,7 @@ from frametool.errors import ValueInvalid
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.result import NoResult, Result, with_entries
 from frametool.stream.row_layout import AS_READ, NOWHERE, PARTS, POSE
-from frametool.text.cells import without_quotes
-from frametool.text.spans import Floats, Ints, Spans
+from frametool.text.spans import Floats, Ints, Spans, without_quotes
 from frametool.text.write import rounded_to_single, shortest_spans
 
 if TYPE_CHECKING:

@@ -18,10 +18,9 @@ from frametool.grammar.readers import in_nanoseconds
 from frametool.stream.layout import Const, IfLocked, In, Instead, Out, Piece, Word
 from frametool.stream.row_poses import NO_STAMP, texts_of
 from frametool.stream.stamp_source import read_header_stamp, read_stamp
-from frametool.text.cells import without_quotes
 from frametool.text.numbers import parse_number
 from frametool.text.parse import LOWEST, parse_floats, trimmed
-from frametool.text.spans import MARGIN, Bytes, Flags, Floats, Ints, Spans, Words, framed, join, windows
+from frametool.text.spans import MARGIN, Bytes, Flags, Floats, Ints, Spans, Words, framed, join, windows, without_quotes
 from frametool.text.write import (
     TENS,
     ZEROS,

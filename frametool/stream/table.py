@@ -32,9 +32,18 @@ from frametool.stream.row_poses import RowPoses, taken
 from frametool.stream.rows import Block, BlockNames, Coded, coded, read_extra, read_stamps, spans_of, written
 from frametool.stream.stamp_source import replaced, stamp_text
 from frametool.stream.table_plan import plan_table
-from frametool.text.cells import Cells, RecordEnds, split_blank, split_delimited, torn_record, without_quotes
 from frametool.text.lines import read_blocks, whole_lines
-from frametool.text.spans import MARGIN, Ints, Spans
+from frametool.text.spans import (
+    MARGIN,
+    Cells,
+    Ints,
+    RecordEnds,
+    Spans,
+    split_blank,
+    split_delimited,
+    torn_record,
+    without_quotes,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence

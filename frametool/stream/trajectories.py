@@ -34,7 +34,7 @@ from frametool.stream.request import Operation, Request, RowOptions
 from frametool.stream.row_poses import RowPoses, block_of, objects, plain_cells
 from frametool.stream.rows import read_stamps as read_columns
 from frametool.stream.table import open_table
-from frametool.text.cells import without_quotes
+from frametool.text.spans import without_quotes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence

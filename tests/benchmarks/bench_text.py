@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frametool.text.cells import Cells, split_blank, split_delimited
 from frametool.text.parse import parse_floats
-from frametool.text.spans import Spans, join
+from frametool.text.spans import Cells, Spans, join, split_blank, split_delimited
 from frametool.text.write import fixed_spans, shortest_spans
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from frametool.documents.document import locate, parse_documents
-from frametool.documents.yaml import TAG
+from frametool.documents.source import TAG
 from frametool.errors import FormatError
 
 TAGS = frozenset(("!Rpy", "!!opencv-matrix"))

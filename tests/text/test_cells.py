@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from frametool.text.cells import Cells, split_blank, split_delimited, whole_records, without_quotes
-from frametool.text.spans import Spans
+from frametool.text.spans import Cells, Spans, split_blank, split_delimited, whole_records, without_quotes
 
 TEXT = st.text('ab1,"\n# .', max_size=5)
 ROWS = st.lists(st.lists(TEXT, min_size=1, max_size=4), max_size=6)

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from sized import sized
 
 from frametool.errors import FormatError
-from frametool.text.cells import RecordEnds, whole_records
 from frametool.text.lines import read_blocks
+from frametool.text.spans import RecordEnds, whole_records
 
 if TYPE_CHECKING:
     from conftest import Sizes

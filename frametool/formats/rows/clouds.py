@@ -22,11 +22,10 @@ from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.formats.rows import column_file
 from frametool.formats.table import FORMATS
 from frametool.grammar.readers import NORMALS
-from frametool.text.cells import Cells, split_blank
 from frametool.text.lines import read_blocks
 from frametool.text.numbers import explain_number
 from frametool.text.parse import parse_floats
-from frametool.text.spans import MARGIN, Spans, framed, join
+from frametool.text.spans import MARGIN, Cells, Spans, framed, join, split_blank
 from frametool.text.write import fixed_spans, rounded_to_single, shortest_spans
 
 if TYPE_CHECKING:

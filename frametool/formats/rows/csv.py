@@ -4,7 +4,7 @@
     camera,map,1.0,2.0,3.0,0.0,0.0,0.0,1.0
 
 Metres, radians unless the column states degrees; the pose of `name` in `parent`.  Single lines are split here, quoted
-as in RFC 4180; `text.cells` processes blocks of lines.
+as in RFC 4180; `text.spans` processes blocks of lines.
 """
 
 from __future__ import annotations

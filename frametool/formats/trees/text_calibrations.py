@@ -30,7 +30,7 @@ import re
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import BadAnswer, FormatError, Unanswered, ValueInvalid
-from frametool.formats.trees.matrices import MATRIX, Stated, edges_of
+from frametool.formats.trees.matrix_files import MATRIX, Stated, edges_of
 from frametool.formats.trees.tree_reader import line_error
 from frametool.geometry import quaternion, rigid
 from frametool.geometry.representations import notation
