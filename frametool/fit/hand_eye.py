@@ -119,14 +119,14 @@ def solve_hand_eye(
     s_t, s_r = model.sigmas.tolist()
     count, off = int(found.kept.sum()), lsq.lengths(found.residuals[found.kept]).T
     rms = np.sqrt((off**2).mean(1))
-    turns = _turns(hand[found.kept])
-    if turns.rms[0] < lsq.KEPT * s_r * sqrt(2.0):
+    first, second, axis = turns = _turns(hand[found.kept])
+    if first < lsq.KEPT * s_r * sqrt(2.0):
         raise _unfitting(rms)
     _require_two_axes(turns, s_r, holder, names[2])
     covariance = lsq.inverse(model.hessian)
     warnings = []
-    if turns.rms[1] < SLIGHT:
-        small = f"{degrees(turns.rms[1]):.1f} deg rms, first axis {turns.axis} in {holder}"
+    if second < SLIGHT:
+        small = f"{degrees(second):.1f} deg rms, first axis {axis} in {holder}"
         warnings.append(f"turns about a second axis are small ({small}): turn more")
     if count < FEWEST_CERTAIN:
         both = " fit with and without --eye-to-hand, and" * bool(others.prod() <= BETTER**2 * medians.prod())
@@ -140,7 +140,7 @@ def solve_hand_eye(
     return HandEye(
         model.x.canonical(), model.z.canonical(), covariance[:6, :6], covariance[6:, 6:],
         None if s_t == s_r == lsq.LEAST else noise_at, found.kept, lsq.deviations(found.residuals, model.sigmas),
-        found.residuals, (s_t, s_r), 3 * count - 6, float(rms[0]), float(rms[1]), turns.rms, warnings,
+        found.residuals, (s_t, s_r), 3 * count - 6, float(rms[0]), float(rms[1]), (first, second), warnings,
     )  # fmt: skip
 
 
@@ -227,7 +227,7 @@ def _start(samples: _Samples, *, robust: bool) -> tuple[_Model, Array]:
     fives: Iterable[Rows] = lsq.draws(DRAWS * robust, min(DRAWN, count - 1), count)
     for few in chain([slice(None)], fives):
         chosen = samples.at(few)
-        if _turns(chosen.gripper).rms[1] < FLAT:
+        if _turns(chosen.gripper)[1] < FLAT:
             continue
         x = park_martin(*chosen)
         z = (chosen.gripper @ x @ chosen.camera).mean()
@@ -282,29 +282,23 @@ def _pairs(count: int) -> tuple[Indices, Indices]:
     return i, (i + np.repeat(lags, count)) % count
 
 
-class _Turns(NamedTuple):
-    """Rotations of pairs of samples: rms about their first and second axis, radians, and the first axis as text."""
-
-    rms: tuple[float, float]
-    axis: str
-
-
-def _turns(gripper: Transform) -> _Turns:
+def _turns(gripper: Transform) -> tuple[float, float, str]:
+    """Return the rms of the rotations of pairs of samples about two main axes, radians, and the first axis as text."""
     i, j = _pairs(len(gripper))
     turns = (gripper[i].rotation.inverse() @ gripper[j].rotation).as_rotvec()
     squares, axes = np.linalg.eigh(turns.T @ turns / len(turns))
     axis = axes[:, 2] * np.sign(axes[np.abs(axes[:, 2]).argmax(), 2])
     _, second, first = np.sqrt(np.maximum(squares, 0.0)).tolist()
-    return _Turns((first, second), " ".join(f"{part:.3f}" for part in np.round(axis, 3) + 0.0))
+    return first, second, " ".join(f"{part:.3f}" for part in np.round(axis, 3) + 0.0)
 
 
-def _require_two_axes(turns: _Turns, s_r: float, holder: str, camera: str) -> None:
-    first, second = turns.rms
+def _require_two_axes(turns: tuple[float, float, str], s_r: float, holder: str, camera: str) -> None:
+    first, second, axis = turns
     if first < FLAT:
         raise ValueInvalid(f"{holder} does not turn ({degrees(first):.2f} deg); hand-eye needs turns about two axes")
     if second < max(FLAT, FLAT_SHARE * first, lsq.KEPT * s_r * sqrt(2.0)):
         raise ValueInvalid(
-            f"all turns are about one axis ({turns.axis} in {holder}): where {camera} is along it cannot be known; "
+            f"all turns are about one axis ({axis} in {holder}): where {camera} is along it cannot be known; "
             "turn about a second one"
         )
 

@@ -270,7 +270,7 @@ def fitted_sigmas(residuals: Array, weights: Array | Mask, unknown: int) -> Arra
     """Return the sigma of each three numbers of weighted rows that share this many unknowns."""
     dof = max(3.0 * float(weights.sum()) - unknown, 1.0)
     squares = (weights[:, None] * lengths(residuals) ** 2).sum(0)
-    return np.array([rms_sigma(each, dof) for each in squares.tolist()])
+    return np.array([max(float(np.sqrt(each / dof)), LEAST) for each in squares.tolist()])
 
 
 def median_sigma(lengths: Array, share: float = 1.0) -> float:
@@ -278,6 +278,3 @@ def median_sigma(lengths: Array, share: float = 1.0) -> float:
     return max(float(np.median(lengths)) / (MEDIAN_OF_THREE * share), LEAST)
 
 
-def rms_sigma(squares: float, dof: float) -> float:
-    """Return the sigma per axis from a sum of squares with this many degrees of freedom."""
-    return max(float(np.sqrt(squares / dof)), LEAST)

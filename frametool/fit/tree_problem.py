@@ -19,7 +19,7 @@ from frametool.geometry.rigid import IDENTITY, compose
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Sequence
     from typing import Any
 
     from frametool.frames.lookups import Frames
@@ -81,15 +81,8 @@ def spanning_tree(count: int, pairs: Pairs, rows: Iterable[int]) -> SpanningTree
 def bridges(tree: SpanningTree, pairs: Pairs, rows: Iterable[int]) -> set[int]:
     """Return the rows of a spanning tree that are in no loop with any of these rows."""
     found = {row for row in tree.row if row >= 0}
-    looped = Groups[int]()  # bodies joined by loops so far; the highest represents them
     for row in set(rows) - found:
-        a, b = map(looped.of, pairs[row])
-        while a != b:
-            if tree.depth[a] < tree.depth[b]:
-                a, b = b, a
-            found.discard(tree.row[a])
-            looped.join(a, tree.above[a])
-            a = looped.of(a)
+        found.difference_update(tree.way(*pairs[row]))
     return found
 
 
@@ -265,14 +258,12 @@ class TreeProblem:
         best = lsq.stacked([Transform.identity()] * self.count)
         least, closest = math.inf, np.full(self.size, math.inf)
 
-        def orders() -> Iterator[Sequence[int]]:
-            yield rows
-            for _ in range(trees - 1):
-                yield sorted(rows, key=[shuffled.random() for _ in rows].__getitem__)
-            if trees > 1:
-                yield np.argsort(closest, kind="stable").tolist()
-
-        for tree in map(self.tree, orders()):
+        for at in range(trees + (trees > 1)):
+            order: Sequence[int] = rows
+            if at:
+                by = closest.tolist() if at == trees else [shuffled.random() for _ in rows]
+                order = sorted(rows, key=by.__getitem__)
+            tree = self.tree(order)
             placed = self.placed(tree)
             off = np.log1p(self.u(self.errors(placed), Noise()) ** 2)
             if (sum_off := float(off.sum())) < least:
@@ -355,7 +346,7 @@ class TreeProblem:
                 dofs[at] = BORROWED + (3.0 * free.sum() - float((covariance * own).sum()))
             squares[0] += BORROWED * (noise.turn * self.arm) ** 2
             squares[1] += BORROWED * (noise.place / self.arm) ** 2
-        place, turn = map(lsq.rms_sigma, squares, dofs)
+        place, turn = (max(float(np.sqrt(each / own)), lsq.LEAST) for each, own in zip(squares, dofs, strict=True))
         return Noise(place, turn, factor)
 
     def medians(self, errors: Array, looped: Any) -> Noise:
@@ -368,8 +359,7 @@ class TreeProblem:
             factor = float(np.median(_odd_count(self.u(errors, noise)[stated]))) / (lsq.MEDIAN_OF_SIX * share)
             noise = noise._replace(factor=max(1.0, factor))
         if free.any():
-            halves = np.hsplit(errors, 2)
-            place, turn = (lsq.median_sigma(_odd_count(lsq.length(part[free])), share) for part in halves)
+            place, turn = (lsq.median_sigma(_odd_count(each), share) for each in lsq.lengths(errors[free]).T)
             noise = noise._replace(place=place, turn=turn)
         return noise.at_least(LOWEST) if looped.sum() <= 2 * unknown else noise
 

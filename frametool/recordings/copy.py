@@ -157,13 +157,6 @@ MOVED_TYPES = frozenset((
 ))  # fmt: skip
 
 
-class MessageHeader(NamedTuple):
-    """The frame and the stamp of a header."""
-
-    frame: str
-    stamp_ns: int
-
-
 class MessageMover:
     """Transforms messages to one frame, by static or moving transforms."""
 
@@ -175,7 +168,7 @@ class MessageMover:
         frames.require(into)
         self.frames, self.into, self.types, self.normalize = frames, frames.resolve_name(into), types, normalize
         self.tally = Diagnostics()  # names with a leading slash, and quaternions that are not unit
-        self.header: MessageHeader | None = None  # of the last message, as far as it was read
+        self.header: tuple[str, int] | None = None  # frame and stamp of the last message, as far as it was read
         self._pose_of = lru_cache(1)(self._looked_up)
 
     def moved(self, channel: Channel, data: bytes) -> bytes:
@@ -187,8 +180,8 @@ class MessageMover:
         message = self.types.read(channel, data)
         self.header = self._read(message.header)
         parts = posed_messages(message, channel.type)
-        movers = [self._pose_of(self._read(each.header)) for each in parts]
-        is_listed = channel.type in LISTS and self.header.frame != self.into
+        movers = [self._pose_of(*self._read(each.header)) for each in parts]
+        is_listed = channel.type in LISTS and self.header[0] != self.into
         if not is_listed and all(each is None for each in movers):
             return data
         for part, mover in zip(parts, movers, strict=True):
@@ -198,19 +191,19 @@ class MessageMover:
             each.header.frame_id = self.into
         return self.types.write(channel, message)
 
-    def _read(self, header: Any) -> MessageHeader:
-        """Read a header; raises ValueInvalid for an invalid stamp."""
+    def _read(self, header: Any) -> tuple[str, int]:
+        """Return the frame and the stamp of a header; raises ValueInvalid for an invalid stamp."""
         if problem := stamp_problem(header.stamp.sec, header.stamp.nanosec, STAMPS[0]):
             raise problem
-        return MessageHeader(self.tally.names.bare(header.frame_id), header.stamp.sec * BILLION + header.stamp.nanosec)
+        return self.tally.names.bare(header.frame_id), header.stamp.sec * BILLION + header.stamp.nanosec
 
-    def _looked_up(self, header: MessageHeader) -> Rigid | None:
-        """Return the pose that transforms from the frame of a header; None for the target frame itself."""
-        if header.frame == self.into:
+    def _looked_up(self, frame: str, stamp_ns: int) -> Rigid | None:
+        """Return the pose that transforms from a frame; None for the target frame itself."""
+        if frame == self.into:
             return None
-        if not header.frame:
+        if not frame:
             raise ValueInvalid("its header names no frame")
-        return self.frames.lookup_components(self.into, header.frame, header.stamp_ns)
+        return self.frames.lookup_components(self.into, frame, stamp_ns)
 
     def _move(self, part: Any, mover: Rigid) -> None:
         """Transform a point, or a pose and its covariance."""

@@ -111,7 +111,7 @@ def stamp(stamp_ns: int, fmt: str) -> dict[str, int]:
 def _lines(mapping: dict[str, Any], style: Style, indent: str = "") -> Iterator[str]:
     """Write block style as PyYAML does for ROS 2, as genpy does for ROS 1, where a list of numbers is one line."""
     is_ros1 = style.format == "ros1"
-    scalar, opening = (_ros1_scalar, ": ") if is_ros1 else (_ros2_scalar, ":")
+    opening = ": " if is_ros1 else ":"
     for key, value in mapping.items():
         if isinstance(value, dict) and (value or is_ros1):
             yield f"{indent}{key}{opening}"
@@ -127,25 +127,22 @@ def _lines(mapping: dict[str, Any], style: Style, indent: str = "") -> Iterator[
                     yield f"{indent}- {next(lines).lstrip()}"
                     yield from lines
                 else:
-                    yield f"{indent}- {scalar(item, style)}"
+                    yield f"{indent}- {_scalar(item, style)}"
         elif isinstance(value, list) and is_ros1:
-            yield f"{indent}{key}: [{', '.join(scalar(item, style) for item in value)}]"
+            yield f"{indent}{key}: [{', '.join(_scalar(item, style) for item in value)}]"
         else:
-            yield f"{indent}{key}: {scalar(value, style):>{9 if key == 'nsecs' else 0}}"
+            yield f"{indent}{key}: {_scalar(value, style):>{9 if key == 'nsecs' else 0}}"
 
 
-def _ros2_scalar(value: Any, style: Style) -> str:
+def _scalar(value: Any, style: Style) -> str:
+    """Write a value on one line, as genpy or PyYAML does."""
     if isinstance(value, Verbatim):
         return str(value)
+    if style.format == "ros1":
+        if isinstance(value, str):
+            return json_dump(value)
+        return style.number(value) if isinstance(value, float) else str(value)
     if not isinstance(value, str):
         return dump(value, style.number).rstrip("\n")
     safe = quoted(value)
     return safe if safe == value or not value.isprintable() else "'" + value.replace("'", "''") + "'"
-
-
-def _ros1_scalar(value: Any, style: Style) -> str:
-    if isinstance(value, bool):
-        return str(value)
-    if isinstance(value, str) and not isinstance(value, Verbatim):
-        return json_dump(value)
-    return style.number(value) if isinstance(value, float) else str(value)

@@ -359,30 +359,27 @@ class MessageLayout(NamedTuple):
     first: int = 0
 
 
-def _layout(groups: dict[str, str], opening: str, entry: str, between: str, closing: str, *lines: int) -> MessageLayout:
+def _layout(groups: dict[str, str], opening: str, entry: str, between: str, closing: str) -> MessageLayout:
     """Return a layout made from the texts of its parts, in which `groups` replaces words by patterns."""
+    lines, first = entry.count("\n"), entry[: entry.index("header")].count("\n")
     for word, pattern in groups.items():
         opening, entry = opening.replace(word, pattern), entry.replace(word, pattern)
     gap, end = f"{between}|{closing}{opening}", f"{closing}|\\Z" if lines else closing
-    first, each, inner, last = (re.compile(part, re.ASCII) for part in (opening, entry, gap, end))
-    return MessageLayout(first, each, inner, last, *lines)
+    begins, each, inner, ends = (re.compile(part, re.ASCII) for part in (opening, entry, gap, end))
+    return MessageLayout(begins, each, inner, ends, lines, first)
 
 
-def _echoed(entry: str) -> MessageLayout:
-    """Return the layout of documents printed by a tool."""
-    lines = entry.count("\n"), entry[: entry.index("header")].count("\n")
-    return _layout(ECHO_GROUPS, "transforms:\n", entry, "", "---\n", *lines)
-
-
-LAYOUTS = (
-    (_echoed(f"- {_block(FIELDS, '  ')[2:]}"), _echoed(f"  -\n{_block(FIELDS1, '    ')}")),
-    *(
-        [_layout(JSON_GROUPS, opening, json.dumps(each), between, closing) for each in (FIELDS, FIELDS1)]
-        for opening, between, closing in (
-            (PUBLISHED + TRANSFORMS, ", ?", r"\]\}\}\n"), (TRANSFORMS, ", ?", r"\]\}\n"), ("", "\n", "\n")
-        )
-    ),
-)  # fmt: skip
+ECHOED = f"- {_block(FIELDS, '  ')[2:]}", f"  -\n{_block(FIELDS1, '    ')}"
+ON_LINES = json.dumps(FIELDS), json.dumps(FIELDS1)
+LAYOUTS = [  # of each kind of text, as ROS 2 and as ROS 1 write it
+    [_layout(groups, opening, entry, between, closing) for entry in entries]
+    for groups, opening, entries, between, closing in (
+        (ECHO_GROUPS, "transforms:\n", ECHOED, "", "---\n"),
+        (JSON_GROUPS, PUBLISHED + TRANSFORMS, ON_LINES, ", ?", r"\]\}\}\n"),
+        (JSON_GROUPS, TRANSFORMS, ON_LINES, ", ?", r"\]\}\n"),
+        (JSON_GROUPS, "", ON_LINES, "\n", "\n"),
+    )
+]
 ROS1_BEGINS = "  ", '{"header": {"seq"', '{"header":{"seq"'
 EACH = 12  # items that `split` returns per transform: text, two parts of the stamp, two names, seven numbers
 

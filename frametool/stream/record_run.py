@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from itertools import chain
+from math import inf
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import (
@@ -74,6 +75,7 @@ class RecordRun:
     def __init__(self, recording: RecordingReader, request: RecordRequest) -> None:
         """Begin with a recording that is not read yet."""
         self.reader, self.request, self.path = recording, request, recording.path
+        self.window = request.window or (-inf, inf)
         self.counts: Counter[Channel] = Counter()
         self.span: tuple[int, int] | None = None
         self.inside = self.outside = 0
@@ -128,7 +130,7 @@ class RecordRun:
             self.counts[channel] += 1
             first, last = self.span or (log_ns, log_ns)
             self.span = min(first, log_ns), max(last, log_ns)
-            is_inside = self._is_inside(log_ns)
+            is_inside = self.window[0] <= log_ns <= self.window[1]
             if is_inside or channel.is_static:
                 self.first_ns = log_ns if self.first_ns is None else min(self.first_ns, log_ns)
                 self.outside += not is_inside
@@ -163,7 +165,7 @@ class RecordRun:
         try:
             new = mover.moved(channel, data)
         except (LookupFailed, ValueInvalid) as error:
-            stamp = "" if mover.header is None else f", stamp {format_stamp(mover.header.stamp_ns)}"
+            stamp = "" if mover.header is None else f", stamp {format_stamp(mover.header[1])}"
             reason = f"on {channel.topic}{stamp}: {error}"
             if self.request.bad.on_error == STOP:
                 error.args = (f"{self.path}: message {number}: {reason}",)
@@ -183,10 +185,6 @@ class RecordRun:
                     advance(STEP, size)
                     size = 0
                 yield message
-
-    def _is_inside(self, log_ns: int) -> bool:
-        window = self.request.window
-        return window is None or window[0] <= log_ns <= window[1]
 
     def pieces(self, fmt: str, folder: str, advance: Advance) -> Iterator[bytes]:
         """Yield the bytes of the copy in a format, starting with the added edges.
@@ -225,7 +223,7 @@ class RecordRun:
         edges, types, bare = {edge.child: edge for edge in self.plan.replaced}, self.reader.types, self.edges.names.bare
         for message in self._messages(advance):
             channel, data = message.channel, message.data
-            if not (self._is_inside(message.log_ns) or channel.is_static):
+            if not (self.window[0] <= message.log_ns <= self.window[1] or channel.is_static):
                 continue
             if channel in self.used and any(name.encode() in data for name in edges):
                 found = types.read(channel, data)
