@@ -18,7 +18,6 @@ from frametool.formats.rows.pose_rows import (
     IMAGE,
     MOST_NAMED,
     NUMBER,
-    DroppedFields,
     Numbers,
     RowForm,
     image_name,
@@ -48,6 +47,7 @@ if TYPE_CHECKING:
     from frametool.stream.row_poses import RowPoses
 
 LEARNED = ("csv", "json", "yaml")
+LOSABLE = {"frames": "names of frames", "stamps": "stamps"}
 
 
 class PoseWriter:
@@ -125,13 +125,26 @@ class TextWriter(SingleWriter):
     def __init__(self, style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> None:
         """Take the style and what a row is; raises ValueInvalid for notations that the format does not have."""
         super().__init__(style, kind, extras, placed=placed)
+        if any(each.spec != "quaternion" for each in style.notations):
+            raise ValueInvalid(f"{style.format} writes rotations in its own way; leave --to out")
         self.fixed = rows_of(style.format) or RowForm(())
-        self.dropped_fields = DroppedFields(self.fixed, style)
+        self.made_up: dict[str, None] = {}
         self.count = 0
 
     def end(self) -> Iterator[bytes]:
-        """Yield what comes behind the last pose, and warn of what was left out."""
-        self.dropped_fields.tell()
+        """Yield what comes behind the last pose, and warn in one line of what was left out or made up."""
+        left = [words for words in LOSABLE.values() if words in self.dropped]
+        if others := self.dropped.keys() - {*LOSABLE.values()}:
+            left.append(listing(others, MOST_NAMED))
+        said = [f"{', '.join(left)} left out"] if left else []
+        said += [*filter(None, [self.fixed.constants]), *self.made_up]
+        fmt, axes = self.style.format, FORMATS[self.style.format].rows.axes
+        if self.count and is_turned(self.style):
+            said.append(f"camera axes turned from {self.style.axes} to {axes}, half a turn about x")
+        elif axes and not self.style.axes:
+            said.append(f"the axes of the poses are taken for {axes}, as {fmt} has them")
+        if said:
+            warn(f"{fmt}: {'; '.join(said)}")
         yield self.fixed.tail if self.count else self.fixed.head + self.fixed.tail
 
     def of_block(self, block: RowPoses) -> bytes:
@@ -142,17 +155,17 @@ class TextWriter(SingleWriter):
             names = ", ".join(each.name for each in (place, *place.more))
             raise ValueInvalid(f"{self.style.format} holds x, y, z; leave --to {names} out, or write csv or json")
         refuse_scale_in(self.style.format, (*self.extras, *block.extras))
-        fmt, dropped, images, size = self.fixed, self.dropped_fields, block.extras.get(IMAGE), len(block.numbers)
+        fmt, images, size = self.fixed, block.extras.get(IMAGE), len(block.numbers)
         before, self.count = self.count, self.count + size
-        dropped.record(
-            frames=any(block.parents) or any(block.names),
-            stamps=block.stamps_ns is not None and NUMBER not in block.extras,
-            extras=[*self.extras, *(name for name in block.extras if name not in (IMAGE, NUMBER))],
-        )
-        dropped.counted |= "stamps" in fmt.holds and block.stamps_ns is None
-        dropped.by_stamp |= IMAGE in fmt.row and images is None
-        dropped.turned = is_turned(self.style)
-        tx, ty, tz, x, y, z, w = self.columns(block)[:7]  # as the format has them: axes, direction
+        there = {"frames": any(block.parents) or any(block.names)}
+        there["stamps"] = block.stamps_ns is not None and NUMBER not in block.extras
+        self.dropped |= {LOSABLE[what]: None for what in there if there[what] and what not in fmt.holds}
+        self.dropped |= dict.fromkeys(name for name in (*self.extras, *block.extras) if name not in (IMAGE, NUMBER))
+        if "stamps" in fmt.holds and block.stamps_ns is None:
+            self.made_up["without stamps, poses are numbered in seconds: 0, 1, 2 .."] = None
+        if IMAGE in fmt.row and images is None:
+            self.made_up["pictures are named by their stamps"] = None
+        tx, ty, tz, x, y, z, w = self.columns(block)[:7]
         pose = turned(self.style, (tx, ty, tz, *quaternion.unit(x, y, z, w, arrays)))
         tx, ty, tz, x, y, z, w = rigid.inverse(*pose) if FORMATS[self.style.format].rows.inverse else pose
         turn = (x, y, z, w) if self.style.keep_sign else quaternion.from_quaternion(x, y, z, w, arrays)

@@ -36,7 +36,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import format_error, lines, parse_documents
 from frametool.documents.source import InputFile, read_text
-from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
+from frametool.errors import FormatError, ValueInvalid, listing, shown
 from frametool.formats.table import FORMATS, Rows
 from frametool.frames.stamps import BILLION, format_stamp, parse_stamp, whole_stamp
 from frametool.geometry import euler, floats, quaternion, rigid
@@ -46,14 +46,13 @@ from frametool.grammar.readers import Misfit, Path, as_mapping, kind, read_numbe
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from frametool.geometry.types import Components
     from frametool.grammar.result import Style
 
 
 HALF_TURN = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # about x: between optical axes and those of OpenGL
-LOSABLE = {"frames": "names of frames", "stamps": "stamps"}
 MOST_NAMED = 8
 IMAGE = "image"  # the extra that names an image
 NUMBER = "number"  # the extra with the number of a pose in the same format
@@ -85,43 +84,6 @@ class RowForm(NamedTuple):
     first: int = 0
     holds: tuple[str, ...] = ("stamps",)
     constants: str = ""
-
-
-class DroppedFields:
-    """What a format cannot store of the poses that are written: collected, and reported at the end."""
-
-    def __init__(self, spec: RowForm, style: Style) -> None:
-        """Start empty; raises ValueInvalid for notations that the format does not have."""
-        self.format, self.style = spec, style
-        self.found: dict[str, None] = {}
-        self.counted = False
-        self.by_stamp = False
-        self.turned = False
-        if any(each.spec != "quaternion" for each in style.notations):
-            raise ValueInvalid(f"{style.format} writes rotations in its own way; leave --to out")
-
-    def record(self, *, frames: bool, stamps: bool, extras: Iterable[str]) -> None:
-        """Record fields of poses that the format cannot store."""
-        said = {"frames": frames, "stamps": stamps}
-        self.found |= {LOSABLE[what]: None for what, there in said.items() if there and what not in self.format.holds}
-        self.found |= dict.fromkeys(extras)  # by name
-
-    def tell(self) -> None:
-        """Warn about everything that was omitted or made up, in one line."""
-        left = [words for words in LOSABLE.values() if words in self.found]
-        if others := self.found.keys() - {*LOSABLE.values()}:
-            left.append(listing(others, MOST_NAMED))
-        said = [f"{', '.join(left)} left out"] if left else []
-        said += [self.format.constants] * bool(self.format.constants)
-        said += ["without stamps, poses are numbered in seconds: 0, 1, 2 .."] * self.counted
-        said += ["pictures are named by their stamps"] * self.by_stamp
-        axes = FORMATS[self.style.format].rows.axes
-        if self.turned:
-            said.append(f"camera axes turned from {self.style.axes} to {axes}, half a turn about x")
-        elif axes and not self.style.axes:
-            said.append(f"the axes of the poses are taken for {axes}, as {self.style.format} has them")
-        if said:
-            warn(f"{self.style.format}: {'; '.join(said)}")
 
 
 def turned(style: Style, pose: Components) -> Components:
