@@ -218,10 +218,6 @@ class TreeBuilder:
         self.earth = self.earth or frame
         return self.earth
 
-    def renames(self, *names: str) -> bool:
-        """Return True if names include the second of the two names of the Earth's frame."""
-        return any(self.one_name(name) != name for name in names)
-
     def add(self, place: EdgePlace) -> None:
         """Add an edge, one sample of it, or a root; an edge between the names of the Earth's frame is the identity.
 
@@ -269,12 +265,20 @@ class TreeBuilder:
         if buffer.insert_components(parent, child, components, stamp_ns) and stamp_ns is not None:
             self._replaced.append((parent, child, place))
 
-    def add_samples(self, file: FrameFile, samples: Samples) -> None:
-        """Add the poses of one frame: in one piece if their order is known to be correct, else one by one."""
-        parent, child, stamps_ns, components, lines = samples
-        if not stamps_ns:
-            return
-        if self._takes_whole(samples):
+    def add_samples(self, file: FrameFile, piece: Samples | EdgeColumns) -> None:
+        """Add samples, frame by frame, if their order is known to be correct, else one by one."""
+        if isinstance(piece, Samples):
+            found, known = {(piece.parent, piece.child): piece}, True
+        else:
+            pairs = [*zip(piece.parents, piece.children, strict=True)]
+            rows: dict[tuple[str, str], list[tuple[int, Rigid, int]]] = {pair: [] for pair in pairs}
+            for pair, row in zip(pairs, zip(*piece[2:5], strict=True), strict=True):
+                rows[pair].append(row)
+            found = {pair: Samples(*pair, *zip(*each, strict=True)) for pair, each in rows.items()}
+            known = all(self._goes_on(*pair) for pair in found)  # the order of new edges matters for cycles
+        known = known and all(self.one_name(name) == name for pair in found for name in pair)
+        whole = {pair: each for pair, each in found.items() if known and self._takes_whole(each)}
+        for (parent, child), (_, _, stamps_ns, components, lines) in whole.items():
             place = EdgePlace(file, Edge(parent, child, components[0], stamps_ns[0], lines[0]))
             try:
                 self._moving().insert_many(parent, child, stamps_ns, components)
@@ -283,27 +287,14 @@ class TreeBuilder:
             self.first.setdefault(child, (parent, components[0], place))
             self._stamps.setdefault(child, stamps_ns[0])
             self._moves.add(child)
+        if len(whole) == len(found):
             return
-        if child not in self._late and any(map(gt, stamps_ns, islice(stamps_ns, 1, None))):
-            self._late.add(child)
-            warn(f"{file.name}: stamps of {shown(child)} are out of order; sorted")
-        for edge in samples.edges():
-            self.add(EdgePlace(file, edge))
-
-    def add_columns(self, file: FrameFile, columns: EdgeColumns) -> None:
-        """Add edges: samples of known frames in bulk, frame by frame, the others one by one."""
-        pairs = [*zip(columns.parents, columns.children, strict=True)]
-        rows: dict[tuple[str, str], list[tuple[int, Rigid, int]]] = {pair: [] for pair in pairs}
-        for pair, row in zip(pairs, zip(*columns[2:5], strict=True), strict=True):
-            rows[pair].append(row)
-        found = {pair: Samples(*pair, *zip(*each, strict=True)) for pair, each in rows.items()}
-        whole = {}
-        if all(self._goes_on(*pair) for pair in found):  # the order of new edges matters for cycles
-            whole = {pair: samples for pair, samples in found.items() if self._takes_whole(samples)}
-        for samples in whole.values():
-            self.add_samples(file, samples)
-        for pair, edge in zip(pairs, columns.edges(), strict=True) if len(whole) < len(found) else ():
-            if pair not in whole:
+        falls = any(map(gt, piece.stamps_ns, islice(piece.stamps_ns, 1, None)))
+        if falls and isinstance(piece, Samples) and piece.child not in self._late:
+            self._late.add(piece.child)
+            warn(f"{file.name}: stamps of {shown(piece.child)} are out of order; sorted")
+        for edge in piece.edges():
+            if (edge.parent, edge.child) not in whole:
                 self.add(EdgePlace(file, edge))
 
     def _goes_on(self, parent: str, child: str) -> bool:
@@ -313,7 +304,7 @@ class TreeBuilder:
 
     def _takes_whole(self, samples: Samples) -> bool:
         """Return True if samples are all later than known ones: of a new frame, or one moving in the same parent."""
-        if self.rules.keep_ns is not None or len(samples.stamps_ns) == 1 or samples.child in self.covariances:
+        if self.rules.keep_ns is not None or len(samples.stamps_ns) < 2 or samples.child in self.covariances:
             return False
         track = None if self.buffer is None else self.buffer.track(samples.child)
         if track is None:
@@ -461,7 +452,15 @@ def load_sources(
         with paused_collector():
             files = [FrameFile.inline(source) if isinstance(source, Source) else source for source in sources]
             for file in files:
-                _add(builder, file)
+                piece = None
+                for piece in file.pieces(normalize=builder.rules.normalize):
+                    if isinstance(piece, Edge):
+                        builder.add(EdgePlace(file, piece))
+                    else:
+                        builder.add_samples(file, piece)
+                if piece is None:
+                    raise file.error("no frames in it")
+                builder.files.append(file)
             refuse_unknown_joints(files)
             tree = builder.finish()
     finally:
@@ -485,19 +484,3 @@ def lines_of(places: Sequence[EdgePlace]) -> list[tuple[str, int]]:
         found = locate_many(file.text, [each.edge.path for each in inside]) if inside else []
         lines |= {id(each): line for each, (line, _) in zip(inside, found, strict=True)}
     return [(each.file.name, lines.get(id(each), each.edge.line)) for each in places]
-
-
-def _add(builder: TreeBuilder, file: FrameFile) -> None:
-    piece = None
-    rules = builder.rules
-    for piece in file.pieces(normalize=rules.normalize):
-        if isinstance(piece, Samples) and not builder.renames(piece.parent, piece.child):
-            builder.add_samples(file, piece)
-        elif isinstance(piece, EdgeColumns) and not builder.renames(*dict.fromkeys((*piece.parents, *piece.children))):
-            builder.add_columns(file, piece)
-        else:
-            for edge in (piece,) if isinstance(piece, Edge) else piece.edges():
-                builder.add(EdgePlace(file, edge))
-    if piece is None:
-        raise file.error("no frames in it")
-    builder.files.append(file)
