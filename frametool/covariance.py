@@ -33,20 +33,13 @@ __all__ = ["compose", "invert", "point"]
 def compose(a: Transform, cov_a: Covariance, b: Transform, cov_b: Covariance) -> Any:
     """Return the covariance of a @ b; b is the lever arm of a's rotation uncertainty."""
     first, second = _placed(a, cov_a), _placed(b, cov_b)
-
-    def kernel(*parts: Any) -> Components | None:
-        return placed.covariance_of(placed.compose(parts[: len(first)], parts[len(first) :]))
-
-    return _found(kernel, uncertainty.POSE, (*first, *second))
+    size, parts = len(first), (*first, *second)
+    return _found(lambda *p: placed.covariance_of(placed.compose(p[:size], p[size:])), uncertainty.POSE, parts)
 
 
 def invert(a: Transform, cov_a: Covariance) -> Any:
     """Return the covariance of a.inverse(), along the axes of the former child."""
-
-    def kernel(*parts: Any) -> Components | None:
-        return placed.covariance_of(placed.inverse(parts))
-
-    return _found(kernel, uncertainty.POSE, _placed(a, cov_a))
+    return _found(lambda *parts: placed.covariance_of(placed.inverse(parts)), uncertainty.POSE, _placed(a, cov_a))
 
 
 def point(a: Transform, cov_a: Covariance, p: Numbers, cov_p: Covariance = None) -> Any:

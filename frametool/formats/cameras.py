@@ -206,11 +206,19 @@ def _in_document(value: Any, file: InputFile) -> Found:
     elif "frames" in value or "camera" in value:
         yield from _ours(value, "")
     elif chain := {at: each for at, each in {"": value, **value}.items() if isinstance(each, dict) and LISTED in each}:
-        yield from ((name, _kalibr(each)) for name, each in chain.items())
+        for name, each in chain.items():  # a camchain, or a sensor.yaml of EuRoC: the model's own parameters come first
+            lens, warp = each.get("camera_model", "pinhole"), each.get("distortion_model", "none")
+            numbers = numbers_of(each[LISTED])
+            d = numbers_of(each.get("distortion_coeffs") or each.get("distortion_coefficients") or [])
+            own = dict(zip(CAMERA_MODELS[lens].parameters, numbers, strict=False)) if lens in CAMERA_MODELS else {}
+            if warp == "fov":
+                own, d = {"w": d[0]}, []
+            size = {"size": numbers_of(each["resolution"])} if "resolution" in each else {}
+            yield name, {"model": warp if lens == "pinhole" else lens, "K": numbers[-4:], "D": d, **own, **size}
     else:
-        numbers = [match[1] for key in value if (match := re.fullmatch(r"(?:K|M|camera_?[mM]atrix)_?(\d+)", key))]
+        ends = [match[1] for key in value if (match := re.fullmatch(r"(?:K|M|camera_?[mM]atrix)_?(\d+)", key))]
         name = (value.get("header") or {}).get("frame_id") or value.get("camera_name") or ""
-        yield from ((end or str(name), fields) for end in numbers or [""] if (fields := _by_keys(value, end)))
+        yield from ((end or str(name), fields) for end in ends or [""] if (fields := _by_keys(value, end)))
 
 
 def _ours(value: Any, name: str) -> Found:
@@ -261,19 +269,7 @@ def _in_bag(file: InputFile) -> Found:
             yield from ((channel.topic, fields), (message["header"].frame_id, fields))
 
 
-# ---------------------------------------------------------------- Kalibr, COLMAP, NeRF
-
-
-def _kalibr(value: dict[str, Any]) -> dict[str, Any]:
-    """Return a camera of a camchain, or of a sensor.yaml of EuRoC: the model's own parameters come first."""
-    lens, warp = value.get("camera_model", "pinhole"), value.get("distortion_model", "none")
-    numbers = numbers_of(value[LISTED])
-    d = numbers_of(value.get("distortion_coeffs") or value.get("distortion_coefficients") or [])
-    own = dict(zip(CAMERA_MODELS[lens].parameters, numbers, strict=False)) if lens in CAMERA_MODELS else {}
-    if warp == "fov":
-        own, d = {"w": d[0]}, []
-    size = {"size": numbers_of(value["resolution"])} if "resolution" in value else {}
-    return {"model": warp if lens == "pinhole" else lens, "K": numbers[-4:], "D": d, **own, **size}
+# ---------------------------------------------------------------- COLMAP, NeRF
 
 
 def _colmap(file: InputFile) -> Found:

@@ -32,6 +32,7 @@ from __future__ import annotations
 import os
 import re
 from functools import cached_property
+from itertools import chain, repeat
 from typing import NamedTuple
 
 from frametool.documents.source import HEAD, LOOKED_AT, UTF16, not_text
@@ -129,25 +130,21 @@ class Beginning:
         from frametool.documents.source import END, LEAF, MAP
         from frametool.documents.yaml import yaml_events
 
-        top: list[Any] = []
-        ways: list[tuple[Any, str | None]] = [(top, None)]  # open containers, and the key that waits for a value
-        for kind, word, *_ in yaml_events(self.text[:LOOKED_AT]):
-            inside, key = ways[-1]
+        opened: list[tuple[Any, list[Any]]] = [("", [])]  # lists and maps, with their items
+        for kind, word, *_ in chain(yaml_events(self.text[:LOOKED_AT]), repeat((END, ""))):
+            if kind not in (LEAF, END):
+                opened.append((kind, []))
+                continue
+            value: Any = word
             if kind == END:
-                ways.pop()
-                continue
-            if isinstance(inside, dict) and key is None and kind == LEAF:
-                ways[-1] = (inside, word)
-                continue
-            value: Any = word if kind == LEAF else {} if kind == MAP else []
-            if isinstance(inside, dict):
-                inside[key or ""] = value
-                ways[-1] = (inside, None)
-            else:
-                inside.append(value)
-            if kind != LEAF:
-                ways.append((value, None))
-        return top[0] if top else None
+                if len(opened) == 1:
+                    break
+                begun, value = opened.pop()
+                if begun == MAP:
+                    pairs = zip(value[::2], value[1::2], strict=False)
+                    value = {key: each for key, each in pairs if isinstance(key, str)}
+            opened[-1][1].append(value)
+        return next(iter(opened[0][1]), None)
 
     @cached_property
     def xml(self) -> str:
