@@ -20,6 +20,7 @@ from frametool.frames.topology import Groups, Query, edges_between, left_out, no
 from frametool.frames.track import StaticTransform, Track
 from frametool.geometry import rigid
 from frametool.geometry.rigid import IDENTITY
+from frametool.geometry.rotation import in_notebook
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
@@ -71,11 +72,7 @@ class Frames:
 
     # --- contents ---
 
-    def _repr_html_(self) -> str | None:
-        """Show it in a notebook as a terminal does."""
-        import frametool
-
-        return frametool.html_of(self)
+    _repr_html_ = in_notebook
 
     @property
     def frames(self) -> tuple[str, ...]:

@@ -440,7 +440,7 @@ class Camera:
 
     def rays_of(self, u: Number, v: Number) -> Vector:
         """Return unit directions x, y, z of pixels, in the camera's frame; NaN where there is none."""
-        return validation.run(self._ray, 3, (u, v))
+        return validation.run(lambda u, v, xp: self._unturned(*self._optical_ray(u, v, xp)), 3, (u, v))
 
     def points_of(self, u: Number, v: Number, depth: Number = None, range: Number = None) -> Vector:  # noqa: A002
         """Return points x, y, z in the camera's frame from pixels and depth, or distance from the camera."""
@@ -530,9 +530,6 @@ class Camera:
         a, b, c, d, e, f, g, h, i = self._turn
         return a * x + d * y + g * z + 0.0, b * x + e * y + h * z + 0.0, c * x + f * y + i * z + 0.0
 
-    def _ray(self, u: N, v: N, xp: Functions[N]) -> Three[N]:
-        return self._unturned(*self._optical_ray(u, v, xp))
-
     def _point(self, at_depth: bool, u: N, v: N, far: N, xp: Functions[N]) -> Three[N]:  # noqa: FBT001 - bound
         x, y, z = self._optical_ray(u, v, xp)
         scale = far / _divisor(z, xp) if at_depth else far
@@ -544,7 +541,7 @@ class Camera:
         self, u: N, v: N, height: N, tx: N, ty: N, tz: N, qx: N, qy: N, qz: N, qw: N, xp: Functions[N]
     ) -> Three[N]:
         ox, oy, oz = rigid.apply(tx, ty, tz, qx, qy, qz, qw, *self._point(False, u, v, 0.0 * u, xp))  # noqa: FBT003
-        x, y, z = quaternion.rotate(qx, qy, qz, qw, *self._ray(u, v, xp))
+        x, y, z = quaternion.rotate(qx, qy, qz, qw, *self._unturned(*self._optical_ray(u, v, xp)))
         scale = (height - oz) / _divisor(z, xp)
         scale = xp.where(scale > 0.0, scale, nan)
         return ox + scale * x, oy + scale * y, 0.0 * scale + height

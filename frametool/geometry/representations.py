@@ -149,20 +149,17 @@ class Representation(NamedTuple):
         return rule.repair(*components, floats)
 
 
-def _arithmetic(kernel: Callable[..., Components]) -> Callable[..., Components]:
-    return lambda components, _xp, _degrees, _axes: kernel(*components)
+def _kernel(kernel: Callable[..., Components], takes: str = "") -> Callable[..., Components]:
+    """Return a kernel as rows hold it: called with (components, xp, degrees, axes).
 
-
-def _plain(kernel: Callable[..., Components]) -> Callable[..., Components]:
-    return lambda components, xp, _degrees, _axes: kernel(*components, xp)
-
-
-def _angular(kernel: Callable[..., Components]) -> Callable[..., Components]:
-    return lambda components, xp, degrees, _axes: kernel(*components, xp, degrees=degrees)
-
-
-def _euler(kernel: Callable[..., Components]) -> Callable[..., Components]:
-    return lambda components, xp, degrees, axes: kernel(*components, axes, xp, degrees=degrees)
+    takes: which of the last three it takes in addition to the components: none, "xp", also "degrees", also "axes"
+    """
+    return {
+        "": lambda components, _xp, _degrees, _axes: kernel(*components),
+        "xp": lambda components, xp, _degrees, _axes: kernel(*components, xp),
+        "degrees": lambda components, xp, degrees, _axes: kernel(*components, xp, degrees=degrees),
+        "axes": lambda components, xp, degrees, axes: kernel(*components, axes, xp, degrees=degrees),
+    }[takes]
 
 
 def _xyzw(x: Any, y: Any, z: Any, w: Any) -> Quaternion:
@@ -221,23 +218,19 @@ MATRICES = BatchRule(
 RPY, EULER_COLUMNS = ("roll", "pitch", "yaw"), ("euler_1", "euler_2", "euler_3")
 XYZW = Representation(
     ("qx", "qy", "qz", "qw"), (), "unit quaternion, scalar last", short=("x", "y", "z", "w"), label="quaternion",
-    forward=_arithmetic(_xyzw), backward=_plain(quaternion.from_quaternion), complaint=quaternion.complaint, kept=_xyzw,
-    batch=QUATERNIONS,
+    forward=_kernel(_xyzw), backward=_kernel(quaternion.from_quaternion, "xp"), kept=_xyzw,
+    complaint=quaternion.complaint, batch=QUATERNIONS,
 )  # fmt: skip
 
 
-def _named(table: dict[str, Representation]) -> dict[str, Representation]:
-    return {name: row._replace(name=name) for name, row in table.items()}
-
-
-ROTATIONS = _named({
+ROTATIONS = {
     "quaternion": XYZW._replace(
         summary="unit quaternion, named x y z w", label="", shape=NAMED, overview=("",)
     ),
     "xyzw": XYZW,
     "wxyz": Representation(
         ("qw", "qx", "qy", "qz"), (), "unit quaternion, scalar first", short=("w", "x", "y", "z"), label="quaternion",
-        forward=_arithmetic(_of_wxyz(_xyzw)), backward=_plain(_as_wxyz(quaternion.from_quaternion)),
+        forward=_kernel(_of_wxyz(_xyzw)), backward=_kernel(_as_wxyz(quaternion.from_quaternion), "xp"),
         complaint=_of_wxyz(quaternion.complaint), kept=_wxyz,
         batch=QUATERNIONS._replace(
             deviation=_of_wxyz(quaternion.deviation), repair=_as_wxyz(_of_wxyz(quaternion.repaired)),
@@ -247,55 +240,55 @@ ROTATIONS = _named({
     "rpy": Representation(
         RPY, (0, 1, 2), "roll, pitch, yaw about the fixed axes x, y, z (URDF, tf2 setRPY)",
         short=RPY, shape=MAP, axes="sxyz", alone=("yaw", "theta"), overview=("_rad", "_deg"),
-        forward=_euler(euler.to_quaternion), backward=_euler(euler.from_quaternion),
+        forward=_kernel(euler.to_quaternion, "axes"), backward=_kernel(euler.from_quaternion, "axes"),
     ),
     "euler": Representation(
         EULER_COLUMNS, (0, 1, 2), "three angles in the order of euler:AXES, s fixed or r rotating axes",
         short=EULER_COLUMNS, shape=(("angles", 3),), axes=NAMED_AXES, searched=False,
-        forward=_euler(euler.to_quaternion), backward=_euler(euler.from_quaternion),
+        forward=_kernel(euler.to_quaternion, "axes"), backward=_kernel(euler.from_quaternion, "axes"),
     ),
     "axis_angle": Representation(
         ("axis_x", "axis_y", "axis_z", "angle"), (3,), "axis of any length, then the angle about it",
         short=("x", "y", "z", "angle"), label="axis-angle", shape=(("axis", 3), ("angle", 1)), overview=("_rad",),
-        forward=_angular(quaternion.from_axis_angle), backward=_angular(quaternion.as_axis_angle),
+        forward=_kernel(quaternion.from_axis_angle, "degrees"), backward=_kernel(quaternion.as_axis_angle, "degrees"),
         complaint=quaternion.axis_angle_complaint,
     ),
     "rotvec": Representation(
         ("rotvec_x", "rotvec_y", "rotvec_z"), (0, 1, 2), "rotation vector: unit axis times angle",
         label="rotation vector", complaint=quaternion.rotvec_complaint,
-        forward=_angular(quaternion.from_rotvec), backward=_angular(quaternion.as_rotvec),
+        forward=_kernel(quaternion.from_rotvec, "degrees"), backward=_kernel(quaternion.as_rotvec, "degrees"),
     ),
     "matrix": Representation(
         ("r11", "r12", "r13", "r21", "r22", "r23", "r31", "r32", "r33"), (), "rotation matrix, row by row",
         shape=ROWS, whole=HOMOGENEOUS, overview=("",),
-        forward=_plain(matrix.to_quaternion), backward=_arithmetic(quaternion.to_matrix),
+        forward=_kernel(matrix.to_quaternion, "xp"), backward=_kernel(quaternion.to_matrix),
         complaint=matrix.complaint, batch=MATRICES,
     ),
     "mrp": Representation(
         ("mrp_x", "mrp_y", "mrp_z"), (), "modified Rodrigues parameters: unit axis times tan(angle/4)",
-        forward=_arithmetic(quaternion.from_mrp), backward=_plain(quaternion.as_mrp),
+        forward=_kernel(quaternion.from_mrp), backward=_kernel(quaternion.as_mrp, "xp"),
         complaint=partial(quaternion.rotvec_complaint, what="mrp"),
     ),
     "six_d": Representation(
         ("r11", "r21", "r31", "r12", "r22", "r32"), (), "first two columns of the matrix (Zhou's continuous 6D)",
         label="6d", searched=False,
-        forward=_plain(matrix.from_six_d), backward=_arithmetic(matrix.as_six_d), complaint=matrix.six_d_complaint,
+        forward=_kernel(matrix.from_six_d, "xp"), backward=_kernel(matrix.as_six_d), complaint=matrix.six_d_complaint,
         batch=BatchRule("pairs of columns", matrix.six_d_deviation, lambda *columns: columns[:-1], 0.0),
     ),
     "rpy_unreal": Representation(
         RPY, (0, 1, 2), "degrees, as Unreal's FRotator and CARLA turn their own axes",
         short=RPY, shape=MAP, axes="sxyz", alone=("yaw",), searched=False, in_degrees=True,
-        forward=_angular(euler.from_unreal), backward=_angular(euler.as_unreal),
+        forward=_kernel(euler.from_unreal, "degrees"), backward=_kernel(euler.as_unreal, "degrees"),
     ),
     "euler_unity": Representation(
         ("euler_x", "euler_y", "euler_z"), (0, 1, 2), "degrees, Unity's Quaternion.Euler: about z, then x, then y",
         axes="szxy", searched=False, in_degrees=True,
-        forward=_angular(euler.from_unity), backward=_angular(euler.as_unity),
+        forward=_kernel(euler.from_unity, "degrees"), backward=_kernel(euler.as_unity, "degrees"),
     ),
-})  # fmt: skip
+}  # fmt: skip
 PLACE = "frametool.geometry.place"
 UTM_NAMES = ("zone", "easting", "northing", "alt")
-POSITIONS = _named({
+POSITIONS = {
     "lla": Representation(("lat", "lon", "alt"), (), "WGS84 latitude, longitude (degrees), metres above the ellipsoid",
                           short=("lat", "lon", "alt"), kernels=f"{PLACE}:LLA_KERNELS"),
     "ecef": Representation(("ecef_x", "ecef_y", "ecef_z"), (),
@@ -306,7 +299,9 @@ POSITIONS = _named({
                           short=("east", "north", "up"), kernels=f"{PLACE}:LOCAL_KERNELS"),
     "ned": Representation(("north", "east", "down"), (), "metres north, east, down of --origin",
                           short=("north", "east", "down"), kernels=f"{PLACE}:LOCAL_KERNELS"),
-})  # fmt: skip
+}  # fmt: skip
+for _table in (ROTATIONS, POSITIONS):
+    _table.update({name: row._replace(name=name) for name, row in _table.items()})
 HEADING = Representation(
     ("heading",), (0,), "where x points, clockwise from north, whatever the tilt; axes of the frame it is seen from",
     axes=OF_WORLD, searched=False, forward=_of_heading, backward=_heading, name="heading",

@@ -25,6 +25,13 @@ _new = object.__new__
 _notation = cache(notation)
 
 
+def in_notebook(value: object) -> str | None:
+    """Show a value in a notebook as a terminal does."""
+    import frametool
+
+    return frametool.html_of(value)
+
+
 class Batched:
     """One item, or an array of them of any shape; immutable."""
 
@@ -68,11 +75,7 @@ class Batched:
         """Iterate over the first axis."""
         return (self[index] for index in range(len(self)))
 
-    def _repr_html_(self) -> str | None:
-        """Show it in a notebook as a terminal does."""
-        import frametool
-
-        return frametool.html_of(self)
+    _repr_html_ = in_notebook
 
 
 class Rotation(Batched):

@@ -16,6 +16,7 @@ import re
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from frametool.errors import ValueInvalid, shown
+from frametool.geometry import floats, matrix
 from frametool.geometry.representations import Notation, notation
 from frametool.text.numbers import parse_angle, parse_number
 
@@ -310,13 +311,12 @@ def matrix_pose(rows: Rows, rep: Notation, *, stated: bool = False) -> dict[str,
 
 
 def is_rotation(rows: Rows) -> bool:
-    """Return True if the texts of 3x3 numbers are a rotation to 1e-3."""
+    """Return True if texts are three rows of three numbers that are a rotation to 1e-3."""
     try:
-        m = [[parse_number(cell) for cell in row] for row in rows]
+        numbers = [parse_number(cell) for row in rows for cell in row]
     except ValueInvalid:
         return False
-    products = [(sum(a * b for a, b in zip(m[i], m[j], strict=True)), i == j) for i in range(3) for j in range(3)]
-    return all(abs(product - same) < 1e-3 for product, same in products)
+    return [*map(len, rows)] == [3, 3, 3] and matrix.defect(*matrix.nine(numbers), floats) < 1e-3
 
 
 def _spelled_rows(rows: Rows, rep: Notation) -> list[Any] | None:

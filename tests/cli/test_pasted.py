@@ -341,3 +341,11 @@ def test_rows_without_a_header_that_from_names_are_rows_with_any_delimiter(run: 
     other = run("convert", "--from", given, "--to", to, stdin=f"{row}\n{row}\n".replace(" ", delimiter))
     assert (other.status, other.err) == (0, with_blanks.err)
     assert other.out.replace(delimiter.strip(" "), " ").replace("  ", " ") == with_blanks.out
+
+
+@pytest.mark.parametrize("ragged", ["1 0 0\n0 1\n0 0 1\n", "1 0 0\n0 1 0 5\n0 0 1\n"])
+@pytest.mark.parametrize("command", ["invert", "relative --consecutive", 'compose - {"xyz":[1,2,3]}'])
+def test_three_lines_of_unequal_length_are_a_table_with_a_bad_row(command: str, ragged: str, run: Run) -> None:
+    done = run(*command.split(), stdin=ragged)
+    assert done.status == 1
+    assert "stdin:2: expected 3 cells, found" in done.err
