@@ -345,8 +345,8 @@ class Frames:
 
     def query_of(self, down: Sequence[str], up: Sequence[str]) -> Query:
         """Prepare a path returned by `between`."""
-        tracks = self._tracks
-        return Query([tracks[child] for child in down], [tracks[child] for child in reversed(up)])
+        track = self._tracks.__getitem__
+        return Query([*map(track, down)], [*map(track, reversed(up))])
 
     def way_at(self, target: str, source: str, at_ns: int) -> tuple[list[str], list[str]] | None:
         """Return the edges as `between` does; None if a changing parent leaves no path."""
@@ -373,9 +373,10 @@ class Frames:
 
     def require(self, *frames: str) -> list[str]:
         """Return the names of frames in this tree; raise UnknownFrame unless all exist."""
-        names = [topology.resolve_name(frame, self._frames) for frame in frames]
-        for frame, name in zip(frames, names, strict=True):
-            if name not in self._frames:
+        names = []
+        for frame in frames:
+            names.append(topology.resolve_name(frame, self._frames))
+            if names[-1] not in self._frames:
                 raise UnknownFrame(frame, known=self.frames, where=self.name)
         return names
 

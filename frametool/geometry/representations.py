@@ -371,7 +371,8 @@ class Notation:
 
     def to_quaternion(self, components: Components, xp: Namespace, *, degrees: bool = False) -> Quaternion:
         """Return x, y, z, w; `degrees` applies if the notation itself states no unit."""
-        result: Quaternion = self.representation.forward(components, xp, self.in_degrees(degrees), self.bound_axes())
+        unit = degrees if self.degrees is None else self.degrees
+        result: Quaternion = self.representation.forward(components, xp, unit, self.bound_axes())
         return result
 
     def from_quaternion(
@@ -383,7 +384,7 @@ class Notation:
         """
         if keep_sign and self.representation.kept is not None:
             return self.representation.kept(x, y, z, w)
-        unit = self.in_degrees(degrees)
+        unit = degrees if self.degrees is None else self.degrees
         result: Components = self.representation.backward((x, y, z, w), xp, unit, self.bound_axes())
         return result
 

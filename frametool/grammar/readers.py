@@ -221,11 +221,11 @@ def read_number(value: Any) -> float:
 
 def places_in(value: list[Any]) -> Sequence[tuple[int, ...]]:
     """Return the paths of the numbers of a list, also if it is written as a column or a row of a matrix: [[x], ..]."""
-    if value and all(type(each) is list and len(each) == 1 for each in value):
+    if not value or type(value[0]) is not list:
+        return [*zip(range(len(value)))]
+    if all(type(each) is list and len(each) == 1 for each in value):
         return [(at, 0) for at in range(len(value))]
-    if len(value) == 1 and type(value[0]) is list:
-        return [(0, at) for at in range(len(value[0]))]
-    return [(at,) for at in range(len(value))]
+    return [(0, at) for at in range(len(value[0]))] if len(value) == 1 else [(at,) for at in range(len(value))]
 
 
 def read_texts(value: Any, names: Sequence[str], *, partial: bool = False) -> list[Any]:

@@ -116,9 +116,9 @@ class Result:
     def mapping(self, style: Style) -> dict[str, Any]:
         """Return the tree entry: name, parent, xyz, one key per representation, then the extras."""
         pose = self.pose
-        entry: dict[str, Any] = {key: name for key, name in (("name", pose.name), ("parent", pose.parent)) if name}
+        entry: dict[str, Any] = {"name": pose.name} if pose.name else {}
+        entry |= {"parent": pose.parent} if pose.parent else {}
         extras = self.said(style)
-        is_within = any(each.representation.whole for each in style.notations)  # the position, in a matrix
         if style.place is not None:
             from frametool.grammar.place import placed_entry
 
@@ -126,7 +126,9 @@ class Result:
             if style.place.origin is not None:  # the keys state its axes
                 entry.pop("parent", None)
             entry |= written
-        elif pose.rotation is None or (pose.position is not None and not is_within):
+        elif pose.rotation is None or (
+            pose.position is not None and not any(each.representation.whole for each in style.notations)
+        ):
             entry |= placed(pose.position or (0.0, 0.0, 0.0), style)
         for each in style.notations if pose.rotation is not None else ():
             key, value = rotation_entry(pose, each, style)
@@ -351,8 +353,11 @@ def write_poses(results: Iterable[Result | dict[str, Any]], style: Style) -> str
         from frametool.documents.json import dump
     else:
         from frametool.documents.yaml_writer import dump
-    records = [each.mapping(style) if isinstance(each, Result) else each for each in results]
-    return ("" if is_json else "---\n").join([dump(each, style.number) + "\n" * is_json for each in records])
+    texts = []
+    for each in results:
+        record = each.mapping(style) if isinstance(each, Result) else each
+        texts.append(dump(record, style.number) + "\n" * is_json)
+    return ("" if is_json else "---\n").join(texts)
 
 
 write_points = write_poses
