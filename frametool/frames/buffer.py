@@ -88,7 +88,19 @@ class TransformBuffer(Frames):
             raise ValueInvalid(f"the pose of {shown(child)} in {shown(parent)} is not finite: {numbers}")
         static = stamp_ns is None if static is None else static
         stamp = 0 if stamp_ns is None else whole_stamp(stamp_ns)
-        return self._admit(parent, child, components, stamp, static=static)
+        if track is not None and track.is_static != static:
+            raise topology.static_and_moving(child)
+        replaced = False
+        if track is None:
+            self._refuse_cycle(parent, child, stamp, static=static)
+            pose = StaticTransform(child, parent, components)
+            self._put(pose if static else MovingTrack(child, stamp, parent, components))
+        elif track.is_static:
+            topology.check_same(child, (track.parent, track.components), (parent, components))
+        else:
+            replaced = self._move(track, parent, components, stamp)
+        self._frames[parent] = None
+        return replaced
 
     def insert_many(self, parent: str, child: str, stamps_ns: Sequence[int], components: Sequence[Rigid]) -> None:
         """Add poses of a moving frame in ascending order of time, all later than the samples it already has.
@@ -104,23 +116,6 @@ class TransformBuffer(Frames):
                 self.insert_components(parent, child, each, stamp_ns)
         else:
             track.extend(stamps_ns[1:], components[1:])
-
-    def _admit(self, parent: str, child: str, components: Rigid, stamp_ns: int, *, static: bool) -> bool:
-        """Add a sample that may be the first of its frame, out of order, or against a rule."""
-        track = self._tracks.get(child)
-        if track is not None and track.is_static != static:
-            raise topology.static_and_moving(child)
-        replaced = False
-        if track is None:
-            self._refuse_cycle(parent, child, stamp_ns, static=static)
-            pose = StaticTransform(child, parent, components)
-            self._put(pose if static else MovingTrack(child, stamp_ns, parent, components))
-        elif track.is_static:
-            topology.check_same(child, (track.parent, track.components), (parent, components))
-        else:
-            replaced = self._move(track, parent, components, stamp_ns)
-        self._frames[parent] = None
-        return replaced
 
     def _move(self, track: MovingTrack, parent: str, components: Rigid, stamp_ns: int) -> bool:
         """Add a further sample of a moving frame; return True if it replaced another one."""

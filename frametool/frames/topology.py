@@ -177,16 +177,10 @@ class Snapshot:
     @cached_property
     def roots(self) -> dict[str, str]:
         """Return the root above each frame, itself for a root; frames with the same root are connected."""
-        roots: dict[str, str] = {}
-        for frame in self.tree.frames:
-            line: dict[str, None] = {}
-            above: str | None = frame
-            while above is not None and above not in roots and above not in line:
-                line[above] = None
-                above = self.parent(above)
-            root = next(reversed(line)) if line and above is None else frame if above in line else roots[above or frame]
-            roots.update(dict.fromkeys(line, root))
-        return roots
+        groups = Groups[str]()
+        for child, (parent, _) in self.edges.items():
+            groups.join(child, parent)
+        return {frame: groups.of(frame) for frame in self.tree.frames}
 
     @cached_property
     def _children(self) -> dict[str, list[str]]:

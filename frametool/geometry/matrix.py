@@ -171,7 +171,8 @@ def complaint(*entries: float, normalize: bool) -> ValueInvalid | None:
         return ValueInvalid(f"{found}: it is left-handed (mirrored); a rotation has 1", rule="mirrored")
     off = defect(*matrix, floats)
     if volume <= SINGULAR:
-        problem = f"matrix {_shown(entries)} is singular; no rotation is nearest to it"
+        rows = ", ".join(" ".join(f"{value:g}" for value in entries[at : at + 3]) for at in (0, 3, 6))
+        problem = f"matrix {rows} is singular; no rotation is nearest to it"
     elif off <= TOLERATED:
         return None
     elif is_multiple(*products, ldexp(1.0, min(-2 * exponent, 1000))):
@@ -190,11 +191,6 @@ def nine(values: Iterable[N]) -> Nine[N]:
     """Return nine values as a tuple of known length."""
     a, b, c, d, e, f, g, h, i = values
     return a, b, c, d, e, f, g, h, i
-
-
-def _shown(entries: tuple[float, ...]) -> str:
-    """Show a matrix on one line."""
-    return ", ".join(" ".join(f"{value:g}" for value in entries[row : row + 3]) for row in (0, 3, 6))
 
 
 def from_six_d(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> Four[N]:
