@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import re
 from contextlib import contextmanager
+from math import pi
 from typing import TYPE_CHECKING, Any
 
 from frametool.calc import functions
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
     from frametool.geometry.place import Earth
     from frametool.geometry.types import Components
 
-TAKEN = frozenset(FUNCTIONS)
-PI = 3.141592653589793
 NAME = "literal"
 AXES = ("x", "y", "z")
 PLACED = {"point": (POINT, AXES), "vector": (VECTOR, AXES), "twist": (TWIST, ("vx", "vy", "vz", "wx", "wy", "wz"))}
@@ -131,7 +130,7 @@ def located(at: int) -> Iterator[None]:
 def read_line(text: str) -> Line:
     """Parse a line; errors point into it."""
     try:
-        return parse_line(text, TAKEN)
+        return parse_line(text, FUNCTIONS)
     except CalcError as error:
         raise pointed(error, text) from None
 
@@ -184,7 +183,7 @@ class _Walk:
         if name == "row":
             return Term(self._row("row"), None, lambda row: row.parts)
         if name == "pi":
-            return Term(PLAIN_NUMBER, (PI,))
+            return Term(PLAIN_NUMBER, (pi,))
         if name in scope.names:
             return scope.names[name]
         if name == "ans":

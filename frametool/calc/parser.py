@@ -20,7 +20,7 @@ from frametool.text.numbers import odd_characters
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Container, Iterator
 
 LONGEST = 1 << 16  # characters of an expression
 DEEPEST = 100  # levels of nested brackets, signs and exponents
@@ -32,14 +32,7 @@ UNITS: dict[str, tuple[float, float, str]] = {
     "rad": (1.0, 1.0, RADIAN), "deg": (1.0, 1.0, RADIAN),
     "s": (1.0, 1.0, SECOND), "ms": (1.0, 1e3, SECOND), "us": (1.0, 1e6, SECOND), "ns": (1.0, 1e9, SECOND),
 }  # fmt: skip
-LOOKUP = "a look-up is written TARGET<-SOURCE"
 JOINING = (("+", "-"), ("*", "/"))  # operators, loosest first
-HINTS = {
-    "}": "a { before it is missing", '"': 'a quote is not closed: "name"', "<": LOOKUP, ">": LOOKUP,
-    ".": "a number has a digit behind its point, a column is row.NAME",
-    ";": "write one expression a line", "~": "the inverse is inv(..)", "'": 'write names with blanks in "',
-}  # fmt: skip
-
 _FRAME = r'(?:"[^"\n]*+"|/?+[^\W\d](?:[\w/:.]|-(?!-*+[<>]))*+)'
 _TOKEN = re.compile(rf"""(?x)
     (?P<lookup>(?P<target>{_FRAME})\s*+<-\s*+(?P<source>{_FRAME}))
@@ -110,7 +103,7 @@ def tokens_of(text: str) -> list[Token]:
             frames = tuple(each.strip('"') for each in (found["target"], found["source"]) if each)
             token = Token(kind, found["digits"] or found[0], at, found.end(), unit, frames)
         else:
-            hint = f"; {HINTS[first]}" if first in HINTS else ""
+            hint = "; a quote is not closed" * (first == '"')
             raise CalcError(f"unexpected {odd_characters(first) or shown(first) + hint}", at)
         tokens.append(token)
         at = token.end
@@ -150,7 +143,7 @@ class Line(NamedTuple):
     text: str
 
 
-def parse_line(text: str, taken: frozenset[str] = frozenset()) -> Line:
+def parse_line(text: str, taken: Container[str]) -> Line:
     """Parse `NAME = expression` or an expression; `taken` are reserved names."""
     head, equals, _ = text.partition("=")
     name = head.strip() if equals else ""

@@ -98,10 +98,11 @@ class RowExpressions(Formula):
         known = self._for(Type(row)).frames
         first = parent if parent in known else SOME
         second = name if name in known else SOME if name == parent else OTHER
+        is_pose = row == POSE
         try:
-            bound = self._for(_row_type(row, first, second))
+            bound = self._for(Type(row, first, second if is_pose else None))
         except FrametoolError:
-            self._bind_all(_row_type(row, parent, name))  # raises the same error with the real names
+            self._bind_all(Type(row, parent, name if is_pose else None))  # raises the same error with the real names
             raise
         if self.adds or not self.kind(row):
             return parent, name
@@ -176,10 +177,6 @@ class RowExpressions(Formula):
             return term.at(row)
         numbers = in_radians(term).at(row)
         return tuple(number * DEGREES for number in numbers) if is_angle else numbers
-
-
-def _row_type(row: str, parent: str | None, name: str | None) -> Type:
-    return Type(POSE, parent, name) if row == POSE else Type(row, parent)
 
 
 def poses_of_table(path: str, fmt: str, *, normalize: bool, degrees: bool) -> Term:

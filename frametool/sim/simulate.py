@@ -24,6 +24,7 @@ from frametool.errors import LookupFailed, ValueInvalid, printable
 from frametool.formats.rows.csv import row
 from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import BILLION
+from frametool.frames.topology import seconds
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
 from frametool.ros.echo_format import message_text, transform_stamped
@@ -286,23 +287,20 @@ class RunSummary:
         near = f"within {self.reach:g} m"
         for name, follow in self._follows.items():
             target = follow.leader if follow.target == "leader" else f"the {follow.target} of {follow.leader}"
-            soon = f"{near} after {_seconds(self.reached_ns[name])}" if name in self.reached_ns else f"never {near}"
+            soon = f"{near} after {seconds(self.reached_ns[name])} s" if name in self.reached_ns else f"never {near}"
             distance = f"not in the world together with {follow.leader}"
             if name in self.distances:
                 distance = f"final distance to {target} {self.distances[name]:.4f} m"
             yield printable(f"{name}: {distance}; {soon}")
         hits = ", ".join(f"{printable(name)} {count}" for name, count in sorted(self.walls.items()))
-        yield f"{_seconds(self.t_ns)} simulated; wall hits: {sum(self.walls.values())}" + (f" ({hits})" if hits else "")
+        total = f"{sum(self.walls.values())}{f' ({hits})' if hits else ''}"
+        yield f"{seconds(self.t_ns)} s simulated; wall hits: {total}"
 
 def goal(leader: TurtleState, follow: Follow, now_ns: int) -> TurtleState:
     """Return the position of a follower's target in the world."""
     x, y = offset(follow.target, now_ns)
     cosine, sine = math.cos(leader.theta), math.sin(leader.theta)
     return TurtleState(leader.x + cosine * x - sine * y, leader.y + sine * x + cosine * y, leader.theta)
-
-
-def _seconds(t_ns: int) -> str:
-    return f"{t_ns / BILLION:.3f}".rstrip("0").rstrip(".") + " s"
 
 
 def event_log(say: Callable[[str], None]) -> Watch:
@@ -323,7 +321,6 @@ def event_log(say: Callable[[str], None]) -> Watch:
 FORMS = ("text", "yaml", "json", "csv")
 EMITS = ("commands", "poses", "tf")
 # of steps in text, whose lines must fit a terminal: millimetres and milliradians, with short names
-STEP_DECIMALS = 3
 SHORT = {
     "linear_x": "linear", "angular_z": "turning", "distance": "away",
     "leader_x": "lead_x", "leader_y": "lead_y", "leader_theta": "lead_th",
@@ -348,7 +345,7 @@ class StepWriter:
     def write(self, step: SimulationStep) -> Iterator[str]:
         """Yield each record of a step, the first one below the header if the format has one."""
         style = self._style
-        digits = STEP_DECIMALS if style.precision is None else style.precision
+        digits = 3 if style.precision is None else style.precision
         for cells, message, labels in self._emissions(step, style):
             if not self._headed and style.format in ("text", "csv"):
                 names = {name: SHORT.get(name, name) for name in cells}

@@ -190,7 +190,16 @@ def write_report(found: Sequence[Comparison], fmt: str, command: str) -> str:
         (right if is_one else left)["lengths"] = lengths
     title = f"{curves[0].name if is_one else f'{len(curves)} estimates'} against {printable(found[0].names[0])}"
     if fmt == "svg":
-        return _side_by_side(f"{title}: ate {numbers[0]['ate']['m']['rmse']:.4g} m", (left, right))
+        title = f"{title}: ate {numbers[0]['ate']['m']['rmse']:.4g} m"
+        pieces, bottom, wide = "", 0.0, left["path"].width
+        for number, column in enumerate((left, right)):
+            top = 24.0
+            for each in column.values():
+                pieces += pictures.svg_element(each, place=f' x="{number * each.width:g}" y="{top:g}"')
+                top += each.height
+            bottom = max(bottom, top)
+        heading = pictures.words(LEFT, 20.0, title, weight="bold")
+        return pictures.write_svg(Picture(2.0 * wide, bottom, [heading], title), pieces)
     drawn = ""
     for column in (left, right):
         figures = (f"<figure id={name}>{pictures.svg_element(each)}</figure>" for name, each in column.items())
@@ -329,16 +338,3 @@ def _samples(curve: Curve, paths: Chart, seen: Any, errors: Chart) -> dict[str, 
         **{key: [[round(x, 1), round(y, 1)] for x, y in places] for key, places in pixels.items()},
         **{key: [float(f"{each:.4g}") for each in values.tolist()] for key, values in numbers.items()},
     }  # fmt: skip
-
-
-def _side_by_side(title: str, columns: Sequence[dict[str, Picture]]) -> str:
-    """Return columns of pictures as one SVG document."""
-    drawn, bottom = "", 0.0
-    for number, column in enumerate(columns):
-        top = 24.0
-        for each in column.values():
-            drawn += pictures.svg_element(each, place=f' x="{number * each.width:g}" y="{top:g}"')
-            top += each.height
-        bottom = max(bottom, top)
-    heading = pictures.words(LEFT, 20.0, title, weight="bold")
-    return pictures.write_svg(Picture(len(columns) * columns[0]["path"].width, bottom, [heading], title), drawn)

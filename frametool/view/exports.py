@@ -17,7 +17,7 @@ from base64 import b64encode
 from itertools import chain, product
 from json import dumps
 from operator import mul
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
 from zlib import compress
 
@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from frametool.sim.simulate import SimulationStep
     from frametool.sim.turtle import Pen, TurtleState
     from frametool.view.pictures import Point, SvgElement
+
+    Stroke = tuple[str, Pen, list[Point]]  # of a turtle, a line drawn with one pen; metres, y up
 
 PIECES, LAST_SHADE = 24, 0.85  # of a trail, from dark when it begins to a green that white paper still shows
 WIDTH, HEIGHT = 1000.0, 700.0
@@ -111,14 +113,6 @@ def _legend(flat: Projection, step: float) -> Iterator[SvgElement]:
 SHORT = 0.05  # metres: two pixels
 
 
-class Stroke(NamedTuple):
-    """A line drawn with one pen; points in metres, y up."""
-
-    turtle: str
-    pen: Pen
-    points: list[Point]
-
-
 class Drawing:
     """Collect what a plot shows of a run; turtles that do not move take no memory."""
 
@@ -140,14 +134,15 @@ class Drawing:
                 self._current.clear()
             self.turtles = step.states
             for name, (x, y, _) in step.states.items():
-                pen, stroke = step.pens[name], self._current.get(name)
-                if stroke is None or stroke.pen != pen:
-                    begin = [stroke.points[-1]] if stroke is not None else []
-                    stroke = self._current[name] = Stroke(name, pen, begin)
+                pen = step.pens[name]
+                _, before, points = self._current.get(name, (name, None, []))
+                if before != pen:
+                    points = points[-1:]
+                    self._current[name] = name, pen, points
                     if not pen.off:
-                        self.strokes.append(stroke)
-                if not stroke.points or math.dist(stroke.points[-1], (x, y)) > SHORT:
-                    stroke.points.append((x, y))
+                        self.strokes.append(self._current[name])
+                if not points or math.dist(points[-1], (x, y)) > SHORT:
+                    points.append((x, y))
         for command in step.commands:
             ahead, turning, _ = command.twist
             self.curves[command.turtle].append((step.t_ns / BILLION, command.distance or 0.0, ahead, turning))
@@ -170,10 +165,9 @@ def run_picture(drawing: Drawing) -> Picture:
 
     colours = colours_of({*drawing.turtles, *drawing.curves})
     shapes = [box(MARGIN, MARGIN, WINDOW, WINDOW, f"#{bytes(BACKGROUND).hex()}")]
-    for stroke in drawing.strokes:
-        *colour, width, _ = stroke.pen
-        points = [place(*point) for point in stroke.points]
-        shapes.append(line(points, f"#{bytes(colour).hex()}", width, title=stroke.turtle))
+    for turtle, (*colour, width, _), way in drawing.strokes:
+        points = [place(*point) for point in way]
+        shapes.append(line(points, f"#{bytes(colour).hex()}", width, title=turtle))
     for name, (*position, theta) in drawing.turtles.items():
         x, y = place(*position)
         cosine, sine = math.cos(theta), math.sin(theta)
@@ -321,42 +315,40 @@ def write_page(
     other, other_title: another tree in the same frame, drawn over this one, and its name.
     sliders: add one for each joint of a robot.  solids: of robots; a mesh is drawn as a box.
     """
-    head, blob = _data(scene)
-    head |= {"title": title, "file": file or title, "made": f"frametool {__version__}"}
+    # as bytes: the static poses, then the stamps and poses of each track
+    index = scene.index
+    tracks: list[dict[str, Any]] = []
+    static = [None if name in scene.tracks else scene.tree.track(name) for name in scene.names]
+    blob = bytearray(_packed("d", chain.from_iterable(track.components if track else IDENTITY for track in static)))
+    for name, moving in scene.tracks.items():
+        stamps, above, poses = zip(*moving.walk(), strict=True)
+        parents = [index[parent] for parent in above] if moving.varies else index[moving.parent]
+        tracks.append({"frame": index[name], "count": len(stamps), "at": len(blob), "parents": parents})
+        blob += _packed("q", stamps) + _packed("d", chain.from_iterable(poses))
+    first, last = map(str, scene.span_ns)
     is_part = not scene.path_only and len(scene.chosen) < len(scene.names)
-    head["show"] = {
-        "fixed": scene.fixed, "path": scene.path_only, "target": scene.target, "source": scene.source,
-        "t": None if scene.at_ns is None else format_stamp(scene.at_ns),
-        "only": [name for name in scene.names if name in scene.chosen] if is_part else None, "view": eye,
+    head: dict[str, Any] = {
+        "names": scene.names, "parents": [-1 if track is None else index[track.parent] for track in static],
+        "tracks": tracks, "first": first, "last": last, "title": title, "file": file or title,
+        "made": f"frametool {__version__}",
+        "show": {
+            "fixed": scene.fixed, "path": scene.path_only, "target": scene.target, "source": scene.source,
+            "t": None if scene.at_ns is None else format_stamp(scene.at_ns),
+            "only": [name for name in scene.names if name in scene.chosen] if is_part else None, "view": eye,
+        },
     }  # fmt: skip
     if sliders and (joints := joint_sliders(scene))["joints"]:
         head |= joints
     if solids:
         head |= _drawn_solids(scene, solids)
     if other is not None:
-        poses = {scene.index[name]: pose for name, pose in other.poses().items() if name in scene.index}
-        head["overlay"] = {"title": other_title, "poses": poses}
+        there = {index[name]: pose for name, pose in other.poses().items() if name in index}
+        head["overlay"] = {"title": other_title, "poses": there}
     if len(blob) > PACKED:
-        blob, head["packed"] = compress(blob), True
+        blob[:], head["packed"] = compress(blob), True
     scripts = " ".join(f"{name}.js" for name in (*SCRIPTS, *(each for each in EXTRAS if each in head), "main"))
     held = {"head-data": dumps(head, separators=(",", ":")), "blob": dumps(b64encode(blob).decode())}
     return pictures.write_html(title, pictures.page_file("page.html"), style="page.css", script=scripts, data=held)
-
-
-def _data(scene: FrameScene) -> tuple[dict[str, Any], bytes]:
-    """Return names and parents, and the static poses, followed by the stamps and poses of each track, as bytes."""
-    index = scene.index
-    static = [None if name in scene.tracks else scene.tree.track(name) for name in scene.names]
-    blob = bytearray(_packed("d", chain.from_iterable(track.components if track else IDENTITY for track in static)))
-    tracks: list[dict[str, Any]] = []
-    for name, track in scene.tracks.items():
-        stamps, above, poses = zip(*track.walk(), strict=True)
-        parents = [index[parent] for parent in above] if track.varies else index[track.parent]
-        tracks.append({"frame": index[name], "count": len(stamps), "at": len(blob), "parents": parents})
-        blob += _packed("q", stamps) + _packed("d", chain.from_iterable(poses))
-    first, last = map(str, scene.span_ns)
-    parents_of = [-1 if track is None else index[track.parent] for track in static]
-    return {"names": scene.names, "parents": parents_of, "tracks": tracks, "first": first, "last": last}, bytes(blob)
 
 
 def _packed(letter: str, numbers: Iterable[float]) -> bytes:

@@ -12,7 +12,7 @@ from frametool.documents.json import dump
 from frametool.errors import printable
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
-from frametool.geometry.representations import ROTATIONS, ROWS, Notation, notation
+from frametool.geometry.representations import ROTATIONS, ROWS, notation
 from frametool.grammar.pose import TIMES, Pose
 from frametool.grammar.readers import EARTH_FRAMES
 from frametool.grammar.result import ROUNDED_TO_ZERO, Result, Style, is_locked, placed, rotation_entry, rotation_numbers
@@ -75,12 +75,28 @@ def _describe(result: Result, style: Style) -> str:
     elif pose.position is not None:
         (position,), unit = placed(pose.position, style).values(), "cm" if style.in_cm else "m"
         lines.append(NumberLine("translation", list(zip("xyz", position, strict=True)), unit))
-    if pose.rotation is not None:
-        for each in style.notations or map(notation, OVERVIEW):
-            lines += _rotation_lines(pose, each, style)
+    for each in style.notations or map(notation, OVERVIEW) if pose.rotation is not None else ():
+        numbers = rotation_numbers(pose, each, style)
+        if each.representation.shape == ROWS:
+            for at, row in enumerate(rotation_entry(pose, each, style)[1][: math.isqrt(len(numbers))]):
+                cells = list(zip(["[" * style.screen, *[""] * len(row)], row, strict=False))
+                lines.append(NumberLine("" if at else each.label, cells, "]" * style.screen))
+            continue
+        unit = ("deg" if each.in_degrees(style.degrees) else "rad") if each.representation.angles else ""
+        lines.append(NumberLine(each.label, list(zip(each.names, numbers, strict=True)), unit))
+        if is_locked(pose, each):
+            lines.append(NumberLine("", [], "gimbal lock: not unique, third angle set to 0"))
     if pose.parent in EARTH_FRAMES and not style.notations and style.place is None:
         lines += _earth_lines(pose)
-    lines += _extra_lines(result.said(style))
+    units = {"distance": "m", "angle": "rad", "linear": "m/s", "angular": "rad/s", "std": "m", "std_angle": "rad"}
+    for key, value in result.said(style).items():
+        if isinstance(value, float):
+            unit = "deg" if key.endswith("_deg") else units.get(key) or units.get(key.partition("_")[0], "")
+            lines.append(NumberLine(key.removesuffix("_deg"), [("", value)], unit))
+        elif sigmas := _sigmas(key, value):
+            lines.append(NumberLine("sigma", [], " ".join(each.replace(" ", GLUE) for each in sigmas)))
+        elif key not in TIMES and value is not None:
+            lines.append(NumberLine(key, [], _said(value)))
     if style.place is not None and style.place.origin is not None:  # of its axes, not of the Earth's
         result = Result(result.pose._replace(parent=f"{style.place.name} at the origin"), result.extras)
     return _heading(result) + (_layout(lines, style) if lines else "  identity\n")
@@ -128,33 +144,6 @@ def _earth_lines(pose: Pose) -> Iterator[NumberLine]:
     yield from (NumberLine(label, [], said) for label, said in overview(pose))
 
 
-def _rotation_lines(pose: Pose, notation: Notation, style: Style) -> Iterator[NumberLine]:
-    """Yield the lines of one notation."""
-    row, numbers = notation.representation, rotation_numbers(pose, notation, style)
-    if row.shape == ROWS:
-        for at, each in enumerate(rotation_entry(pose, notation, style)[1][: math.isqrt(len(numbers))]):
-            names = ["[" * style.screen, *[""] * len(each)]
-            yield NumberLine("" if at else notation.label, list(zip(names, each, strict=False)), "]" * style.screen)
-        return
-    unit = ("deg" if notation.in_degrees(style.degrees) else "rad") if row.angles else ""
-    yield NumberLine(notation.label, list(zip(notation.names, numbers, strict=True)), unit)
-    if is_locked(pose, notation):
-        yield NumberLine("", [], "gimbal lock: not unique, third angle set to 0")
-
-
-def _extra_lines(extras: dict[str, Any]) -> Iterator[NumberLine]:
-    """Yield the lines of what is only said about a pose."""
-    units = {"distance": "m", "angle": "rad", "linear": "m/s", "angular": "rad/s", "std": "m", "std_angle": "rad"}
-    for key, value in extras.items():
-        if isinstance(value, float):
-            unit = "deg" if key.endswith("_deg") else units.get(key) or units.get(key.partition("_")[0], "")
-            yield NumberLine(key.removesuffix("_deg"), [("", value)], unit)
-        elif sigmas := _sigmas(key, value):
-            yield NumberLine("sigma", [], " ".join(each.replace(" ", GLUE) for each in sigmas))
-        elif key not in TIMES and value is not None:
-            yield NumberLine(key, [], _said(value))
-
-
 def _sigmas(key: str, value: Any) -> list[str]:
     """Write the roots of the diagonal of a covariance, two digits each; nothing of any other value."""
     if key != "covariance" or not isinstance(value, list) or len(value) not in (36, 9):
@@ -166,7 +155,7 @@ def _sigmas(key: str, value: Any) -> list[str]:
     if numbers[0] == -1.0:
         return ["unknown"]  # as ROS has it
     roots = sigmas_of(numbers)
-    return [*map(_length, roots[:3]), *map(_angle, roots[3:])]
+    return [*map(_length, roots[:3]), *(_two_digits(math.degrees(root), "deg") for root in roots[3:])]
 
 
 def sigmas_of(covariance: Sequence[float]) -> list[float]:
@@ -177,15 +166,11 @@ def sigmas_of(covariance: Sequence[float]) -> list[float]:
 def largest_sigmas(entries: Sequence[float]) -> str:
     """Return how uncertain a pose is along its worst axis, and about its worst: `±10 mm 1.0 deg`."""
     roots = sigmas_of(entries)
-    return f"±{_length(max(roots[:3]))} {_angle(max(roots[3:]))}"
+    return f"±{_length(max(roots[:3]))} {_two_digits(math.degrees(max(roots[3:])), 'deg')}"
 
 
 def _length(metres: float) -> str:
     return _two_digits(metres * 1000.0, "mm") if metres < 1.0 else _two_digits(metres, "m")
-
-
-def _angle(radians: float) -> str:
-    return _two_digits(math.degrees(radians), "deg")
 
 
 def _two_digits(value: float, unit: str) -> str:
@@ -249,14 +234,13 @@ def _aligned(rows: Sequence[Sequence[str]]) -> list[list[str]]:
     return [[f"{cell:<{width}}" for cell, width in zip(row, widths, strict=False)] for row in moved]
 
 
-ECHO_DECIMALS = 3
 ECHOED = (("quaternion", "Quaternion"), ("rpy_rad", "RPY (radian)"), ("rpy_deg", "RPY (degree)"))
 
 
 def write_blocks(results: Iterable[Result], target: str, source: str, style: Style) -> Iterator[str]:
     """Yield the blocks as they come; the first begins by saying in words which frame is seen from which."""
     heading = in_width(f"{source} seen from {target}", f"(maps points in {source} to points in {target})")
-    decimals = ECHO_DECIMALS if style.precision is None else style.precision
+    decimals = 3 if style.precision is None else style.precision
 
     def fixed(values: Sequence[float]) -> list[str]:
         return [f"{value:z.{decimals}f}" for value in values]

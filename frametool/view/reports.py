@@ -19,7 +19,7 @@ from frametool.lint.tree_diff import SAME, Apart, Difference
 from frametool.view.pose_text import WIDTH, in_width, largest_sigmas, sigmas_of
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Sequence
+    from collections.abc import Collection, Iterable, Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.frames.track import Track
@@ -57,15 +57,13 @@ def columns(rows: Sequence[Sequence[str]], left: Sequence[bool]) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def folded(text: str, indent: str = "") -> Iterator[str]:
-    """Wrap a text by display width, with a hanging indent."""
-    line = indent
-    for word in (short(word, WIDTH - len(indent) - 2) for word in text.split(" ")):
-        if cells(line) + cells(word) >= WIDTH and line.strip():
-            yield line
-            line = f"{indent}  "
-        line += f" {word}" if line.strip("│ ") else word
-    yield line
+def folded(text: str, indent: str = "") -> list[str]:
+    """Wrap a text with a hanging indent; a word that is too long is shortened."""
+    words = (short(word, WIDTH - len(indent) - 2) for word in text.split(" "))
+    return wrap(
+        " ".join(words), WIDTH, initial_indent=indent, subsequent_indent=f"{indent}  ", break_long_words=False,
+        break_on_hyphens=False,
+    )  # fmt: skip
 
 
 def short(name: str, width: int) -> str:
@@ -121,16 +119,14 @@ HEADINGS = {
     "parent": "parent <- child", "rate_hz": "rate Hz", "first_ns": "first", "last_ns": "last", "gap_s": "gap s",
     "delay_mean_s": "delay s", "delay_max_s": "max s", "backward": "back", "parent_changes": "parents",
 }  # fmt: skip
-MOTION = ("length_m", "duration_s", "speed_mean", "speed_max", "gaps")  # a sentence for each edge that moves
-HIDDEN = ("kind", "child", "gap_until_ns", "parents", "overlap", *MOTION)
-RARE = ("parent_changes",)  # left out where all are 0
-
-
+HIDDEN = (  # of a table of edges; what moves has a sentence of its own
+    "kind", "child", "gap_until_ns", "parents", "overlap", "length_m", "duration_s", "speed_mean", "speed_max", "gaps",
+)  # fmt: skip
 def write_report(entries: Sequence[dict[str, Any]]) -> str:
     """Return the edges as a table without empty columns, then sentences on those that move and on the chain."""
     edges = [entry for entry in entries if entry["kind"] != "chain"]
     keys = [key for key in entries[0] if key not in HIDDEN]
-    shown = [key for key in keys if any(entry[key] or (entry[key] == 0 and key not in RARE) for entry in edges)]
+    shown = [key for key in keys if any(entry[key] or (entry[key] == 0 and key != "parent_changes") for entry in edges)]
     rows = [[HEADINGS.get(key, key) for key in shown], *([_cell(key, entry) for key in shown] for entry in edges)]
     sentences = []
     for entry in entries:

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     Point = tuple[float, float, float]
     Ground = tuple[str, Rigid]  # the replacement of the Earth's frame: level axes, x east and y north, at a frame
     Box = tuple[float, float, float, float]  # left, top, right, bottom
+    Label = tuple[str, "Flat", Box, float]  # a name, the point it labels, its box in whole cells, its distance in lines
 
 PARTS = 8  # of the way between two stamps, so that a trail is round where a frame turns
 FEW_STAMPS = 500  # above, a trail has one point a stamp
@@ -367,15 +368,6 @@ LONGEST = 60  # characters of a name
 WIDE, THIN = "mwMW_@", "il.·tfjrI "
 
 
-class Label(NamedTuple):
-    """A placed name: its text, the point it labels, its box in whole cells with margins, its distance in lines."""
-
-    words: str
-    point: Flat
-    box: Box
-    away: float
-
-
 class Labels:
     """Names next to frames that cover neither one another nor, if possible, an axis."""
 
@@ -413,11 +405,11 @@ class Labels:
 
     def place(self, spots: Iterable[Label]) -> bool:
         """Place a name at the first free spot, or else at the first that covers axes only; return False for none."""
-        free = [spot for spot in spots if self._taken.isdisjoint(self._cells(spot.box))]
+        free = [spot for spot in spots if self._taken.isdisjoint(self._cells(spot[2]))]
         if not free:
             return False
-        found = next((spot for spot in free if self._axes.isdisjoint(self._cells(spot.box))), free[0])
-        self._taken.update(self._cells(found.box))
+        found = next((spot for spot in free if self._axes.isdisjoint(self._cells(spot[2]))), free[0])
+        self._taken.update(self._cells(found[2]))
         self.placed.append(found)
         return True
 
@@ -429,7 +421,7 @@ class Labels:
         left, top = wide * round(left / wide), high * round((middle - self._size.line / 2.0) / high)
         right, bottom = left + wide * math.ceil(length / wide), top + self._size.line
         if left >= 0.0 and right <= self._size.width and top >= 0.0 and bottom <= self._size.height:
-            yield Label(words, point, (left - MARGIN, top, right + MARGIN, bottom), away)
+            yield words, point, (left - MARGIN, top, right + MARGIN, bottom), away
 
     def _cells(self, box: Box) -> Iterator[tuple[int, int]]:
         """Return the cells that a box covers; a point covers one."""

@@ -13,23 +13,22 @@ from frametool.errors import cells, printable
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.sim.turtle import SIZE, TurtleState
 from frametool.view.progress import coloured_console
-from frametool.view.scene import SLANTED, Flat, FrameScene, Label, Labels, Projection, Size, nice, words_of
+from frametool.view.scene import SLANTED, Flat, FrameScene, Labels, Projection, Size, nice, words_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
-    from typing import Self
 
     from rich.console import Console
     from rich.panel import Panel
 
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import IssuedCommand, SimulationStep
+    from frametool.view.scene import Label
 
     Run = tuple[str, str]  # text and its style
     Spot = tuple[int, int]  # line and column
 
 
-BRAILLE = 0x2800
 DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # by row, then column of a cell
 
 
@@ -53,18 +52,14 @@ class Canvas:
         drawn = []
         for column in range(self.columns):
             dots, colour = self.cells.get((line, column), (0, ""))
-            drawn.append(over.get((line, column)) or (chr(BRAILLE + dots) if dots else " ", colour))
+            drawn.append(over.get((line, column)) or (chr(0x2800 + dots) if dots else " ", colour))
         return [("".join(map(itemgetter(0), run)), colour) for colour, run in groupby(drawn, key=itemgetter(1))]
 
 COLOURS = ("red", "green", "blue")  # of axes
 ARROWS = "→↗↑↖←↙↓↘"
-LEAST_LINES, LEAST_COLUMNS = 4, 20
-MOST_OUTSIDE = 12  # frames that are pointed to
-
-
 def terminal_lines(scene: FrameScene, columns: int, lines: int, eye: tuple[float, float] = SLANTED) -> list[list[Run]]:
     """Draw a scene in some columns and lines, each as runs of one style; the last line is the scale."""
-    canvas = Canvas(max(lines, LEAST_LINES) - 1, max(columns, LEAST_COLUMNS))
+    canvas = Canvas(max(lines, 4) - 1, max(columns, 20))
     wide, high = 2.0 * canvas.columns, 4.0 * canvas.lines
     margin = min(14.0, wide / 8.0, high / 8.0)
     size = Size(wide, high, margin, (6.0, 14.0), cell=(2, 4), line=4.0, measure=lambda words: 2.0 * cells(words))
@@ -79,16 +74,24 @@ def terminal_lines(scene: FrameScene, columns: int, lines: int, eye: tuple[float
             _mark_line(canvas, flat, flat.origins[name], tip, COLOURS[axis])
     labels = Labels(flat)
     outside = [name for name, point in flat.origins.items() if not flat.holds(point)]
-    pointed = sum(labels.place(_at_edge(labels, flat, name)) for name in outside[:MOST_OUTSIDE])
+    pointed = sum(labels.place(_at_edge(labels, flat, name)) for name in outside[:12])
     arrows = len(labels.placed)
     labels.place_all()
     letters: dict[Spot, Run] = {}
-    for number, label in enumerate(labels.placed):
-        row, column = int(label.box[1]) // 4, int(label.box[0]) // 2 + 1
+    for number, (words, _, (left, top, *_), _) in enumerate(labels.placed):
+        row, column = int(top) // 4, int(left) // 2 + 1
         style = "dim" if number < arrows else "bold"
-        drawn = (each for letter in label.words for each in (letter, *[""] * (cells(letter) - 1)))  # wide ones take two
+        drawn = (each for letter in words for each in (letter, *[""] * (cells(letter) - 1)))  # wide ones take two
         letters |= {(row, column + at): (letter, style) for at, letter in enumerate(drawn)}
-    scale = _scale_line(flat, canvas.columns, eye, len(outside) - pointed + labels.hidden)
+    # the scale, the direction of view, and the number of names without room
+    metres, stamp_ns, hidden = nice(24.0 / flat.scale), scene.at_ns, len(outside) - pointed + labels.hidden
+    bar = "─" * max(round(metres * flat.scale / 2.0) - 2, 0)
+    azimuth, elevation = (round(math.degrees(angle)) + 0 for angle in eye)
+    more = f", {hidden} name{'s' * (hidden > 1)} hidden" if hidden else ""
+    time = "" if stamp_ns is None else f" at {format_stamp(stamp_ns)[:-6]} s"
+    seen = f"in {printable(scene.fixed)[:40]}{time}, from {azimuth}, {elevation} deg{more}"
+    text = f"├{bar}┤ {metres:g} m  {seen}  axes "[: canvas.columns - 6]
+    scale = [(text, ""), ("x", COLOURS[0]), (" ", ""), ("y", COLOURS[1]), (" ", ""), ("z", COLOURS[2])]
     return [*(canvas.runs(row, letters) for row in range(canvas.lines)), scale]
 
 
@@ -140,18 +143,6 @@ def _at_edge(labels: Labels, flat: Projection, name: str) -> Iterator[Label]:
         yield from labels.at(text, length, flat.origins[name], left, middle)
 
 
-def _scale_line(flat: Projection, columns: int, eye: tuple[float, float], hidden: int) -> list[Run]:
-    """Return the scale, the direction of view, and the number of names without room."""
-    metres, stamp_ns = nice(24.0 / flat.scale), flat.scene.at_ns
-    bar = "─" * max(round(metres * flat.scale / 2.0) - 2, 0)
-    azimuth, elevation = (round(math.degrees(angle)) + 0 for angle in eye)
-    more = f", {hidden} name{'s' * (hidden > 1)} hidden" if hidden else ""
-    time = "" if stamp_ns is None else f" at {format_stamp(stamp_ns)[:-6]} s"
-    seen = f"in {printable(flat.scene.fixed)[:40]}{time}, from {azimuth}, {elevation} deg{more}"
-    text = f"├{bar}┤ {metres:g} m  {seen}  axes "[: columns - 6]
-    return [(text, ""), ("x", COLOURS[0]), (" ", ""), ("y", COLOURS[1]), (" ", ""), ("z", COLOURS[2])]
-
-
 # where pens have all one colour, curves and turtles still differ: one colour a turtle, in the order of their names;
 # the second is how it shows on white
 ON_WHITE = {
@@ -159,7 +150,6 @@ ON_WHITE = {
     "#f7a1c4": "#d6458b", "#c3f584": "#5a9a16", "#d0bdf4": "#7d5fc7", "#ffffff": "#666666",
 }  # fmt: skip
 BACKGROUND = (69, 86, 255)  # turtlesim's
-SCREEN_FRAME = 1.0 / 20.0  # seconds
 TALK = 3  # lines of messages below the turtles
 
 
@@ -169,7 +159,7 @@ def colours_of(turtles: Iterable[str]) -> dict[str, str]:
 
 
 class Screen:
-    """Draw the steps of a run as they come; a context manager that restores the terminal."""
+    """Draw the steps of a run as they come; `live` is a context manager that takes and restores the terminal."""
 
     def __init__(self, scene: Scene, *, to_stderr: bool = False, console: Console | None = None) -> None:
         """Choose where to draw; the picture fits the terminal."""
@@ -181,22 +171,15 @@ class Screen:
         room = console.height - TALK - 3 - len(scene.followers)
         lines = max(5, min(room, (console.width - 4) // 2, 40))
         self._canvas = Canvas(lines, 2 * lines)
-        # what goes to stdout next to the picture is data and must not be caught
-        self._live = Live(console=console, auto_refresh=False, redirect_stdout=False, redirect_stderr=False)
         self._talk: list[str] = []
         self._last: dict[str, IssuedCommand] = {}
         self._tick = SimulationStep(0)  # the last one
         self._drawn = -math.inf
-
-    def __enter__(self) -> Self:
-        """Take the terminal."""
-        self._live.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Draw the last frame and restore the terminal."""
-        self._live.update(self._picture(), refresh=True)
-        self._live.stop()
+        # what goes to stdout next to the picture is data and must not be caught
+        self.live = Live(
+            get_renderable=self._picture, console=console, auto_refresh=False, redirect_stdout=False,
+            redirect_stderr=False,
+        )  # fmt: skip
 
     def watch(self, step: SimulationStep) -> None:
         """Add a step to the picture, and show it if enough time has passed."""
@@ -210,8 +193,8 @@ class Screen:
         for name, colour in colours_of(step.states).items():
             if not step.pens[name].off:
                 self._canvas.mark(*self._dot(step.states[name]), colour)
-        if monotonic() - self._drawn >= SCREEN_FRAME:
-            self._live.update(self._picture(), refresh=True)
+        if monotonic() - self._drawn >= 1.0 / 20.0:
+            self.live.refresh()
             self._drawn = monotonic()
 
     def _dot(self, state: TurtleState) -> tuple[int, int]:

@@ -25,7 +25,8 @@ def test_dots_of_a_cell_add_up() -> None:
 def test_a_screen_draws_turtles_and_what_they_say() -> None:
     console = Console(file=io.StringIO(), force_terminal=True, width=60, height=24, color_system=None)
     scene = tutorial(leader="circle", duration=0.5)
-    with Screen(scene, console=console) as screen:
+    screen = Screen(scene, console=console)
+    with screen.live:
         for step in simulate(scene):
             screen.watch(step)
     drawn = console.file.getvalue()  # type: ignore[attr-defined]

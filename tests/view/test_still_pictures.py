@@ -59,7 +59,7 @@ def test_everything_lies_inside_the_picture_and_no_name_over_another(name: str, 
         x, y, _ = flat.origins[frame]
         assert SIZE.margin - 1e-6 <= x <= WIDTH - SIZE.margin + 1e-6
         assert SIZE.margin - 1e-6 <= y <= HEIGHT - SIZE.margin + 1e-6
-    for a, b in itertools.combinations([label.box for label in labels.placed], 2):
+    for a, b in itertools.combinations([box for _, _, box, _ in labels.placed], 2):
         assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
 
 

@@ -150,7 +150,9 @@ class SimOutput:
             from frametool.view.terminal import Screen
 
             STATE.cleans_up = True  # the terminal's cursor
-            yield stack.enter_context(Screen(scene, to_stderr=not sys.stdout.isatty())).watch
+            screen = Screen(scene, to_stderr=not sys.stdout.isatty())
+            stack.enter_context(screen.live)
+            yield screen.watch
         else:
             yield event_log(say)
         if self.output is not None or not (self.live and sys.stdout.isatty()):
