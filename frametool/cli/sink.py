@@ -13,7 +13,7 @@ import sys
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from itertools import groupby, pairwise
-from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TextIO
+from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
 
 from click import echo_via_pager
 
@@ -79,7 +79,18 @@ def _replacing(path: str, *, force: bool, folder: bool) -> Iterator[Write]:
             check()
         refuse()  # again, now that the part is complete
         with problems_of(path):
-            _take_over(part, place)
+            if folder:
+                with suppress(FileNotFoundError):
+                    os.rename(place, f"{part}.before")
+                os.rename(part, place)
+                _remove(f"{part}.before")
+                return
+            with suppress(FileNotFoundError):  # the file before has a mode and, where the system lets us, an owner
+                known = os.stat(place)
+                with suppress(OSError, AttributeError):  # Windows has no chown
+                    os.chown(part, known.st_uid, known.st_gid)
+                os.chmod(part, stat.S_IMODE(known.st_mode))
+            os.replace(part, place)
     except BaseException:
         _remove(part)
         raise
@@ -200,23 +211,6 @@ def _folder_writer(part: str, path: str, opened: ExitStack) -> Write:
     return fill
 
 
-def _take_over(part: str, place: str) -> None:
-    """Put a part in its place, a file with the mode and, where the system lets us, the owner of the file before."""
-    if os.path.isdir(part):
-        before = f"{part}.before"
-        with suppress(FileNotFoundError):
-            os.rename(place, before)
-        os.rename(part, place)
-        _remove(before)
-        return
-    with suppress(FileNotFoundError):
-        known = os.stat(place)
-        with suppress(OSError, AttributeError):  # Windows has no chown
-            os.chown(part, known.st_uid, known.st_gid)
-        os.chmod(part, stat.S_IMODE(known.st_mode))
-    os.replace(part, place)
-
-
 def _remove(part: str) -> None:
     """Remove a file or a folder, if there is one."""
     if os.path.isdir(part):
@@ -240,18 +234,7 @@ def _refuse_folder(path: str, *, force: bool) -> None:
         raise FileProblem(f"{printable(path)}: holds more than a bag ({shown(others[0])}); it is not replaced")
 
 
-class BatchLine(NamedTuple):
-    """A line of a batch, and the file it is in."""
-
-    source: str
-    line: int
-
-    def __str__(self) -> str:
-        """Return what begins each message of its command."""
-        return f"{self.source}:{self.line}: "
-
-
-LINES: list[BatchLine] = []  # the last one is named in all messages
+PLACES: list[dict[str, Any]] = []  # source and line of a batch; the last one begins all messages
 
 
 def tell(text: str) -> None:
@@ -266,7 +249,8 @@ def tell(text: str) -> None:
 
 def say(text: str) -> None:
     """Write one line about the work, under the program's name; several where a terminal ends."""
-    text = printable(f"frametool: {LINES[-1] if LINES else ''}{text}")
+    where = "{source}:{line}: ".format(**PLACES[-1]) if PLACES else ""
+    text = printable(f"frametool: {where}{text}")
     tell(folded(text) if sys.stderr is not None and sys.stderr.isatty() else text)
 
 
@@ -310,10 +294,10 @@ def say_error(error: FrametoolError, *, in_json: bool, fate: str = "") -> None:
         from frametool.documents.json import dump
 
         message, details = str(error), dict(error.details())
-        if LINES:
+        if PLACES:
             own = {key: details.pop(key) for key in ("source", "line", "column") if key in details}
-            message = f"{LINES[-1]}{message}"
-            details = {**LINES[-1]._asdict(), **({"input": own} if own else {}), **details}
+            message = f"{'{source}:{line}: '.format(**PLACES[-1])}{message}"
+            details = {**PLACES[-1], **({"input": own} if own else {}), **details}
         tell(dump({"error": error.kind, "message": f"{message}{fate}", **details}))
         return
     say(f"{error}{getattr(error, 'remedy', '')}{fate}")

@@ -27,7 +27,6 @@ from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, Ba
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Sequence
 
-    from frametool.cli.command import Adds
     from frametool.explain.derive import DerivationStyle, WrittenPose
     from frametool.explain.render import Explanation
     from frametool.grammar.edges import Diagnostics
@@ -62,11 +61,9 @@ several_stream_options = together(_input("read this file, not stdin; several clo
 pose_stream_options = together(stream_options, options.pose_reading_options)
 
 
-def explain_option(**rest: Any) -> Adds:
-    """Return --explain, with what it says of other options."""
-    return option("--explain [=FORM]", "derive the result step by step (help explain)", under="Result", **rest)
-
-
+explain_option = partial(
+    option, "--explain [=FORM]", "derive the result step by step (help explain)", under="Result"
+)  # fmt: skip
 EXPLAIN = explain_option()
 
 
@@ -81,6 +78,8 @@ class Stream:
         self.path: str | None = self.paths[0] if self.paths and self.paths[0] != "-" else None
         self._opened: BufferedReader | None = None
         self.within = ""  # the format of the records in a bag
+        looked = inputs.peek  # an option may say that the stream is a table
+        self._is_table = bool(looked("columns") or looked("keep") or looked("prefix") or looked("header") is False)
         notations: Any = inputs.peek("from_rep") or (None,)
         refuse(len(notations) > 1, "--from takes one representation")
         self.notation: Any = notations[0]
@@ -106,7 +105,7 @@ class Stream:
         if has_record(begin) or not has_line(begin):
             return has_record(begin)
         try:
-            return bool(self.chosen_format() or self.detected(begin, is_table=self._says_columns()))
+            return bool(self.chosen_format() or self.detected(begin, is_table=self._is_table))
         except FormatError:
             return False
 
@@ -191,7 +190,7 @@ class Stream:
         """Return what messages call the stream."""
         return self.path or "stdin"
 
-    def run(self, request: Request, *, tables_only: bool = False) -> int:
+    def run(self, request: Request) -> int:
         """Run the stream and return its exit status; the error that ends it says what to do."""
         from frametool.formats.detect import refuse_robots, with_hint
 
@@ -200,15 +199,16 @@ class Stream:
             head = source.peek()
             refuse_robots(head, self.name)
             try:
-                return self._run_opened(source, request, tables_only=tables_only)
+                return self._run_opened(source, request)
             except FormatError as error:
                 if isinstance(error, BadRow) and not (error.fault.final or head[:1] == b"[" or error.fault.line <= TOP):
                     error.remedy = "; --on-error skip goes on"
                 raise with_hint(error, head, self.name, chosen=bool(self.chosen_format())) from None
 
-    def _run_opened(self, stream: BufferedReader, request: Request, *, tables_only: bool) -> int:
+    def _run_opened(self, stream: BufferedReader, request: Request) -> int:
         """Run the stream, of whatever format it is."""
-        output, is_table = self.output, tables_only or self._says_columns()
+        looks_up = not request.rows.poses and request.operation.formula is None
+        output, is_table = self.output, looks_up or self._is_table
         fmt = self.within or self.chosen_format()
         signed = fmt or _signed(stream.peek(), self.name)
         if not (fmt or is_table or is_trajectory(signed) or holds_arrays(signed)):
@@ -225,7 +225,7 @@ class Stream:
             self.inputs.ask(*FORMATS[fmt].required_options)
         if output.chosen is None and (output.path or "").endswith(".bin") and not fmt.endswith("-bin"):
             raise click.UsageError(f"-o {output.path} does not name its format; give -f kitti-bin or nuscenes-bin")
-        refuse(tables_only and fmt in RECORDS, f"frames are looked up for the rows of a table, not of {fmt}")
+        refuse(looks_up and fmt in RECORDS, f"frames are looked up for the rows of a table, not of {fmt}")
         request = self._completed(request, fmt)
         if request.offset_ns and fmt in RECORDS:
             from frametool.stream.record_stream import at_other_times
@@ -325,11 +325,6 @@ class Stream:
         style = output.style.changed(format=output.chosen or fmt)
         request = request.with_results(by_default=not output.notations)
         return run_columns(columns, request, style, source=self.name, into=into)
-
-    def _says_columns(self) -> bool:
-        """Return True if an option says that the stream is a table."""
-        looked = self.inputs.peek
-        return bool(looked("columns") or looked("keep") or looked("prefix") or looked("header") is False)
 
     def _run_pasted(self, source: Source, request: Request) -> int:
         """Write the results of a text that was pasted."""

@@ -206,7 +206,8 @@ def test_what_is_no_example_is_refused(words: tuple[str, ...], status: int, mess
 def test_a_plain_install_has_the_examples_where_they_are_looked_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     wheel = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"]
     assert wheel["force-include"] == {"examples": "frametool/examples"}
-    monkeypatch.setattr(examples, "PACKAGE", str(tmp_path))
+    assert examples.EXAMPLES in (f"{examples.PACKAGE}/examples", str(ROOT / "examples"))
+    monkeypatch.setattr(examples, "EXAMPLES", str(tmp_path / "examples"))
     with pytest.raises(FileProblem, match="the example files are missing; install frametool anew"):
         examples.names()
     (tmp_path / "examples").mkdir()

@@ -238,21 +238,28 @@ def apply_command(inputs: Inputs) -> int:
         if task.place:
             inputs.ask("from_rep")
         output.values(values_of(list(sources_of(rest, kind, task.place)), request, output))
-    way.finish()
+    if isinstance(way, TreeWay):  # what was taken for granted
+        inputs.note(way.lookups.granted())
+    else:
+        warn_if_wide([way.pose.covariance or ()] * way.uncertain)
     return status
 
 
 def _derived(task: PoseTask, plan: DerivationStyle, way: Way, record: str | Source, kind: str) -> int:
     """Write the derivation of one record."""
     from frametool.stream.request import Operation, RowOptions
-    from frametool.stream.written import derive_record
+    from frametool.stream.written import ByTree, derive_record
 
     asked, timeless = task.request(operation=Operation(moves=True)), task.inputs.at is not None
+    if isinstance(way, TreeWay):
+        mover: ByTree | WrittenPose = ByTree(way.tree, way.target, way.source, options.at_ns(way.at))
+    else:
+        mover = task.written(way.read, warned=True)
     with inline_misuse():
         rows = RowOptions(
             kind=kind, degrees=asked.rows.degrees, normalize=task.normalize, frame_is_counter=way.counters
         )
-        made = derive_record(plan, way.explained(task), pose_source(record, asked), rows, timeless=timeless)
+        made = derive_record(plan, mover, pose_source(record, asked), rows, timeless=timeless)
     task.output.text(made.render(task.inputs.explain))
     return 0
 
@@ -296,14 +303,6 @@ class Way:
         _settled(own, self.source)
         return self.pose.placed
 
-    def explained(self, task: PoseTask) -> ByTree | WrittenPose:
-        """Return the same for derivations."""
-        return task.written(self.read, warned=True)
-
-    def finish(self) -> None:
-        """Report what was taken for granted."""
-        warn_if_wide([self.pose.covariance or ()] * self.uncertain)
-
     def request(self, frame_column: str | None, time_column: str | None) -> Request:
         """Return how records move: from one frame or each from its own, all alike or each at its own time."""
         from frametool.stream.request import Operation, Request, RowOptions
@@ -327,7 +326,7 @@ class TreeWay(Way):
 
         numbers: what looks like one is no frame's name
         """
-        self.inputs, self.at, self.uncertain = inputs, inputs.at, bool(inputs.covariance)
+        self.at, self.uncertain = inputs.at, bool(inputs.covariance)
         arguments = inputs.arguments
         refuse(len(arguments) < 2, "name TREE and TARGET, or give --transform")
         is_named = len(arguments) > 2 and not is_record(arguments[2]) and not (numbers and begins_number(arguments[2]))
@@ -370,16 +369,6 @@ class TreeWay(Way):
         width = UNCERTAIN if self.uncertain else EXACT
         timed = Timed(time_column or "", self.at_times, self.from_frame, moves, width) if self.in_time else None
         return super().request(frame_column, time_column)._replace(timed=timed)
-
-    def explained(self, task: PoseTask) -> ByTree:  # noqa: ARG002 - of a pose
-        """Return the look-up for derivations."""
-        from frametool.stream.written import ByTree
-
-        return ByTree(self.tree, self.target, self.source, options.at_ns(self.at))
-
-    def finish(self) -> None:
-        """Report what look-ups have taken for granted."""
-        self.inputs.note(self.lookups.granted())
 
 
 def _settled(own: str | None, source: str | None) -> str | None:

@@ -17,7 +17,7 @@ import click
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, say_if_typed
 from frametool.cli.commands import TROUBLE, answered, called, called_in, group
 from frametool.cli.embedded import streams, writer
-from frametool.cli.sink import LINES, TROUBLES, BatchLine, say_error, wants_json, words_of
+from frametool.cli.sink import PLACES, TROUBLES, say_error, wants_json, words_of
 from frametool.documents.source import ReadCache, opened
 from frametool.errors import FileProblem, FrametoolError, Misused, ValueInvalid, alternatives
 from frametool.stream.faults import ROWS_SKIPPED, SKIP, STOP, RowsSkipped
@@ -98,11 +98,11 @@ class CommandBatch:
         with streams(_NoInput(), piped):  # standard input has the lines of the batch
             for number, name, text in command_lines(stream):
                 self.count += 1
-                LINES.append(BatchLine(self.source, number))
+                PLACES.append({"source": self.source, "line": number})
                 try:
                     status = self._run_line(text, name, number)
                 finally:
-                    LINES.pop()
+                    PLACES.pop()
                 if status in FINISHED:
                     self.status = self.status or status
                 elif self.skips:

@@ -23,25 +23,22 @@ if TYPE_CHECKING:
 
 
 PACKAGE = os.path.dirname(os.path.dirname(os.path.dirname(__file__)))
-
-
-def folder() -> str:
-    """Return where the files are: in the installed package, or next to it in its sources."""
-    installed = os.path.join(PACKAGE, "examples")
-    return installed if os.path.isdir(installed) else os.path.join(os.path.dirname(PACKAGE), "examples")
+EXAMPLES = os.path.join(PACKAGE, "examples")
+if not os.path.isdir(EXAMPLES):  # they are next to the package in its sources
+    EXAMPLES = os.path.join(os.path.dirname(PACKAGE), "examples")
 
 
 def names() -> list[str]:
     """Return the names of the example files."""
     try:
-        return sorted(each for each in os.listdir(folder()) if os.path.isfile(os.path.join(folder(), each)))
+        return sorted(each for each in os.listdir(EXAMPLES) if os.path.isfile(os.path.join(EXAMPLES, each)))
     except OSError:
-        raise FileProblem(f"{folder()}: the example files are missing; install frametool anew") from None
+        raise FileProblem(f"{EXAMPLES}: the example files are missing; install frametool anew") from None
 
 
 def example(name: str) -> bytes:
     """Return what is in an example file."""
-    with open(os.path.join(folder(), name), "rb") as file:
+    with open(os.path.join(EXAMPLES, name), "rb") as file:
         return file.read()
 
 
@@ -158,17 +155,6 @@ def _search(ctx: click.Context, name: str) -> str:
     })  # fmt: skip
 
 
-def common(ctx: click.Context) -> str:
-    """Return the options that are in groups, each as the first command has it that does."""
-    found: dict[str, Any] = {}
-    for command in _commands(ctx).values():
-        several = [each for each in command.params if getattr(each, "under", shared.HEADINGS[0]) != shared.HEADINGS[0]]
-        found = {each.name or "": each for each in several} | found
-    formatter = ctx.make_formatter()
-    shared.write_options(formatter, shared.grouped(found.values()))
-    return f"{MADE['common']}\n\n{formatter.getvalue()}"
-
-
 def described(name: str, command: click.Command, ctx: click.Context) -> dict[str, Any]:
     """Return all that there is to say of a command for a program."""
     lines = [line.strip() for line in (command.help or "").replace("\b\n", "").split("\n")]
@@ -242,8 +228,16 @@ def help_command(ctx: click.Context, inputs: Inputs) -> None:
         from frametool.formats.trees.schema import schema
 
         text = f"{dump(schema())}\n"
-    elif name in MADE:
-        text = common(ctx) if name == "common" else example("SKILL.md").decode()
+    elif name == "common":  # the options that are in groups, each as the first command has it that does
+        first, found = shared.HEADINGS[0], dict[str, Any]()
+        for command in _commands(ctx).values():
+            shared_by_several = [each for each in command.params if getattr(each, "under", first) != first]
+            found = {each.name or "": each for each in shared_by_several} | found
+        formatter = ctx.make_formatter()
+        shared.write_options(formatter, shared.grouped(found.values()))
+        text = f"{MADE[name]}\n\n{formatter.getvalue()}"
+    elif name == "skill":
+        text = example("SKILL.md").decode()
     else:
         text = topic(name) if name in topics() else _search(ctx, name)
     show(text, paged=True)

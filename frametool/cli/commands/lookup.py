@@ -209,7 +209,7 @@ def _by_row(task: PoseTask, lookups: algebra.Lookups, target: str | None, source
         poses=0, pose_from_frame=edge_of, notations=task.output.notations or QUATERNION,
         operation=Operation(uncertain=lookups.carried), timed=timed,
     )  # fmt: skip
-    return task.run(request.with_rows(frames=frames), tables_only=True)
+    return task.run(request.with_rows(frames=frames))
 
 
 @command_named("echo")
