@@ -37,24 +37,14 @@ def utf8(text: str) -> str:
     return text
 
 
-def read_names(text: str) -> tuple[str, ...]:
-    """Read names with commas between them."""
+def read_names(text: str, spec: str = "") -> tuple[str, ...]:
+    """Read names with commas between them; spec: as many as REF,EST has, each once."""
     names = tuple(name.strip() for name in text.split(",")) if text else ()
     if not all(names):
         raise ValueInvalid(f"{shown(text)} is not names with commas between them")
+    if spec and (len({*names}) < len(names) or len(names) != spec.count(",") + 1):
+        raise ValueInvalid(f"{shown(text)} is not {spec}, different names")
     return names
-
-
-def names_as(spec: str) -> Callable[[str], tuple[str, ...]]:
-    """Return what reads as many names as REF,EST has, each once."""
-
-    def read(text: str) -> tuple[str, ...]:
-        names = read_names(text)
-        if len({*names}) < len(names) or len(names) != spec.count(",") + 1:
-            raise ValueInvalid(f"{shown(text)} is not {spec}, different names")
-        return names
-
-    return read
 
 
 FULL = -1  # digits: as many as the number has
@@ -107,15 +97,11 @@ def suffix_of(path: str) -> str:
     return os.path.splitext(path)[1].lower()
 
 
-def file_with(*suffixes: str) -> Callable[[str], str]:
-    """Return what takes the name of a file that ends in one of some suffixes."""
-
-    def parse(path: str) -> str:
-        if suffix_of(path) not in suffixes:
-            raise ValueInvalid(f"{shown(path)} does not end in {' or '.join(suffixes)}")
-        return path
-
-    return parse
+def read_path(path: str, suffixes: Collection[str]) -> str:
+    """Take the name of a file that ends in one of some suffixes."""
+    if suffix_of(path) not in suffixes:
+        raise ValueInvalid(f"{shown(path)} does not end in {' or '.join(suffixes)}")
+    return path
 
 
 def _offer_axes(_ctx: click.Context, incomplete: str) -> Mapping[str, str]:
@@ -251,7 +237,8 @@ _RECORDING = together(
 )  # fmt: skip
 # of commands that have no --frames for what they read
 _FRAMES_OUT = "names of the frames of poses in a recording; adds /tf"
-frames_out_option = _of_results("--frames WORLD,BODY", _FRAMES_OUT, names_as("WORLD,BODY"), name="recorded_frames")
+frames_out_option = _of_results("--frames WORLD,BODY", _FRAMES_OUT, partial(read_names, spec="WORLD,BODY"),
+                                name="recorded_frames")  # fmt: skip
 
 
 def result_options(*what: str) -> Adds:

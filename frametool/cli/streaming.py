@@ -125,12 +125,15 @@ class Stream:
 
     def read_clouds_as_rows(self) -> None:
         """Let the points of a cloud be rows of CSV, which has room for more columns."""
-        begin = self.opened().peek()
-        fmt = "" if self.within else self.chosen_format() or (_signed(begin, self.name) if begin else "")
+        from frametool.formats.detect import by_sign
+
+        opened = self.opened()
+        begin, fmt = opened.peek(), "" if self.within else self.chosen_format()
+        if not self.within and begin:
+            fmt = fmt or by_sign(begin, *options.STREAMED, name=self.name) or ""
         if holds_arrays(fmt):
             from frametool.text.lines import Pieces
 
-            opened = self.opened()
             self._opened, self.within = BufferedReader(Pieces(self._rows_of_cloud(fmt, opened), opened)), "csv"
 
     def _rows_of_cloud(self, fmt: str, opened: BufferedReader) -> Iterator[bytes]:
@@ -210,8 +213,11 @@ class Stream:
         looks_up = not request.rows.poses and request.operation.formula is None
         output, is_table = self.output, looks_up or self._is_table
         fmt = self.within or self.chosen_format()
-        signed = fmt or _signed(stream.peek(), self.name)
-        if not (fmt or is_table or is_trajectory(signed) or holds_arrays(signed)):
+        from frametool.formats.detect import by_sign
+
+        signed = fmt or by_sign(stream.peek(), *options.STREAMED, name=self.name) or ""
+        may_be_pasted = signed == "kitti" or not (is_trajectory(signed) or holds_arrays(signed))  # one row of a pose is
+        if may_be_pasted and not (fmt or is_table):
             pasted, stream = pasted_stream(stream, self.name, request, self.notation, self.place)
             if pasted is not None:
                 return self._run_pasted(pasted, request)
@@ -408,14 +414,6 @@ def open_columns(file: InputFile, fmt: str) -> Any:
     """Return the columns of numbers that a file of a format holds."""
     file.format = fmt
     return import_module(FORMATS[fmt].reader).open_columns(file)
-
-
-def _signed(begin: bytes, name: str) -> str:
-    """Return the format that a stream shows, if it is no single row of a pose, which may have been pasted."""
-    from frametool.formats.detect import by_sign
-
-    fmt = by_sign(begin, *options.STREAMED, name=name) or ""
-    return "" if fmt == "kitti" else fmt
 
 
 def is_bag(path: str) -> bool:

@@ -142,12 +142,12 @@ def _surroundings() -> str:
     return python + "".join(f"{package} {there.get(package, 'not installed')}\n" for package in PACKAGES)
 
 
-@click.command(cls=Group, help=HELP)
-@click.option("-v", "all_versions", is_flag=True, is_eager=True,
-              help="with --version: of Python and of its packages too")  # fmt: skip
-@click.option("--version", is_flag=True, expose_value=False, callback=_show_version, help="Show the version and exit.")
-def group(all_versions: bool) -> None:
-    """Hold the commands."""
+group = Group("group", help=HELP, params=[
+    click.Option(["-v", "all_versions"], is_flag=True, is_eager=True,
+                 help="with --version: of Python and of its packages too"),
+    click.Option(["--version"], is_flag=True, expose_value=False, callback=_show_version,
+                 help="Show the version and exit."),
+])  # fmt: skip
 
 
 def called(arguments: list[str]) -> object:

@@ -107,7 +107,8 @@ EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 5 file; -
 @option("--rows [=ate|rpe|kitti]", "one row per pair, step or segment: CSV, JSON")
 @option("--explain", "the formulas with this run's numbers", ("text",), under="Result", excludes=("rows",))
 @option("--fail LIMIT,..", "exit with 1 if a limit is exceeded: ate>5cm", _read_limits, name="limits")
-@option("--report FILE.html|svg", "also write a report in one file; with -o instead", options.file_with(*REPORTS))
+@option("--report FILE.html|svg", "also write a report in one file; with -o instead",
+        partial(options.read_path, suffixes=REPORTS))  # fmt: skip
 @trajectory_options
 @options.list_options("markdown", "latex")
 def compare_command(inputs: Inputs) -> int:
@@ -184,7 +185,7 @@ def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], ro
 @argument("ref")
 @argument("est")
 @pairing_options
-@option("--names REF,EST", "names of the two worlds  [default: their own]", options.names_as("REF,EST"))
+@option("--names REF,EST", "names of the two worlds  [default: their own]", partial(options.read_names, spec="REF,EST"))
 @trajectory_options
 @options.rotation_options
 @options.result_options("poses")

@@ -14,7 +14,7 @@ import click
 
 from frametool.cli.command import EXIT_CODES, Command, Inputs, argument, misuse, option, refuse, say_if_typed, together
 from frametool.cli.commands import Group
-from frametool.cli.options import PRECISION, file_with, place_options, suffix_of
+from frametool.cli.options import PRECISION, place_options, read_path, suffix_of
 from frametool.cli.output import Output
 from frametool.cli.poses import inline_misuse, source_of
 from frametool.cli.signals import STATE
@@ -75,12 +75,14 @@ output_options = together(  # what is shown of a run
     _of_turtles("--reach D", "distance in metres at which the target is reached", parse_number, default=0.5),
     _of_turtles("--realtime", "run in real time, instead of as fast as possible"),
     option("--live", "draw the turtles in the terminal, in real time"),
-    option("--view FILE.html", "show the frames over time on a page, like `view`", file_with(".html")),
+    option("--view FILE.html", "show the frames over time on a page, like `view`",
+           partial(read_path, suffixes=(".html",))),
     option("-f --format", "format of the records  [default: text on a terminal, yaml otherwise]", FORMS,
            name="format_name"),
     PRECISION,
     place_options,
-    option("--plot FILE", "draw the result into a .svg, .html or .png", file_with(".svg", ".html", ".png")),
+    option("--plot FILE", "draw the result into a .svg, .html or .png",
+           partial(read_path, suffixes=(".svg", ".html", ".png"))),
 )  # fmt: skip
 
 
@@ -202,11 +204,7 @@ of transforms, as `lookup` does. A summary goes to stderr.
 """
 
 
-@click.group("sim", cls=Group, table=SUBCOMMANDS, help=HELP, epilog=EXIT_CODES)
-def sim_command() -> None:
-    """Hold the subcommands."""
-
-
+sim_command = Group("sim", table=SUBCOMMANDS, help=HELP, epilog=EXIT_CODES)
 LAW_OPTIONS = ("rate", "gain_linear", "gain_angular", "max_linear", "max_angular")
 SCENE_OPTIONS = ("followers", "spawn", "target", "delay", "duration", "turtlesim")
 

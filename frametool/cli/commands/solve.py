@@ -196,7 +196,8 @@ FORMATS_OF_SCALE = ("text", "yaml", "json", "csv")
 @option("--scale", "estimate the scale from A to B too", requires=("points",))
 @option("--names NAME,..", "BASE,GRIPPER,CAMERA,TARGET, or A,B", options.read_names, requires=("hand_eye", "points"))
 @option("--no-robust", "use all rows, outliers too")
-@option("--report FILE.json|csv", "statistics of the fit and of each row", options.file_with(".json", ".csv"))
+@option("--report FILE.json|csv", "statistics of the fit and of each row",
+    partial(options.read_path, suffixes=(".json", ".csv")))  # fmt: skip
 @options.reading_options
 @options.pose_result_options("tree", "trajectory")
 def solve_command(inputs: Inputs) -> None:
