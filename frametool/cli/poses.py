@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from frametool.cli.command import misuse, refuse, refuse_two_readers, say_if_typed
-from frametool.documents.source import Source, decode, read_text
+from frametool.documents.source import Pasted, Source, decode, read_text
 from frametool.errors import FormatError, Misused, ValueInvalid, heard_by, shown, warn
 from frametool.grammar.pose import Pose, pose_of_numbers
 from frametool.grammar.readers import NotARotation, Reading, stamp_column
@@ -135,7 +135,6 @@ def without_inverse(argument: str) -> tuple[str, bool]:
 def _inverses(source: Source, request: Request) -> Source:
     """Return a text with the inverse of each pose of another one: what `invert -f json` writes of it."""
     from frametool.documents.json import dump
-    from frametool.documents.source import Pasted
     from frametool.geometry.representations import notation
     from frametool.grammar.result import Style
     from frametool.stream.record_values import results

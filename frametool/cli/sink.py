@@ -15,7 +15,7 @@ from functools import partial
 from itertools import groupby, pairwise
 from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
 
-from click import echo_via_pager
+import click
 
 from frametool.cli.signals import STATE
 from frametool.errors import FileProblem, FrametoolError, ValueInvalid, printable, shown
@@ -124,7 +124,7 @@ def show(text: str, *, paged: bool) -> None:
     is_seen = sys.stdout.isatty() and os.environ.get("TERM") != "dumb"
     if is_seen and paged and text.count("\n") >= get_terminal_size().lines:
         check()
-        echo_via_pager(in_colour(text, HELP_MARKS).removesuffix("\n"))
+        click.echo_via_pager(in_colour(text, HELP_MARKS).removesuffix("\n"))
         return
     with writing(None) as write:
         write(in_colour(text, HELP_MARKS) if is_seen else text)
@@ -273,8 +273,6 @@ def say_warning(message: str, rule: str = "") -> None:
     are taken for by their size is said once.
     """
     if rule in ("slash", "by-size"):
-        import click
-
         context = click.get_current_context()
         said = context.meta if not context.params.get("quiet") else {"by-size": True, "slash": True}
         if said.get(rule):

@@ -22,7 +22,8 @@ from frametool.documents.source import HEAD, InputFile, Source, has_line, has_re
 from frametool.errors import FormatError, FrametoolError, heard_by, warn
 from frametool.formats import table
 from frametool.formats.table import BAG, FORMATS, has_no_text, holds_arrays, is_trajectory, readers
-from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRow, BadRows, Outcome
+from frametool.grammar.result import Style
+from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRow, BadRows, Outcome, run
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Sequence
@@ -138,7 +139,6 @@ class Stream:
 
     def _rows_of_cloud(self, fmt: str, opened: BufferedReader) -> Iterator[bytes]:
         from frametool.cli.trees import answers
-        from frametool.grammar.result import Style
         from frametool.stream.as_poses import FormatConverter
         from frametool.stream.request import Request, ResultOptions
 
@@ -257,8 +257,6 @@ class Stream:
 
     def _write(self, outcomes: Generator[Outcome], bad: BadRows, *, gathers: bool = False) -> int:
         """Write what becomes of each block as it comes, or nothing of it, and report its bad rows."""
-        from frametool.stream.faults import run
-
         progress = None
         if not self.inputs.quiet and sys.stderr is not None and sys.stderr.isatty():
             from frametool.view.progress import ProgressBar

@@ -14,7 +14,10 @@ from frametool.cli.sink import say, say_first
 from frametool.cli.streaming import EXPLAIN, PoseTask, one_argument, pose_stream_options
 from frametool.errors import warn
 from frametool.grammar.pose import LEFT_OUT, Pose
+from frametool.grammar.result import Result
 from frametool.stream.faults import MOST
+from frametool.stream.request import PREVIOUS, START, VELOCITIES, Operation, Request, RowOptions
+from frametool.stream.row_layout import VECTOR
 from frametool.text.numbers import parse_fractions, parse_number
 
 
@@ -41,7 +44,6 @@ def compose_command(inputs: Inputs) -> int:
     if task.plan:
         return task.derive("compose", *map(task.written, inputs.poses))
     from frametool.grammar.pose_algebra import product
-    from frametool.stream.request import Operation
 
     request = task.request(operation=Operation(similar=True, multiples=inputs.scale))
     rows = poses.rows_among(inputs.poses, request, task)
@@ -75,8 +77,6 @@ def invert_command(inputs: Inputs) -> int:
     task = PoseTask(inputs)
     if task.plan:
         return task.derive("invert", task.written(inputs.pose))
-    from frametool.stream.request import Operation
-
     operation = Operation(inverse=True, similar=True, multiples=inputs.scale)
     return task.answer(inputs.pose, task.request(operation=operation, rename=lambda parent, name: (name, parent)))
 
@@ -112,8 +112,6 @@ def relative_command(inputs: Inputs) -> int:
     task, a, b = PoseTask(inputs), inputs.a, inputs.b
     if task.plan:
         return task.derive("relative", *map(task.written, [one_argument(each) for each in (a, b)]))
-    from frametool.stream.request import PREVIOUS, START, VELOCITIES, Operation
-
     if inputs.consecutive or inputs.first:
         velocity = inputs.consecutive and inputs.velocity
         refuse(b is not None, "rows are compared with one of themselves; leave A and B out")
@@ -163,7 +161,6 @@ def interpolate_command(inputs: Inputs) -> int:
         refuse(len(asked) != 1, f"--explain derives one fraction, found {len(asked)}")
         return task.derive("interpolate", task.written(inputs.a), task.written(inputs.b), asked[0])
     from frametool.grammar.pose_algebra import interpolated, shared_stamp
-    from frametool.grammar.result import Result
 
     pairs = poses.combinations((inputs.a, inputs.b), task.request())
     if any(pose.covariance for pair in pairs for pose in pair):
@@ -200,7 +197,6 @@ def mean_command(inputs: Inputs) -> int:
     numbers are those of the plain mean. Weights are in proportion to 1 / variance.
     """
     task, weights, by, robust = PoseTask(inputs), inputs.weights, inputs.by, inputs.robust
-    from frametool.grammar.result import Result
     from frametool.stream.gathering import Gathered
     from frametool.stream.record_values import read_poses
 
@@ -257,8 +253,6 @@ def between_command(inputs: Inputs) -> None:
     """
     from frametool.grammar.pose_algebra import turn_between
     from frametool.stream.record_values import read_text
-    from frametool.stream.request import Operation, Request, RowOptions
-    from frametool.stream.row_layout import VECTOR
 
     output, request = Output(inputs, "poses"), Request(Operation(moves=True), RowOptions(kind=VECTOR))
     texts, found = inputs.vectors, list[Any]()

@@ -25,6 +25,7 @@ from frametool.geometry.uncertainty import warn_if_wide
 from frametool.grammar.edges import Diagnostics
 from frametool.grammar.readers import EARTH_FRAMES
 from frametool.stream.faults import BadRows, Fault, run
+from frametool.stream.request import COMBINED, Operation, Request, RowOptions
 from frametool.text.numbers import NotFinite, parse_length
 
 if TYPE_CHECKING:
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Components
     from frametool.recordings.messages import PointCloud
-    from frametool.stream.request import Request
     from frametool.stream.written import ByTree
 
 
@@ -138,8 +138,6 @@ class SeveralClouds:
         """Move all and write them as one; return the exit status."""
         from frametool.formats.detect import detect
         from frametool.stream.column_stream import MergedClouds
-        from frametool.stream.request import Operation, Request
-
         count, frames, output, on_error = len(self.paths), self.frames, self.task.output, self.task.inputs.on_error
         is_open = way.has_source == bool(frames) or len(frames) not in (0, count)
         refuse(is_open, f"name SOURCE, the frame of all clouds, or --frames A,B with one for each of the {count}")
@@ -247,7 +245,6 @@ def apply_command(inputs: Inputs) -> int:
 
 def _derived(task: PoseTask, plan: DerivationStyle, way: Way, record: str | Source, kind: str) -> int:
     """Write the derivation of one record."""
-    from frametool.stream.request import Operation, RowOptions
     from frametool.stream.written import ByTree, derive_record
 
     asked, timeless = task.request(operation=Operation(moves=True)), task.inputs.at is not None
@@ -280,8 +277,6 @@ class Way:
 
     def __init__(self, task: PoseTask) -> None:
         """Read the pose of --transform."""
-        from frametool.stream.request import COMBINED
-
         inputs = task.inputs
         self.uncertain, self.rest = bool(inputs.covariance), inputs.arguments
         asked = task.request(operation=COMBINED._replace(similar=True, multiples=inputs.scale))
@@ -305,8 +300,6 @@ class Way:
 
     def request(self, frame_column: str | None, time_column: str | None) -> Request:
         """Return how records move: from one frame or each from its own, all alike or each at its own time."""
-        from frametool.stream.request import Operation, Request, RowOptions
-
         has_source = self.has_source and frame_column is None
         left = self.from_frame(None) if has_source and not time_column else None
         return Request(
@@ -363,11 +356,10 @@ class TreeWay(Way):
         """Return how records move, unless all move at one time each at its own."""
         from frametool.stream.stamp_source import Timed
 
-        def moves(own: str | None) -> bool:
-            return self.tree.latest(self.target, self.start(own)) is not None
-
-        width = UNCERTAIN if self.uncertain else EXACT
-        timed = Timed(time_column or "", self.at_times, self.from_frame, moves, width) if self.in_time else None
+        timed = None if not self.in_time else Timed(
+            time_column or "", self.at_times, self.from_frame, width=UNCERTAIN if self.uncertain else EXACT,
+            moves=lambda own: self.tree.latest(self.target, self.start(own)) is not None,
+        )  # fmt: skip
         return super().request(frame_column, time_column)._replace(timed=timed)
 
 

@@ -26,6 +26,7 @@ from frametool.documents.source import HEAD, decode, opened, read_text
 from frametool.errors import FrametoolError
 from frametool.formats.table import FORMATS
 from frametool.grammar.result import Result, Style
+from frametool.grammar.result import write_poses as write_documents
 from frametool.stream.faults import STOP, Fault
 
 if TYPE_CHECKING:
@@ -119,8 +120,6 @@ def _for_a_person(term: Term, style: Style) -> str:
     if type_.kind in (POINT, VECTOR):
         result = plain_result(term, style)
         if type_.kind not in result:  # at a place on the Earth
-            from frametool.grammar.result import write_poses as write_documents
-
             return write_documents([result], style)
         return write_points([result], style)
     return line_of_value(term, style)

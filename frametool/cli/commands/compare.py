@@ -18,6 +18,9 @@ from frametool.formats.table import by_name, writers
 from frametool.frames.stamps import parse_stamp, parse_time
 from frametool.frames.topology import seconds
 from frametool.grammar.edges import stop
+from frametool.grammar.pose import Pose
+from frametool.grammar.pose_algebra import result_at
+from frametool.grammar.result import Result
 from frametool.stream.faults import ROWS_SKIPPED, STOP, BadRows
 from frametool.text.numbers import parse_lengths, parse_share
 
@@ -205,8 +208,6 @@ def align_command(inputs: Inputs) -> int:
     entry = Output(inputs.but(output=None, format_name=None) if into else inputs, "poses")
     (found,), skipped = comparisons(inputs.ref, [inputs.est], inputs)
     from frametool.fit.numbers import whole_estimate, worlds
-    from frametool.grammar.pose import Pose
-    from frametool.grammar.result import Result
 
     named = inputs.names or worlds(found)
     whole = whole_estimate(found)._replace(world=found.pairs.ref.world)
@@ -363,8 +364,6 @@ def write_trajectory(output: Output, found: Trajectory) -> None:
     world, body = (found.world, found.body) if (found.world, found.body) != (WORLD, BODY) else (None, None)
     stamps = [None] * found.size if found.stamps_ns is None else found.stamps_ns.tolist()
     if found.xyzw is not None:
-        from frametool.grammar.pose_algebra import result_at
-
         rows = zip(zip(*(part.tolist() for part in found.poses.components), strict=True), stamps, strict=True)
         output.poses_as_they_come(result_at(row, world, body, at) for row, at in rows)
         return

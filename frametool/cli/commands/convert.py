@@ -18,13 +18,13 @@ from frametool.geometry import floats
 from frametool.geometry.representations import REPRESENTATIONS, Notation, notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style, is_locked, mapping_of_numbers
+from frametool.stream.request import Operation
 from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.explain.derive import OtherAxes
-    from frametool.stream.request import Operation
 
 
 _REPRESENTATIONS = f"Representations: {', '.join(row.spelling for row in REPRESENTATIONS.values())}."
@@ -59,8 +59,6 @@ def convert_command(inputs: Inputs) -> int:
     its unit: 90deg, 1.57rad, pi/2. POSE is a mapping, what a tool printed (help pose), a file, or - for stdin.
     """
     values, task = poses.rejoined(inputs.values), PoseTask(inputs, "poses", "points")
-    from frametool.stream.request import Operation
-
     output, axes, world, operation = task.output, inputs.axes, inputs.world, Operation()
     if {axes, world, inputs.all_axes} != {None}:
         axes, world, operation = _change_of_axes(axes, world, inputs.all_axes)
@@ -146,7 +144,6 @@ def _change_of_axes(
 ) -> tuple[str | None, str | None, Operation]:
     """Return what --axes and --world-axes name, or --all-axes for both, and the operation that it is."""
     from frametool.geometry.conventions import both_sides, sides_of
-    from frametool.stream.request import Operation
 
     if both is not None:
         with misuse("--all-axes: "):

@@ -26,7 +26,6 @@ from frametool.stream.faults import NULL, SKIP, RowsSkipped
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.cli.command import Adds
     from frametool.frames.lookups import Replayed
     from frametool.geometry.types import Components
     from frametool.grammar.result import Result
@@ -70,10 +69,9 @@ class Skipped:
         return total.exit_code
 
 
-def _column_option(end: str, *excludes: str) -> Adds:
-    about, under = f"column with the {end} of each row of -i or stdin", "Time" if end == "time" else "Rows"
-    excluded = (*excludes, "times", "source_at", "fixed", "explain")  # a table has many look-ups
-    return option(f"--{end.lower()}-column NAME", about, options.COLUMN, excludes=excluded, under=under)
+# columns with what each row has, in a table of many look-ups
+_COLUMNS = (("TARGET", "Rows", ()), ("SOURCE", "Rows", ()), ("time", "Time", ("at",)))
+_ONE = ("times", "source_at", "fixed", "explain")
 
 
 @command_named("lookup", own=("times", "notations"))
@@ -92,7 +90,11 @@ def _column_option(end: str, *excludes: str) -> Adds:
 @options.reading_options
 @options.pose_result_options("poses")
 @EXPLAIN
-@together(_column_option("TARGET"), _column_option("SOURCE"), _column_option("time", "at"))
+@together(*(
+    option(f"--{end.lower()}-column NAME", f"column with the {end} of each row of -i or stdin", options.COLUMN,
+           excludes=(*more, *_ONE), under=under)
+    for end, under, more in _COLUMNS
+))  # fmt: skip
 def lookup_command(inputs: Inputs) -> int:
     """Print the pose of SOURCE in TARGET, which maps points in SOURCE to TARGET.
 

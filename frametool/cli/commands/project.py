@@ -16,9 +16,10 @@ from frametool.cli.poses import is_inline, values_of
 from frametool.cli.sink import refuse_existing, say, writing
 from frametool.cli.streaming import Stream, is_bag, stream_options
 from frametool.cli.trees import FRAME, frame_name
-from frametool.documents.source import Source
+from frametool.documents.source import InputFile, Source
 from frametool.errors import FormatError, ValueInvalid, listing, shown
 from frametool.geometry.rigid import EXACT
+from frametool.stream.request import Operation, Request
 from frametool.text.numbers import parse_length, parse_number
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from frametool.geometry.camera import Camera
     from frametool.geometry.types import Components
     from frametool.stream.pixels import Seen
-    from frametool.stream.request import Formula, Request
+    from frametool.stream.request import Formula
 
 AXES = ("optical", "opengl", "flu")
 
@@ -37,7 +38,6 @@ def _offer_cameras(_ctx: click.Context, incomplete: str) -> Mapping[str, str] | 
     path, colon, _ = incomplete.rpartition(":")
     if not colon:
         return None
-    from frametool.documents.source import InputFile
     from frametool.formats.cameras import cameras_of
 
     return {f"{path}:{name}": "" for name in cameras_of(InputFile(path)) if name}
@@ -154,8 +154,6 @@ class CameraTask(Stream):
 
     def request(self, frame_column: str | None, formula: Formula) -> Request:
         """Return what is done with rows."""
-        from frametool.stream.request import Operation, Request
-
         inputs = self.inputs
         asked = Request(Operation(moves=True))
         if self.way is not None:

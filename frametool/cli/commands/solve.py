@@ -17,8 +17,9 @@ from frametool.cli.trees import answers, load_tree, opened, state
 from frametool.errors import ValueInvalid, alternatives, first_of, shown, warn
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.pose import Pose
+from frametool.grammar.result import Result, uncertain
 from frametool.stream.faults import BadRows
-from frametool.view.reports import Solution, sigma_entry
+from frametool.view.reports import Solution, sigma_entry, write_left_out, write_solution
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
@@ -232,8 +233,6 @@ def solve_command(inputs: Inputs) -> None:
         raise ValueInvalid(f"{output.style.format} has no place for a scale; write json, yaml or csv")
     solve = solved_hand_eye if hand_eye else solved_points if points else solved_tree
     found = solve(inputs, files, robust=not inputs.no_robust)
-    from frametool.view.reports import write_left_out, write_solution
-
     if said := (write_left_out if inputs.quiet else write_solution)(found):
         tell(said.rstrip("\n"))
     if report:  # one document, or a table of the rows
@@ -247,8 +246,6 @@ def solve_command(inputs: Inputs) -> None:
 def _write(output: Output, found: Solution, *, on_hand: bool) -> None:
     """Write the result: a tree, or entries where there is a scale; as hand-eye calibration only the camera."""
     if output.style.format == "csv" or found.numbers["scale_sigma"] is not None:
-        from frametool.grammar.result import Result, uncertain
-
         output.values([Result(each, uncertain(each.covariance)) for each in found.poses if each.parent])
     elif output.style.format == "handeye" and found.numbers["shape"] == "hand-eye":
         from frametool.formats.trees.calibrations import write_mount
