@@ -21,7 +21,7 @@ from frametool.formats.robots.joints import JointColumn, JointState, find_joint_
 from frametool.formats.robots.model import TURNING, JointValue, Robot
 from frametool.formats.table import FORMATS
 from frametool.ros import messages
-from frametool.stream.record_text import without_noise
+from frametool.stream.record_values import without_noise
 from frametool.stream.request import Formula
 from frametool.stream.row_layout import POSE
 from frametool.stream.splitter import Splitter

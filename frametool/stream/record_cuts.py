@@ -1,37 +1,291 @@
-"""Records in bulk found in text: those written alike are cut by one expression, learned from the first of them."""
+"""Records that are written alike: what is learned from one of them, and holds for all; where in a text the others are.
+
+Records are alike if they differ only in our numbers and in scalars that cannot matter; then one regular expression
+cuts them all into the same stretches, and nothing has to be parsed again.
+"""
 
 from __future__ import annotations
 
-from itertools import accumulate, chain, count, starmap
-from typing import TYPE_CHECKING, Any, NamedTuple
+import re
+from functools import cached_property
+from itertools import accumulate, chain, count, pairwise
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from frametool.documents.json import JSON_NUMBER
+from frametool.errors import FrametoolError
+from frametool.grammar.pose import DESCRIPTIVE, LISTED_WORDS, POSE_KEYS, ROTATION_KEYS
+from frametool.grammar.readers import AXES_KEY, NAME_KEYS, PARENT_KEYS, Path, may_be_uncertain
 from frametool.stream.evaluate import Plan
 from frametool.stream.faults import NULL, SKIP, Fault
-from frametool.stream.layout import In, Renamed
-from frametool.stream.record import KEYS_REMEDY
+from frametool.stream.layout import Const, In, Renamed
+from frametool.stream.record import KEYS_REMEDY, POINT_KEYS, Record
+from frametool.stream.row_layout import POSE
 from frametool.stream.rows import Block, read_extra
-from frametool.stream.splice import column_in, quoted_name
+from frametool.stream.splice import OURS, column_in, quoted_name, stretches_of
 from frametool.stream.splitter import DOCUMENTS, LINES, Part, Splitter
-from frametool.stream.template import Template
 from frametool.text.spans import MARGIN, Bytes, Ints, Spans, framed, without_quotes
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-    from typing import TypeAlias
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from frametool.stream.record_text import RecordText
+    from frametool.documents.document import Node
+    from frametool.stream.record_values import RecordText
     from frametool.stream.request import Request
-    from frametool.stream.template import Names
 
+    Names: TypeAlias = tuple[str | None, str | None]
     Places: TypeAlias = Sequence[tuple[int, int]]
-    Hit: TypeAlias = tuple[Template, Places]
+    Hit: TypeAlias = tuple["Template", Places]
 
 MOST_TEMPLATES = 256  # kept in mind
 MOST_TRIED = 8  # of them tried on whole blocks
 MOST_LOOKED = 1 << 16  # bytes in which the first record of what is left is looked for
 WORTH_CUTTING = 1 << 12  # bytes
+MOST_NAMES = 1 << 16  # of frames, kept in mind
+# what a number looks like: JSON's is exact, YAML's is judged when it is read
+YAML_NUMBER = r"[-+.]?[0-9][-+.0-9eE]*+"
+JSON_TEXT = r'"[^"\\\x00-\x1f]*(?:\\(?:["\\/bfnrt]|u[0-9a-fA-F]{4})[^"\\\x00-\x1f]*)*"'
+# what may stand for a scalar that passes, by its quotes: never anything that could be read as more than one scalar
+YAML_PLAIN = r"(?:-(?! )|[A-Za-z0-9_./+])(?:[\w./+-]| (?=[\w./+(-])|:(?=[\w/]))*"
+FREE = {
+    (True, '"'): JSON_TEXT,
+    (True, ""): rf"(?:{JSON_NUMBER}|true|false|null)",
+    (False, '"'): r'"[^"\\\x00-\x1f]*"',
+    (False, "'"): r"'[^'\x00-\x1f]*'",
+    (False, ""): YAML_PLAIN,
+}
+FRAME = {
+    (True, '"'): r'[^"\\\x00-\x1f]+',
+    (False, '"'): r'[^"\\\x00-\x1f]+',
+    (False, "'"): r"[^'\x00-\x1f]+",
+    (False, ""): rf"(?!(?:null|Null|NULL)\b){YAML_PLAIN}",
+}
+STAMP = r"(?:0|[1-9]\d{0,8}|[1-3]\d{9})(?![.\deE])", r"(?:0|[1-9]\d{0,8})(?![.\deE])"  # seconds, nanoseconds
+NOT_UNKNOWN = r"(?!-1(?:\.0*)?(?:[eE][-+]?0+)?(?![.\deE]))"  # as a covariance begins of which nothing is known
+# scalars under these keys decide what a record is, wherever in it they are ..
+DECISIVE = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *PARENT_KEYS, *NAME_KEYS))
+# .. and these in the mappings that hold the record, unless a number alone is under them
+_WORDS = frozenset(
+    word.partition("_deg")[0].partition("_rad")[0] for word in {*OURS, *POSE_KEYS, "theta"} - LISTED_WORDS
+)  # fmt: skip
+COVARIANCE = "covariance"  # an entry of one that passes as it is decides nothing
+RESULT_KEYS = DESCRIPTIVE - {"frame"}  # a number under these belongs to a result; null may be another record
+OF_PLACES = ("no-alt", "band-s", "stays", "left-out")  # the rules of notes on places, which rows do not tell
+
+
+class Template:
+    """The text of records, and what holds for all that are written alike.
+
+    stretches: where each part of the text is
+    numbers: the stretches that hold our numbers, in order; regular: whether all of them are written plainly
+    stamps: the stretches of each entry's stamp
+    frames: the stretches of the names of each entry's frames, parent and name; None where they are the same in all
+    pieces: what the result is made of; renamed: whose name it is that stood somewhere: of which entry, whether its
+        parent or its name, and the scalar that it was
+    notes: what is worth telling about all of them
+    of_places: those of them that hold for all
+    leaves: of what is written anew, the scalars that differ: the stretch of each, and where it was learned
+    """
+
+    def __init__(self, known: RecordText) -> None:
+        """Cut the text where numbers, stamps, names and edits are."""
+        self.text = text = known.text
+        self.entries = tuple(known.entries)
+        self.json, self.line = known.json, known.line
+        self.notes = list(known.row_notes())
+        self.of_places = [each for each in known.notes_at(0, known.source.first_column) if each.about in OF_PLACES]
+        self._root, self._request = known.root, known.request
+        self._named: dict[tuple[int, Names], Names | None] = {}
+        number = re.compile(JSON_NUMBER if self.json else YAML_NUMBER)
+        self._patterns: dict[tuple[int, int], str] = {}  # of what may be there
+        numbers: list[tuple[int, int]] = []
+        paths = [(record, path) for record, *_ in self.entries for path in record.numbers]
+        for record, path in paths:
+            if path is not None:
+                numbers.append(_text_of(known.root.at(path)))
+                self._patterns[numbers[-1]] = NOT_UNKNOWN * (path in record.begins) + number.pattern
+        self.regular = len(numbers) == len(paths) and all(number.fullmatch(text, *span) for span in numbers)
+        self._patterns = self._patterns if self.regular else {}
+        stamps = [[known.root.at(path) for path in entry.stamp] for entry in self.entries]
+        cuts = {*numbers, *((node.start, node.end) for node in chain(*stamps))}
+        frames = [_frames_of(known.root, entry.record, known.request, json=self.json) for entry in self.entries]
+        self._patterns |= {_text_of(node): FRAME[self.json, node.quote] for node in chain(*frames) if node is not None}
+        leaves: dict[tuple[int, int], Node] = {}
+        if known.request.results.canonical and self.regular:
+            own = [known.root.at(path) for _, path in paths if path is not None]
+            leaves = {_text_of(node): node for node in (*own, *chain(*frames)) if node is not None}
+            taken = cuts | self._patterns.keys()
+            for leaf, pattern in self._free_leaves():  # a stamp is read as it is written, others without their quotes
+                size = 0 if (leaf.start, leaf.end) in taken else len(leaf.quote)
+                span = leaf.start + size, leaf.end - size
+                if span[0] < span[1]:
+                    leaves[span], self._patterns[span] = leaf, pattern[size : len(pattern) - size]
+        self.stretches, pieces = stretches_of(len(text), sorted(cuts | self._patterns.keys()), known.edits)
+        at = dict(zip(self.stretches, count(), strict=False))
+        self.numbers = tuple(at[span] for span in numbers)
+        self.stamps = tuple(tuple(at[node.start, node.end] for node in each) for each in stamps)
+        self.frames = [[None if node is None else at[_text_of(node)] for node in nodes] for nodes in frames]
+        self.leaves = sorted(((at[span], node) for span, node in leaves.items()), key=itemgetter(0))
+        self.renamed: dict[int, tuple[int, int, Node]] = {}
+        for entry, nodes in enumerate(frames):
+            for role, node in enumerate(nodes):
+                if node is not None:
+                    self.renamed.setdefault(node.start, (entry, role, node))
+        self.pieces = [
+            Const(each.text) if isinstance(each, Renamed) and each.at not in self.renamed else each for each in pieces
+        ]
+
+    @cached_property
+    def pattern(self) -> re.Pattern[bytes]:
+        """Match a record that is alike."""
+        return re.compile(self._expression)
+
+    @cached_property
+    def block_pattern(self) -> re.Pattern[bytes]:
+        """Match such a record from where one may begin; its last group is what parts it from the next."""
+        if self.json:
+            return re.compile(rb"(?m:^)" + self._expression + rb"([ \t]*,?[ \t]*\r?\n)")
+        return re.compile(rb"(?:\A|(?<=\n---\n)|(?<=\n---\r\n))" + self._expression + rb"(---[ \t]*\r?\n)")
+
+    @cached_property
+    def _expression(self) -> bytes:
+        """Return the regular expression, one group a stretch, that all records match that are alike."""
+        free = iter(() if self._request.results.canonical else self._free_leaves())
+        leaf = next(free, None)
+        groups = []
+        for start, end in self.stretches:
+            if (start, end) in self._patterns:
+                groups.append(f"({self._patterns[start, end]})")
+                continue
+            parts, at = [], start
+            while leaf is not None and leaf[0].end <= end:
+                node, pattern = leaf
+                if node.start >= at:
+                    parts += [re.escape(self.text[at : node.start]), pattern]
+                    at = node.end
+                leaf = next(free, None)
+            groups.append("".join(["(", *parts, re.escape(self.text[at:end]), ")"]))
+        return "".join(groups).encode()
+
+    def named(self, at: int, names: Names) -> Names | None:
+        """Return the frames of the result of an entry that names these; None where the text around them is another."""
+        if (at, names) not in self._named:
+            if len(self._named) > MOST_NAMES:
+                self._named.clear()
+            record = self.entries[at].record
+            found, own = self._renamed(at, names), self._renamed(at, (record.parent.text, record.name.text))
+            self._named[at, names] = found[0] if found and own and found[1:] == own[1:] else None
+        return self._named[at, names]
+
+    def _renamed(self, at: int, names: Names) -> tuple[Names, Any, Any, bool] | None:
+        """Return the frames of such a result, and all else that they decide about its text."""
+        entry, request, timed = self.entries[at], self._request, self._request.timed
+        asked = request.for_kind(entry.record.shape.kind)
+        if any(path[-1] == "frame" and request.counts(names[0] or "") for path in entry.record.parent.paths):
+            return None
+        try:
+            new = names if asked.rename is None else asked.rename(*names)
+            if entry.edge is not None and request.pose_from_frame is not None:
+                request.pose_from_frame(names[0])
+            is_timed = timed is not None and not timed.name and timed.moves(names[0])
+        except FrametoolError:
+            return None
+        parent, name = (
+            name if index is None else (name == old, name == other, not name)
+            for name, old, other, index in zip(new, names, names[::-1], self.frames[at], strict=True)
+        )
+        return new, parent, name, is_timed
+
+    def fits_in(self, text: bytes, places: Places) -> bool:
+        """Return True if the frames that a record names fit; places: where its stretches are."""
+        for at, (entry, found) in enumerate(zip(self.entries, self.frames, strict=True)):
+            known = entry.record.parent.text, entry.record.name.text
+            parent, name = (
+                old if index is None else text[slice(*places[index])].decode()
+                for old, index in zip(known, found, strict=True)
+            )
+            if self.named(at, (parent, name)) is None:
+                return False
+        return True
+
+    def stretch_of(self, path: Path) -> int:
+        """Return the stretch of a scalar that decides nothing."""
+        node = self._root.at(path)
+        return next(at for at, each in self.leaves if each.start == node.start)
+
+    def _free_leaves(self) -> Iterator[tuple[Node, str]]:
+        """Yield the scalars that decide nothing, in order, each with the expression of what it may be."""
+        around: set[Path] = set()
+        fixed: set[Path | None] = set()
+        for record, *_ in self.entries:
+            depths = range(len(record.path) + 1)
+            around.update(record.path[:depth] for depth in depths)
+            around.update((*record.path[:depth], "header") for depth in depths)
+            around.update([(*record.path, "scale")] * (record.shape.kind == POSE))
+            fixed.update(record.numbers, record.begins)
+        has_poses = any(record.shape.kind == POSE for record, *_ in self.entries)
+        words = _WORDS if has_poses else _WORDS - {"scale"}  # of points that is data
+        placed = {(*record.path, key) for record, *_ in self.entries for key in record.placed}
+        number = JSON_NUMBER if self.json else YAML_NUMBER
+        operation = self._request.operation
+        passes = operation.keeps_frames and operation.formula is None and self._request.gathered is None
+        stamps = {path: STAMP[at % 2] for record, *_ in self.entries for at, path in enumerate(record.stamps)}
+        for path, leaf in _leaves(self._root, ()):
+            depth = next((depth for depth in range(len(path), 0, -1) if type(path[depth - 1]) is str), 0)
+            key, is_own = str(path[depth - 1]) if depth else "", depth == len(path)
+            # with our numbers the scalar of a key may be one of them or change what they mean, whatever its unit
+            stem = re.split(r"[^a-z0-9_]|_(?:deg|rad|mm)", key.casefold(), maxsplit=1)[0]
+            is_free = key in RESULT_KEYS if is_own else key == COVARIANCE and passes
+            pattern = FREE.get((self.json, leaf.quote), FREE[self.json, ""])
+            if key == "frame" and self._request.counts(leaf.value):
+                pattern = f"{leaf.quote}[0-9]++{leaf.quote}"
+            elif path in stamps:
+                pattern = f"{leaf.quote}{stamps[path]}{leaf.quote}"
+            elif "sigma" in path or may_be_uncertain(key) or any(path[: len(each)] == each for each in placed):
+                continue  # they say a covariance or a place, and are no numbers of ours
+            elif is_free and path not in fixed and re.fullmatch(number, leaf.value):
+                pattern = f"{leaf.quote}{number}{leaf.quote}"
+            elif is_own and key in LISTED_WORDS:
+                pass
+            elif path in fixed or key in DECISIVE or (path[: depth - 1] in around and stem in words):
+                continue
+            if re.fullmatch(pattern, self.text[leaf.start : leaf.end], re.ASCII):
+                yield leaf, pattern
+
+
+def _leaves(node: Node, path: Path) -> Iterator[tuple[Path, Node]]:
+    """Yield the scalars that are values, in the order of the text, with their paths."""
+    if type(node.value) is dict:
+        for key, (_, value) in node.value.items():
+            yield from _leaves(value, (*path, key))
+    elif type(node.value) is list:
+        for index, value in enumerate(node.value):
+            yield from _leaves(value, (*path, index))
+    else:
+        yield path, node
+
+
+def _frames_of(root: Node, record: Record, request: Request, *, json: bool) -> list[Node | None]:
+    """Return where the frames of a record are named, parent and name, if all that is alike may name others.
+
+    None where no other name may be: a name is written as plainly there as all that are alike are.
+    """
+    is_placed = record.placed or record.shape.place or request.results.place or request.rows.given_place
+    found: list[Node | None] = []
+    for name in (record.parent, record.name):
+        is_one = name.text and len(name.paths) == 1 and request.rows.poses and not is_placed
+        node = root.at(name.paths[0]) if is_one else None
+        is_plain = node and type(node.value) is str and len(node.value) == node.end - node.start - 2 * bool(node.quote)
+        pattern = FRAME.get((json, node.quote)) if node and is_plain else None
+        found.append(node if node and pattern and re.fullmatch(pattern, node.value, re.ASCII) else None)
+    return found
+
+
+def _text_of(node: Node) -> tuple[int, int]:
+    """Return where the text of a scalar is, without its quotes."""
+    return node.start + bool(node.quote), node.end - bool(node.quote)
 
 
 class Cut(NamedTuple):
@@ -69,25 +323,20 @@ class RecordCutter:
             return cuts, rest
         for template in self.templates[-MOST_TRIED:][::-1]:
             rest = _cut_by(template, text, rest, cuts)
-        for _ in range(MOST_TRIED):
+        for _ in range(MOST_TRIED):  # by one that is learned from the first record of what is left, if need be
             start, end = rest[0] if len(rest) == 1 else (0, 0)
-            if end - start < WORTH_CUTTING or not self._learn_first(text[start : min(end, start + MOST_LOOKED)]):
+            head = text[start : min(end, start + MOST_LOOKED)]
+            part = next(iter(self.splitter.parts(head).parts), None) if end - start >= WORTH_CUTTING else None
+            if part is None or part.problem:
                 break
+            if self.match(head, part) is None:
+                known = self.read(head, part)
+                if isinstance(known, Fault) or known.is_long or not known.entries:
+                    break
+                self.learned(known, head, part)
             rest = _cut_by(self.templates[-1], text, rest, cuts)
         cuts, strays = _without_strays(cuts, text)
         return cuts, sorted(rest + strays)
-
-    def _learn_first(self, text: bytes) -> bool:
-        """Return True if there is a template for the first record of a text, which is learned from it if need be."""
-        part = next(iter(self.splitter.parts(text).parts), None)
-        if part is None or part.problem:
-            return False
-        if self.match(text, part) is None:
-            known = self.read(text, part)
-            if isinstance(known, Fault) or known.is_long or not known.entries:
-                return False
-            self.learned(known, text, part)
-        return True
 
     def match(self, text: bytes, part: Part) -> Hit | None:
         """Find the template that a record follows, and where its stretches are."""
@@ -104,10 +353,47 @@ class RecordCutter:
         if not known.entries:
             return None
         template = Template(known)
-        if known.is_long:
-            return template, [(begin + part.start, end + part.start) for begin, end in template.places()]
+        if known.is_long:  # no expression is made of it
+            sizes = [len(template.text[start:end].encode()) for start, end in template.stretches]
+            ends = list(accumulate(sizes, initial=part.start))
+            return template, list(pairwise(ends))
         self.templates = [*self.templates[-MOST_TEMPLATES + 1 :], template]
         return self.match(text, part)
+
+
+def _cut_by(template: Template, text: bytes, rest: list[tuple[int, int]], cuts: list[Cut]) -> list[tuple[int, int]]:
+    """Cut what is left of a block by one expression, and add the records to `cuts`; return what is then left."""
+    left = []
+    width = len(template.stretches) + 2  # with what follows a record, and what parts it from the one before
+    for start, end in rest:
+        pieces = template.block_pattern.split(text[start:end])
+        count = len(pieces) // width
+        ends = np.cumsum(np.fromiter(map(len, pieces), np.int64, len(pieces))) + start
+        starts = np.concatenate([[start], ends[:-1]])
+        between = np.arange(0, len(pieces), width)
+        left += [(int(starts[at]), int(ends[at])) for at in between[starts[between] < ends[between]]]
+        if count:
+            begins, stops = (each[: count * width].reshape(count, width)[:, 1:] for each in (starts, ends))
+            first = begins[:, :1]  # nothing is before a record
+            cuts.append(Cut(template, *(np.concatenate([each, first], axis=1) for each in (begins, stops))))
+    return left
+
+
+def _without_strays(cuts: Sequence[Cut], text: bytes) -> tuple[list[Cut], list[tuple[int, int]]]:
+    """Leave out records whose frames are called so that their results are written otherwise; return where these are."""
+    found: list[Cut] = []
+    strays: list[tuple[int, int]] = []
+    for cut in cuts:
+        fits = np.ones(len(cut.starts), np.bool_)
+        for at in range(len(cut.template.entries)):
+            names = names_of(cut, at, text)
+            wrong = {each for each in {*names} if cut.template.named(at, each) is None}
+            if wrong:
+                fits &= np.resize(np.array([each not in wrong for each in names]), len(fits))
+        gone = ~fits
+        strays += zip(cut.starts[gone, 0].tolist(), cut.ends[gone, -2].tolist(), strict=True)
+        found.append(cut if fits.all() else Cut(cut.template, cut.starts[fits], cut.ends[fits]))
+    return [cut for cut in found if len(cut.starts)], strays
 
 
 def by_template(cuts: Iterable[Cut], singles: Iterable[tuple[Part, Hit]]) -> list[Cut]:
@@ -115,12 +401,16 @@ def by_template(cuts: Iterable[Cut], singles: Iterable[tuple[Part, Hit]]) -> lis
 
     singles: those that were found alone
     """
+    found: dict[Template, list[Cut]] = {}
+    for cut in cuts:
+        found.setdefault(cut.template, []).append(cut)
     alone: dict[Template, list[Places]] = {}
     for part, (template, places) in singles:
         alone.setdefault(template, []).append((*places, (part.end, part.after), (part.begin, part.start)))
-    found: dict[Template, list[Cut]] = {}
-    for cut in chain(cuts, starmap(_as_cut, alone.items())):
-        found.setdefault(cut.template, []).append(cut)
+    for template, spans in alone.items():
+        every = np.fromiter(chain.from_iterable(chain.from_iterable(spans)), np.int64).reshape(len(spans), -1, 2)
+        one = Cut(template, *(np.ascontiguousarray(every[:, :, side]) for side in (0, 1)))
+        found.setdefault(template, []).append(one)
     joined = []
     for template, each in found.items():
         starts, ends = (np.concatenate(parts) for parts in zip(*(cut[1:] for cut in each), strict=True))
@@ -129,9 +419,22 @@ def by_template(cuts: Iterable[Cut], singles: Iterable[tuple[Part, Hit]]) -> lis
     return joined
 
 
+def in_order(cuts: Sequence[Cut]) -> list[Cut]:
+    """Part cuts so that their records follow each other as in the text; a record that holds several is alone."""
+    if not cuts:
+        return []
+    sorts = np.concatenate([np.full(len(cut.starts), index) for index, cut in enumerate(cuts)])
+    rows = np.concatenate([np.arange(len(cut.starts)) for cut in cuts])
+    order = np.argsort(np.concatenate([cut.starts[:, 0] for cut in cuts]), kind="stable")
+    several, ordered = np.array([len(cut.template.entries) > 1 for cut in cuts]), sorts[order]
+    changes = np.flatnonzero((np.diff(ordered) != 0) | several[ordered[1:]]) + 1
+    parts = [(cuts[sorts[part[0]]], rows[part]) for part in np.split(order, changes)]
+    return [Cut(cut.template, cut.starts[part], cut.ends[part]) for cut, part in parts]
+
+
 def block_of(cut: Cut, data: Bytes, text: bytes, request: Request) -> Block:
     """Describe the records of one template as rows; request: that of their plan."""
-    template = cut.template
+    template, rows = cut.template, len(cut.starts)
     starts, ends = cut.starts + MARGIN, cut.ends + MARGIN
     parts = [Spans(data, starts[:, index], ends[:, index]) for index in range(starts.shape[1])]
 
@@ -152,9 +455,16 @@ def block_of(cut: Cut, data: Bytes, text: bytes, request: Request) -> Block:
         bad = {**late, **bad}
     named = [names_of(cut, at, text) for at in range(len(template.entries))]
     frames = [[parent for parent, _ in each] for each in named]
-    renamed = [piece for piece in template.pieces if isinstance(piece, Renamed)]
-    parts += [_renamed(template, piece, named, len(starts)) for piece in renamed]
-    numbers = _numbers(template, data, starts, ends)
+    renamed = (piece for piece in template.pieces if isinstance(piece, Renamed))
+    parts += [_as_renamed(template, piece, named, rows) for piece in renamed]
+    if template.regular:
+        columns = list(template.numbers)
+        numbers = Spans(data, np.ascontiguousarray(starts[:, columns]), np.ascontiguousarray(ends[:, columns]))
+    else:  # those that are not written as plain numbers are the template's own
+        texts = [repr(value).encode() for record, *_ in template.entries for value in record.values]
+        lengths = np.array([len(each) for each in texts], np.int64)
+        first = np.cumsum(lengths + 1) - lengths - 1 + MARGIN
+        numbers = Spans(framed(b" ".join(texts)), np.tile(first, (rows, 1)), np.tile(first + lengths, (rows, 1)))
     places = cut.starts[:, -1]
     return Block(numbers, parts, places, line_of, stamps=stamps, bad=bad, place_of=place_of, frames=frames)
 
@@ -182,7 +492,7 @@ def _texts(text: bytes, starts: Ints, ends: Ints) -> list[str | None]:
     return [known[each] for each in texts]
 
 
-def _renamed(template: Template, piece: Renamed, frames: Sequence[Sequence[Names]], rows: int) -> Spans:
+def _as_renamed(template: Template, piece: Renamed, frames: Sequence[Sequence[Names]], rows: int) -> Spans:
     """Return the names of frames as results have them."""
     at, role, node = template.renamed[piece.at]
     texts = {}
@@ -231,69 +541,3 @@ def is_text(block: bytes) -> bool:
     except UnicodeDecodeError:
         return False
     return True
-
-
-def _cut_by(template: Template, text: bytes, rest: list[tuple[int, int]], cuts: list[Cut]) -> list[tuple[int, int]]:
-    """Cut what is left of a block by one expression, and add the records to `cuts`; return what is then left."""
-    left = []
-    width = len(template.stretches) + 2  # with what follows a record, and what parts it from the one before
-    for start, end in rest:
-        pieces = template.block_pattern.split(text[start:end])
-        count = len(pieces) // width
-        ends = np.cumsum(np.fromiter(map(len, pieces), np.int64, len(pieces))) + start
-        starts = np.concatenate([[start], ends[:-1]])
-        between = np.arange(0, len(pieces), width)
-        left += [(int(starts[at]), int(ends[at])) for at in between[starts[between] < ends[between]]]
-        if count:
-            begins, stops = (each[: count * width].reshape(count, width)[:, 1:] for each in (starts, ends))
-            first = begins[:, :1]  # nothing is before a record
-            cuts.append(Cut(template, *(np.concatenate([each, first], axis=1) for each in (begins, stops))))
-    return left
-
-
-def _without_strays(cuts: Sequence[Cut], text: bytes) -> tuple[list[Cut], list[tuple[int, int]]]:
-    """Leave out records whose frames are called so that their results are written otherwise; return where these are."""
-    found: list[Cut] = []
-    strays: list[tuple[int, int]] = []
-    for cut in cuts:
-        fits = np.ones(len(cut.starts), np.bool_)
-        for at in range(len(cut.template.entries)):
-            names = names_of(cut, at, text)
-            wrong = {each for each in {*names} if cut.template.named(at, each) is None}
-            if wrong:
-                fits &= np.resize(np.array([each not in wrong for each in names]), len(fits))
-        gone = ~fits
-        strays += zip(cut.starts[gone, 0].tolist(), cut.ends[gone, -2].tolist(), strict=True)
-        found.append(cut if fits.all() else Cut(cut.template, cut.starts[fits], cut.ends[fits]))
-    return [cut for cut in found if len(cut.starts)], strays
-
-
-def _as_cut(template: Template, spans: Sequence[Places]) -> Cut:
-    found = np.fromiter(chain.from_iterable(chain.from_iterable(spans)), np.int64).reshape(len(spans), -1, 2)
-    return Cut(template, np.ascontiguousarray(found[:, :, 0]), np.ascontiguousarray(found[:, :, 1]))
-
-
-def in_order(cuts: Sequence[Cut]) -> list[Cut]:
-    """Part cuts so that their records follow each other as in the text; a record that holds several is alone."""
-    if not cuts:
-        return []
-    sorts = np.concatenate([np.full(len(cut.starts), index) for index, cut in enumerate(cuts)])
-    rows = np.concatenate([np.arange(len(cut.starts)) for cut in cuts])
-    order = np.argsort(np.concatenate([cut.starts[:, 0] for cut in cuts]), kind="stable")
-    several, ordered = np.array([len(cut.template.entries) > 1 for cut in cuts]), sorts[order]
-    changes = np.flatnonzero((np.diff(ordered) != 0) | several[ordered[1:]]) + 1
-    parts = [(cuts[sorts[part[0]]], rows[part]) for part in np.split(order, changes)]
-    return [Cut(cut.template, cut.starts[part], cut.ends[part]) for cut, part in parts]
-
-
-def _numbers(template: Template, data: Bytes, starts: Ints, ends: Ints) -> Spans:
-    """Return the spans of our numbers; those that a template does not write as plain numbers are its own."""
-    rows = len(starts)
-    if template.regular:
-        columns = list(template.numbers)
-        return Spans(data, np.ascontiguousarray(starts[:, columns]), np.ascontiguousarray(ends[:, columns]))
-    texts = [repr(value).encode() for record, *_ in template.entries for value in record.values]
-    own = framed(b" ".join(texts))
-    lengths = np.array([len(text) for text in texts], np.int64)
-    first = np.cumsum(lengths + 1) - lengths - 1 + MARGIN
-    return Spans(own, np.tile(first, (rows, 1)), np.tile(first + lengths, (rows, 1)))

@@ -41,7 +41,7 @@ class BlockResults(NamedTuple):
 LINE = re.compile(rb'((?:[^"\n]|"[^"]*")*+)\n')
 
 
-def text_of(lines: Sequence[tuple[int, bytes]], groups: Sequence[tuple[Ints, list[Spans]]]) -> bytes:
+def text_in_order(lines: Sequence[tuple[int, bytes]], groups: Sequence[tuple[Ints, list[Spans]]]) -> bytes:
     """Return lines of single results and groups of rows in the order of their places."""
     if not groups:
         return b"".join(map(itemgetter(1), lines))
@@ -98,7 +98,7 @@ class Documents(ResultWriter):
             text = self.parting + write_poses([batch.marked.value], self.exact)
             syntax = YAML if self.style.format == "yaml" else JSON
             groups.append((batch.places, batch.text([(text, syntax)], self.style)))
-        found = text_of(lines, groups)
+        found = text_in_order(lines, groups)
         begun, self.begun = self.begun, self.begun or bool(found)
         return found if begun else found[len(self.parting) :]
 
@@ -120,7 +120,7 @@ def csv_rows(block: BlockResults, columns: dict[str, None], style: Style) -> byt
             from frametool.stream.text_rows import in_table
 
             groups.append((alike.places, alike.text(in_table(cells, columns, style), style)))
-    return text_of(lines, groups)
+    return text_in_order(lines, groups)
 
 
 class CsvTable(ResultWriter):

@@ -18,9 +18,8 @@ from frametool.geometry import floats
 from frametool.geometry.representations import notation
 from frametool.grammar.readers import in_nanoseconds
 from frametool.grammar.result import Result, Style
-from frametool.stream.record_cuts import Cut, names_of, plan_of
-from frametool.stream.record_text import Answer
-from frametool.stream.record_values import SPELLED, stamp_key, unit_of, values_of_unit
+from frametool.stream.record_cuts import Cut, Template, names_of, plan_of
+from frametool.stream.record_values import MOST_ENTRIES, SPELLED, Answer, stamp_key, unit_of, values_of_unit
 from frametool.stream.row_layout import POINT, POSE, ROTATION, VECTOR, Target
 from frametool.stream.row_poses import RowPoses
 from frametool.stream.rows import read_stamps
@@ -30,10 +29,8 @@ from frametool.text.spans import MARGIN, Bytes, Spans
 if TYPE_CHECKING:
     from frametool.stream.evaluate import Plan, Run
     from frametool.stream.request import Request
-    from frametool.stream.template import Template
 
 QUATERNIONS = ((notation("quaternion"), False),)
-MOST_ENTRIES = 8  # points or poses of a record: each is looked at for itself
 
 
 class RecordRows:

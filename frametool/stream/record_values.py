@@ -1,36 +1,326 @@
-"""Records of a whole text and their results as values: for arguments, for files, and for output in another format.
+"""The records of a text, read once: an argument, a document or one record of a stream, and what becomes of them.
 
-The records, the operation and what is said of them are those of streams; only the text is not kept.
+Results are values: for arguments, for files, and for output in another format.  The records, the operation and what is
+said of them are those of streams.
 """
 
 from __future__ import annotations
 
 import re
 from contextlib import suppress
+from functools import cached_property, partial
 from itertools import islice
-from typing import TYPE_CHECKING, Any
+from math import isfinite, isinf
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.documents.document import Aliased, Node, parse_nodes, refuse_alias
-from frametool.documents.json import JSON_NUMBER
-from frametool.documents.source import Source, Verbatim
-from frametool.errors import FormatError, Misused, ValueInvalid, shown, warn
+from frametool.documents.document import (
+    Aliased,
+    Document,
+    Node,
+    locate_many,
+    parse_documents,
+    parse_nodes,
+    refuse_alias,
+)
+from frametool.documents.json import JSON_NUMBER, strict_json
+from frametool.documents.source import Source, Verbatim, check_text
+from frametool.errors import Finding, FormatError, FrametoolError, Misused, ValueInvalid, shown, warn
 from frametool.formats.table import is_recording
+from frametool.geometry import floats
 from frametool.grammar.pose import SCALE, Pose
-from frametool.grammar.readers import Misfit, NotARotation, Path, Reading, in_nanoseconds, stamp_column, tell
+from frametool.grammar.readers import (
+    Misfit,
+    NotARotation,
+    Path,
+    Reading,
+    in_nanoseconds,
+    stamp_column,
+    tell,
+    within,
+)
 from frametool.grammar.result import Result, Style, with_entries
-from frametool.stream.record import STALE, Record, pose_of, value_at
-from frametool.stream.record_text import Answer, Outside, RecordText, wide_turn, written
+from frametool.stream.faults import ZONES, RowNote
+from frametool.stream.record import STALE, Record, find_records, pose_of, value_at
 from frametool.stream.request import Request, RowOptions
-from frametool.stream.row_layout import AS_READ, PARTS, POSE, ROTATION, VECTOR
-from frametool.stream.stamp_source import read_stamp
+from frametool.stream.row_layout import (
+    AS_READ,
+    FLAT,
+    LEAVES_PLANE,
+    PARTS,
+    POSE,
+    ROTATION,
+    VECTOR,
+    Target,
+    checked_rotation,
+)
+from frametool.stream.stamp_source import key_path, read_header_stamp, read_stamp, stamp_keys
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from frametool.geometry.types import Components, Rigid
+    from frametool.stream.request import Operation
+    from frametool.stream.splice import Edit
+
     Value = Result | dict[str, Any]
 
+ROUNDED = "rounded"  # rule of the warning about rotations that were normalised
+MOST_LEAVES = 2000  # scalars of a record: an expression that cuts those written alike takes longer for more
+MOST_ENTRIES = 8  # points or poses of a record whose result is written anew: each is looked at for itself
+SIX_BY_SIX = 36  # entries of the covariance of a pose
 SPELLED = ("yaml", "json", "csv")  # formats in which other keys keep their names
 NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
+
+
+class Outside(FrametoolError):
+    """Report a record whose time is not wanted, which is left out without a word."""
+
+    kind = "outside"
+
+
+class Entry(NamedTuple):
+    """One record of a text and what is asked of it.
+
+    target: how its result is written
+    edge: the pose that moves it; None if absent, or where its own time decides
+    stamp: the paths of that time, or of what else comes with it: one, or seconds and nanoseconds
+    parent, name: the frames of its result
+    """
+
+    record: Record
+    target: Target
+    edge: Rigid | None
+    stamp: tuple[Path, ...] = ()
+    parent: str | None = None
+    name: str | None = None
+
+    @property
+    def lost(self) -> str:
+        """Name a frame that the record names and the result cannot."""
+        is_named = self.parent is not None or self.name is not None
+        return "" if is_named else self.record.parent.text or self.record.name.text or ""
+
+
+class Answer(NamedTuple):
+    """What became of a record: the components of its result; has_gaps: numbers of it may be nan."""
+
+    entry: Entry
+    parts: Components
+    has_gaps: bool = False
+
+
+def _entry(document: Document, record: Record, request: Request) -> Entry:
+    """Find the pose that moves a record, or the stamp at which it is looked up; check the frames it names."""
+    stamp: tuple[Path, ...] = ()
+    edge = None
+    timed, operation = request.timed, request.operation
+    if timed is not None and timed.name:
+        stamp = _scalar(document, record, timed.name)
+    elif timed is not None and record.stamps and timed.moves(record.parent.text):
+        stamp = record.stamps[:2]
+    elif timed is not None and operation.formula is not None and not operation.shown:
+        stamp = _scalar(document, record)
+    elif (key := request.rows.extra_column) is not None:
+        stamp = (not key and record.stamps[:2]) or _scalar(document, record, key)
+    elif request.pose_from_frame is not None:
+        edge = request.pose_from_frame(record.parent.text)
+    request = request.for_kind(record.shape.kind)
+    parent, name = record.parent.text, record.name.text
+    if request.rename is not None:
+        parent, name = request.rename(parent, name)
+    names = [each.representation.name for each in request.results.notations]
+    # conventions of Euler angles share a key and are together
+    together = sorted(request.results.notations, key=lambda each: names.index(each.representation.name))
+    target = request.with_results(notations=tuple(together)).target(record.shape)
+    return Entry(record, target, edge, stamp, parent, name)
+
+
+def _scalar(document: Document, record: Record, name: str = "") -> tuple[Path]:
+    """Find a scalar of a record or of what is around it, by a name or that of a stamp; raises Misfit."""
+    find = partial(key_path, name=name) if name else stamp_keys
+    return ((document.index, *within((document.index,), find, document.value, record.path[1:])),)
+
+
+def answer(entry: Entry, stamp: Sequence[str], request: Request) -> Answer:
+    """Return what becomes of a record.
+
+    stamp: the texts of its own time
+    Raises ValueInvalid for what is no rotation, FrametoolError where there is no pose at its time.
+    """
+    operation, shape, timed = request.operation, entry.record.shape, request.timed
+    edge, at_ns = entry.edge, None
+    if stamp and (timed is not None or request.window):
+        key = str(entry.stamp[0][-1])
+        try:
+            at_ns = read_header_stamp(*stamp) if stamp[1:] else read_stamp(stamp[0], in_ns=in_nanoseconds(key))
+            if timed is not None and (operation.formula is None or operation.shown):
+                edge = timed.pose(entry.record.parent.text, at_ns)
+        except FrametoolError as error:
+            error.column_name = timed.column if timed else key  # type: ignore[attr-defined]
+            raise
+    if request.window and at_ns is not None and not request.window[0] <= at_ns <= request.window[1]:
+        raise Outside("beyond --start or --stop")
+    parts = operation.result(
+        shape, entry.record.values, edge, floats,
+        rotation=lambda own: checked_rotation(shape, own, normalize=request.rows.normalize)[0],
+        compared=lambda pose: [pose], seconds=float, times_ns=at_ns,
+    )  # fmt: skip
+    return Answer(entry, parts, has_gaps=operation.shown is not None)
+
+
+def wide_turn(made: Answer, operation: Operation) -> Finding | None:
+    """Return a warning of a turn that is too uncertain for the first order; of what moves others it comes elsewhere."""
+    record = made.entry.record
+    if operation.uncertain or len(operation.carried(record.shape)) < SIX_BY_SIX:
+        return None
+    from frametool.geometry.uncertainty import WIDE_RULE, doubt
+
+    message = doubt(made.parts[-SIX_BY_SIX:])
+    return Finding(WIDE_RULE, message, path=record.path) if message else None
+
+
+def written(each: Answer) -> list[float]:
+    """Return the numbers of a result as they are written; raises ValueInvalid for one that leaves the plane."""
+    target = each.entry.target
+    for name, number in target.left_out(each.parts, floats):
+        if abs(number) > FLAT:
+            raise ValueInvalid(LEAVES_PLANE.format(name, number))
+    if target.place is not None:
+        target.place.check_result(*each.parts[:3])
+    numbers = [number + 0.0 for number in target.written(each.parts, floats)]  # none is -0.0
+    if not all(map(isfinite, numbers)) and (not each.has_gaps or any(map(isinf, numbers))):
+        raise ValueInvalid("the result is not finite: the numbers are too large")
+    return numbers
+
+
+class RecordText:
+    """The records of a text, and what is asked of each.
+
+    values: of its documents, by their number in the text; entries: its records
+    notes: warnings about them
+    edits: what changes in the text
+    """
+
+    def __init__(self, source: Source, request: Request, *, json: bool) -> None:
+        """Read the records; raises FormatError with the place."""
+        self.source, self.text, self.request, self.json = source, source.text, request, json
+        self.notes: list[Finding] = []
+        self.edits: list[Edit] = []
+        documents = json_documents(source) if json else parse_documents(source.text, source.name)
+        self.values = {document.index: document.value for document in documents}
+        self.entries = [entry for each in documents for entry in self._read(each)]
+
+    def _read(self, document: Document) -> list[Entry]:
+        """Read the records of a document, and what each is asked; add warnings about them to the notes.
+
+        Raises FormatError with the place of a record that cannot be read.
+        """
+        source, request, rows = self.source, self.request, self.request.rows
+        reading = Reading(source, degrees=rows.degrees, normalize=rows.normalize, earth=request.earth)
+        try:
+            records = list(find_records(document.value, request, reading, (document.index,)))
+            for note in reading.notes:
+                # of a rotation the place of the first of its numbers, as blocks of rows have it
+                its = (each for each in records if note.rule == ROUNDED and each.path == note.path)
+                found = next((each for each in its if each.shape.notation), None)
+                path = found and found.numbers[found.shape.rotation_at[0]]
+                self.notes.append(note._replace(path=path) if path else note)
+            return [_entry(document, record, request) for record in records]
+        except Misfit as misfit:
+            error = misfit.placed(source)
+            error.column_name = ".".join(map(str, misfit.path[1:]))  # type: ignore[attr-defined]
+            raise error from misfit
+
+    @property
+    def records(self) -> list[Record]:
+        """Return the records."""
+        return [entry.record for entry in self.entries]
+
+    @cached_property
+    def root(self) -> Node:
+        """Return the nodes of the text, by the number of their document."""
+        return Node(0, len(self.text), parse_nodes(self.text))
+
+    @cached_property
+    def is_long(self) -> bool:
+        """Return True if it has so many scalars that no other one is looked for that is written alike."""
+        return next(islice(self.root.leaves(), MOST_LEAVES, None), None) is not None
+
+    @cached_property
+    def line(self) -> int:
+        """Return the line, from 0, of the first of our numbers."""
+        paths = (path for entry in self.entries for path in entry.record.numbers if path is not None)
+        return self.text.count("\n", 0, min((self.root.at(path).start for path in paths), default=0))
+
+    def answer(self, entry: Entry) -> Answer:
+        """Return what becomes of a record."""
+        texts = [str(value_at(self.values, path)) for path in entry.stamp] if entry.stamp else ()
+        return answer(entry, texts, self.request)
+
+    def answers(self, parts: Sequence[Components] | None = None) -> list[Answer]:
+        """Return what becomes of the records but for those whose time is not wanted; raises Outside if none is.
+
+        parts: the components of each result, if known
+        """
+        if parts is not None:
+            return [Answer(*each) for each in zip(self.entries, parts, strict=True)]
+        found = []
+        for entry in self.entries:
+            with suppress(Outside):
+                found.append(self.answer(entry))
+        if len(found) < len(self.entries) and (not found or not self.request.results.canonical):
+            raise Outside("beyond --start or --stop")
+        return found
+
+    def row_notes(self) -> Iterator[RowNote]:
+        """Yield warnings that hold for all records that are written alike."""
+        for entry in self.entries:
+            if entry.lost:
+                yield RowNote.of_lost_name(0, entry.lost)
+            if not entry.record.values and entry.record.shape.kind:
+                yield RowNote(0, "identity", "neither position nor rotation: taken as the identity")
+
+    def notes_at(self, line: int, column: int, answers: Sequence[Answer] = ()) -> list[RowNote]:
+        """Return all warnings about the records, their numbers, and what became of them, each with its place.
+
+        line, column: where the text begins; lines count from 0
+        """
+        begin, found = Source("", self.text, line, column), list[RowNote]()
+        places = locate_many(self.text, [note.path for note in self.notes]) if self.notes else ()
+        for note, at_char in zip(self.notes, places, strict=True):
+            at, there = begin.place(*at_char)
+            found.append(RowNote(at, note.rule, note.message, str(there)))
+        for each in self.row_notes():
+            if all(each.about != other.about for other in found[: len(self.notes)]):
+                found.append(each._replace(line=line + self.line))
+        found.sort()
+        for answer in answers:
+            if wide := wide_turn(answer, self.request.operation):
+                found.append(RowNote(line + self.line, wide.rule, wide.message))
+                break
+        if answers and (place := answers[0].entry.target.place) is not None:
+            from frametool.geometry.earth import ZONES as ZONE_NAMES
+
+            numbers = written(answers[0])
+            found += [RowNote(line + self.line, ZONES, ZONE_NAMES[int(numbers[at])]) for at in place.words]
+        return found
+
+
+def json_documents(source: Source) -> list[Document]:
+    """Read strict JSON: what only YAML would take is a fault of the record."""
+    check_text(source)
+    values = strict_json(source)
+    return [Document(value, index, source) for index, value in enumerate(values) if value is not None]
+
+
+def without_noise(text: str) -> str:
+    """Blank the lines that the echo tools print between messages."""
+    from frametool.ros.message_stream import NOISE
+
+    return "\n".join("" if NOISE(line.rstrip("\r")) else line for line in text.split("\n"))
+
+
+# --- results as values ---
 
 
 def read_poses(source: Source, asked: Request) -> list[Pose]:
@@ -125,12 +415,8 @@ def values_of_unit(node: Node, unit: Path, answers: list[Answer], request: Reque
         yield _of_several(node, unit, answers, request)
         return
     for each in answers:
-        if request.operation.formula is not None:
-            yield _formula_result(node, unit, each, request, style.format)
-        elif each.entry.record.shape.kind in (POSE, ROTATION):
-            yield _pose_result(node, unit, each, request, style)
-        else:
-            yield _flat(node, unit, each, request, style.format)
+        made = _result if request.operation.formula is None else _formula_result
+        yield made(node, unit, each, request, style.format)
 
 
 def _formula_result(node: Node, unit: Path, made: Answer, request: Request, fmt: str) -> Value:
@@ -160,20 +446,41 @@ def _header_stamp(record: Record) -> dict[str, int]:
     return {} if record.stamp_ns is None else {"stamp_ns": record.stamp_ns}
 
 
-def _pose_result(node: Node, unit: Path, made: Answer, request: Request, style: Style) -> Value:
-    """Return a pose with its frames and what else its record says; a vector that nothing turns stays one."""
-    entry = made.entry
-    record = entry.record
-    pose = Pose.of(made.parts[:7], entry.name, entry.parent)
-    placed, turned = entry.target.unit is not None or entry.target.whole, bool(entry.target.notations)
-    pose = pose._replace(position=pose.position if placed else None, rotation=pose.rotation if turned else None)
-    extras = _extras(made, request, 7) | _rest(node, unit, record)
-    if record.key == VECTOR and placed and not turned and request.operation.keeps_frames:  # it is at no place
-        named = {} if entry.parent is None else {"frame": entry.parent}
-        return named | {VECTOR: [*made.parts[:3]]} | _header_stamp(record) | with_stamp_ns(extras, style.format)
-    if request.operation.similar and isinstance(extras.get(SCALE), float):
-        pose = pose._replace(scale=extras.pop(SCALE))
-    return Result(pose, _header_stamp(record) | with_stamp_ns(extras, style.format))
+def _result(node: Node, unit: Path, made: Answer, request: Request, fmt: str) -> Value:
+    """Return what a record becomes, with its frames and what else it says: a pose, or a mapping without levels."""
+    entry, parts, keeps_frames = made.entry, made.parts, request.operation.keeps_frames
+    record, target = entry.record, entry.target
+    kind, stamp = record.shape.kind, _header_stamp(record)
+    named: dict[str, Any] = {} if entry.parent is None else {"frame": entry.parent}
+    if kind in (POSE, ROTATION):
+        placed, turned = target.unit is not None or target.whole, bool(target.notations)
+        extras = _extras(made, request, 7) | with_stamp_ns(_rest(node, unit, record), fmt)
+        if record.key == VECTOR and placed and not turned and keeps_frames:  # nothing turns it, it is at no place
+            return named | {VECTOR: [*parts[:3]]} | stamp | extras
+        pose = Pose.of(parts[:7], entry.name, entry.parent)
+        pose = pose._replace(position=pose.position if placed else None, rotation=pose.rotation if turned else None)
+        if request.operation.similar and isinstance(extras.get(SCALE), float):
+            pose = pose._replace(scale=extras.pop(SCALE))
+        return Result(pose, stamp | extras)
+    numbers = written(made)[: target.size]
+    if kind in PARTS:
+        named |= dict(zip(PARTS[kind], (numbers[:3], numbers[3:]), strict=True))
+    elif target.place is not None:
+        from frametool.grammar.place import point_entry
+
+        named = point_entry(entry.parent, parts[:3], target.place, getattr(parts, "read", None))
+    else:
+        named[kind] = numbers
+    if is_recording(fmt) and keeps_frames:
+        from frametool.grammar.place import LLA_KEYS, read_at
+
+        holder = node.at(record.path[len(unit) :])
+        keys = [key for key in (*record.members, *record.placed) if key in LLA_KEYS]
+        if keys:
+            place, read = read_at({key: str(plain(holder.at((key,)))) for key in keys}, Reading(Source("", "")))
+            named[AS_READ] = [*place.lla(read)]
+    named = ({"name": entry.name} if entry.name else {}) | named | stamp | _extras(made, request, len(numbers))
+    return named | with_stamp_ns(_rest(node, unit, record), fmt)
 
 
 def with_stamp_ns(extras: dict[str, Any], fmt: str) -> dict[str, Any]:
@@ -237,39 +544,6 @@ def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
     return rest
 
 
-def _flat(node: Node, unit: Path, made: Answer, request: Request, fmt: str) -> dict[str, Any]:
-    """Return a point, vector, twist or wrench as a mapping without levels, with what else its record says."""
-    entry = made.entry
-    kind = entry.record.shape.kind
-    named: dict[str, Any] = {"frame": entry.parent} if entry.parent is not None else {}
-    numbers = written(made)[: entry.target.size]
-    extra = _extras(made, request, len(numbers))
-    if kind in PARTS:
-        named |= dict(zip(PARTS[kind], (numbers[:3], numbers[3:]), strict=True))
-    elif entry.target.place is not None:
-        from frametool.grammar.place import point_entry
-
-        named = point_entry(entry.parent, made.parts[:3], entry.target.place, getattr(made.parts, "read", None))
-    else:
-        named[kind] = numbers
-    if is_recording(fmt) and request.operation.keeps_frames:
-        holder = node.at(entry.record.path[len(unit) :])
-        named |= {AS_READ: read} if (read := _place_as_read(holder, entry.record)) else {}
-    rest = with_stamp_ns(_rest(node, unit, entry.record), fmt)
-    return ({"name": entry.name} if entry.name else {}) | named | _header_stamp(entry.record) | extra | rest
-
-
-def _place_as_read(node: Node, record: Record) -> list[float]:
-    """Return lat, lon and alt where a record says them; [] elsewhere."""
-    from frametool.grammar.place import LLA_KEYS, read_at
-
-    keys = [key for key in (*record.members, *record.placed) if key in LLA_KEYS]
-    if not keys:
-        return []
-    place, numbers = read_at({key: str(plain(node.at((key,)))) for key in keys}, Reading(Source("", "")))
-    return [*place.lla(numbers)]
-
-
 def _of_several(node: Node, unit: Path, answers: list[Answer], request: Request) -> dict[str, Any]:
     """Return a message of several things as a mapping without levels, a key for each of their numbers."""
     last = answers[-1].entry  # of the first, an orientation, nothing may be known: then it stays
@@ -304,10 +578,10 @@ def plain(node: Node) -> Any:
     refuse_alias(node)
     if node.quote or node.value is None:
         return node.value
-    return plain_scalar(node.value)
+    return _plain_scalar(node.value)
 
 
-def plain_scalar(text: str) -> str | Verbatim | None:
+def _plain_scalar(text: str) -> str | Verbatim | None:
     """Return a scalar without quotes as a plain value: numbers and truth values keep their text."""
     if text in ("null", "~", ""):
         return None
@@ -317,5 +591,5 @@ def plain_scalar(text: str) -> str | Verbatim | None:
 def plain_text(text: str, quote: str) -> Any:
     """Return the text within the quotes of a scalar as a plain value."""
     if not quote:
-        return plain_scalar(text)
+        return _plain_scalar(text)
     return plain(parse_nodes(f"{quote}{text}{quote}")[0]) if "\\" in text else text

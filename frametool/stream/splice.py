@@ -21,7 +21,7 @@ from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream.faults import Fault
 from frametool.stream.layout import Const, IfLocked, In, Item, Out, Piece, Renamed, Word, number_text
 from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ, Name, outermost
-from frametool.stream.record_text import Answer, Entry, RecordText, json_documents, without_noise, written
+from frametool.stream.record_values import Answer, Entry, RecordText, json_documents, without_noise, written
 from frametool.stream.row_layout import POINT, POSE, SIX, TURNED, VECTOR, count_of
 from frametool.stream.stamp_source import replaced
 
@@ -71,31 +71,32 @@ class Splicer:
         self.node = root.at(outermost(record.path) if request.operation.only_adds else record.path)
         self.members: dict[str, tuple[Node, Node]] = self.node.value if type(self.node.value) is dict else {}
         self.flow = json or self.node.flow or not self.members
+        inner = [*self.members.values()] or [(self.node, self.node)]
+        self.first_key, self.end = inner[0][0], inner[-1][1].end
+        self.between = ", " if self.flow else "\n" + " " * self.first_key.column  # what parts two members
         self.edits: list[Edit] = []
         self.dropped: set[str] = set()
         self.slots: list[Node | None] = [None if path is None else root.at(path) for path in record.numbers]
 
     def run(self) -> list[Edit]:
         """Return the edits, in no order."""
-        shape = self.record.shape
+        shape, target = self.record.shape, self.target
         if self.request.operation.only_adds:
             self._add(self._extras(0))
-        elif not self.members:
-            if self.kind == shape.kind and self._stays_a_list():
+            return self.edits
+        stays = self.kind == shape.kind
+        if not self.members:  # a bare list, which stays one if the result has its numbers and no others
+            has_place = target.unit is None or shape.unit is not None
+            if stays and self._same_rotation() and has_place and not self.request.extras(shape):
                 self._numbers(range(len(self.slots)), 0)
             else:
                 self._anew()
-        else:
-            self._names()
-            if self.kind == shape.kind:
-                self._in_place()
-            else:
-                self._anew()
-        return self.edits
-
-    def _in_place(self) -> None:
-        """Write the numbers of a result where those of the record are, or its members anew."""
-        shape, target = self.record.shape, self.target
+            return self.edits
+        self._names()
+        if not stays:
+            self._anew()
+            return self.edits
+        # the numbers of a result are written where those of the record are, or its members anew
         if target.scaled:
             self.dropped.update(self.record.covariances)  # the matrix says the scale
         elif not shape.rewritten:
@@ -103,7 +104,7 @@ class Splicer:
             self._numbers(range(shape.own_size, shape.own_size + sum(shape.covariance)), target.size + extras)
         if shape.kind in SIX:
             self._numbers(range(6), 0)
-            return
+            return self.edits
         self._position()
         if shape.kind in TURNED:
             self._rotation()
@@ -112,11 +113,7 @@ class Splicer:
             self.dropped.update(self.record.others)
             self._add(self._extras(target.size))
         self._leave_out()
-
-    def _stays_a_list(self) -> bool:
-        """Return True if a result has the numbers of the bare list it comes from and no others."""
-        has_place = self.target.unit is None or self.record.shape.unit is not None
-        return self._same_rotation() and has_place and not self.request.extras(self.record.shape)
+        return self.edits
 
     def _same_rotation(self) -> bool:
         """Return True if the rotation is written as it was read, number by number."""
@@ -214,29 +211,26 @@ class Splicer:
             for key, sample in with_entries(dict.fromkeys(names, 0.5)).items():
                 members.append(self._member({key: sample}, first))
                 first += len(sample) if isinstance(sample, list) else 1
-        for name, value in said.members.items() if said else ():
-            key, member = prefix + name, self._shown(prefix + name, value)
+        precision = self.request.results.precision
+        fmt, exponent = "" if precision is None else f"z.{precision}f", b"e" if self.json else b".0e"
+        for name, value in said.members.items() if said else ():  # a text, a word, or a list of numbers
+            key = prefix + name
+            member = self._member({key: value if isinstance(value, str) else 0.5}, 0)
+            if isinstance(value, Word):
+                member = (*member[:-1], value._replace(number=self.first + value.number))
+            elif not isinstance(value, str):
+                begin, end = ("[", "]") if value[1:] else ("", "")
+                items = [
+                    (begin * (at == value[0]), end if at == value[-1] else ", ", "null" * (at == value[0]), fmt)
+                    for at in value
+                ]
+                numbers = (Item(self.first + at, words, exponent) for at, words in zip(value, items, strict=True))
+                member = (*member[:-1], *numbers)
             if said and said.replaces and key in self.members:
                 self._replace(key, member)
             else:
                 members.append(member)
         return members
-
-    def _shown(self, key: str, value: str | Word | tuple[int, ...]) -> tuple[Piece, ...]:
-        """Return a text, a word, or a list of numbers as a member."""
-        if isinstance(value, str):
-            return self._member({key: value}, 0)
-        begin = self._member({key: 0.5}, 0)[:-1]
-        if isinstance(value, Word):
-            return (*begin, value._replace(number=self.first + value.number))
-        precision = self.request.results.precision
-        fmt, exponent = "" if precision is None else f"z.{precision}f", b"e" if self.json else b".0e"
-        marks = [("[" * (not at), "]" if at == len(value) - 1 else ", ") for at in range(len(value))]
-        marks = marks if value[1:] else [("", "")]
-        items = zip(value, marks, strict=True)
-        return (*begin, *(
-            Item(self.first + at, (*around, "null" * (at == value[0]), fmt), exponent) for at, around in items
-        ))  # fmt: skip
 
     def _names(self) -> None:
         """Rename the frames as the operation does."""
@@ -281,36 +275,26 @@ class Splicer:
         elif self.flow:
             text = flow(entry, lambda _: MARK)[1:-1]
         else:
-            text = yaml(entry, lambda _: MARK).rstrip("\n").replace("\n", self._between)
-        return tuple(_with_numbers(text, self.first + first))
-
-    @property
-    def _between(self) -> str:
-        """Return what parts two members."""
-        return ", " if self.flow else "\n" + " " * self._first_key.column
-
-    @property
-    def _first_key(self) -> Node:
-        return next(iter(self.members.values()))[0]
-
-    @property
-    def _end(self) -> int:
-        return [*self.members.values()][-1][1].end
+            text = yaml(entry, lambda _: MARK).rstrip("\n").replace("\n", self.between)
+        pieces: list[Piece] = []
+        for number, part in enumerate(text.split(MARK), self.first + first):
+            pieces += [Const(part.encode())] * bool(part) + [Out(number, number + 1, b"")]
+        return tuple(pieces[:-1])
 
     def _lead(self, member: tuple[Piece, ...], key: str = "") -> None:
         """Write a member in front of one that is there, or of all."""
-        start = (self.members[key][0] if key else self._first_key).start
-        self.edits.append(Edit(start, start, (*member, Const(self._between.encode()))))
+        start = (self.members[key][0] if key else self.first_key).start
+        self.edits.append(Edit(start, start, (*member, Const(self.between.encode()))))
 
     def _add(self, members: Sequence[tuple[Piece, ...]], key: str = "") -> None:
         """Write members behind one that is there, or behind all."""
-        end = self.members[key][1].end if key else self._end
+        end = self.members[key][1].end if key else self.end
         self.edits += [Edit(end, end, self._led(member)) for member in members]
 
     def _led(self, member: tuple[Piece, ...]) -> tuple[Piece, ...]:
         """Return a member with what parts it from the one before."""
         conditional = any(isinstance(piece, IfLocked) for piece in member)
-        return ((IfLocked if conditional else Const)(self._between.encode()), *member)
+        return ((IfLocked if conditional else Const)(self.between.encode()), *member)
 
     def _replace(self, key: str, pieces: tuple[Piece, ...]) -> None:
         self.edits.append(Edit(self.members[key][0].start, self.members[key][1].end, pieces))
@@ -326,7 +310,7 @@ class Splicer:
         if not self.members:
             self.edits.append(Edit(self.node.start, self.node.end, (Const(b"{"), *pieces, Const(b"}"))))
         elif self.dropped.issuperset(self.members):
-            self.edits = [Edit(self._first_key.start, self._end, tuple(pieces))]
+            self.edits = [Edit(self.first_key.start, self.end, tuple(pieces))]
         else:
             self._leave_out()
             self._add(members)
@@ -356,33 +340,13 @@ def quoted_name(node: Node, name: str, *, json: bool) -> str:
     return dump(name)
 
 
-def _with_numbers(text: str, first: int) -> Iterator[Piece]:
-    """Split a text at the marks of numbers."""
-    parts = text.split(MARK)
-    for index, part in enumerate(parts):
-        if index:
-            yield Out(first + index - 1, first + index, b"")
-        if part:
-            yield Const(part.encode())
-
-
-def edits_of(known: RecordText) -> list[Edit]:
-    """Return what changes in the text; a name that several records share changes once."""
-    edits: list[Edit] = []
-    first = 0
-    for entry in known.entries:
-        edits += Splicer(known.root, entry, known.request, json=known.json, first=first).run()
-        first += known.request.result_size(entry.record.shape, entry.target)
-    return list(dict.fromkeys(edits))
-
-
 def rendered(known: RecordText, answers: Sequence[Answer]) -> bytes:
     """Return the text with results in the place of numbers, some of them as words; b"" where nothing is in it."""
     numbers = [number for each in answers for number in written(each)]
     precision, exponent = known.request.results.precision, "e" if known.json else ".0e"
     fmt = "" if precision is None else f"z.{precision}f"
     locked = any(each.entry.target.locked(each.parts) for each in answers)
-    stretches, pieces = cut(len(known.text), (), known.edits)
+    stretches, pieces = stretches_of(len(known.text), (), known.edits)
     shown = []
     for piece in pieces:
         if isinstance(piece, In):
@@ -396,7 +360,7 @@ def rendered(known: RecordText, answers: Sequence[Answer]) -> bytes:
     return "".join(shown).encode() if known.entries else b""
 
 
-def cut(
+def stretches_of(
     length: int, cuts: Sequence[tuple[int, int]], edits: Iterable[Edit]
 ) -> tuple[list[tuple[int, int]], list[Piece]]:
     """Cut a text into stretches, each number one of its own; return them with the pieces of the result."""
@@ -461,8 +425,11 @@ def attempt(text: bytes, part: Part, line: int = 0, *, fmt: str, request: Reques
             decoded = without_noise(decoded)
         source = source._replace(text=decoded)
         found = RecordText(source, request, json=fmt == "json")
-        if not request.results.canonical:
-            found.edits = edits_of(found)
+        edits, first = list[Edit](), 0
+        for entry in () if request.results.canonical else found.entries:
+            edits += Splicer(found.root, entry, request, json=found.json, first=first).run()
+            first += request.result_size(entry.record.shape, entry.target)
+        found.edits = list(dict.fromkeys(edits))  # a name that several records share changes once
     except Aliased as error:
         return fault_at(source, error.in_text(source.text))
     except FormatError as error:

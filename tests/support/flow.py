@@ -22,8 +22,7 @@ from frametool.grammar.result import Style
 from frametool.stream.faults import MOST, BadRows, run
 from frametool.stream.record import find_records
 from frametool.stream.record_stream import run_records
-from frametool.stream.record_text import Entry, answer
-from frametool.stream.record_values import read_poses, results
+from frametool.stream.record_values import Entry, answer, read_poses, results
 from frametool.stream.request import Operation, Request, ResultOptions, RowOptions
 from frametool.stream.rows import read_stamps
 from frametool.stream.stamp_source import read_stamp
