@@ -59,11 +59,11 @@ from frametool.stream.stamp_source import key_path
 from frametool.text.numbers import parse_number, read_number_or_angle
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from frametool.grammar.readers import Path
     from frametool.stream.header import Columns, PoseColumns
-    from frametool.stream.request import Formula, Request
+    from frametool.stream.request import Request
 
 POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # with metres a unit
 INNER = ("transforms", "static_transforms", "poses", "pose", "transform", "twist", "wrench", "accel", "msg", "message",
@@ -143,9 +143,17 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
     Raises Misfit, with the path, for a document without records and for a record that cannot be read.
     """
     formula = request.operation.formula
+    found: list[RecordPlace] = []
+    places: list[tuple[Any, Path, tuple[Path, ...]]] = [(document, (), ())]
+    for key in request.rows.columns[0].split(".") if request.rows.poses and request.rows.columns else ():
+        items = [(value_at(each, at), (*above, *at), near) for each, above, near in places for at in _mappings(each)]
+        places = [(each[key], (*above, key), (*near, above)) for each, above, near in items if key in each]
+        if not places:
+            keys = dict.fromkeys(each for item, *_ in items for each in item)
+            raise Misfit(f"no key {shown(key)} for --columns{alternatives(key, keys, 'keys')}", path)
     try:
-        search = _search_under if request.rows.columns else _search
-        found = list(search(document, (), (), request)) if request.rows.poses else []
+        if request.rows.poses:
+            found = [each for place in places for each in _search(*place, request)]
         is_bare = request.rows.poses and not request.operation.takes_points
         if not found and is_bare and type(document) is dict and NOTHING_BUT.issuperset(document):
             reading.here = path
@@ -161,19 +169,6 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
         raise Misfit("a record holds one pose; name A or B, or compare it with the one before by --consecutive", path)
     for place in found:
         yield _record(document, place, request, reading, path)
-
-
-def _search_under(document: Any, path: Path, outer: tuple[Path, ...], request: Request) -> Iterator[RecordPlace]:
-    """Search what is under the key `detections.pose`, which --columns names; a list stands for its items."""
-    found = [(document, path, outer)]
-    for key in request.rows.columns[0].split("."):
-        items = [(value_at(each, at), (*above, *at), around) for each, above, around in found for at in _mappings(each)]
-        found = [(each[key], (*above, key), (*around, above)) for each, above, around in items if key in each]
-        if not found:
-            keys = dict.fromkeys(each for item, *_ in items for each in item)
-            raise Misfit(f"no key {shown(key)} for --columns{alternatives(key, keys, 'keys')}")
-    for each in found:
-        yield from _search(*each, request)
 
 
 def _mappings(document: Any) -> list[Path]:
@@ -223,31 +218,34 @@ def _search(value: Any, path: Path, outer: tuple[Path, ...], request: Request) -
             yield from _search(item, (*path, index), outer, request)
     elif type(value) is dict:
         operation = request.operation
-        holds, stays = _message(value)
+        holds: dict[str, str] = {}  # which fields of a known message hold what, and which stay, by the fields it has
+        stays: tuple[str, ...] = ()
+        if "header" in value or "angular_velocity" in value:
+            from frametool.ros.messages import HELD
+
+            there = {key for key, each in value.items() if type(each) in (dict, list)}
+            known = [row for row in HELD.values() if there.issuperset(row[0])]
+            holds, stays = max(known, key=lambda row: len(there.intersection(row[1])), default=({}, ()))
         if operation.moves and any(holds.values()):
             found = [RecordPlace(path, outer, *field, (f"{field[0]}_covariance",)) for field in holds.items()]
         elif _holds_numbers(value):
             _refuse_several(value, ["the record's own keys"], path)
             found = [RecordPlace(path, outer)]
         else:
-            found = list(_search_inside(value, path, outer, request, stays))
+            inner = [key for key in INNER if type(value.get(key)) in (dict, list)]
+            if operation.moves:
+                inner += [key for key in LISTS if _is_geometry(key, value.get(key), doubtful=False)]
+            around = (*outer, path)
+            held = {key: [*_search(value[key], (*path, key), around, request)] for key in inner if key not in stays}
+            if keys := [key for key, each in held.items() if each]:
+                _refuse_several(value, keys, path)
+            found = [*chain.from_iterable(held.values())]
         if not operation.keeps_frames and (operation.formula is None or operation.formula.reads_row):
             _refuse_half(value, found, path, stays if operation.moves else ())
         if operation.turns and found and (rates := [key for key in value if is_rate(key)]):
             what = f"{first_of(rates, 3, quote=shown)} would keep to the old axes; a table turns vx, vy, vz along"
             raise Misfit(f"{what}; leave them out, or convert to CSV first", (*path, rates[0]), key=True)
         yield from found
-
-
-def _message(value: dict[str, Any]) -> tuple[dict[str, str], tuple[str, ...]]:
-    """Return which fields of a known message hold what, and which stay, by the fields that it has."""
-    if "header" not in value and "angular_velocity" not in value:
-        return {}, ()
-    from frametool.ros.messages import HELD
-
-    there = {key for key, each in value.items() if type(each) in (dict, list)}
-    found = [row for row in HELD.values() if there.issuperset(row[0])]
-    return max(found, key=lambda row: len(there.intersection(row[1])), default=({}, ()))
 
 
 def _refuse_half(value: dict[str, Any], found: Sequence[RecordPlace], path: Path, stays: Sequence[str]) -> None:
@@ -280,20 +278,6 @@ def _is_geometry(key: str, value: Any, *, doubtful: bool) -> bool:
     numbers = sum(type(each) is str and each[:1] in NUMBER_BEGINS for each in some)
     is_it = (numbers > 1 and (doubtful or key.endswith("covariance"))) or (doubtful and key == "name")
     return is_it or any(_is_geometry(key, each, doubtful=doubtful) for each in some)
-
-
-def _search_inside(
-    value: dict[str, Any], path: Path, outer: tuple[Path, ...], request: Request, stays: Sequence[str]
-) -> Iterator[RecordPlace]:
-    """Yield what the known keys of a message hold."""
-    inner = [key for key in INNER if type(value.get(key)) in (dict, list)]
-    if request.operation.moves:
-        inner += [key for key in LISTS if _is_geometry(key, value.get(key), doubtful=False)]
-    held = {key: list(_search(value[key], (*path, key), (*outer, path), request)) for key in inner if key not in stays}
-    found = {key: each for key, each in held.items() if each}
-    if found:
-        _refuse_several(value, list(found), path)
-    yield from chain.from_iterable(found.values())
 
 
 def _holds_numbers(value: dict[str, Any]) -> bool:
@@ -348,6 +332,7 @@ def _record(document: Any, place: RecordPlace, request: Request, reading: Readin
     path, has_poses = place.path, request.rows.poses > 0
     value = value_at(document, path)
     reading.here = here = (*above, *path)
+    operation, formula = request.operation, request.operation.formula
     try:
         if type(value) is list:
             return _bare_list(value, here, reading, request)
@@ -355,19 +340,30 @@ def _record(document: Any, place: RecordPlace, request: Request, reading: Readin
             record = _of_message(value, place, here, reading, request)
         else:
             record = _mapping(value, here, reading, request) if has_poses else _only_asked(value, here, request)
-        if has_poses and request.operation.formula is not None:
-            record = _for_formula(record, value, request.operation.formula)
     except Misfit as misfit:
         raise misfit.below(*here) from None
+    if has_poses and formula is not None and record.shape.kind in PARTS:
+        raise Misfit(f"an expression takes poses, points and vectors; this is a {record.shape.kind}", here)
+    if has_poses and formula is not None and not (formula.reads_row or record.values or _is_holder(value)):
+        record = record._replace(shape=Shape("", None))
+    if operation.only_adds:
+        said, holder = operation.shown, value_at(document, outermost(path))
+        for name in (*request.extras(record.shape), *(said.members if said and not said.replaces else ())):
+            if (key := request.results.prefix + name) in holder:
+                raise Misfit(f"key {shown(key)} is there already; take another name, or --prefix", here)
     try:
-        if not record.placed and (around := holders(document, place, record.shape)):
-            from frametool.stream.extra_numbers import with_covariances
+        # what says a covariance: the record, or the mapping around it where a message has it so
+        around = (path, path[:-1]) if path[-1:] == (record.shape.kind,) else (path,)
+        keys = {*place.covariances, *COVARIANCE_KEYS}
+        for each in () if record.placed else around:
+            holder = value_at(document, each)
+            if type(holder) is dict and (not keys.isdisjoint(holder) or any(map(may_be_uncertain, holder))):
+                from frametool.stream.extra_numbers import with_covariances
 
-            record = with_covariances(record, value_at(document, around[0]), around[0], place, above, request, reading)
+                record = with_covariances(record, holder, each, place, above, request, reading)
+                break
         record = _with_asked(record, document, path, above, request)
-        if request.operation.only_adds:
-            _refuse_repeated(record, document, path, request)
-        return _with_names(record, document, path, place.outer, above, request) if request.rows.poses else record
+        return _with_names(record, document, path, place.outer, above, request) if has_poses else record
     except Misfit as misfit:
         raise misfit.below(*above) from None
 
@@ -391,26 +387,9 @@ def _only_asked(value: dict[str, Any], path: Path, request: Request) -> Record:
     return _with_stamp(record, header, ("header", "stamp"), path) if type(header) is dict else record
 
 
-def _for_formula(record: Record, value: dict[str, Any], formula: Formula) -> Record:
-    """Refuse what an expression cannot take; what holds no numbers of ours is a row of kind ""."""
-    if record.shape.kind in PARTS:
-        raise Misfit(f"an expression takes poses, points and vectors; this is a {record.shape.kind}")
-    if not record.numbers and not record.values and not formula.reads_row and not _is_holder(value):
-        return record._replace(shape=Shape("", None))
-    return record
-
-
 def outermost(path: Path) -> Path:
     """Return the path of the outermost value that holds a record alone: an item of a list, or the whole document."""
     return path[: max((at for at, step in enumerate(path, 1) if type(step) is int), default=0)]
-
-
-def _refuse_repeated(record: Record, document: Any, path: Path, request: Request) -> None:
-    """Stop where a key that an expression adds is there already, unless it gives way."""
-    said, holder = request.operation.shown, value_at(document, outermost(path))
-    for name in (*request.extras(record.shape), *(said.members if said and not said.replaces else ())):
-        if (key := request.results.prefix + name) in holder:
-            raise Misfit(f"key {shown(key)} is there already; take another name, or --prefix", path)
 
 
 def _with_asked(record: Record, document: Any, path: Path, above: Path, request: Request) -> Record:
@@ -469,8 +448,8 @@ def _bare_list(value: list[Any], path: Path, reading: Reading, request: Request)
 
 def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Request) -> Record:
     """Read what a mapping says: its position, then its rotation; or the two vectors of a twist or a wrench."""
-    if (parts := _parts_of(value)) is not None and not _is_holder(value):
-        return _two_vectors(value, ACCEL if path[-1:] == (ACCEL,) else parts, path, request)
+    if (name := _parts_of(value)) is not None and not _is_holder(value):
+        return _two_vectors(value, ACCEL if path[-1:] == (ACCEL,) else name, path, request)
     positions = [key for key in value if _holds_position(key, value[key])]
     if any(map(may_be_on_earth, value)):
         from frametool.stream.earth_columns import placed_record
@@ -496,8 +475,14 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
         raise Misfit(f"expected one position, found {shown_both}", (flat.position.names[0],), key=True)
     _refuse_typos(value, rotations=bool(turned), position=bool(there))
     key = positions[0] if positions else ""
-    turns = turned or (not request.operation.moves and _turns_in_doubt(value))
-    stays = not turns and _stays_point(value, key, request)
+    operation, rows, sigma = request.operation, request.rows, value.get("sigma")
+    # what says how sure its rotation is, is a pose, if only by that
+    is_sure = type(sigma) is dict and any(each[:3] in ("rpy", "rol", "pit", "yaw") for each in sigma)
+    turns = turned or (not operation.moves and is_sure)
+    # a PointStamped or Vector3Stamped stays one where it is written anew and nobody asked for a rotation
+    is_usual = not (rows.kind or rows.given) and {each.spec for each in request.results.notations} <= {"quaternion"}
+    is_kept = operation.changes_nothing and operation.formula is None and request.gathered is None
+    stays = not turns and "header" in value and key in (POINT, VECTOR) and is_kept and is_usual
     record = Record(path, Shape(key if stays else _kind(key, turns, request), None), key=key)
     if positions:
         record = _with_position(record, value[key], POINT_KEYS[key], partial="header" not in value)
@@ -594,8 +579,12 @@ def _refuse_typos(value: dict[str, Any], *, rotations: bool, position: bool) -> 
     wanted = {*([] if rotations else ROTATION_KEYS), *([] if position else POSITION_KEYS)} - LISTED_WORDS
     # a number under a letter or two, as px and ry, is no misspelt list of them
     others = (key for key in value if key not in KNOWN and (key[2:] or type(value[key]) is not str))
-    unknown = islice(others, MOST_COMPARED)
-    if near := [(key, hint) for key in unknown if (hint := _meant(key, value[key], wanted))]:
+    near = []
+    for key in islice(others, MOST_COMPARED):
+        word = OTHER_WORDS.get(key.lower(), "") if type(value[key]) in (list, dict) else ""
+        hint = f"; did you mean {shown(word)}?" if word in wanted else did_you_mean(key, wanted, cutoff=0.75)
+        near += [(key, hint)] if hint else []
+    if near:
         raise _unknown(near)
 
 
@@ -604,12 +593,6 @@ OTHER_WORDS = dict.fromkeys(("q", "quats", "quaternions", "orient", "so3"), "qua
     "loc": "xyz", "location": "xyz", "xzy": "xyz",
     "rpi": "rpy", "ypr": "rpy", "eul": "rpy", "euler_angles": "rpy", "angle_axis": "axis_angle",
 }  # fmt: skip
-
-
-def _meant(key: str, value: Any, wanted: Collection[str]) -> str:
-    """Return `; did you mean ..` for a key that is nearly a wanted one, or another word for it; "" for any other."""
-    word = OTHER_WORDS.get(key.lower(), "") if type(value) in (list, dict) else ""
-    return f"; did you mean {shown(word)}?" if word in wanted else did_you_mean(key, wanted, cutoff=0.75)
 
 
 def _flat_pose(value: dict[str, Any], rotations: list[str]) -> PoseColumns | None:
@@ -668,9 +651,20 @@ def _with_flat_rotation(
     numbers = [_number(value, name, shape.in_degrees(at)) for at, name in enumerate(names, len(values))]
     if shape.notation is not None:
         numbers = as_meant(shape.notation, numbers, [value[name] for name in names], reading)
-    _check(shape, (*values, *numbers), names, reading)
+    every = (*values, *numbers)
+    try:
+        _, doubts = checked_rotation(shape, every, normalize=reading.normalize)
+    except ValueInvalid as error:
+        raise NotARotation(str(error), (names[0],)) from None
+    for rule, message in doubts:
+        reading.note(message, names[0], rule=rule)
+    angles = shape.rotation(every)
+    largest = max(shape.bare_angles, key=lambda at: abs(angles[at]), default=None)
+    if largest is not None and abs(angles[largest]) > TURN:
+        name = names[shape.number_at(largest) - shape.position_size]
+        reading.note(doubt(shape, angles[largest], KEYS_REMEDY), name, rule="degrees")
     return record._replace(
-        shape=shape, numbers=(*paths, *((*record.path, name) for name in names)), values=(*values, *numbers),
+        shape=shape, numbers=(*paths, *((*record.path, name) for name in names)), values=every,
         rotation=next(key for key in value if key in names), flat=names,
     )  # fmt: skip
 
@@ -684,27 +678,6 @@ def _number(
     return float(within((key,), read_number_or_angle, value[key], degrees, metres=metres))
 
 
-def _check(shape: Shape, values: Sequence[float], names: Sequence[str], reading: Reading) -> None:
-    """Refuse numbers that are no rotation; note what is invalid about them."""
-    try:
-        _, doubts = checked_rotation(shape, values, normalize=reading.normalize)
-    except ValueInvalid as error:
-        raise NotARotation(str(error), (names[0],)) from None
-    for rule, message in doubts:
-        reading.note(message, names[0], rule=rule)
-    angles = shape.rotation(values)
-    largest = max(shape.bare_angles, key=lambda at: abs(angles[at]), default=None)
-    if largest is not None and abs(angles[largest]) > TURN:
-        name = names[shape.number_at(largest) - shape.position_size]
-        reading.note(doubt(shape, angles[largest], KEYS_REMEDY), name, rule="degrees")
-
-
-def _turns_in_doubt(value: dict[str, Any]) -> bool:
-    """Return True if a mapping says how sure its rotation is, so that it is a pose, if only by that."""
-    sigma = value.get("sigma")
-    return type(sigma) is dict and any(each[:3] in ("rpy", "rol", "pit", "yaw") for each in sigma)
-
-
 def _kind(key: str, rotations: object, request: Request) -> str:
     """Decide what a mapping is: with a rotation a pose, else a point or a vector, or what --as says."""
     if request.rows.kind in PARTS:
@@ -714,14 +687,6 @@ def _kind(key: str, rotations: object, request: Request) -> str:
             raise Misfit(f"a record has a rotation and cannot be taken for a {request.rows.kind}")
         return POSE
     return request.rows.kind or (VECTOR if key == "vector" else POINT)
-
-
-def _stays_point(value: dict[str, Any], key: str, request: Request) -> bool:
-    """Tell a PointStamped or Vector3Stamped that is written anew and for which nobody asked for a rotation."""
-    operation, asked = request.operation, request.rows
-    is_kept = operation.changes_nothing and operation.formula is None and request.gathered is None
-    is_usual = not (asked.kind or asked.given) and {each.spec for each in request.results.notations} <= {"quaternion"}
-    return "header" in value and key in (POINT, VECTOR) and is_kept and is_usual
 
 
 def _with_position(record: Record, value: Any, metre: float, *, partial: bool) -> Record:
@@ -828,14 +793,6 @@ def _with_stamp(record: Record, header: dict[str, Any], path: Path, above: Path)
     parts = (next(key for key in header["stamp"] if key.startswith(letter)) for letter in "sn")
     stamps = (*record.stamps, *((*above, *path, part) for part in parts))
     return record._replace(stamps=stamps, stamp_ns=record.stamp_ns if record.stamps else stamp_ns)
-
-
-def holders(document: Any, place: RecordPlace, shape: Shape) -> list[Path]:
-    """Return which mappings say a covariance: that of a record, or the one around it where a message has it so."""
-    around = (place.path, place.path[:-1])[: 1 + (place.path[-1:] == (shape.kind,))]
-    keys = {*place.covariances, *COVARIANCE_KEYS}
-    maps = [(path, held) for path in around if type(held := value_at(document, path)) is dict]
-    return [path for path, held in maps if not keys.isdisjoint(held) or any(map(may_be_uncertain, held))]
 
 
 def value_at(value: Any, path: Path) -> Any:
