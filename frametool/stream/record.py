@@ -143,17 +143,9 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
     Raises Misfit, with the path, for a document without records and for a record that cannot be read.
     """
     formula = request.operation.formula
-    found: list[RecordPlace] = []
-    places: list[tuple[Any, Path, tuple[Path, ...]]] = [(document, (), ())]
-    for key in request.rows.columns[0].split(".") if request.rows.poses and request.rows.columns else ():
-        items = [(value_at(each, at), (*above, *at), near) for each, above, near in places for at in _mappings(each)]
-        places = [(each[key], (*above, key), (*near, above)) for each, above, near in items if key in each]
-        if not places:
-            keys = dict.fromkeys(each for item, *_ in items for each in item)
-            raise Misfit(f"no key {shown(key)} for --columns{alternatives(key, keys, 'keys')}", path)
     try:
-        if request.rows.poses:
-            found = [each for place in places for each in _search(*place, request)]
+        search = _search_under if request.rows.columns else _search
+        found = list(search(document, (), (), request)) if request.rows.poses else []
         is_bare = request.rows.poses and not request.operation.takes_points
         if not found and is_bare and type(document) is dict and NOTHING_BUT.issuperset(document):
             reading.here = path
@@ -169,6 +161,19 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
         raise Misfit("a record holds one pose; name A or B, or compare it with the one before by --consecutive", path)
     for place in found:
         yield _record(document, place, request, reading, path)
+
+
+def _search_under(document: Any, path: Path, outer: tuple[Path, ...], request: Request) -> Iterator[RecordPlace]:
+    """Search what is under the key `detections.pose`, which --columns names; a list stands for its items."""
+    found = [(document, path, outer)]
+    for key in request.rows.columns[0].split("."):
+        items = [(value_at(each, at), (*above, *at), around) for each, above, around in found for at in _mappings(each)]
+        found = [(each[key], (*above, key), (*around, above)) for each, above, around in items if key in each]
+        if not found:
+            keys = dict.fromkeys(each for item, *_ in items for each in item)
+            raise Misfit(f"no key {shown(key)} for --columns{alternatives(key, keys, 'keys')}")
+    for each in found:
+        yield from _search(*each, request)
 
 
 def _mappings(document: Any) -> list[Path]:
@@ -232,20 +237,26 @@ def _search(value: Any, path: Path, outer: tuple[Path, ...], request: Request) -
             _refuse_several(value, ["the record's own keys"], path)
             found = [RecordPlace(path, outer)]
         else:
-            inner = [key for key in INNER if type(value.get(key)) in (dict, list)]
-            if operation.moves:
-                inner += [key for key in LISTS if _is_geometry(key, value.get(key), doubtful=False)]
-            around = (*outer, path)
-            held = {key: [*_search(value[key], (*path, key), around, request)] for key in inner if key not in stays}
-            if keys := [key for key, each in held.items() if each]:
-                _refuse_several(value, keys, path)
-            found = [*chain.from_iterable(held.values())]
+            found = _search_inside(value, path, (*outer, path), request, stays)
         if not operation.keeps_frames and (operation.formula is None or operation.formula.reads_row):
             _refuse_half(value, found, path, stays if operation.moves else ())
         if operation.turns and found and (rates := [key for key in value if is_rate(key)]):
             what = f"{first_of(rates, 3, quote=shown)} would keep to the old axes; a table turns vx, vy, vz along"
             raise Misfit(f"{what}; leave them out, or convert to CSV first", (*path, rates[0]), key=True)
         yield from found
+
+
+def _search_inside(
+    value: dict[str, Any], path: Path, outer: tuple[Path, ...], request: Request, stays: Sequence[str]
+) -> list[RecordPlace]:
+    """Return what the known keys of a message hold."""
+    inner = [key for key in INNER if type(value.get(key)) in (dict, list)]
+    if request.operation.moves:
+        inner += [key for key in LISTS if _is_geometry(key, value.get(key), doubtful=False)]
+    held = {key: [*_search(value[key], (*path, key), outer, request)] for key in inner if key not in stays}
+    if keys := [key for key, each in held.items() if each]:
+        _refuse_several(value, keys, path)
+    return [*chain.from_iterable(held.values())]
 
 
 def _refuse_half(value: dict[str, Any], found: Sequence[RecordPlace], path: Path, stays: Sequence[str]) -> None:
@@ -347,10 +358,7 @@ def _record(document: Any, place: RecordPlace, request: Request, reading: Readin
     if has_poses and formula is not None and not (formula.reads_row or record.values or _is_holder(value)):
         record = record._replace(shape=Shape("", None))
     if operation.only_adds:
-        said, holder = operation.shown, value_at(document, outermost(path))
-        for name in (*request.extras(record.shape), *(said.members if said and not said.replaces else ())):
-            if (key := request.results.prefix + name) in holder:
-                raise Misfit(f"key {shown(key)} is there already; take another name, or --prefix", here)
+        within(above, _refuse_repeated, record, document, path, request)
     try:
         # what says a covariance: the record, or the mapping around it where a message has it so
         around = (path, path[:-1]) if path[-1:] == (record.shape.kind,) else (path,)
@@ -366,6 +374,14 @@ def _record(document: Any, place: RecordPlace, request: Request, reading: Readin
         return _with_names(record, document, path, place.outer, above, request) if has_poses else record
     except Misfit as misfit:
         raise misfit.below(*above) from None
+
+
+def _refuse_repeated(record: Record, document: Any, path: Path, request: Request) -> None:
+    """Stop where a key that an expression adds is there already, unless it gives way."""
+    said, holder = request.operation.shown, value_at(document, outermost(path))
+    for name in (*request.extras(record.shape), *(said.members if said and not said.replaces else ())):
+        if (key := request.results.prefix + name) in holder:
+            raise Misfit(f"key {shown(key)} is there already; take another name, or --prefix", path)
 
 
 def _only_asked(value: dict[str, Any], path: Path, request: Request) -> Record:

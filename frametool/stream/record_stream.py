@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Components
     from frametool.stream.evaluate import Run, State
-    from frametool.stream.record_cuts import Cut, Hit, RecordCutter
+    from frametool.stream.record_cuts import Hit, RecordCutter
     from frametool.stream.record_rows import RecordRows
     from frametool.stream.request import Request
     from frametool.stream.text_rows import AlikeRows
@@ -162,18 +162,8 @@ class RecordBlocks:
 
     def outcome(self, text: bytes, *, are_few: bool) -> Outcome:
         """Return the outcome of a block; a few records are taken one by one."""
-        found, cuts, closed = Found(), list["Cut"](), False
-        if are_few or self._is_singly:
-            closed = self._take(text, 0, len(text), found)
-        else:
-            from frametool.stream.record_cuts import by_template, in_order
-
-            found.singles = []
-            cuts, rest = self._bulk[0].cut(text)
-            for start, end in rest:
-                closed = self._take(text, start, end, found)
-            cuts = by_template(cuts, found.singles)
-            self._run(text, in_order(cuts) if self.request.in_order else cuts, found)
+        found, are_few = Found(), are_few or self._is_singly
+        closed = self._take(text, 0, len(text), found) if are_few else self._run(text, found)
         self.ended = text.endswith(b"\n")
         found.faults.sort()
         stops = self.request.on_error == STOP and found.faults
@@ -251,13 +241,22 @@ class RecordBlocks:
             else:
                 found.items.append((part.start, _no_result(record, style, json=is_json)))
 
-    def _run(self, text: bytes, cuts: Sequence[Cut], found: Found) -> None:
-        """Run the records of all templates; one that is bad is taken alone, which says where it is wrong."""
+    def _run(self, text: bytes, found: Found) -> bool:
+        """Run the records of all templates, the others alone.  Return whether an array ends there.
+
+        One that is bad is taken alone too, which says where it is wrong.
+        """
         from frametool.stream.evaluate import Run
-        from frametool.stream.record_cuts import block_of, plan_of
+        from frametool.stream.record_cuts import block_of, by_template, in_order, plan_of
         from frametool.text.spans import framed
 
-        _, state, rows = self._bulk
+        cutter, state, rows = self._bulk
+        found.singles, closed = [], False
+        cuts, rest = cutter.cut(text)
+        for start, end in rest:
+            closed = self._take(text, start, end, found)
+        cuts = by_template(cuts, found.singles)
+        cuts = in_order(cuts) if self.request.in_order else cuts
         data = framed(text if cuts else b"")
         for cut in cuts:
             template, left = cut.template, set[int]()
@@ -280,6 +279,7 @@ class RecordBlocks:
             found.notes += run.notes
             own = [*template.notes, *template.of_places] if len(cut.starts) else ()
             found.notes += [each._replace(line=run.block.line_of(0)) for each in own]
+        return closed
 
 
 def _no_result(record: bytes, style: Style, *, json: bool) -> NoResult:

@@ -472,15 +472,20 @@ def _result(node: Node, unit: Path, made: Answer, request: Request, fmt: str) ->
     else:
         named[kind] = numbers
     if is_recording(fmt) and keeps_frames:
-        from frametool.grammar.place import LLA_KEYS, read_at
-
-        holder = node.at(record.path[len(unit) :])
-        keys = [key for key in (*record.members, *record.placed) if key in LLA_KEYS]
-        if keys:
-            place, read = read_at({key: str(plain(holder.at((key,)))) for key in keys}, Reading(Source("", "")))
-            named[AS_READ] = [*place.lla(read)]
+        named |= _place_as_read(node.at(record.path[len(unit) :]), record)
     named = ({"name": entry.name} if entry.name else {}) | named | stamp | _extras(made, request, len(numbers))
     return named | with_stamp_ns(_rest(node, unit, record), fmt)
+
+
+def _place_as_read(holder: Node, record: Record) -> dict[str, list[float]]:
+    """Return lat, lon and alt where a record says them; nothing elsewhere."""
+    from frametool.grammar.place import LLA_KEYS, read_at
+
+    keys = [key for key in (*record.members, *record.placed) if key in LLA_KEYS]
+    if not keys:
+        return {}
+    place, numbers = read_at({key: str(plain(holder.at((key,)))) for key in keys}, Reading(Source("", "")))
+    return {AS_READ: [*place.lla(numbers)]}
 
 
 def with_stamp_ns(extras: dict[str, Any], fmt: str) -> dict[str, Any]:

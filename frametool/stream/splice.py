@@ -211,26 +211,28 @@ class Splicer:
             for key, sample in with_entries(dict.fromkeys(names, 0.5)).items():
                 members.append(self._member({key: sample}, first))
                 first += len(sample) if isinstance(sample, list) else 1
-        precision = self.request.results.precision
-        fmt, exponent = "" if precision is None else f"z.{precision}f", b"e" if self.json else b".0e"
-        for name, value in said.members.items() if said else ():  # a text, a word, or a list of numbers
-            key = prefix + name
-            member = self._member({key: value if isinstance(value, str) else 0.5}, 0)
-            if isinstance(value, Word):
-                member = (*member[:-1], value._replace(number=self.first + value.number))
-            elif not isinstance(value, str):
-                begin, end = ("[", "]") if value[1:] else ("", "")
-                items = [
-                    (begin * (at == value[0]), end if at == value[-1] else ", ", "null" * (at == value[0]), fmt)
-                    for at in value
-                ]
-                numbers = (Item(self.first + at, words, exponent) for at, words in zip(value, items, strict=True))
-                member = (*member[:-1], *numbers)
+        for name, value in said.members.items() if said else ():
+            key, member = prefix + name, self._shown(prefix + name, value)
             if said and said.replaces and key in self.members:
                 self._replace(key, member)
             else:
                 members.append(member)
         return members
+
+    def _shown(self, key: str, value: str | Word | tuple[int, ...]) -> tuple[Piece, ...]:
+        """Return a text, a word, or a list of numbers as a member."""
+        if isinstance(value, str):
+            return self._member({key: value}, 0)
+        begin = self._member({key: 0.5}, 0)[:-1]
+        if isinstance(value, Word):
+            return (*begin, value._replace(number=self.first + value.number))
+        precision = self.request.results.precision
+        fmt, exponent = "" if precision is None else f"z.{precision}f", b"e" if self.json else b".0e"
+        opens, closes = ("[", "]") if value[1:] else ("", "")
+        return (*begin, *(
+            Item(self.first + at, (opens * first, closes if at == value[-1] else ", ", "null" * first, fmt), exponent)
+            for at in value for first in [at == value[0]]
+        ))  # fmt: skip
 
     def _names(self) -> None:
         """Rename the frames as the operation does."""
