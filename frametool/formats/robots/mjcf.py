@@ -91,6 +91,7 @@ class MjcfModel:
         self._read_classes(root)
         self.links: dict[str, Link] = {}
         self.joints: dict[str, Joint] = {}
+        self.geoms: list[tuple[Element, _Inside]] = []
         self._counts: dict[tuple[str, str], int] = {}
         for section in root.all("worldbody"):  # in the order of the file; with a stack, because bodies may be deep
             pending = [(child, _Inside(WORLD, MAIN, rigid.IDENTITY)) for child in reversed(section.children)]
@@ -143,6 +144,8 @@ class MjcfModel:
             return _Inside(name, self._class(node, "childclass", inside.around), rigid.IDENTITY)
         elif node.tag in JOINTS:
             self._join(node, inside)
+        elif node.tag == "geom":
+            self.geoms.append((node, inside))
         elif node.tag in ("site", "camera"):
             said = self.attributes(node, inside.around)
             name = self._place(node, inside, self.pose_of_site(said) if node.tag == "site" else self.pose(said))
@@ -346,31 +349,19 @@ def read_joints(file: InputFile, state: str) -> Iterator[JointSample]:
         yield JointSample(joint.name, pose, None, refuse)
 
 
-class _Geoms(MjcfModel):
-    """A model, read for its geoms."""
-
-    def __init__(self, root: Element) -> None:
-        self.solids: list[Solid] = []
-        super().__init__(root, Options(Diagnostics(), Topics()))
-
-    def _take(self, node: Element, inside: _Inside) -> _Inside | None:
-        if node.tag != "geom":
-            return super()._take(node, inside)
-        attributes = self.attributes(node, inside.around)
+def read_solids(file: InputFile) -> Iterator[Solid]:
+    """Yield the geoms of a model that MuJoCo's viewer draws."""
+    model = MjcfModel(read_xml(file, "mujoco"), Options(Diagnostics(), Topics()))
+    for node, inside in model.geoms:
+        attributes = model.attributes(node, inside.around)
         usual = "mesh" if "mesh" in attributes else "sphere"
         kind = attributes["type"].attribute("type") if "type" in attributes else usual
         if numbers_of(attributes, "group", "0")[0] >= SHOWN_GROUPS or kind not in SHAPES:
-            return None
+            continue
         size = numbers_of(attributes, "size", attributes["size"].attribute("size") if "size" in attributes else "")
         if "fromto" in attributes:
             ends = numbers_of(attributes, "fromto", "0 0 0 0 0 0")
             size = (*size[:1], 0.5 * dist(ends[:3], ends[3:]))
         size = tuple(2.0 * number if kind == "box" or at == 1 else number for at, number in enumerate(size))
-        pose = rigid.compose(*inside.frame, *self.pose_of_site(attributes))
-        self.solids.append(Solid(inside.body, kind, size[: SIZES.get(kind, 0)], pose))
-        return None
-
-
-def read_solids(file: InputFile) -> list[Solid]:
-    """Return the geoms of a model."""
-    return _Geoms(read_xml(file, "mujoco")).solids
+        pose = rigid.compose(*inside.frame, *model.pose_of_site(attributes))
+        yield Solid(inside.body, kind, size[: SIZES.get(kind, 0)], pose)

@@ -199,48 +199,42 @@ def followed(joint: Joint, leader: Value) -> Value:
 
 
 def read_value(joint: Joint, value: Any, source: Source, *, normalize: bool = False) -> Value:
-    """Read the value of a joint: a number, text with or without a unit, a mapping with a pose.
+    """Read the value of a joint: a number, text with or without a unit, a mapping with a pose within its freedom.
 
     source: where it is, for messages.  Raises Misfit with the path below the value, and ValueInvalid.
     """
-    if joint.posed:
-        return _read_posed(joint, value, source, normalize=normalize)
-    if isinstance(value, (JointValue, float)):
-        return value if isinstance(value, JointValue) else JointValue(value)
-    if type(value) is not str:
-        expected = "metres, or 2cm" if joint.kind == "prismatic" else "radians, or 30deg"
-        raise Misfit(f"joint {shown(joint.name)} is {joint.kind}: expected {expected}, found {kind(value)}")
-    if joint.kind == "prismatic":
-        return JointValue(parse_length(value))
-    number, unit = parse_angle(value)
-    return JointValue(number, degrees=unit == "deg")
-
-
-def _read_posed(joint: Joint, value: Any, source: Source, *, normalize: bool) -> Rigid:
-    """Read the pose of a planar, floating or ball joint; one outside of its degrees of freedom is refused."""
-    example = "'{xyz: [1, 2, 0], rpy_deg: [0, 0, 90]}'"
-    expected = f"joint {shown(joint.name)} is {joint.kind}: it takes a POSE, as {example}"
+    which = f"joint {shown(joint.name)}"
+    if not joint.posed:
+        if isinstance(value, (JointValue, float)):
+            return value if isinstance(value, JointValue) else JointValue(value)
+        if type(value) is not str:
+            expected = "metres, or 2cm" if joint.kind == "prismatic" else "radians, or 30deg"
+            raise Misfit(f"{which} is {joint.kind}: expected {expected}, found {kind(value)}")
+        if joint.kind == "prismatic":
+            return JointValue(parse_length(value))
+        number, unit = parse_angle(value)
+        return JointValue(number, degrees=unit == "deg")
+    expected = f"{which} is {joint.kind}: it takes a POSE, as '{{xyz: [1, 2, 0], rpy_deg: [0, 0, 90]}}'"
     if type(value) is str and value.lstrip().startswith("{"):
         try:
             documents = parse_documents(value, source.name)
         except FormatError as error:
-            raise ValueInvalid(f"joint {shown(joint.name)}: {error.message}") from None
+            raise ValueInvalid(f"{which}: {error.message}") from None
         value = documents[0].value if len(documents) == 1 else None
     if type(value) is not dict:
         raise Misfit(f"{expected}; found {kind(value)}")
     pose = read_pose(as_mapping(value, expected), Reading(source, normalize=normalize))
     if pose.name is not None or pose.parent is not None:
-        raise Misfit(f"joint {shown(joint.name)} names its frames itself; leave name and parent out")
+        raise Misfit(f"{which} names its frames itself; leave name and parent out")
     tx, ty, tz, x, y, z, _ = pose.components
     ax, ay, az = joint.axis
     if joint.kind == "ball" and (tx or ty or tz):
-        raise Misfit(f"joint {shown(joint.name)} is a ball joint: it turns only; leave the position out")
+        raise Misfit(f"{which} is a ball joint: it turns only; leave the position out")
     if joint.kind == "planar":
         along = ax * tx + ay * ty + az * tz
         tilt = max(map(abs, (y * az - z * ay, z * ax - x * az, x * ay - y * ax)))
         if max(abs(along), tilt) > OUT_OF_PLANE * (1.0 + max(map(abs, (tx, ty, tz)))):
-            normal = f"{ax:g} {ay:g} {az:g}"
-            raise Misfit(f"joint {shown(joint.name)} is planar: this pose leaves the plane across {normal}")
+            raise Misfit(f"{which} is planar: this pose leaves the plane across {ax:g} {ay:g} {az:g}")
     return pose.components
 
 

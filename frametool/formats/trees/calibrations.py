@@ -123,11 +123,31 @@ def _handeye(value: Any, reading: Reading) -> Iterator[Edge]:
 
 
 def _nuscenes(file: InputFile, options: Options, value: Any, reading: Reading) -> Iterator[Edge]:
-    """Yield one edge per sensor, or one sample per ego pose; of sensor.json only the frame above the sensors."""
+    """Yield one edge per pose of a sensor, or one sample per ego pose; of sensor.json only the frame above the sensors.
+
+    If a sensor has several poses, each name includes the token.
+    """
     world, ego = options.answers.names("global", "ego")
     records = _records(value)
     if "sensor_token" in records[0]:
-        yield from _sensors(records, ego, channels_of(file), reading, options)
+        channels = channels_of(file)
+        poses: dict[str, dict[Rigid, tuple[str, Path]]] = {}
+        for index, record in enumerate(records):
+            try:
+                sensor = within((index,), _text, record, "sensor_token")
+                pose = _sensor_pose(record, index, reading)
+            except Misfit as misfit:
+                reading.refuse(misfit)
+                continue
+            name = (channels or {}).get(sensor, sensor)
+            poses.setdefault(name, {}).setdefault(pose, (str(record.get("token")), (index,)))
+        unnamed = f"sensors are called by their tokens ({SENSORS} has the names: --with it)" if channels is None else ""
+        several = next((name for name, found in poses.items() if len(found) > 1), None)
+        more = f"those of several poses as {bare(several)}/TOKEN" if several else ""
+        options.tally.assumed = ", ".join(filter(None, (unnamed, more)))
+        for name, found in poses.items():
+            for pose, (token, path) in found.items():
+                yield Edge(ego, f"{name}/{token}" if len(found) > 1 else name, pose, path=path)
     elif {"translation", "rotation", "timestamp"} <= records[0].keys():
         for index, record in enumerate(records):
             try:
@@ -147,29 +167,6 @@ def _records(value: Any) -> list[dict[str, Any]]:
     if type(value) is not list or not value:
         raise Misfit(f"expected a list of records, found {kind(value) if value else 'an empty one'}")
     return [within((index,), as_mapping, record, "a record") for index, record in enumerate(value)]
-
-
-def _sensors(
-    records: Iterable[dict[str, Any]], ego: str, channels: dict[str, str] | None, reading: Reading, options: Options
-) -> Iterator[Edge]:
-    """Yield an edge for each pose of each sensor; if it has several, each name includes the token."""
-    poses: dict[str, dict[Rigid, tuple[str, Path]]] = {}
-    for index, record in enumerate(records):
-        try:
-            sensor = within((index,), _text, record, "sensor_token")
-            pose = _sensor_pose(record, index, reading)
-        except Misfit as misfit:
-            reading.refuse(misfit)
-            continue
-        name = (channels or {}).get(sensor, sensor)
-        poses.setdefault(name, {}).setdefault(pose, (str(record.get("token")), (index,)))
-    unnamed = f"sensors are called by their tokens ({SENSORS} has the names: --with it)" if channels is None else ""
-    several = next((name for name, found in poses.items() if len(found) > 1), None)
-    more = f"those of several poses as {bare(several)}/TOKEN" if several else ""
-    options.tally.assumed = ", ".join(filter(None, (unnamed, more)))
-    for name, found in poses.items():
-        for pose, (token, path) in found.items():
-            yield Edge(ego, f"{name}/{token}" if len(found) > 1 else name, pose, path=path)
 
 
 def _text(record: dict[str, Any], key: str) -> str:

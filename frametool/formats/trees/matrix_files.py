@@ -336,10 +336,23 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         options.tally.assumed = left if found.left else options.tally.assumed
         return edges
 
-    if file.head().lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
-        yield from _read_xml(file, options, take)
-    else:
+    if not file.head().lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
         yield from document_edges(made_ordinary(file), options, take, TAGS)
+        return
+    try:
+        stored = StoredXml(read_xml(file))
+        reading = Reading(stored.root.source, normalize=options.normalize)
+        reading.bare_numbers = True
+        for edge in take(stored.value, reading):
+            yield edge._replace(path=(), line=stored.element(edge.path).line)
+        remember(reading.notes, [stored.element(note.path).line for note in reading.notes], options.tally)
+    except Misfit as misfit:
+        error = stored.element(misfit.path).error(str(misfit), rule=misfit.rule)
+        if isinstance(misfit, Unclear):
+            raise answerable(error) from None
+        options.report(error)
+    except FormatError as error:
+        options.report(error)
 
 
 class MatrixBlock(NamedTuple):
@@ -485,24 +498,6 @@ def _blocks(entries: dict[str, Any], name: str, path: Path) -> Iterator[MatrixBl
         for index, each in enumerate(value) if type(value) is list else ():
             if type(each) is dict:
                 yield from _blocks(each, f"{inner}{index}", (*path, key, index))
-
-
-def _read_xml(file: InputFile, options: Options, take: Any) -> Iterator[Edge]:
-    """Read OpenCV's XML."""
-    try:
-        stored = StoredXml(read_xml(file))
-        reading = Reading(stored.root.source, normalize=options.normalize)
-        reading.bare_numbers = True
-        for edge in take(stored.value, reading):
-            yield edge._replace(path=(), line=stored.element(edge.path).line)
-        remember(reading.notes, [stored.element(note.path).line for note in reading.notes], options.tally)
-    except Misfit as misfit:
-        error = stored.element(misfit.path).error(str(misfit), rule=misfit.rule)
-        if isinstance(misfit, Unclear):
-            raise answerable(error) from None
-        options.report(error)
-    except FormatError as error:
-        options.report(error)
 
 
 class StoredXml:
