@@ -66,16 +66,12 @@ def events_of(text: str) -> Iterator[Event]:
     return yaml_events(text)
 
 
-def locate(text: str, path: Path, *, key: bool = False) -> tuple[int, int]:
-    """Return line and column, from 1, of the value at a path, or of its key.
+def locate_many(text: str, paths: Sequence[Path], *, key: bool = False) -> list[tuple[int, int]]:
+    """Return line and column, from 1, of the values at several paths, or of their keys, in one pass over a text.
 
+    text: one that `parse_documents` has read.
     path: (document index, key or index, ...).  A missing value gets the place of the nearest enclosing one.
     """
-    return locate_many(text, [path], key=key)[0]
-
-
-def locate_many(text: str, paths: Sequence[Path], *, key: bool = False) -> list[tuple[int, int]]:
-    """Return the places of several paths in one pass over a text that parse_documents has read."""
     text = text.removeprefix(_BYTE_ORDER_MARK)
     return places_of(text, _offsets(text, paths, key=key))
 

@@ -14,7 +14,7 @@ import re
 import sys
 import time
 from bisect import bisect_right
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cached_property
 from io import BufferedReader, BytesIO, FileIO
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
@@ -124,7 +124,10 @@ class ReadCache:
         size: of texts that are read in addition to files
         """
         found = self._values.pop(key, None)
-        if found is None or not _are_current(found[1]):
+        is_current = False
+        with suppress(OSError):
+            is_current = found is not None and all(states_of(path) == states for path, states in found[1].items())
+        if found is None or not is_current:
             noted = {path: states_of(path) for path in files}
             _noted.append(noted)
             try:
@@ -140,14 +143,6 @@ class ReadCache:
         while len(self._values) > MOST_KEPT or sum(size for *_, size in self._values.values()) > MOST_KEPT_BYTES:
             del self._values[next(iter(self._values))]
         return found[0]
-
-
-def _are_current(files: dict[str, list[State]]) -> bool:
-    """Return True if all files are unchanged."""
-    try:
-        return all(states_of(path) == states for path, states in files.items())
-    except OSError:
-        return False
 
 
 def opened(path: str | PathLike[str]) -> BufferedReader:

@@ -30,7 +30,7 @@ class XmlFile:
 
     def __init__(self, file: InputFile) -> None:
         """Read the bytes; raises FileProblem, and FormatError if they are too many."""
-        self.name = file.name
+        self.name, self.source = file.name, Source(file.name, "")
         try:
             self.data = file.stream.read(sizes.MOST_CHARACTERS + 1)
         except OSError as error:
@@ -62,11 +62,6 @@ class Element:
         self.line, self.column, self.offset = place
         self.children: list[Element] = []
         self.text = ""
-
-    @property
-    def source(self) -> Source:
-        """Return the text of its file, without its contents."""
-        return Source(self.file.name, "")
 
     def all(self, *tags: str) -> Iterator[Element]:
         """Yield the direct children of some kinds."""

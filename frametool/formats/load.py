@@ -17,7 +17,7 @@ from os import PathLike
 from types import MappingProxyType
 from typing import Any, BinaryIO, NamedTuple
 
-from frametool.documents.document import format_error, locate, locate_many
+from frametool.documents.document import format_error, locate_many
 from frametool.documents.source import InputFile, Source, paused_collector
 from frametool.errors import BadAnswer, BadTopology, FileProblem, FormatError, ValueInvalid, alternatives, shown, warn
 from frametool.formats.detect import Beginning, detect, of_folder
@@ -396,7 +396,7 @@ class EdgePlace(NamedTuple):
 
     def seen_from(self, other: EdgePlace) -> str:
         """Format this place relative to another one: `line 7`, or `other.yaml:7` in another file."""
-        line = locate(self.file.text, self.edge.path)[0] if self.edge.path else self.edge.line
+        line = locate_many(self.file.text, [self.edge.path])[0][0] if self.edge.path else self.edge.line
         return f"line {line}" if other.file.name == self.file.name else f"{self.file.name}:{line}"
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as some
 
 from frametool import sizes
 from frametool.documents import yaml as yaml_documents
-from frametool.documents.document import explain_scalar, format_error, locate, locate_many, parse_documents, parse_nodes
+from frametool.documents.document import explain_scalar, format_error, locate_many, parse_documents, parse_nodes
 from frametool.documents.json import dump
 from frametool.documents.source import decode, read_text
 from frametool.errors import FileProblem, FormatError
@@ -187,7 +187,7 @@ PLACES = {
 
 @pytest.mark.parametrize("path", PLACES, ids=str)
 def test_a_path_is_found_in_yaml(path: tuple[int | str, ...]) -> None:
-    assert (locate(TREE, path), locate(TREE, path, key=True)) == PLACES[path]
+    assert (*locate_many(TREE, [path]), *locate_many(TREE, [path], key=True)) == PLACES[path]
 
 
 def test_a_path_is_found_in_json() -> None:
@@ -243,7 +243,7 @@ def test_the_deepest_text_has_nodes_and_places(text: str) -> None:
     (leaf,) = node.leaves()
     assert text[leaf.start : leaf.end] == "1"
     step: int | str = "a" if text.startswith("{") else 0
-    assert locate(text, (0, *[step] * 990)) == (1, leaf.start + 1)
+    assert locate_many(text, [(0, *[step] * 990)]) == [(1, leaf.start + 1)]
 
 
 def yaml_lines(text: str) -> list[str]:
@@ -345,7 +345,7 @@ def test_any_bytes_are_documents_or_one_placed_line(data: bytes) -> None:
     try:
         text = decode(data, "f")
         for document in parse_documents(text, "f"):
-            assert locate(text, (document.index,)) >= (1, 1)
+            assert locate_many(text, [(document.index,)]) >= [(1, 1)]
     except FormatError as error:
         assert error.line >= 1  # noqa: PT017 - either outcome is right
         assert error.column >= 1  # noqa: PT017
@@ -363,7 +363,7 @@ def list_of_frames(count: int) -> str:
 def test_many_frames_are_read() -> None:
     (document,) = parse_documents(list_of_frames(2000), "f")
     assert len(document.value["frames"]) == 2000
-    line, column = locate(document.source.text, (0, "frames", 1999, "rpy_deg", 2))
+    ((line, column),) = locate_many(document.source.text, [(0, "frames", 1999, "rpy_deg", 2)])
     assert document.source.text.split("\n")[line - 1][column - 1 :] == "-4.9959]}"
     assert line == 2001
 

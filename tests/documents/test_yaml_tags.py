@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from frametool.documents.document import locate, parse_documents
+from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import TAG
 from frametool.errors import FormatError
 
@@ -15,7 +15,7 @@ def test_a_mapping_keeps_its_tag_beside_its_keys() -> None:
     text = "a: !Rpy {deg: [1]}\nb: !!opencv-matrix\n  rows: 4\n"
     (document,) = parse_documents(text, "f", TAGS)
     assert document.value == {"a": {TAG: "!Rpy", "deg": ["1"]}, "b": {TAG: "!!opencv-matrix", "rows": "4"}}
-    assert locate(text, (0, "b", "rows")) == (3, 9)
+    assert locate_many(text, [(0, "b", "rows")]) == [(3, 9)]
 
 
 def test_an_alias_repeats_the_tag() -> None:

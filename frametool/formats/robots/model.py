@@ -50,7 +50,7 @@ OUT_OF_PLANE = 1e-9
 
 def read_quaternion(element: Element, texts: Sequence[str], options: Options, attribute: str = "") -> Quaternion:
     """Read x, y, z, w of an element by the rules of the grammar; warnings are recorded.  Raises FormatError."""
-    reading = Reading(element.source, normalize=options.normalize)
+    reading = Reading(element.file.source, normalize=options.normalize)
     try:
         _, rotation = read_spelled(notation("xyzw"), texts, INDICES, reading)
     except ValueInvalid as error:

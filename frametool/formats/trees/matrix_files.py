@@ -341,7 +341,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         return
     try:
         stored = StoredXml(read_xml(file))
-        reading = Reading(stored.root.source, normalize=options.normalize)
+        reading = Reading(stored.root.file.source, normalize=options.normalize)
         reading.bare_numbers = True
         for edge in take(stored.value, reading):
             yield edge._replace(path=(), line=stored.element(edge.path).line)
