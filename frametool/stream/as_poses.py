@@ -50,6 +50,7 @@ from frametool.stream.writers import LEARNED, RowsWriter, SingleWriter, TextWrit
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Sequence
 
+    from frametool.geometry.place import Place
     from frametool.geometry.types import Components
     from frametool.stream.array_writer import ArrayWriter
     from frametool.stream.recording_writer import RecordingWriter
@@ -113,17 +114,23 @@ class FormatConverter:
     def outcomes(self, stream: ByteStream, *, header: bool = True) -> Generator[Outcome]:
         """Yield the text of the results, block by block, and what comes behind the last."""
         writer: BlockWriter | None = None
+        operation, style = self.request.operation, self.style
         for made, outcome in self.steps(stream, header=header):
             if self.request.gathered is not None:
                 yield outcome
                 continue
             if writer is None:
-                writer = self._writer()
-            poses = made
+                kind = operation.result_kind(self.shape.kind)
+                extras = [self.request.results.prefix + name for name in self.request.extras(self.shape)]
+                if operation.only_adds or not kind or (extras and kind != POSE and operation.formula is not None):
+                    raise Misused(f"a stream of {self.fmt} with such results stays one; leave -f {style.format} out")
+                writer = writer_for(style, kind, extras, placed=self.placed)
+            poses, notes = made, [*outcome.notes]
             if self.request.on_error == STOP and outcome.faults:
                 poses = kept(made, slice(0, int(np.searchsorted(made.lines, outcome.faults[0].line))))
-            text = writer.of_block(poses)
-            yield outcome._replace(text=text, notes=[*outcome.notes, *self._zones(poses)])
+            if style.place is not None and style.place.words:
+                notes += _zones(style.place, poses)
+            yield outcome._replace(text=writer.of_block(poses), notes=notes)
         if writer is None and self.request.gathered is None:
             raise FormatError("nothing in it", source=self.source)
         if writer is not None:
@@ -136,26 +143,6 @@ class FormatConverter:
         if self.is_table:
             return self._rows(stream, header=header)
         return self._columns(stream) if "arrays" in FORMATS[self.fmt].reads else self._listed(stream)
-
-    def _writer(self) -> BlockWriter:
-        """Choose what writes the results, by what they are."""
-        operation = self.request.operation
-        kind = operation.result_kind(self.shape.kind)
-        extras = [self.request.results.prefix + name for name in self.request.extras(self.shape)]
-        if operation.only_adds or not kind or (extras and kind != POSE and operation.formula is not None):
-            raise Misused(f"a stream of {self.fmt} with such results stays one; leave -f {self.style.format} out")
-        return writer_for(self.style, kind, extras, placed=self.placed)
-
-    def _zones(self, poses: RowPoses) -> list[RowNote]:
-        """Return the warnings about the zones of results in UTM."""
-        place = self.style.place
-        there = np.flatnonzero(~np.isnan(poses.numbers[:, 0])) if place is not None and place.words else ()
-        if place is None or not len(there):
-            return []
-        from frametool.stream.earth_columns import zone_notes
-
-        x, y, z = (np.ascontiguousarray(poses.numbers[there, at]) for at in range(3))
-        return zone_notes(place, place.numbers(x, y, z), lambda row: int(poses.lines[there[row]]))
 
     def _begin(self, rows: PlannedRows, line: int = 0) -> None:
         """Decide what rows become: without a rotation points, where nobody asked for one; raises FormatError."""
@@ -228,12 +215,13 @@ class FormatConverter:
 
     def _with_place(self, poses: RowPoses) -> RowPoses:
         """Add to points of the Earth their lat, lon and alt as they were read, where these are written again."""
-        operation, inputs = self.request.operation, self.rows.inputs
-        if not (is_recording(self.style.format) or self.style.place) or not operation.keeps_frames:
+        place, inputs = self.shape.place, self.rows.inputs
+        is_written = is_recording(self.style.format) or self.style.place
+        if not is_written or place is None or place.name != "lla" or not self.request.operation.keeps_frames:
             return poses
         inputs[:, np.isnan(poses.numbers[:, 0])] = np.nan
-        read = operation.place_as_read(self.shape, lambda size: [*inputs[:size]])
-        return poses._replace(read=np.column_stack(read)) if read else poses
+        fields = tuple(field for field in place.fields if field[:3] in ("lat", "lon", "alt", "msl", "und"))
+        return poses._replace(read=np.column_stack(place._replace(fields=fields).lla([*inputs[: len(fields)]])))
 
     # --- formats that list poses ---
 
@@ -250,7 +238,12 @@ class FormatConverter:
             report = lambda error: faults.append(Fault(max(error.line, 1) - 1, "", error.message))  # noqa: E731
         file, options = self._opened(stream)
         fmt: Rows = module.form_of(file, options)
-        self.placed, self.shape, plan, state = True, Shape(POSE, 1.0, QUATERNION), _plan_listed(request), State()
+        self.placed, self.shape, state, timed = True, Shape(POSE, 1.0, QUATERNION), State(), request.timed
+        edge_of = request.pose_from_frame if request.operation.moves and timed else None
+        bare = request._replace(timed=timed if timed and timed.name else None)
+        bare = bare.with_rows(extra_column=None).with_results(unwrap=False)
+        target = Target(1.0, ((QUATERNION, False),), keep_sign=True)
+        plan = Plan((self.shape,), (target,), bare, ("x", "y", "z", *QUATERNION.columns), edge_of=edge_of)
         rename = request.renaming or (lambda parent, name: (parent, name))
         for each in module.blocks(file, options._replace(report=report), named=False):
             lines = [row.line - 1 for row in each.rows]
@@ -274,15 +267,15 @@ class FormatConverter:
             faults.clear()
 
 
-def _plan_listed(request: Request) -> Plan:
-    """Plan poses that are no text: the components of each."""
-    timed = request.timed
-    edge = request.pose_from_frame if request.operation.moves and timed else None
-    timed = timed if timed and timed.name else None
-    request = request._replace(timed=timed).with_rows(extra_column=None).with_results(unwrap=False)
-    target = Target(1.0, ((QUATERNION, False),), keep_sign=True)
-    names = "x", "y", "z", *QUATERNION.columns
-    return Plan((Shape(POSE, 1.0, QUATERNION),), (target,), request, names, edge_of=edge)
+def _zones(place: Place, poses: RowPoses) -> list[RowNote]:
+    """Return the warnings about the zones of results in UTM."""
+    there = np.flatnonzero(~np.isnan(poses.numbers[:, 0]))
+    if not len(there):
+        return []
+    from frametool.stream.earth_columns import zone_notes
+
+    x, y, z = (np.ascontiguousarray(poses.numbers[there, at]) for at in range(3))
+    return zone_notes(place, place.numbers(x, y, z), lambda row: int(poses.lines[there[row]]))
 
 
 # --- tables as frames ---

@@ -62,7 +62,7 @@ from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape, place_of
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Sequence
+    from collections.abc import Callable, Collection, Sequence
     from typing import TypeAlias
 
     from frametool.stream.record import Record
@@ -125,7 +125,14 @@ def _find(groups: Groups, earth: Earth, expected: str) -> PoseColumns | None:
     if len(plain) > 1:
         several = "; ".join(columns.shown for _, columns in plain if columns)
         raise ValueInvalid(f"several positions on the Earth: {several}; choose with --columns NAMES --from lla")
-    return PoseColumns(plain[0][1], _heading(plain[0][0])) if plain else None
+    if not plain:
+        return None
+    spot = plain[0][0].get("heading")
+    if spot is None or spot.unit == "":
+        return PoseColumns(plain[0][1], None)
+    degrees = not _in_radians(spot)
+    heading = Notation(f"heading_{'deg' if degrees else 'rad'}", HEADING, NED, degrees=degrees)
+    return PoseColumns(plain[0][1], Columns((spot.place,), (spot.name,), notation=heading, degrees=(degrees,)))
 
 
 def _position(kind: str, spots: dict[str, NamedColumn], groups: Groups, earth: Earth) -> Columns | None:
@@ -169,16 +176,6 @@ def _in_radians(spot: NamedColumn) -> bool:
         unknown = f"column {shown(spot.name)}: unknown unit {shown(spot.unit)}"
         raise ValueInvalid(f"{unknown}; lat and lon are degrees, or rad")
     return DEGREES[spot.unit]
-
-
-def _heading(spots: dict[str, NamedColumn]) -> Columns | None:
-    """Return the rotation that a heading with its unit says."""
-    spot = spots.get("heading")
-    if spot is None or spot.unit == "":
-        return None
-    degrees = not _in_radians(spot)
-    heading = Notation(f"heading_{'deg' if degrees else 'rad'}", HEADING, NED, degrees=degrees)
-    return Columns((spot.place,), (spot.name,), notation=heading, degrees=(degrees,))
 
 
 def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumns | None:
@@ -345,14 +342,35 @@ def doubt_band(place: Place, columns: Sequence[Floats], line_of: Callable[[int],
 def settle(
     request: Request, shapes: tuple[Shape, ...], names: Sequence[str], source: str, *, on_earth: bool
 ) -> tuple[Request, tuple[Shape, ...]]:
-    """Check what rows on the Earth need; stop where places are asked for of results whose frame is not the Earth's.
+    """Check what rows on the Earth need: axes for rotations, a height; and that the frame of places is the Earth's.
 
-    Raises FormatError, CalcError.
+    Raises FormatError for a rotation whose axes nobody says, CalcError.
     """
-    operation = request.operation
-    if on_earth and shapes[0].place is not None:
-        request, shape = _check_rows(request, shapes[0], shapes[0].place, names, source)
-        shapes = (shape,)
+    operation, asked = request.operation, request.results
+    if on_earth and (place := shapes[0].place) is not None:
+        shape, earth = shapes[0], request.earth
+        reads = operation.moves or not operation.keeps_frames or asked.place is not None or asked.all_numbers
+        if shape.kind == VECTOR:
+            raise Misused("a vector has no place on the Earth; leave --as vector out")
+        if place.name in (LLA, UTM) and not {"alt", "msl"}.intersection(place.fields) and reads:
+            warn(f"{source}: {NO_ALT}")
+        if request.gathered is not None:
+            request.gathered.frame = ECEF
+        if operation.keeps_frames and asked.place is None:
+            bare = shape.notation is None and all(each.representation.name == "quaternion" for each in asked.notations)
+            request = request.with_results(place=Place.written((ECEF,), Earth()), by_default=asked.by_default or bare)
+        if shape.notation is None and not (operation.inverse or operation.similar):
+            has_idle_axes = earth and earth.axes and operation.keeps_frames
+            if has_idle_axes and not (asked.all_numbers or any(map(may_be_uncertain, names))):
+                raise Misused("--local-axes has no effect: the rows have no rotation")
+        elif shape.notation is None or not (place.axes or AXES in place.fields):
+            raise FormatError(UNSAID, source=source, line=1)
+        else:  # a heading is one in the axes there
+            level = shape.notation.representation is HEADING
+            if level and place.axes == ECEF:
+                what = "a heading is clockwise from north, which axes ecef do not have"
+                raise FormatError(what, source=source, line=1)
+            shapes = (shape._replace(unit=place._replace(level=level)),)
     is_formula = operation.formula is not None
     stays = not (is_formula or operation.moves)
     says_itself = stays and (on_earth or not {*PARENT_COLUMNS}.isdisjoint(names))
@@ -366,37 +384,6 @@ def settle(
     except ValueInvalid as error:
         raise FormatError(str(error), source=source, line=1) from None
     return request, shapes
-
-
-def _check_rows(
-    request: Request, shape: Shape, place: Place, names: Sequence[str], source: str
-) -> tuple[Request, Shape]:
-    """Check what rows on the Earth need: axes for rotations, a height; a heading is one in those axes.
-
-    Raises FormatError for a rotation whose axes nobody says.
-    """
-    operation, asked = request.operation, request.results
-    reads = operation.moves or not operation.keeps_frames or asked.place is not None or asked.all_numbers
-    if shape.kind == VECTOR:
-        raise Misused("a vector has no place on the Earth; leave --as vector out")
-    if place.name in (LLA, UTM) and not {"alt", "msl"}.intersection(place.fields) and reads:
-        warn(f"{source}: {NO_ALT}")
-    if request.gathered is not None:
-        request.gathered.frame = ECEF
-    if operation.keeps_frames and asked.place is None:
-        bare = shape.notation is None and all(each.representation.name == "quaternion" for each in asked.notations)
-        request = request.with_results(place=Place.written((ECEF,), Earth()), by_default=asked.by_default or bare)
-    if shape.notation is None and not (operation.inverse or operation.similar):
-        has_idle_axes = request.earth and request.earth.axes and operation.keeps_frames
-        if has_idle_axes and not (asked.all_numbers or any(map(may_be_uncertain, names))):
-            raise Misused("--local-axes has no effect: the rows have no rotation")
-        return request, shape
-    if shape.notation is None or not (place.axes or AXES in place.fields):
-        raise FormatError(UNSAID, source=source, line=1)
-    level = shape.notation.representation is HEADING
-    if level and place.axes == ECEF:
-        raise FormatError("a heading is clockwise from north, which axes ecef do not have", source=source, line=1)
-    return request, shape._replace(unit=place._replace(level=level))
 
 
 # --- records ---
@@ -451,7 +438,8 @@ def placed_record(
     stays = False
     if pose.read and is_point and not extra:
         place, named = pose.read.place, {SAME.get(key): key for key in keys}
-        stays = len(keys) == len(named) and named.keys() == {"lat", "lon", "alt"} and _are_numbers(value, keys)
+        stays = len(keys) == len(named) and named.keys() == {"lat", "lon", "alt"}
+        stays = stays and all(re.fullmatch(JSON_NUMBER, value[key]) for key in keys)  # without marks of degrees
         if stays or operation.keeps_frames:
             shape, numbers = Shape(POINT, place), tuple(pose.read.numbers)
         keys = [named[field] for field in place.fields] if stays else keys
@@ -463,11 +451,6 @@ def placed_record(
     return record._replace(
         numbers=(None,) * len(values), members=(first,), others=tuple(others), placed=tuple(keys)
     )  # fmt: skip
-
-
-def _are_numbers(value: dict[str, Any], keys: Iterable[str]) -> bool:
-    """Return True if members are plain numbers, without marks of degrees."""
-    return all(re.fullmatch(JSON_NUMBER, value[key]) for key in keys)
 
 
 def _extra(pose: Pose, reading: Reading, request: Request, *, is_point: bool) -> tuple[float, ...]:

@@ -46,7 +46,12 @@ def apply_arrow(
     if not isinstance(data, (pa.RecordBatch, pa.Table)):
         kind = f"{type(data).__module__}.{type(data).__name__}"
         raise ValueInvalid(f"expected a pyarrow RecordBatch or Table, got {kind}")
-    names = _named(columns, as_)
+    if as_ not in COLUMNS:
+        raise ValueInvalid(f"as_ is one of {', '.join(COLUMNS)}; found {shown(as_)}")
+    names = COLUMNS[as_] if columns is None else tuple(columns)
+    if len(names) != len(COLUMNS[as_]) or len(set(names)) != len(names):
+        usual = f"a {as_} has {len(COLUMNS[as_])}, like {', '.join(COLUMNS[as_])}"
+        raise ValueInvalid(f"columns: {usual}; found {', '.join(names)}")
     places = [_place_of(name, data.schema.names) for name in names]
     fields = [data.schema.field(place) for place in places]
     for field in fields:
@@ -57,7 +62,12 @@ def apply_arrow(
     masks = [mask for mask in map(nulls_of, inputs) if mask is not None]
     nulls = np.logical_or.reduce(masks) if masks else None
     if tree is None:
-        mover = _one_or_each(transform, data.num_rows, tree=bool(target or source or time_column))
+        mover, rows, lacks_tree = transform, data.num_rows, target or source or time_column
+        if lacks_tree or not isinstance(mover, Transform):
+            found = "no tree" if lacks_tree else type(mover).__name__
+            raise ValueInvalid(f"expected a Transform, or tree, target and source; got {found}")
+        if mover.shape not in ((), (rows,)):
+            raise ValueInvalid(f"transforms of shape {mover.shape} for {rows} rows; expected one, or one a row")
     elif transform is None and target and source:
         mover = _looked_up(tree, target, source, data, time_column, nulls)
     else:
@@ -80,27 +90,6 @@ def _place_of(name: str, names: Sequence[str]) -> int:
     if names.count(name) > 1:
         raise ValueInvalid(f"column {shown(name)} appears twice")
     return names.index(name)
-
-
-def _named(columns: Sequence[str] | None, as_: str) -> tuple[str, ...]:
-    """Return the columns of points or poses; raises ValueInvalid."""
-    if as_ not in COLUMNS:
-        raise ValueInvalid(f"as_ is one of {', '.join(COLUMNS)}; found {shown(as_)}")
-    usual = COLUMNS[as_]
-    named = usual if columns is None else tuple(columns)
-    if len(named) != len(usual) or len(set(named)) != len(named):
-        raise ValueInvalid(f"columns: a {as_} has {len(usual)}, like {', '.join(usual)}; found {', '.join(named)}")
-    return named
-
-
-def _one_or_each(transform: Any, rows: int, *, tree: bool) -> Transform:
-    """Check that a transform moves all rows or that there is one a row."""
-    if tree or not isinstance(transform, Transform):
-        found = "no tree" if tree else type(transform).__name__
-        raise ValueInvalid(f"expected a Transform, or tree, target and source; got {found}")
-    if transform.shape not in ((), (rows,)):
-        raise ValueInvalid(f"transforms of shape {transform.shape} for {rows} rows; expected one, or one a row")
-    return transform
 
 
 def _looked_up(

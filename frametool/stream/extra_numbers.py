@@ -6,7 +6,6 @@ Loaded where one of them is there.
 from __future__ import annotations
 
 import re
-from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
@@ -94,18 +93,6 @@ def is_unknown(value: Any, sizes: Sequence[int]) -> bool:
     return _entries(value, sizes)[0][1] == UNKNOWN
 
 
-def _of_flat(own: dict[str, Any], reading: Reading, *, flat: Sequence[str], size: int) -> Components:
-    """Read the covariance that keys say as columns do: `c11` .. `c66`, or `sigma_x` .."""
-    numbers = [within((key,), read_number, own[key]) for key in flat]
-    _, sigma = covariance.find_columns(flat, size)
-    if not sigma:
-        within((flat[0],), covariance.check, numbers)
-        return tuple(numbers)
-    if negative := next((key for key, number in zip(flat, numbers, strict=True) if number < 0.0), ""):
-        raise NotARotation(f"sigma is negative: {own[negative]}", (negative,))
-    return _of_sources(numbers, _with_unit(sigma, degrees=reading.degrees), size)
-
-
 def _with_unit(sigma: Sequence[tuple[int, str]], *, degrees: bool) -> tuple[tuple[int, str], ...]:
     """Return the sources of six sigmas with the unit of bare angles."""
     return tuple((at, unit or "deg" * (degrees and axis > 2)) for axis, (at, unit) in enumerate(sigma))
@@ -124,8 +111,18 @@ def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Readi
     degrees = reading.degrees
     reading.degrees = read_angle_unit(own["angles"]) if "angles" in own else degrees
     try:
-        read = partial(_of_flat, flat=flat, size=size) if flat else covariance.read_covariance
-        entries = within(path, read, own, reading=reading)
+        if not flat:
+            entries = within(path, covariance.read_covariance, own, reading=reading)
+        else:  # keys as columns: c11 .. c66, or sigma_x ..
+            numbers = [within((*path, key), read_number, own[key]) for key in flat]
+            _, sigma = covariance.find_columns(flat, size)
+            negative = next((key for key, number in zip(flat, numbers, strict=True) if number < 0.0), "")
+            if sigma and negative:
+                raise NotARotation(f"sigma is negative: {own[negative]}", (*path, negative))
+            if not sigma:
+                within((*path, flat[0]), covariance.check, numbers)
+            sigma = _with_unit(sigma, degrees=reading.degrees)
+            entries = _of_sources(numbers, sigma, size) if sigma else tuple(numbers)
     finally:
         reading.degrees = degrees
     if size < len(entries) and any(entries[18:]):
@@ -158,9 +155,13 @@ def covariance_columns(
     """Find the columns of a covariance or of sigmas where they count; return their places and the shapes with them."""
     kinds = [shape.kind for shape in shapes]
     passes = request.operation.keeps_frames and request.gathered is None
-    own = shapes[0].place if shapes else None
-    if passes and own is not None and request.results.place is not None and own.axes != request.results.place.axes:
-        _refuse_extra(table, own.axes, request.results.place.axes, source)
+    own, place = shapes[0].place if shapes else None, request.results.place
+    if passes and own and place and own.axes != place.axes:  # its columns would stay along axes that the result has not
+        for found, _ in (covariance.find_columns(table.names or (), size) for size in (9, 36)):
+            message = f"the covariance is along {own.axes or 'the axes there'}, the result along {place.axes}"
+            remedy = "" if own.axes else f", or say --local-axes {place.axes}"
+            if found:
+                raise FormatError(f"{message}; leave its columns out{remedy}", source=source, line=1)
     if passes or not kinds or not {*PLACED}.issuperset(kinds):
         return (), shapes
     try:
@@ -183,14 +184,6 @@ def covariance_columns(
         raise FormatError(message, source=source, line=1)
     sigma = _with_unit(sigma, degrees=request.rows.degrees)
     return places, (shape._replace(covariance=(len(places),), rewritten=True, sigma=sigma),)
-
-
-def _refuse_extra(table: Table, axes: str, others: str, source: str) -> None:
-    """Raise FormatError for the columns of a covariance that would stay along axes which a result does not have."""
-    if any(covariance.find_columns(table.names or (), size)[0] for size in (9, 36)):
-        wording, remedy = (f"along {axes}", "") if axes else ("along the axes there", f", or say --local-axes {others}")
-        message = f"the covariance is {wording}, the result along {others}; leave its columns out{remedy}"
-        raise FormatError(message, source=source, line=1)
 
 
 def find_rates(

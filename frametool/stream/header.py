@@ -77,11 +77,6 @@ class Columns(NamedTuple):
         """Name the columns."""
         return " ".join(self.names)
 
-    @property
-    def spread(self) -> int:
-        """Count the other columns between the first and the last."""
-        return max(self.places) - min(self.places) - len(self.places)
-
 
 class PoseColumns(NamedTuple):
     """The columns of one point or pose."""
@@ -212,11 +207,12 @@ def find_rotations(header: Header, expected: Notation | None) -> list[Columns]:
             found[frozenset(match.places)] = _rotation(match, row, expected)
         for match in header.match(row.whole.columns) if row.whole else ():
             found[frozenset(match.places)] = _rotation(match, row, expected)._replace(whole=True, unit=1.0)
+    spread = [(max(each.places) - min(each.places) - len(each.places), each) for each in found.values()]
     best: dict[int, int] = {}  # where several share a column, an axis with an angle and an angle_deg, the nearest
-    for each in found.values():
+    for size, each in spread:
         for place in each.places:
-            best[place] = min(best.get(place, each.spread), each.spread)
-    nearest = [each for each in found.values() if each.spread <= min(map(best.__getitem__, each.places))]
+            best[place] = min(best.get(place, size), size)
+    nearest = [each for size, each in spread if size <= min(map(best.__getitem__, each.places))]
     if nearest:
         return nearest
     alone = []  # columns that say a rotation by themselves, where none of the others is there: `yaw`, `theta`

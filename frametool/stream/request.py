@@ -201,17 +201,6 @@ class Operation(NamedTuple):
         changed = self.left or self.right or self.of or self.moves or self.mirrors
         return not (changed or self.inverse)
 
-    def place_as_read(self, shape: Shape, numbers: Callable[[int], Sequence[Any]]) -> Components:
-        """Return lat, lon and alt of rows that say them where nothing changes them; () elsewhere.
-
-        numbers: returns so many of the first numbers of the rows
-        """
-        place = shape.place
-        if place is None or place.name != "lla" or not self.keeps_frames:
-            return ()
-        fields = tuple(field for field in place.fields if field[:3] in ("lat", "lon", "alt", "msl", "und"))
-        return place._replace(fields=fields).lla(numbers(len(fields)))
-
     @property
     def keeps_frames(self) -> bool:
         """Return True if records stay in the frames they name."""
