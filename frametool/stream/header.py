@@ -388,14 +388,9 @@ def find_six(names: Sequence[str], kind: str) -> Columns | None:
         for prefix in [name.removesuffix(base[0]) for name in folded if re.fullmatch(f"(.*_)?{base[0]}", name)]:
             wanted = [prefix + word for word in base]
             if {*wanted} <= {*folded}:
-                return _six([folded.index(name) for name in wanted], names, found)
+                places = tuple(map(folded.index, wanted))
+                return Columns(places, tuple(names[place] for place in places), kind=found)
     return None
-
-
-def _six(places: Sequence[int], names: Sequence[str], kind: str) -> Columns:
-    if len(places) != 6:
-        raise Misused(f"--columns: a {kind} has six ({' '.join(six_names(kind))}); found {len(places)}")
-    return Columns(tuple(places), tuple(names[place] for place in places), kind=kind)
 
 
 def row_shape(pose: PoseColumns, request: Request) -> Shape:
@@ -432,8 +427,10 @@ def named_pose(spec: str, names: Sequence[str] | None, width: int, request: Requ
     Raises Misused for names that are not there, or a count that says nothing.
     """
     called, places = places_named(spec, names, width)
+    if kind in SIX and len(places) != 6:
+        raise Misused(f"--columns: a {kind} has six ({' '.join(six_names(kind))}); found {len(places)}")
     if kind in SIX:
-        return PoseColumns(_six(places, called, kind), None)
+        return PoseColumns(Columns(tuple(places), tuple(called[place] for place in places), kind=kind), None)
     header = Header(called)
     count, rotation = _chosen_rotation(header, places, request.rows.given)
     if count == len(places):

@@ -110,25 +110,43 @@ def plan_table(
 
 
 def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
-    """Find the columns of the poses, by --columns, by name, or by their number where there are no names."""
-    asked, width = request.rows, table.width
+    """Find the columns of the poses, by --columns, by name, or by their number where there are no names.
+
+    With a pose a twist is another column.
+    """
+    asked, specs, width = request.rows, request.rows.columns, table.width
     if not asked.poses:
         return []
-    specs, kinds = asked.columns, asked.kinds or (asked.kind,) * asked.poses
     if specs and len(specs) != asked.poses:
         raise Misused(f"--columns is given {len(specs)} times, for {asked.poses} poses in a row")
     if not specs and asked.poses == 1 and table.pose is not None and asked.given is None:
         return [table.pose]
-    if not specs and table.names:
-        names = ["" if name == asked.extra_column or may_be_uncertain(name) else name for name in table.names]
-        return _find_named(names, request, source)
-    if not specs:
-        specs, kinds = (_by_width(width, request, source),), (asked.kind,)
-    if asked.given_place:
+    if specs or not table.names:
+        kinds = (asked.kinds if specs else ()) or (asked.kind,) * max(len(specs), 1)
+        specs = specs or (_by_width(width, request, source),)
+        if not asked.given_place:
+            chosen = zip(specs, kinds, strict=True)
+            return [named_pose(spec, table.names, width, request, kind) for spec, kind in chosen]
         from frametool.stream.earth_columns import chosen_pose
 
         return [chosen_pose(spec, table.names, width, request) for spec in specs]
-    return [named_pose(spec, table.names, width, request, kind) for spec, kind in zip(specs, kinds, strict=True)]
+    names = ["" if name == asked.extra_column or may_be_uncertain(name) else name for name in table.names]
+    six = find_six(names, asked.kind if asked.kind in SIX else "")
+    if asked.kind in SIX and six is None:
+        wanted = " ".join(six_names(asked.kind))
+        found = f"no columns of a {asked.kind} ({wanted}) among: {listed(names)}; name them with --columns"
+        raise FormatError(found, source=source, line=1)
+    others = ["" if six and place in six.places else name for place, name in enumerate(names)]
+    if six is not None and (asked.kind in SIX or not has_pose_column(others)):
+        return [PoseColumns(six, None)]
+    if not (request.operation.moves or request.operation.changes_nothing):
+        others = names  # what a pose has with it would no longer be true
+    if asked.poses == 1 and (asked.given_place or any(map(may_be_on_earth, names))):
+        from frametool.stream.earth_columns import find_pose
+
+        if (pose := find_pose(others, request, source)) is not None:
+            return [pose]
+    return find_poses(others, asked.given, asked.poses, source)
 
 
 def _by_width(width: int, request: Request, source: str) -> str:
@@ -148,28 +166,6 @@ def _by_width(width: int, request: Request, source: str) -> str:
             reason = f"{said.counted}; found {width} columns without names; or give --columns"
         raise FormatError(reason, source=source, line=1)
     return "" if asked.given_place else f"{begin}-{width}"
-
-
-def _find_named(names: Sequence[str], request: Request, source: str) -> list[PoseColumns]:
-    """Find points, poses, a twist or a wrench by their names; with a pose a twist is another column."""
-    asked = request.rows
-    six = find_six(names, asked.kind if asked.kind in SIX else "")
-    if asked.kind in SIX and six is None:
-        wanted = " ".join(six_names(asked.kind))
-        found = f"no columns of a {asked.kind} ({wanted}) among: {listed(names)}; name them with --columns"
-        raise FormatError(found, source=source, line=1)
-    taken = () if six is None else six.places
-    others = ["" if place in taken else name for place, name in enumerate(names)]
-    if six is not None and (asked.kind in SIX or not has_pose_column(others)):
-        return [PoseColumns(six, None)]
-    if not (request.operation.moves or request.operation.changes_nothing):
-        others = list(names)  # what a pose has with it would no longer be true
-    if asked.poses == 1 and (asked.given_place or any(map(may_be_on_earth, names))):
-        from frametool.stream.earth_columns import find_pose
-
-        if (pose := find_pose(others, request, source)) is not None:
-            return [pose]
-    return find_poses(others, asked.given, asked.poses, source)
 
 
 def _turning_along(
