@@ -196,6 +196,24 @@ class ColumnRows(PlannedRows):
         return [weights], dict.fromkeys(np.flatnonzero(invalid).tolist(), (name, "not finite"))
 
 
+    def in_other_format(self, columns: Sequence[OutColumn], batch: Batch) -> tuple[int, dict[str, Made]]:
+        """Return how many results a batch has, and their columns by name, for a file of another format."""
+        results = self.of_batch(batch)
+        new, found = iter(made_of(columns, self, results)), {}
+        for column in columns:
+            place = column.passed
+            if place is None:
+                made = next(new)
+                made = made if isinstance(made.values, np.ndarray) else Made(objects(made.values))
+            elif column.kind is not None and column.kind.kind in FLOATS:
+                values, nulls = batch.numbers(place)
+                made = Made(values.astype(column.kind)[results.rows], None if nulls is None else nulls[results.rows])
+            else:
+                made = Made(taken(batch.column(place), results.rows))
+            found[column.name] = made
+        return len(results.numbers), found
+
+
 def run_columns(
     file: ColumnFile, request: Request, style: Style, *, source: str, into: Any = None
 ) -> Generator[Outcome]:
@@ -205,23 +223,22 @@ def run_columns(
     move_along(file, request)
     if not request.gathered:
         _say_rounded([rows], f"{source}: ")
-    drops = request.on_error == SKIP or request.operation.of == VELOCITIES
     writer: ColumnWriter | None = None
     other = None if into is None else ColumnsWriter(style, into)
-    if other is None and not request.gathered:
-        writer = file.rewriter(columns, style, drops=drops)
+    if other is not None:  # it has its columns even where there are no rows
+        other.of_columns(*rows.in_other_format(columns, file.nothing()))
+    elif not request.gathered:
+        writer = file.rewriter(columns, style, drops=request.on_error == SKIP or request.operation.of == VELOCITIES)
     for batch in file.batches():
-        results = rows.of_batch(batch)
         text: Any = b""
         if other is not None:
-            text = other.of_columns(len(results.numbers), _in_other_format(columns, rows, batch, results))
-        elif writer is not None:
-            chosen = None if len(results.rows) == batch.size else results.rows
-            text = writer.of_rows(batch, chosen, made_of(columns, rows, results))
+            text = other.of_columns(*rows.in_other_format(columns, batch))
+        else:
+            results = rows.of_batch(batch)
+            if writer is not None:
+                chosen = None if len(results.rows) == batch.size else results.rows
+                text = writer.of_rows(batch, chosen, made_of(columns, rows, results))
         yield rows.outcome(batch, text)
-    if other is not None and not other.begun:
-        empty = file.nothing()
-        other.of_columns(0, _in_other_format(columns, rows, empty, rows.of_batch(empty)))
     if (last := other or writer) is not None:
         yield from map(Outcome, last.end())
 
@@ -254,40 +271,18 @@ class MergedClouds:
         file, rows = self.parts[at]
         columns = rows.out_columns(named=True)
         for batch in file.batches():
-            results = rows.of_batch(batch)
-            made = _in_other_format(columns, rows, batch, results)
+            size, made = rows.in_other_format(columns, batch)
             typed = {
                 name: made[name] if kind is None else made[name]._replace(values=made[name].values.astype(kind))
                 for name, kind in self.kinds.items()
             }
-            text = self.writer.of_columns(len(results.numbers), typed)
-            yield rows.outcome(batch, text)
+            yield rows.outcome(batch, self.writer.of_columns(size, typed))
 
 
 def _say_rounded(every: Sequence[ColumnRows], begin: str = "") -> None:
     """Warn of columns of fewer digits than results are computed with."""
     if kinds := sorted({kind.name for rows in every for kind in rows.narrow.values()}):
         warn(f"{begin}{', '.join(kinds)} columns are computed as float64 and rounded once")
-
-
-def _in_other_format(
-    columns: Sequence[OutColumn], rows: ColumnRows, batch: Batch, results: RowResults
-) -> dict[str, Made]:
-    """Return the columns of a batch by name, for a file of another format."""
-    new = iter(made_of(columns, rows, results))
-    found = {}
-    for column in columns:
-        place = column.passed
-        if place is None:
-            made = next(new)
-            made = made if isinstance(made.values, np.ndarray) else Made(objects(made.values))
-        elif column.kind is not None and column.kind.kind in FLOATS:
-            values, nulls = batch.numbers(place)
-            made = Made(values.astype(column.kind)[results.rows], None if nulls is None else nulls[results.rows])
-        else:
-            made = Made(taken(batch.column(place), results.rows))
-        found[column.name] = made
-    return found
 
 
 def move_along(file: ColumnFile, request: Request) -> None:
