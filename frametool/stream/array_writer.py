@@ -204,21 +204,6 @@ def _values(cells: Cells) -> list[Any]:
     return texts_of(cells) if isinstance(cells, Spans) else plain_cells(cells)
 
 
-def _in_columns(name: str, cells: Cells) -> dict[str, Made]:
-    """Return the column of a name; covariances as columns c11, c12, .. of numbers."""
-    if name != "covariance" or isinstance(cells, Spans):
-        return {name: Made(cells)}
-    from frametool.grammar.covariance import columns
-
-    values = plain_cells(cells)
-    lengths = {len(each) if isinstance(each, list) else 0 for each in values if each is not None}
-    if lengths not in ({36}, {9}):
-        return {name: Made(cells)}
-    size = lengths.pop()
-    rows = np.array([[np.nan] * size if each is None else each for each in values], np.float64)
-    return {column: Made(each, not_finite(each)) for column, each in zip(columns(size), rows.T, strict=True)}
-
-
 class ArrayWriter(PoseWriter):
     """Write blocks of poses, points, vectors, twists or wrenches one after the other.
 
@@ -270,6 +255,15 @@ class ArrayWriter(PoseWriter):
             none = block.stamps_ns == NO_STAMP
             made["stamp_ns"] = Made(block.stamps_ns.astype(STAMP_NS), none if none.any() else None)
         for name, cells in block.extras.items():
-            for column_name, each in _in_columns(name, cells).items():
-                made.setdefault(column_name, each)
+            values = plain_cells(cells) if name == "covariance" and not isinstance(cells, Spans) else []
+            sizes = {len(each) if isinstance(each, list) else 0 for each in values if each is not None}
+            if sizes not in ({36}, {9}):
+                made.setdefault(name, Made(cells))
+                continue
+            from frametool.grammar.covariance import columns as names_of  # c11, c12, ..
+
+            width = sizes.pop()
+            rows = np.array([[np.nan] * width if each is None else each for each in values], np.float64)
+            for entry, column in zip(names_of(width), rows.T, strict=True):
+                made.setdefault(entry, Made(column, not_finite(column)))
         return made

@@ -118,7 +118,7 @@ def names_in(begin: bytes, fmt: str, source: str, wanted: str, *, header: bool =
 
         table, _ = open_table(begin, fmt, header=header, source=source)
         return table.names or tuple(map(str, range(1, table.width + 1)))
-    part = next(iter(Splitter(fmt).parts(begin).parts), None)
+    part = next(iter(Splitter(fmt).parts(begin)[0]), None)
     text = "" if part is None else begin[part.start : part.end].decode("utf-8", "replace")
     documents = parse_documents(without_noise(text) if fmt == "yaml" else text, source)
     value: Any = documents[0].value if documents else {}

@@ -470,9 +470,7 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     if any(map(may_be_on_earth, value)):
         from frametool.stream.earth_columns import placed_record
 
-        def inner(rest: dict[str, Any]) -> tuple[Pose, list[str]]:
-            return _pose_at_place(rest, path, reading, request)
-
+        inner = partial(_pose_at_place, path=path, reading=reading, request=request)
         empty = Record(path, Shape("", None), parent=Name(EARTH_FRAMES[0]))
         if (found := placed_record(value, empty, positions, inner, reading, request)) is not None:
             return found

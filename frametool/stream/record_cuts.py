@@ -326,7 +326,7 @@ class RecordCutter:
         for _ in range(MOST_TRIED):  # by one that is learned from the first record of what is left, if need be
             start, end = rest[0] if len(rest) == 1 else (0, 0)
             head = text[start : min(end, start + MOST_LOOKED)]
-            part = next(iter(self.splitter.parts(head).parts), None) if end - start >= WORTH_CUTTING else None
+            part = next(iter(self.splitter.parts(head)[0]), None) if end - start >= WORTH_CUTTING else None
             if part is None or part.problem:
                 break
             if self.match(head, part) is None:
@@ -335,8 +335,17 @@ class RecordCutter:
                     break
                 self.learned(known, head, part)
             rest = _cut_by(self.templates[-1], text, rest, cuts)
-        cuts, strays = _without_strays(cuts, text)
-        return cuts, sorted(rest + strays)
+        found = []
+        for cut in cuts:  # without records whose frames are called so that their results are written otherwise
+            fits = np.ones(len(cut.starts), np.bool_)
+            for at in range(len(cut.template.entries)):
+                names = names_of(cut, at, text)
+                wrong = {each for each in {*names} if cut.template.named(at, each) is None}
+                if wrong:
+                    fits &= np.resize(np.array([each not in wrong for each in names]), len(fits))
+            rest += zip(cut.starts[~fits, 0].tolist(), cut.ends[~fits, -2].tolist(), strict=True)
+            found.append(cut if fits.all() else Cut(cut.template, cut.starts[fits], cut.ends[fits]))
+        return [cut for cut in found if len(cut.starts)], sorted(rest)
 
     def match(self, text: bytes, part: Part) -> Hit | None:
         """Find the template that a record follows, and where its stretches are."""
@@ -377,23 +386,6 @@ def _cut_by(template: Template, text: bytes, rest: list[tuple[int, int]], cuts: 
             first = begins[:, :1]  # nothing is before a record
             cuts.append(Cut(template, *(np.concatenate([each, first], axis=1) for each in (begins, stops))))
     return left
-
-
-def _without_strays(cuts: Sequence[Cut], text: bytes) -> tuple[list[Cut], list[tuple[int, int]]]:
-    """Leave out records whose frames are called so that their results are written otherwise; return where these are."""
-    found: list[Cut] = []
-    strays: list[tuple[int, int]] = []
-    for cut in cuts:
-        fits = np.ones(len(cut.starts), np.bool_)
-        for at in range(len(cut.template.entries)):
-            names = names_of(cut, at, text)
-            wrong = {each for each in {*names} if cut.template.named(at, each) is None}
-            if wrong:
-                fits &= np.resize(np.array([each not in wrong for each in names]), len(fits))
-        gone = ~fits
-        strays += zip(cut.starts[gone, 0].tolist(), cut.ends[gone, -2].tolist(), strict=True)
-        found.append(cut if fits.all() else Cut(cut.template, cut.starts[fits], cut.ends[fits]))
-    return [cut for cut in found if len(cut.starts)], strays
 
 
 def by_template(cuts: Iterable[Cut], singles: Iterable[tuple[Part, Hit]]) -> list[Cut]:
@@ -474,22 +466,22 @@ def names_of(cut: Cut, at: int, text: bytes) -> list[Names]:
     record = cut.template.entries[at].record
     columns: list[list[str | None]] = []
     for index, known in zip(cut.template.frames[at], (record.parent.text, record.name.text), strict=True):
-        columns.append([known] if index is None else _texts(text, cut.starts[:, index], cut.ends[:, index]))
+        if index is None:
+            columns.append([known])
+            continue
+        starts, ends = cut.starts[:, index], cut.ends[:, index]
+        width = ends[0] - starts[0]
+        if (ends - starts == width).all():
+            letters = np.frombuffer(text, np.uint8)[starts[:, None] + np.arange(width)]
+            if (letters == letters[0]).all():
+                columns.append([text[starts[0] : ends[0]].decode()])
+                continue
+        texts = [text[start:end] for start, end in zip(starts.tolist(), ends.tolist(), strict=True)]
+        decoded = {each: each.decode() for each in {*texts}}
+        columns.append([decoded[each] for each in texts])
     size = max(map(len, columns))
     parents, names = (each if len(each) == size else each * size for each in columns)
     return [*zip(parents, names, strict=True)]
-
-
-def _texts(text: bytes, starts: Ints, ends: Ints) -> list[str | None]:
-    """Return texts, one a record, or the one that all have."""
-    size = ends[0] - starts[0]
-    if (ends - starts == size).all():
-        found = np.frombuffer(text, np.uint8)[starts[:, None] + np.arange(size)]
-        if (found == found[0]).all():
-            return [text[starts[0] : ends[0]].decode()]
-    texts = [text[start:end] for start, end in zip(starts.tolist(), ends.tolist(), strict=True)]
-    known = {each: each.decode() for each in {*texts}}
-    return [known[each] for each in texts]
 
 
 def _as_renamed(template: Template, piece: Renamed, frames: Sequence[Sequence[Names]], rows: int) -> Spans:

@@ -63,7 +63,7 @@ def _outcomes(stream: ByteStream, work: RecordBlocks) -> Generator[Outcome]:
             second = next(blocks, None)
         except FormatError as error:  # comes behind the results of what is whole
             failed = error
-    are_few = second is None and not work.request.in_order and len(work.splitter.parts(first).parts) <= sizes.FEW
+    are_few = second is None and not work.request.in_order and len(work.splitter.parts(first)[0]) <= sizes.FEW
     is_open: bool | None = True
     for block in chain([first, second] if second else [first], blocks):
         outcome = work.outcome(block, are_few=are_few)
@@ -82,7 +82,7 @@ def at_other_times(stream: ByteStream, fmt: str, offset_ns: int) -> BufferedRead
         splitter = Splitter(fmt)
         for block in read_blocks(stream, whole=splitter.whole):
             edits = []
-            for part in splitter.parts(block).parts:
+            for part in splitter.parts(block)[0]:
                 with suppress(FrametoolError, TypeError, UnicodeDecodeError):  # a list is no key
                     moved, _ = stamp_source.at_other_times(block[part.start : part.end].decode(), offset_ns)
                     edits.append((part.start, part.end, moved.encode()))

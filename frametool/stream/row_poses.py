@@ -129,30 +129,23 @@ def block_of_points(records: Sequence[Mapping[str, Any]]) -> tuple[str, RowPoses
 
     Raises ValueInvalid for no such column, or several of them.
     """
-    found = [_components(record) for record in records]
-    kinds = sorted({kind for kind, _, _ in found})
-    if len(kinds) > 1:
-        raise ValueInvalid(f"columns hold things of one kind, found {' and '.join(kinds)}")
-    numbers = np.array([numbers for _, _, numbers in found], np.float64)
-    rest = [
-        {key: value for key, value in record.items() if key not in used}
-        for record, (_, used, _) in zip(records, found, strict=True)
-    ]
-    return kinds[0], _block(numbers, [record.get("frame") for record in records], [None], rest)
-
-
-def _components(record: Mapping[str, Any]) -> tuple[str, tuple[str, ...], list[float]]:
-    """Return what a mapping is, the keys that say so, and its numbers: lists, mappings, or under x, y, z."""
     choices = (("point",), ("vector",), ("xyz",), *PARTS.values())
-    keys = next((keys for keys in choices if set(keys) <= record.keys()), tuple("xyz"))
-    kind = next((kind for kind, parts in PARTS.items() if parts == keys), "vector" if "vector" in keys else "point")
-    numbers: list[Any] = []
-    for key in keys:
-        value = record.get(key)
-        numbers += value.values() if isinstance(value, dict) else value if isinstance(value, list) else [value]
-    if len(numbers) != (6 if kind in PARTS else 3) or not all(isinstance(number, float) for number in numbers):
-        raise ValueInvalid(f"columns hold points or poses, found {', '.join(record)}")
-    return kind, (*keys, "frame"), numbers
+    kinds, found, rest = set[str](), list[list[Any]](), list[dict[str, Any]]()
+    for record in records:  # its numbers are in lists, mappings, or under x, y, z
+        keys = next((keys for keys in choices if set(keys) <= record.keys()), tuple("xyz"))
+        kind = next((kind for kind, parts in PARTS.items() if parts == keys), "vector" if "vector" in keys else "point")
+        numbers: list[Any] = []
+        for value in map(record.get, keys):
+            numbers += value.values() if isinstance(value, dict) else value if isinstance(value, list) else [value]
+        if len(numbers) != (6 if kind in PARTS else 3) or not all(isinstance(number, float) for number in numbers):
+            raise ValueInvalid(f"columns hold points or poses, found {', '.join(record)}")
+        kinds.add(kind)
+        found.append(numbers)
+        rest.append({key: value for key, value in record.items() if key not in (*keys, "frame")})
+    if len(kinds) > 1:
+        raise ValueInvalid(f"columns hold things of one kind, found {' and '.join(sorted(kinds))}")
+    frames = [record.get("frame") for record in records]
+    return min(kinds), _block(np.array(found, np.float64), frames, [None], rest)
 
 
 def _block(
@@ -253,12 +246,7 @@ def plain_cells(cells: Cells) -> list[Any]:
     if not isinstance(cells, Spans) and cells.dtype == object:
         return list(cells)
     texts = texts_of(cells)
-    known = {text: plain_cell(text) for text in {*texts}}
+    known: dict[str, str | Verbatim | None] = {"": None}
+    for text in {*texts} - {""}:  # numbers and truth values as they are written
+        known[text] = Verbatim(text) if text in ("true", "false") or re.fullmatch(JSON_NUMBER, text) else text
     return [known[text] for text in texts]
-
-
-def plain_cell(text: str) -> str | Verbatim | None:
-    """Return a cell as a plain value: numbers and truth values as they are written."""
-    if not text:
-        return None
-    return Verbatim(text) if text in ("true", "false") or re.fullmatch(JSON_NUMBER, text) else text

@@ -57,13 +57,6 @@ class Part(NamedTuple):
         )
 
 
-class Parts(NamedTuple):
-    """The records of a block; `closed` where an array ends in it."""
-
-    parts: list[Part]
-    closed: bool = False
-
-
 class Splitter:
     """Cut a stream into records; `layout` is "" until the first line of JSON has been seen."""
 
@@ -74,60 +67,57 @@ class Splitter:
 
     def whole(self, text: bytes) -> int:
         """Return how many bytes of what has come are whole records; called with more until some are."""
-        if self.layout == DOCUMENTS:
-            return self._whole_documents(text)
+        if self.layout == DOCUMENTS:  # what has been looked at is not looked at again
+            ends = [found.end() for found in _SEPARATOR.finditer(text, text.rfind(b"\n", 0, self._looked) + 1)]
+            self._looked = 0 if ends else len(text)
+            return ends[-1] if ends else 0
         self.layout = self.layout or _layout_of(text, final=False)
         if self.layout in ("", LINES):
             return whole_lines(text) if self.layout else 0
         if MUCH < len(text) < 2 * self._looked:
             return 0
-        ended = [part.after for part in self._values(text, final=False).parts if self._has_ended(text, part)]
+        ended = 0
+        for part in self._values(text, final=False)[0]:  # a text is cut so that either piece means what it meant
+            if part.final or self.layout != ARRAY:
+                is_end = part.final or part.after < len(text) or text.endswith(b"\n")
+            else:
+                is_end = bool(_BEHIND_ITEM.match(text, part.end))
+            ended = part.after if is_end else ended
         self._looked = 0 if ended else len(text)
-        return ended[-1] if ended else 0
+        return ended
 
-    def _has_ended(self, text: bytes, part: Part) -> bool:
-        """Return True if a text can be cut behind a record so that either piece means what it meant."""
-        if part.final or self.layout != ARRAY:
-            return part.final or part.after < len(text) or text.endswith(b"\n")
-        return bool(_BEHIND_ITEM.match(text, part.end))
-
-    def _whole_documents(self, text: bytes) -> int:
-        """Return the end of the last separator; what has been looked at is not looked at again."""
-        ends = [found.end() for found in _SEPARATOR.finditer(text, text.rfind(b"\n", 0, self._looked) + 1)]
-        self._looked = 0 if ends else len(text)
-        return ends[-1] if ends else 0
-
-    def parts(self, text: bytes) -> Parts:
-        """Return the records of a block of whole records, or of the rest of a stream."""
+    def parts(self, text: bytes) -> tuple[list[Part], bool]:
+        """Return the records of a block of whole records, or of a stream's rest, and whether an array ends in it."""
         if self.layout == DOCUMENTS:
-            return Parts(list(_documents(text)))
+            return list(_documents(text)), False
         self.layout = self.layout or _layout_of(text, final=True)
         if self.layout == LINES:
-            return Parts([part for line in _LINE.finditer(text) for part in self._line(text, *line.span())])
+            return [part for line in _LINE.finditer(text) for part in _of_line(text, *line.span())], False
         return self._values(text, final=True)
 
-    def _line(self, text: bytes, start: int, end: int) -> list[Part]:
-        """Return the record of a line, or several."""
-        line = text[start:end]
-        body = line.strip(b" \t\r\n,").removeprefix(MARK)
-        if not body:
-            return []
-        begin = start + line.find(body)
-        if not _SEVERAL.search(body):
-            return [_with_separator(text, begin, begin + len(body))]
-        found = _scanned(body, 0, array=False, final=True).parts
-        parts = [_with_separator(text, begin + each.begin, begin + each.end, each.problem) for each in found]
-        kept = text.rfind(body[-1:], start, end) + 1  # the end of the line goes with none of several
-        return [part._replace(after=min(part.after, kept)) for part in parts] if len(parts) > 1 else parts
-
-    def _values(self, text: bytes, *, final: bool) -> Parts:
+    def _values(self, text: bytes, *, final: bool) -> tuple[list[Part], bool]:
         """Scan JSON values one after the other, in an array with commas between them."""
         opening = _OPENING.match(text) if self.layout == ARRAY else None
         start = opening.end() if opening else 3 if text.startswith(MARK) else 0
-        found = _scanned(text, start, array=self.layout == ARRAY, final=final, first=bool(opening))
+        found, closed = _scanned(text, start, array=self.layout == ARRAY, final=final, first=bool(opening))
         if self.layout == ARRAY:
-            return found
-        return Parts([each if each.final else _with_separator(text, each.start, each.end) for each in found.parts])
+            return found, closed
+        return [each if each.final else _with_separator(text, each.start, each.end) for each in found], False
+
+
+def _of_line(text: bytes, start: int, end: int) -> list[Part]:
+    """Return the record of a line, or several."""
+    line = text[start:end]
+    body = line.strip(b" \t\r\n,").removeprefix(MARK)
+    if not body:
+        return []
+    begin = start + line.find(body)
+    if not _SEVERAL.search(body):
+        return [_with_separator(text, begin, begin + len(body))]
+    found, _ = _scanned(body, 0, array=False, final=True)
+    parts = [_with_separator(text, begin + each.begin, begin + each.end, each.problem) for each in found]
+    kept = text.rfind(body[-1:], start, end) + 1  # the end of the line goes with none of several
+    return [part._replace(after=min(part.after, kept)) for part in parts] if len(parts) > 1 else parts
 
 
 def _with_separator(text: bytes, start: int, end: int, problem: str = "") -> Part:
@@ -151,11 +141,7 @@ def _layout_of(text: bytes, *, final: bool) -> str:
         return ARRAY  # its first item is no record: lists of numbers hold no objects
     if problem is not None:
         return LINES
-    return _layout_of_cut(body, rest, final=final)
-
-
-def _layout_of_cut(body: bytes, rest: bytes, *, final: bool) -> str:
-    """Return True if a first line that ends within a value goes on in the rest, or is broken."""
+    # the first line ends within a value, which goes on in the rest or is broken
     second, end, _ = rest.partition(b"\n")
     if not (end or final):
         return ""
@@ -189,7 +175,9 @@ def _decoder() -> Callable[[str, int], tuple[object, int]]:
     return JSONDecoder(parse_int=str, parse_float=str, parse_constant=str).raw_decode
 
 
-def _scanned(data: bytes, at: int, *, array: bool, final: bool, first: bool = True) -> Parts:
+def _scanned(
+    data: bytes, at: int, *, array: bool, final: bool, first: bool = True
+) -> tuple[list[Part], bool]:
     """Scan values from a place on; one that may go on behind the text ends the scan, or is a part if it is final."""
     found: list[Part] = []
     text = data.decode("latin-1")  # keeps every offset; the syntax of JSON is ASCII
@@ -201,41 +189,35 @@ def _scanned(data: bytes, at: int, *, array: bool, final: bool, first: bool = Tr
         if comma and array and final and opening in (b"", b"]"):
             found.append(Part(at, start - (not opening), start, start, "no record follows this comma"))
         if not opening or (array and opening == b"]" and not final):
-            return Parts(found)
+            return found, False
         if array and opening == b"]":
-            return Parts([*found, *_behind(data, start + 1)], closed=True)
+            if rest := data[start + 1 :].strip():
+                begin = data.find(rest, start + 1)
+                behind = "text behind the end of the array"
+                found.append(Part(start + 1, begin, begin + len(rest), len(data), behind, final=True))
+            return found, True
         if array and opening == b",":
             found.append(Part(at, start, start, start, "no record stands between two commas"))
             at, needs_comma = start, False
             continue
         end, wrong = _value(text, start)
         if wrong is None and not final:
-            return Parts(found)
+            return found, False
         if wrong != "":
             problem, begin, place = wrong or "not JSON: it is cut off", at if array else start, end if wrong else start
-            return Parts([*found, Part(begin, place, len(data), len(data), problem, final=True)])
+            return [*found, Part(begin, place, len(data), len(data), problem, final=True)], False
         problem = "a comma is missing before this record" if needs_comma and not comma else ""
         found.append(Part(at if array else start, start, end, end, problem))
         at, needs_comma = end, array
 
 
-def _behind(data: bytes, at: int) -> Iterator[Part]:
-    """Yield what follows an array, if anything does."""
-    if rest := data[at:].strip():
-        start = data.find(rest, at)
-        yield Part(at, start, start + len(rest), len(data), "text behind the end of the array", final=True)
-
-
 def _documents(text: bytes) -> Iterator[Part]:
     """Yield the documents of a YAML text that hold more than comments, each with the separator behind it."""
     start = 0
-    for mark in _SEPARATOR.finditer(text):
-        yield from _document(text, start, mark.start() if mark[0].startswith(b"-") else mark.end(), mark.end())
-        start = mark.end()
-    yield from _document(text, start, len(text), len(text))
-
-
-def _document(text: bytes, start: int, end: int, after: int) -> Iterator[Part]:
-    start += len(MARK) * text.startswith(MARK, start)
-    if not _NO_DOCUMENT.fullmatch(text, start, end):
-        yield Part(start, start, end, after)
+    for mark in (*_SEPARATOR.finditer(text), None):
+        after = len(text) if mark is None else mark.end()
+        end = mark.start() if mark and mark[0].startswith(b"-") else after
+        start += len(MARK) * text.startswith(MARK, start)
+        if not _NO_DOCUMENT.fullmatch(text, start, end):
+            yield Part(start, start, end, after)
+        start = after

@@ -38,7 +38,7 @@ from frametool.stream.row_layout import POSE, SIX, Target
 from frametool.stream.row_poses import block_of, kept, spelled, texts_of, values_of
 from frametool.stream.rows import assemble, number_spans, separators, spans_of
 from frametool.stream.text_rows import MORE_NUMBERS, NAME, NUMBERS, PARENT, STAMP_NS, AlikeRows, Marked, leaf_mark
-from frametool.text.spans import Flags, Floats, Spans, join
+from frametool.text.spans import Floats, Spans, join
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -218,7 +218,15 @@ class RowsWriter(PoseWriter):
             self.empty = block
             return b""
         self.settle(block)
-        alone, alike = self._alone(block), list[AlikeRows]()
+        # rows without a result are written one by one, and those whose angles are not unique
+        alone, alike = np.isnan(block.numbers[:, 0]), list[AlikeRows]()
+        with np.errstate(invalid="ignore"):
+            if (locked := self.target.locked(self.columns(block)[:7])) is not None:
+                alone |= locked != 0
+        varies = block.extras or any(len(each) > 1 for each in (block.names, block.parents))
+        is_worded = self.target.place is not None and self.target.place.words
+        if self.style.screen or is_worded or (varies and self.style.format == "yaml"):
+            alone[:] = True
         rows, singles = np.flatnonzero(~alone), np.flatnonzero(alone)
         if len(rows):
             some = kept(block, rows) if len(singles) else block
@@ -242,17 +250,6 @@ class RowsWriter(PoseWriter):
         """Yield the names of the columns if there were no rows."""
         if self.documents is None and not self.names and self.empty is not None:
             yield row(cells_of(self._marked(self.empty).value, self.style), self.style).encode()
-
-    def _alone(self, block: RowPoses) -> Flags:
-        """Return which rows are written one by one: without a result, and those whose angles are not unique."""
-        varies = block.extras or any(len(each) > 1 for each in (block.names, block.parents))
-        is_worded = self.target.place is not None and self.target.place.words
-        if self.style.screen or is_worded or (varies and self.style.format == "yaml"):
-            return np.ones(len(block.numbers), np.bool_)
-        absent = np.isnan(block.numbers[:, 0])
-        with np.errstate(invalid="ignore"):
-            locked = self.target.locked(self.columns(block)[:7])
-        return absent if locked is None else absent | (locked != 0)
 
     def _marked(self, block: RowPoses) -> Marked:
         """Make a result with what this block's have; what differs from row to row is marked."""
