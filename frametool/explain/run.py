@@ -53,6 +53,8 @@ FUNCTIONS: dict[str, Callable[..., float]] = {
 COMPARISONS: dict[type[ast.cmpop], Callable[[float, float], bool]] = {
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
 }  # fmt: skip
+
+
 @lru_cache(maxsize=1024)
 def parsed(formula: str) -> ast.expr:
     """Return the syntax tree of a formula."""

@@ -234,37 +234,34 @@ def check(
     others: other files are allowed; a file without any sign of frames only gets the finding that it has none
     """
     findings: list[Finding] = []
-    findings += lint(_of_one_earth(_statements(files, findings, normalize=normalize, others=others)), tree)
+    findings += lint(_statements(files, findings, normalize=normalize, others=others), tree)
     order = {file.name: index for index, file in enumerate(files)}
     return sorted(findings, key=lambda each: (order.get(each.source, 0), each.line, each.column))
-
-
-def _of_one_earth(everything: Iterable[Statement]) -> Iterator[Statement]:
-    """Rename the Earth's frame to the first of its names; the identity between the two is no edge."""
-    earth = ""
-    for each in everything:
-        earth = earth or next((name for name in each[:2] if name in EARTH_FRAMES), "")
-        parent, child = (earth if name in EARTH_FRAMES else name for name in each[:2])
-        if parent != child or each.parent == each.child or any(each.components[:6]):
-            yield each if (parent, child) == each[:2] else each._replace(parent=parent, child=child)
 
 
 def _statements(
     files: Sequence[FrameFile], findings: list[Finding], *, normalize: bool, others: bool
 ) -> Iterator[Statement]:
-    """Read all files; unreadable parts become findings."""
+    """Read all files; unreadable parts become findings.
+
+    The Earth's frame gets the first of its names; the identity between the two is no edge.
+    """
+    earth = ""
     for file in files:
         before = len(findings)
         may_be_other = others and by_sign(file.head(), "tree") is None
-        statement = None
+        each = None
         read = _read_recording(file, findings.append, normalize=normalize)
         if not file.holds_samples:
             read = _read_tree(file.source, findings.append, normalize=normalize)
-        for statement in read:
-            yield statement
-        if statement is None and may_be_other:
+        for each in read:
+            earth = earth or next((name for name in each[:2] if name in EARTH_FRAMES), "")
+            parent, child = (earth if name in EARTH_FRAMES else name for name in each[:2])
+            if parent != child or each.parent == each.child or any(each.components[:6]):
+                yield each if (parent, child) == each[:2] else each._replace(parent=parent, child=child)
+        if each is None and may_be_other:
             findings[before:] = [Finding("no-frames", "no frames in it", file.name, 1, 1)]
-        elif statement is None and len(findings) == before:
+        elif each is None and len(findings) == before:
             findings.append(Finding("empty", "no transforms in it", file.name, 1, 1))
     refuse_unknown_joints(files)
 
@@ -479,14 +476,6 @@ def edge_entry(log: EdgeLog) -> dict[str, Any]:
         "topics": ", ".join(f"{topic} ({count})" for topic, count in log.topics.items()),
         "overlap": None,
     }
-
-
-YEAR_S = 31_557_600
-
-
-def clocks_differ(entries: Sequence[dict[str, Any]]) -> bool:
-    """Return True if stamps and the recorder count from different years: with simulated time a delay has no meaning."""
-    return any(abs(entry["delay_max_s"] or 0.0) > YEAR_S for entry in entries)
 
 
 # of the values of its edges, that of a chain

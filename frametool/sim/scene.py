@@ -34,7 +34,7 @@ from frametool.frames.stamps import BILLION, FURTHEST_NS, format_stamp, parse_ti
 from frametool.grammar.readers import Misfit, Path, as_mapping, kind, read_number, read_numbers, within
 from frametool.ros.message_stream import NOISE
 from frametool.sim.drivers import KEYS, LAWS, LEADERS, TARGETS, FollowController, built_in, scripted
-from frametool.sim.turtle import CENTRE, SERVICES, TICK_NS, VARIANTS, Twist, complete
+from frametool.sim.turtle import CENTRE, SERVICES, VARIANTS, Twist, complete
 from frametool.text.numbers import parse_number, read_number_or_angle
 
 if TYPE_CHECKING:
@@ -92,13 +92,6 @@ class Scene(NamedTuple):
     def followers(self) -> dict[str, Follow]:
         """Return the turtles that follow another, by name."""
         return {turtle.name: turtle.driver for turtle in self.turtles if isinstance(turtle.driver, Follow)}
-
-    def late_calls(self) -> list[ServiceCall]:
-        """Return the calls at or after the end: a call acts at the first tick after its time."""
-        if self.duration_ns is None:
-            return []
-        last_ns = self.duration_ns // TICK_NS * TICK_NS
-        return [call for call in self.calls if call.t_ns >= last_ns]
 
 
 def tutorial(
@@ -186,6 +179,8 @@ read_angle = partial(
 )
 read_time = partial(read_as, parse=_time, what="a time in seconds")
 read_flag = partial(read_as, parse=lambda text: parse_number(FLAGS.get(text) or text), what="true or false")
+
+
 def read_place(value: Any) -> Place:
     """Read [x, y] or [x, y, theta]: metres, radians; the angle may have a unit."""
     if type(value) is not list or len(value) not in (2, 3):

@@ -272,8 +272,10 @@ class RunSummary:
             self.walls[hit.turtle] = self.walls.get(hit.turtle, 0) + 1
         for name, follow in self._follows.items():
             if name in step.states and follow.leader in step.states:
-                distance = step.states[name].distance(goal(step.states[follow.leader], follow, step.t_ns))
-                self.distances[name] = distance
+                own, leader, (x, y) = step.states[name], step.states[follow.leader], offset(follow.target, step.t_ns)
+                cosine, sine = math.cos(leader.theta), math.sin(leader.theta)
+                goal = leader.x + cosine * x - sine * y, leader.y + sine * x + cosine * y
+                self.distances[name] = distance = math.hypot(goal[0] - own.x, goal[1] - own.y)
                 if distance <= self.reach:
                     self.reached_ns.setdefault(name, step.t_ns)
             elif step.is_tick:  # one of them has left the world
@@ -295,12 +297,6 @@ class RunSummary:
         hits = ", ".join(f"{printable(name)} {count}" for name, count in sorted(self.walls.items()))
         total = f"{sum(self.walls.values())}{f' ({hits})' if hits else ''}"
         yield f"{seconds(self.t_ns)} s simulated; wall hits: {total}"
-
-def goal(leader: TurtleState, follow: Follow, now_ns: int) -> TurtleState:
-    """Return the position of a follower's target in the world."""
-    x, y = offset(follow.target, now_ns)
-    cosine, sine = math.cos(leader.theta), math.sin(leader.theta)
-    return TurtleState(leader.x + cosine * x - sine * y, leader.y + sine * x + cosine * y, leader.theta)
 
 
 def event_log(say: Callable[[str], None]) -> Watch:
@@ -365,6 +361,7 @@ class StepWriter:
                         text = "-" if cell is None else printable(str(cell))
                         texts[name] = f"{round(cell, digits) + 0.0:.{digits}f}" if isinstance(cell, float) else text
                     yield _aligned(texts | {"t": f"{cells['t']:.3f}"})
+
 
 def _aligned(texts: Record) -> str:
     """Format a line, each cell right-aligned in its column."""

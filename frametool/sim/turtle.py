@@ -58,10 +58,6 @@ class TurtleState(NamedTuple):
     y: float
     theta: float
 
-    def distance(self, other: TurtleState) -> float:
-        """Return the distance in metres to another turtle."""
-        return math.hypot(other.x - self.x, other.y - self.y)
-
 
 class TurtlePose(NamedTuple):
     """The message that turtlesim publishes at every tick: turtlesim/Pose, rounded to float32; the speed has no sign."""
@@ -207,6 +203,7 @@ class Turtle:
         self._x = min(max(self._x, 0.0), SIZE)
         self._down = min(max(self._down, 0.0), SIZE)
         return outside
+
 
 VARIANTS = ("ros1", "ros2")
 FAR = 1e9  # metres; beyond, a position is written with an exponent

@@ -147,6 +147,7 @@ class Drawing:
             ahead, turning, _ = command.twist
             self.curves[command.turtle].append((step.t_ns / BILLION, command.distance or 0.0, ahead, turning))
 
+
 WINDOW, METRE = 500.0, 45.0  # pixels, as turtlesim's
 MARGIN = 30.0
 LEFT = WINDOW + 110.0  # where the curves begin
@@ -369,6 +370,8 @@ def run_page() -> tuple[Callable[[SimulationStep], None], Callable[[], str]]:
 
 
 SLIDER_KEYS = ("name", "kind", "axis", "anchor", "rest", "lower", "upper", "mimic")
+
+
 def joint_sliders(scene: FrameScene) -> dict[str, list[dict[str, Any]]]:
     """Return the revolute and prismatic joints with a constant value, and the links that they move, for the page."""
     sliders: list[dict[str, Any]] = []

@@ -137,32 +137,26 @@ def write_svg(picture: Picture, more: str = "") -> str:
 
 
 def svg_element(picture: Picture, before: str = "", place: str = "") -> str:
-    """Return the picture as an SVG element without styles.
+    """Return the picture as an SVG element without styles; names of colours are classes.
 
     before: elements drawn below it.  place: its x and y attributes inside another SVG.
     """
     width, height, (left, top) = f"{picture.width:g}", f"{picture.height:g}", picture.corner
     size = f'width="{width}" height="{height}" viewBox="{left:g} {top:g} {width} {height}"'
-    head = f'<svg xmlns="http://www.w3.org/2000/svg"{place} {size} {FONT}>\n{_title(picture.title)}'
-    return f"{head}{before}{''.join(_element(each, picture.decimals) for each in picture.shapes)}</svg>\n"
-
-
-def _element(shape: SvgElement, decimals: int) -> str:
-    """Return an element without the attributes that are as usual; the name of a colour is a class."""
-    kind, colour, look, points, text = shape
-    if colour in NAMED:
-        paint = f' class="{colour}{CLASSES.get(kind, "")}"'
-    else:
-        paint = f' {"stroke" if points else "fill"}="{colour}"' * bool(colour)
-    others = "".join(
-        f' {name}="{_attribute(value, decimals)}"'
-        for name, value in look.items()
-        if value not in ("", (), USUAL.get(name))
-    )
-    if points:
-        others += f' d="M{"L".join(f"{_attribute(x, decimals)} {_attribute(y, decimals)}" for x, y in points)}"'
-    inside = _text(text) if kind == "text" else _title(text)
-    return f"<{kind}{paint}{others}" + (f">{inside}</{kind}>\n" if inside else "/>\n")
+    parts = [f'<svg xmlns="http://www.w3.org/2000/svg"{place} {size} {FONT}>\n{_title(picture.title)}{before}']
+    for kind, colour, look, points, text in picture.shapes:
+        if colour in NAMED:
+            paint = f' class="{colour}{CLASSES.get(kind, "")}"'
+        else:
+            paint = f' {"stroke" if points else "fill"}="{colour}"' * bool(colour)
+        unusual = {name: value for name, value in look.items() if value not in ("", (), USUAL.get(name))}
+        others = "".join(f' {name}="{_attribute(value, picture.decimals)}"' for name, value in unusual.items())
+        if points:
+            pairs = (" ".join(_attribute(number, picture.decimals) for number in point) for point in points)
+            others += f' d="M{"L".join(pairs)}"'
+        inside = _text(text) if kind == "text" else _title(text)
+        parts.append(f"<{kind}{paint}{others}" + (f">{inside}</{kind}>\n" if inside else "/>\n"))
+    return f"{''.join(parts)}</svg>\n"
 
 
 def _attribute(value: Any, decimals: int) -> str:
@@ -410,38 +404,38 @@ PNG, JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
 FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}  # the markers of JPEG that are followed by a size
 
 
-def read_shot(path: str) -> SvgElement:
-    """Read a PNG or a JPEG, and embed it unchanged; raises FormatError for anything else, FileProblem."""
-    with opened(path) as file:
-        data = file.read()
-    kind, width, height = "", 0, 0
-    if data.startswith(PNG) and len(data) > 24:
-        kind, (width, height) = "png", struct.unpack_from(">II", data, 16)
-    at = 2 if data.startswith(JPEG) else len(data)
-    while not kind and at + 9 < len(data) and data[at] == 0xFF:
-        if data[at + 1] in FRAMES:
-            kind, (height, width) = "jpeg", struct.unpack_from(">HH", data, at + 5)
-        is_filled = data[at + 1] == 0xFF  # before a marker there may be more of its first byte
-        at += 1 if is_filled else 2 + int.from_bytes(data[at + 2 : at + 4], "big")
-    if not kind:
-        raise FormatError("neither a PNG nor a JPEG; an overlay is drawn over one of these", source=path)
-    href = f"data:image/{kind};base64,{b64encode(data).decode()}"
-    return SvgElement("image", "", {"x": CORNER[0], "y": CORNER[1], "width": width, "height": height, "href": href})
-
-
 class Overlay:
     """The points in an image; beyond MOST, every second, fourth .. is drawn."""
 
     def __init__(self, image: str, path: str) -> None:
-        """Read the image; path: the output file, with one of SUFFIXES.  Raises ValueInvalid."""
+        """Read a PNG or a JPEG, to be embedded unchanged.
+
+        path: the output file, with one of SUFFIXES.
+        Raises ValueInvalid; FormatError for anything else, FileProblem.
+        """
         self.image, self.path = image, path
         self.suffix = os.path.splitext(path)[1].lower()
         if self.suffix not in SUFFIXES:
             raise ValueInvalid(f"{path}: --image draws {', '.join(SUFFIXES)}")
         if self.suffix == ".png":
             require_matplotlib()
-        self.shot = read_shot(image)
-        self.size: tuple[int, int] = self.shot.look["width"], self.shot.look["height"]
+        with opened(image) as file:
+            data = file.read()
+        kind, width, height = "", 0, 0
+        if data.startswith(PNG) and len(data) > 24:
+            kind, (width, height) = "png", struct.unpack_from(">II", data, 16)
+        at = 2 if data.startswith(JPEG) else len(data)
+        while not kind and at + 9 < len(data) and data[at] == 0xFF:
+            if data[at + 1] in FRAMES:
+                kind, (height, width) = "jpeg", struct.unpack_from(">HH", data, at + 5)
+            is_filled = data[at + 1] == 0xFF  # before a marker there may be more of its first byte
+            at += 1 if is_filled else 2 + int.from_bytes(data[at + 2 : at + 4], "big")
+        if not kind:
+            raise FormatError("neither a PNG nor a JPEG; an overlay is drawn over one of these", source=image)
+        self.size = width, height
+        look = {"x": CORNER[0], "y": CORNER[1], "width": width, "height": height}
+        href = f"data:image/{kind};base64,{b64encode(data).decode()}"
+        self.shot = SvgElement("image", "", {**look, "href": href})
         self.points: list[tuple[float, float, float]] = []  # depth, u, v
         self.count, self.every = 0, 1
 

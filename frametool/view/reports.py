@@ -122,6 +122,8 @@ HEADINGS = {
 HIDDEN = (  # of a table of edges; what moves has a sentence of its own
     "kind", "child", "gap_until_ns", "parents", "overlap", "length_m", "duration_s", "speed_mean", "speed_max", "gaps",
 )  # fmt: skip
+
+
 def write_report(entries: Sequence[dict[str, Any]]) -> str:
     """Return the edges as a table without empty columns, then sentences on those that move and on the chain."""
     edges = [entry for entry in entries if entry["kind"] != "chain"]

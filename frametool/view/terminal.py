@@ -55,8 +55,11 @@ class Canvas:
             drawn.append(over.get((line, column)) or (chr(0x2800 + dots) if dots else " ", colour))
         return [("".join(map(itemgetter(0), run)), colour) for colour, run in groupby(drawn, key=itemgetter(1))]
 
+
 COLOURS = ("red", "green", "blue")  # of axes
 ARROWS = "→↗↑↖←↙↓↘"
+
+
 def terminal_lines(scene: FrameScene, columns: int, lines: int, eye: tuple[float, float] = SLANTED) -> list[list[Run]]:
     """Draw a scene in some columns and lines, each as runs of one style; the last line is the scale."""
     canvas = Canvas(max(lines, 4) - 1, max(columns, 20))

@@ -26,7 +26,7 @@ from frametool.frames.stamps import BILLION
 from frametool.sim import drivers
 from frametool.sim.scene import duration_ns, parse_spawn, read_scene, read_script, read_stream, tutorial
 from frametool.sim.simulate import EMITS, FORMS, RunSummary, StepWriter, event_log, simulate
-from frametool.sim.turtle import VARIANTS
+from frametool.sim.turtle import TICK_NS, VARIANTS
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
@@ -281,7 +281,9 @@ def run(inputs: Inputs) -> None:
         read = read_scene(source_of(inputs.scene), seed=inputs.seed)
     with misuse():
         chosen = read if duration is None else read._replace(duration_ns=duration_ns(duration))
-    if late := chosen.late_calls():
+    # a call acts at the first tick after its time
+    last_ns = math.inf if chosen.duration_ns is None else chosen.duration_ns // TICK_NS * TICK_NS
+    if late := [call for call in chosen.calls if call.t_ns >= last_ns]:
         end = f"{(chosen.duration_ns or 0) / BILLION:g} s"
         more = f", nor do{f'es {late[1].place}' if len(late) == 2 else f' {len(late) - 1} more'}" if late[1:] else ""
         say(f"warning: {late[0].place} ({late[0].service}) never happens, the run ends at {end}{more}")
