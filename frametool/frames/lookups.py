@@ -233,10 +233,11 @@ class Frames:
             raise ValueInvalid(f"no edge between {bare(target)} and {bare(source)} has a sigma or a covariance")
         from frametool.geometry import placed, uncertainty
 
-        def edge(child: str) -> Components:
-            return *(sample(self._tracks[child]) or IDENTITY), *self.covariances.get(child, ())
-
-        steps = [*(placed.inverse(edge(child)) for child in reversed(down)), *map(edge, reversed(up))]
+        edges: dict[str, Components] = {
+            child: (*(sample(self._tracks[child]) or IDENTITY), *self.covariances.get(child, ()))
+            for child in (*down, *up)
+        }
+        steps = [*(placed.inverse(edges[child]) for child in reversed(down)), *(edges[child] for child in reversed(up))]
         found = placed.covariance_of(reduce(placed.compose, steps, IDENTITY)) or (0.0,) * uncertainty.POSE
         return tuple(entry + 0.0 for entry in uncertainty.symmetric(found))
 

@@ -120,16 +120,18 @@ def symmetric(entries: Entries) -> Components:
 
 def taken(numbers: Any, size: int = POSE) -> Components:
     """Check a covariance passed from Python, numbers or rows of them, and return its entries."""
-    rows, side = numbers.tolist() if hasattr(numbers, "tolist") else numbers, round(size**0.5)
+    import numpy as np
+
+    side = round(size**0.5)
     try:
-        listed = [row if hasattr(row, "__iter__") else (row,) for row in rows]
-        entries = tuple(float(entry) for row in listed for entry in row)
+        array = np.asarray(numbers, np.float64)
     except (TypeError, ValueError):
-        entries, listed = (), [()]
-    if not {len(row) for row in listed} <= {1, side}:
+        array = np.empty((0, 0))
+    if array.ndim == 0 or array.shape[1:] not in ((), (side,)):
         raise ValueInvalid(f"covariance must be {size} numbers or {side} rows of {side}")
-    if len(entries) != size:
-        raise ValueInvalid(wrong_count(len(entries), (size,)))
+    if array.size != size:
+        raise ValueInvalid(wrong_count(array.size, (size,)))
+    entries = tuple(array.ravel().tolist())
     if bad := [entry for entry in entries if not -INFINITE < entry < INFINITE]:
         raise ValueInvalid(f"covariance has {bad[0]} in it; every number must be finite")
     check(entries)

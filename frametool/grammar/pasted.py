@@ -30,10 +30,7 @@ Rows: TypeAlias = "list[list[str]]"
 DECIMAL = r"(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][-+]?[0-9]++)?"
 NUMBER = rf"[-+]?{DECIMAL}"
 LABEL = r"\s*+[A-Za-z_]\w*+\s*+=(?!=)\s*+"  # MATLAB's and Python's `T =`
-_NAMED = r"(?<![\w.)\]}])[A-Za-z_][\w.]*+\((?=\s*[-+.\d\[({A-Za-z])"  # array(, np.array(, tensor(
-_ARGUMENTS = r"(?:,\s*+[A-Za-z]\w*+\s*+=\s*+[\w.'\":<>]++){1,9}+\s*+(?=\))"  # dtype=float32
 _SCALE = rf"\s*({NUMBER})\s*\*\s*\n"  # MATLAB's `1.0e+03 *` above a matrix
-_SCALAR = r"(?:np|numpy)\.\w+\(([^()]*)\)"  # numpy 2 in lists: np.float64(0.5)
 _BY_COLUMNS = r"(?:[dft]|high|med|low)?p?_?mat[34](?:x[34])?\("
 _UNSUPPORTED: Sequence[tuple[str, str]] = (  # prints that are recognised but not read, and the tools that print them
     (r"Out\[\d+\](?://\w+)?\s*=|\{\{?[^{}]*?\d(?:`|\*\^)", "Mathematica"),
@@ -55,7 +52,9 @@ _DECORATIONS: Sequence[tuple[str, str]] = (
     (rf"\A({LABEL})\s*\d+[\xd7x]\d+\b[^\n]*\n", ""),  # heading of MATLAB's live scripts
     (rf"\A({LABEL})\s*(?:se3|so3)[ \t]*\n", ""),  # MATLAB's classes
     (r"(?s)\A([^<]*)<Matrix \d+x\d+\s*(.*)>", r"\1[\2]"),  # Blender
-    (_SCALAR, r"\1"),
+    (r"(?:np|numpy)\.\w+\(([^()]*)\)", r"\1"),  # numpy 2 in lists: np.float64(0.5)
+    (r"(?:,\s*+[A-Za-z]\w*+\s*+=\s*+[\w.'\":<>]++){1,9}+\s*+(?=\))", ""),  # dtype=float32
+    (r"(?<![\w.)\]}])[A-Za-z_][\w.]*+\((?=\s*[-+.\d\[({A-Za-z])", "("),  # array(, np.array(, tensor(
 )
 _DECORATED = r"""[\x1b\\⎡⎛`^\xd7]|<|\[\d*,?\d*\]|[A-Za-z]\w{,60}[(: ]|(?m:^[ \t]*se3|so3)"""
 
@@ -118,8 +117,7 @@ def _undecorated(text: str) -> str:
         raise ValueInvalid(f"a print of {tool} is not read; write its rows, [[..], [..], [..]], as numpy does")
     for pattern, plain in _DECORATIONS:
         text = re.sub(pattern, plain, text)
-    text = re.sub(_ARGUMENTS, "", text)
-    return re.sub(_NAMED, "(", text)
+    return text
 
 
 def unsupported_tool(text: str) -> str:
