@@ -52,18 +52,10 @@ def inverse(a: Components) -> Components:
 
 def relative(a: Components, b: Components) -> Components:
     """Return the pose of b in a: inverse(a) b."""
-    first, second = pose_of(a), pose_of(b)
-    pose = rigid.relative(*first, *second)
-    if len(a) == len(b) == EXACT:
-        return pose
+    pose = rigid.relative(*pose_of(a), *pose_of(b))
     if SCALED in (len(a), len(b)):
         raise ValueInvalid(SIMILARITY)
-    from frametool.geometry import uncertainty
-
-    of_a = covariance_of(a)
-    of_back = of_a and uncertainty.propagate_inverse(first, of_a)
-    entries = uncertainty.propagate_compose(rigid.inverse(*first), of_back, second, covariance_of(b))
-    return (*pose, *(entries or ()))
+    return pose if len(a) == len(b) == EXACT else (*pose, *compose(inverse(a), b)[EXACT:])
 
 
 def pose_of(a: Components) -> Rigid:
