@@ -147,9 +147,9 @@ def read_sigmas(value: Any, reading: Reading) -> list[float]:
                 places = [(key, *step) for step in (places_in(value[key]) if type(value[key]) is list else zip(axes))]
             degrees = (reading.degrees if ANGLES[key] is None else ANGLES[key]) if key in ANGLES else None
             numbers = [within(path, _sigma, text, degrees) for path, text in zip(places, texts, strict=True)]
-            unit = LENGTHS.get(key)
-            numbers = [each / unit for each in numbers] if unit else [*map(radians, numbers)] if degrees else numbers
-            sigmas[first : first + 3] = numbers
+            if key in LENGTHS:
+                numbers = [each / LENGTHS[key] for each in numbers]
+            sigmas[first : first + 3] = map(radians, numbers) if degrees else numbers
     return sigmas
 
 
