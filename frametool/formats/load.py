@@ -209,7 +209,6 @@ class TreeBuilder:
         self._moves: set[str] = set()
         self._late: set[str] = set()  # children with a warning that their samples go back in time
         self.covariances: dict[str, Components] = {}  # child -> the covariance of its edge
-        self.files: list[FrameFile] = []  # those that were read
 
     def one_name(self, frame: str) -> str:
         """Return a name; for the Earth's frame that of its two names which was used first."""
@@ -314,21 +313,6 @@ class TreeBuilder:
             follows = goes_on and track.last_ns < samples.stamps_ns[0]  # type: ignore[union-attr]
         return follows and all(map(lt, samples.stamps_ns, islice(samples.stamps_ns, 1, None)))
 
-    def finish(self) -> FrameTree | TransformBuffer:
-        """Return the tree, or the buffer if anything moves."""
-        made = self.tree if self.buffer is None else self._settled(self.buffer)
-        made.covariances |= self.covariances
-        held: list[FrameFile] = []  # files of other formats that may hold cameras, read on demand
-        for file in self.files:
-            made.camera_axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}
-            made.drawn |= file.tally.drawn
-            made.cameras = {**made.cameras, **file.cameras}
-            made.robots = [*made.robots, *([] if file.tally.robot is None else [file.tally.robot])]
-            held += [file] * ("cameras" in FORMATS[file.format].reads)
-        if held:
-            made.read_cameras = partial(_read_cameras, made, held)
-        return made
-
     def _moving(self) -> TransformBuffer:
         """Return the buffer; at the first stamp it receives the static edges."""
         if self.buffer is None:
@@ -341,7 +325,7 @@ class TreeBuilder:
                 self.buffer.insert_components(parent, child, components)
         return self.buffer
 
-    def _settled(self, buffer: TransformBuffer) -> FrameTree | TransformBuffer:
+    def settled(self, buffer: TransformBuffer) -> FrameTree | TransformBuffer:
         """Return a buffer, or the tree of its static edges if nothing moves; a frame with one stamp is static.
 
         Refuses static frames with two values; warns about moving ones with two poses at one stamp.
@@ -460,11 +444,18 @@ def load_sources(
                         builder.add_samples(file, piece)
                 if piece is None:
                     raise file.error("no frames in it")
-                builder.files.append(file)
             refuse_unknown_joints(files)
-            tree = builder.finish()
+            tree = builder.tree if builder.buffer is None else builder.settled(builder.buffer)
     finally:
         close_all(sources)
+    tree.covariances |= builder.covariances
+    for file in files:
+        tree.camera_axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}
+        tree.drawn |= file.tally.drawn
+        tree.cameras = {**tree.cameras, **file.cameras}
+    tree.robots = [file.tally.robot for file in files if file.tally.robot is not None]
+    if held := [file for file in files if "cameras" in FORMATS[file.format].reads]:
+        tree.read_cameras = partial(_read_cameras, tree, held)
     if places is not None:
         places |= {child: place for child, (_, _, place) in builder.first.items()}
     return tree
