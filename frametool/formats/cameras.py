@@ -169,21 +169,35 @@ def _placed(source: str, name: str = "", line: int = 0) -> Iterator[None]:
 
 
 def _read(file: InputFile) -> Found:
-    """Yield the name of each camera of a file, and its fields."""
-    if "text" not in vars(file):  # that of a tree has been read
-        if of_folder(file.path) or file.path.endswith(".db3") or file.head().startswith((b"#ROSBAG ", b"\x89MCAP")):
-            return _in_bag(file)
-        if file.head().lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
-            from frametool.documents.xml import read_xml
-            from frametool.formats.trees.matrix_files import StoredXml
+    """Yield the name of each camera of a file, and its fields; those of a bag by topic and by frame_id."""
+    is_open = "text" not in vars(file)  # that of a tree has been read
+    if is_open and (
+        of_folder(file.path) or file.path.endswith(".db3") or file.head().startswith((b"#ROSBAG ", b"\x89MCAP"))
+    ):
+        from frametool.recordings.read import opened_recording
 
-            return _in_document(StoredXml(read_xml(file)).value, file)
-    if re.search(r"(?m)^(?:P[0-3]|P_rect_0\d|K_0\d):", file.text):
-        return _kitti(file)
-    if re.match(r"(?:\s*#.*\n)*\s*\d+\s+[A-Z_]+\s+\d+\s+\d+\s", file.text):
-        return _colmap(file)
-    documents = parse_documents(made_ordinary(file).text, file.name, TAGS)
-    return (each for document in documents for each in _in_document(document.value, file))
+        with opened_recording(file.path, Diagnostics()) as reader:
+            for channel, _, data, *_ in reader.messages([each for each in reader.channels if each.type == INFO]):
+                message = vars(reader.types.read(channel, data))
+                plain = {key: each.tolist() if hasattr(each, "tolist") else each for key, each in message.items()}
+                fields = _by_keys({**plain, "roi": vars(message["roi"])})
+                yield from ((channel.topic, fields), (message["header"].frame_id, fields))
+    elif is_open and file.head().lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
+        from frametool.documents.xml import read_xml
+        from frametool.formats.trees.matrix_files import StoredXml
+
+        yield from _in_document(StoredXml(read_xml(file)).value, file)
+    elif re.search(r"(?m)^(?:P[0-3]|P_rect_0\d|K_0\d):", file.text):
+        yield from _kitti(file)
+    elif re.match(r"(?:\s*#.*\n)*\s*\d+\s+[A-Z_]+\s+\d+\s+\d+\s", file.text):  # cameras.txt of COLMAP
+        for line, text in enumerate(file.text.splitlines(), 1):
+            if text.strip() and not text.startswith("#"):
+                name, model, *words = text.split()
+                width, height, *numbers = map(parse_number, words)
+                yield name, {"colmap": model, "numbers": numbers, "size": [width, height], "line": line}
+    else:
+        for document in parse_documents(made_ordinary(file).text, file.name, TAGS):
+            yield from _in_document(document.value, file)
 
 
 def _in_document(value: Any, file: InputFile) -> Found:
@@ -257,28 +271,7 @@ def _by_keys(value: dict[str, Any], end: str = "") -> dict[str, Any]:
     return found if "K" in found else {}
 
 
-def _in_bag(file: InputFile) -> Found:
-    """Yield the cameras of a bag by topic and by frame_id, from CameraInfo messages."""
-    from frametool.recordings.read import opened_recording
-
-    with opened_recording(file.path, Diagnostics()) as reader:
-        for channel, _, data, *_ in reader.messages([each for each in reader.channels if each.type == INFO]):
-            message = vars(reader.types.read(channel, data))
-            plain = {key: each.tolist() if hasattr(each, "tolist") else each for key, each in message.items()}
-            fields = _by_keys({**plain, "roi": vars(message["roi"])})
-            yield from ((channel.topic, fields), (message["header"].frame_id, fields))
-
-
 # ---------------------------------------------------------------- COLMAP, NeRF
-
-
-def _colmap(file: InputFile) -> Found:
-    """Yield the cameras of cameras.txt by their numbers."""
-    for line, text in enumerate(file.text.splitlines(), 1):
-        if text.strip() and not text.startswith("#"):
-            name, model, *words = text.split()
-            width, height, *numbers = map(parse_number, words)
-            yield name, {"colmap": model, "numbers": numbers, "size": [width, height], "line": line}
 
 
 def _of_colmap(name: str, numbers: Sequence[float], size: Sequence[int] | None) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+from contextlib import ExitStack, closing
 from functools import partial
 from importlib import import_module
 from io import BytesIO
@@ -148,12 +149,9 @@ class FrameFile(InputFile):
 
 def opened_together(files: Iterable[FrameFile]) -> list[FrameFile]:
     """Open files one after another; if one cannot be opened, close the others."""
-    found: list[FrameFile] = []
-    try:
-        found.extend(files)
-    except BaseException:
-        close_all(found)
-        raise
+    with ExitStack() as opened:
+        found = [opened.enter_context(closing(file)) for file in files]
+        opened.pop_all()
     for file in found:
         file.siblings = found
     return found

@@ -256,20 +256,19 @@ class ArrowFile(column_file.ColumnFile):
             group = self.reader.metadata.row_group(0)
             stored = [group.column(at) for at in range(group.num_columns)]
             codecs = {each.path_in_schema: each.compression.replace("UNCOMPRESSED", "NONE") for each in stored}
+            repeating = []  # that a dictionary made smaller; for others trying costs time
+            for each in stored:
+                plain = SIZES.get(each.physical_type, 0) * each.num_values
+                if not DICTIONARIES.isdisjoint(each.encodings) and not 0 < plain <= each.total_uncompressed_size:
+                    repeating.append(each.path_in_schema)
             how = {
                 "compression": codecs,
-                "use_dictionary": [each.path_in_schema for each in stored if _repeats(each)],
+                "use_dictionary": repeating,
                 "use_deprecated_int96_timestamps": any(each.physical_type == "INT96" for each in stored),
                 "use_compliant_nested_type": not any(OLD_LIST in each.path_in_schema for each in stored),
                 "store_schema": OWN_SCHEMA in (self.reader.metadata.metadata or {}),
             }
         return GroupWriter(fmt, columns, self.schema, how)
-
-
-def _repeats(column: Any) -> bool:
-    """Return True if a dictionary made a column smaller; for others trying costs time."""
-    plain = SIZES.get(column.physical_type, 0) * column.num_values
-    return not DICTIONARIES.isdisjoint(column.encodings) and not 0 < plain <= column.total_uncompressed_size
 
 
 def empty_rows(schema: Any) -> Any:

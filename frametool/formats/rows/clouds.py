@@ -286,15 +286,15 @@ class BinCloud(column_file.RecordFile):
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> PointsWriter:
         """Return a writer for a cloud of either format."""
         del drops
-        return PointsWriter(columns, style.format)
+        return PointsWriter(columns, None, style)
 
 
 class PointsWriter:
     """Writes points without a header; `off` is the largest rounding error of float32."""
 
-    def __init__(self, columns: Sequence[OutColumn], fmt: str) -> None:
+    def __init__(self, columns: Sequence[OutColumn], _count: int | None, style: Style) -> None:
         """Find the columns; raises ValueInvalid if one is missing, and warns about those that are omitted."""
-        self.columns, self.format = columns, fmt
+        self.columns, self.format = columns, (fmt := style.format)
         self.names = FORMATS[fmt].rows.columns
         self.off = 0.0
         at_input = [column.name for column in columns if column.kind is not None]
@@ -329,9 +329,4 @@ class PointsWriter:
         return iter(())
 
 
-def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> PointsWriter:
-    """Return a writer for new points."""
-    return PointsWriter(columns, style.format)
-
-
-open_columns = BinCloud
+open_columns, create = BinCloud, PointsWriter

@@ -329,11 +329,6 @@ def _new_field(column: OutColumn) -> PcdField:
     return PcdField(column.name, *type_in("pcd", CODES, column, PADDING), 1)
 
 
-def misfit(column: OutColumn) -> str:
-    """Return why PCD cannot hold a column, "" if it can."""
-    return misfit_of(CODES, column, PADDING)
-
-
 def create(
     columns: Sequence[OutColumn], count: int | None, _style: Style, *, grid: tuple[int, int] | None = None,
     sensor: Rigid | None = None,
@@ -356,4 +351,4 @@ def create(
     return column_file.CountedWriter(encode, head, count)
 
 
-open_columns = PcdFile
+open_columns, misfit = PcdFile, partial(misfit_of, CODES, taken=PADDING)

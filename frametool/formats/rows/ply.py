@@ -242,11 +242,6 @@ def _property_line(column: OutColumn) -> bytes:
     return f"property {_type_of(column)} {column.name}".encode()
 
 
-def misfit(column: OutColumn) -> str:
-    """Return why PLY cannot hold a column, "" if it can."""
-    return clouds.misfit_of(NEW_NAMES, column)
-
-
 def create(columns: Sequence[OutColumn], count: int | None, _style: Style) -> column_file.CountedWriter:
     """Return a writer for new points, with numbers of their own types."""
     record = column_file.record_of(f"<{TYPES[_type_of(column)]}" for column in columns)
@@ -258,4 +253,4 @@ def create(columns: Sequence[OutColumn], count: int | None, _style: Style) -> co
     return column_file.CountedWriter(partial(column_file.encode_records, columns, record), head, count)
 
 
-open_columns = PlyFile
+open_columns, misfit = PlyFile, partial(clouds.misfit_of, NEW_NAMES)
