@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from frametool.text.lines import ByteStream
 
 _BYTE_ORDER_MARK = "\ufeff"
-_TIGHT_COLON = r"([\w./-]+):(?=[^\s:/])"
-_EQUALS = r"([\w./-]+) ?="
 
 
 class Document:
@@ -122,11 +120,11 @@ def format_error(
 
 def explain_scalar(text: str) -> str:
     """Return why a text is found instead of a mapping: no blank after a colon, an invisible character; or ""."""
-    if match := re.match(_TIGHT_COLON, text):
+    if match := re.match(r"([\w./-]+):(?=[^\s:/])", text):
         return f"write a blank after '{match[1]}:'"
     if ":" in text and (strange := odd_characters(text)):
         return f"it has {strange}; use an ordinary blank"
-    if match := re.match(_EQUALS, text):
+    if match := re.match(r"([\w./-]+) ?=", text):
         return f"write '{match[1]}: ' instead of '='"
     return ""
 

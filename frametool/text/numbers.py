@@ -33,8 +33,6 @@ _DECIMAL = r"(?:[0-9]++\.?+[0-9]*+|\.[0-9]++)(?:[eE][-+]?+[0-9]++)?+"
 # patterns are compiled at first use, not at start-up: most texts are plain numbers
 _WITH_UNIT = rf"([-+]?{_DECIMAL}) ?(deg|rad|°)"
 _MULTIPLE_OF_PI = rf"([-+]?)({_DECIMAL})? ?\*? ?(?:pi|π) ?(?:/ ?({_DECIMAL}))?"
-_BARE_STAR = r"[-+]? ?\*"
-_UNITS = {"deg": "deg", "°": "deg", "rad": "rad"}
 _LENGTH = rf"([-+]?{_DECIMAL}) ?(m|cm|mm|um)"
 MOST_FRACTIONS = 1_000_000  # of a range
 _ODD_MINUS = "\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"
@@ -72,8 +70,8 @@ def parse_angle(text: str) -> Angle:
     if not _strip(text, _DECIMAL_CHARACTERS):
         return parse_number(text), None
     if match := re.fullmatch(_WITH_UNIT, text):
-        return parse_number(match[1]), _UNITS[match[2]]
-    if (match := re.fullmatch(_MULTIPLE_OF_PI, text)) and not re.match(_BARE_STAR, text):
+        return parse_number(match[1]), "rad" if match[2] == "rad" else "deg"
+    if (match := re.fullmatch(_MULTIPLE_OF_PI, text)) and not re.match(r"[-+]? ?\*", text):
         divisor = parse_number(match[3] or "1")
         if not divisor:
             raise ValueInvalid(f"{shown(text)} divides by zero")

@@ -242,7 +242,6 @@ WIDTH = 40
 POINT = 15
 # one byte of the fifteen is the sign
 GREATEST_WHOLE = 10**14
-_MINUS = ord("-")
 _POINT_CHARACTER = np.uint64(ord(".") << 56)
 
 
@@ -290,7 +289,7 @@ class Fields:
 
     def write_sign(self, starts: Ints, negative: Flags) -> Ints:
         """Write a minus before each start; return the starts, moved to the minus of negative numbers."""
-        self.data[starts - 1] = _MINUS
+        self.data[starts - 1] = ord("-")
         return starts - negative
 
     def whole_starts(self, whole: Ints) -> Ints:

@@ -47,7 +47,6 @@ COLUMNS = {
     "type": ("type", "joint_type", "kind", "sigma"),
     "name": ("name", "joint", "joint_name", "link", "i", "j", "id", "#", "no", "frame", "index"),
 }
-NEEDED = ("d", "a", "alpha")
 UNITS = {
     "deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "rad": "rad", "radians": "rad",
     "m": "m", "cm": "cm", "mm": "mm",
@@ -152,7 +151,7 @@ def column_of(written: str) -> tuple[str, str] | None:
 
 def _row(number: int, cells: dict[str, Cell], fail: Fail, line: int) -> DhRow:
     """Read one row."""
-    if missing := [name for name in NEEDED if name not in cells]:
+    if missing := [name for name in ("d", "a", "alpha") if name not in cells]:
         raise fail(f"missing {', '.join(missing)}; a row has theta, d, a, alpha, maybe offset, type and joint")
     zero = Cell("0", "", fail)
     theta, d = _read(cells.get("theta", zero), _angle), _read(cells["d"], _length)
@@ -277,7 +276,6 @@ def _is_row(keys: Collection[str]) -> bool:
     return {"a", "alpha"} <= {column[0] for key in keys if (column := column_of(key))}
 
 
-AXIS = (0.0, 0.0, 1.0)
 TURN = 6.283185307179586
 
 
@@ -301,6 +299,6 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         origin, after = rigid.IDENTITY, rigid.compose(*along_z, *along_x)
         if options.answers.dh == "modified":
             origin, after = rigid.compose(*along_x, *along_z), rigid.IDENTITY
-        joints = () if row.kind == "fixed" else (Joint(row.name, row.kind, AXIS, line=row.line),)
+        joints = () if row.kind == "fixed" else (Joint(row.name, row.kind, (0.0, 0.0, 1.0), line=row.line),)
         links.append(Link(parent, child, origin, joints, row.line, after, fixed="" if joints else row.name))
     yield from JointState.of(links, options, file.name).edges(links)

@@ -44,7 +44,6 @@ if TYPE_CHECKING:
 
 SLACK = 1e-9  # tolerance of limits: values are printed with fewer digits than they have
 HALF_TURN = 3.141592653589793
-STATES = "--joint NAME=VALUE"
 
 
 class JointState:
@@ -87,7 +86,7 @@ class JointState:
         if free and not options.tally.assumed:
             at_zero = all(self.joints[name].posed or self.series[name] == {None: JointValue(0.0)} for name in free)
             many = f"{len(free)} joint{'s' * (len(free) > 1)}"
-            options.tally.assumed = f"{many} at {'0' if at_zero else 'rest'} ({STATES})"
+            options.tally.assumed = f"{many} at {'0' if at_zero else 'rest'} (--joint NAME=VALUE)"
 
     @classmethod
     def of(cls, links: Collection[Link], options: Options, file: str) -> JointState:

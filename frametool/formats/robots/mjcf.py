@@ -38,9 +38,6 @@ if TYPE_CHECKING:
 
 WORLD = "world"
 WHOLE = "save it whole: mujoco.mj_saveLastXML('whole.xml', mujoco.MjModel.from_xml_path('FILE'))"
-REFUSED = ("include", "replicate", "attach")
-MADE = ("composite", "flexcomp")
-JOINTS = ("joint", "freejoint")
 NESTING = ("mujoco", "default", "worldbody", "body", "frame", "keyframe")  # with elements that are read
 TYPES = {"hinge": "revolute", "slide": "prismatic", "ball": "ball", "free": "floating"}
 ORIENTATIONS = {  # and their defaults
@@ -72,7 +69,7 @@ class MjcfModel:
         nodes = [root]
         for node in nodes:  # grows during the loop
             nodes += node.children if node.tag in NESTING else ()
-            if node.tag in REFUSED:
+            if node.tag in ("include", "replicate", "attach"):
                 raise node.error(f"<{node.tag}> is not expanded here; {WHOLE}")
         said: dict[str, Element] = {}  # of the compiler sections, anywhere in the file: the last value counts
         for section in root.all("compiler"):
@@ -134,7 +131,7 @@ class MjcfModel:
 
     def _take(self, node: Element, inside: _Inside) -> _Inside | None:
         """Read one element; for a body or frame return the context of its children."""
-        if node.tag in MADE:
+        if node.tag in ("composite", "flexcomp"):
             self.options.tally.note_each(f"<{node.tag}> is left out: its bodies are made by MuJoCo; {WHOLE}", node.line)
         elif node.tag == "frame":
             pose = rigid.compose(*inside.frame, *self.pose(own_attributes(node)))
@@ -142,7 +139,7 @@ class MjcfModel:
         elif node.tag == "body":
             name = self._place(node, inside, self.pose(own_attributes(node)))
             return _Inside(name, self._class(node, "childclass", inside.around), rigid.IDENTITY)
-        elif node.tag in JOINTS:
+        elif node.tag in ("joint", "freejoint"):
             self._join(node, inside)
         elif node.tag == "geom":
             self.geoms.append((node, inside))

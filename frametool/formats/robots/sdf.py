@@ -107,7 +107,6 @@ KINDS = {  # number of axes of each
     "revolute": 1, "continuous": 1, "prismatic": 1, "universal": 2, "revolute2": 2, "ball": 0, "fixed": 0,
     "screw": 0, "gearbox": 0,
 }  # fmt: skip
-STILL = ("screw", "gearbox")
 UNLIMITED = 1e15  # SDF writes 1e16 for no limit
 
 
@@ -317,7 +316,7 @@ class SdfTree:
         parent, child = (self.body(self.end(frame, which)) for which in ("parent", "child"))
         if parent is None or child is None or parent is child:
             raise holder.error(f"joint {shown(frame.local)} does not connect two links")
-        if kind in STILL:
+        if kind in ("screw", "gearbox"):
             named = f"joint {shown(frame.local)} is a {kind}"
             self.note(holder, f"{named}: it is fixed as in the file and takes no value")
         name, line = self.names[frame.name], holder.line

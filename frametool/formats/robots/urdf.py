@@ -40,9 +40,6 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Rigid
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
-WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
-LIMITED = ("revolute", "prismatic")
-PARTS = ("origin", "parent", "child", "axis", "limit", "mimic")
 _XACRO = f"xacro, not yet URDF; {UNSUPPORTED['xacro'].remedy}"
 
 
@@ -107,7 +104,7 @@ def describe(file: InputFile, options: Options) -> tuple[dict[str, int], list[Li
 def _link(element: Element, joints: Mapping[str, tuple[Link, Element]], options: Options) -> Link:
     """Read one joint; raises FormatError."""
     parts: dict[str, Element] = {}
-    for part in element.all(*PARTS):
+    for part in element.all("origin", "parent", "child", "axis", "limit", "mimic"):
         if parts.setdefault(part.tag, part) is not part:
             options.report(part.error(f"<{part.tag}> twice in one joint"))
     name, kind = element.required("name"), element.required("type")
@@ -149,13 +146,13 @@ def _origin(element: Element, options: Options) -> Rigid:
 def _moving(name: str, kind: str, line: int, parts: Mapping[str, Element], options: Options) -> Joint:
     """Read axis, limits, and the joint to mimic."""
     axis, lower, upper, mimic = (1.0, 0.0, 0.0), None, None, None
-    if "axis" in parts and kind in WITH_AXIS:
+    if "axis" in parts and kind != "floating":
         x, y, z = parts["axis"].numbers(3, "xyz", "1 0 0")
         if not (x or y or z):
             raise parts["axis"].error(f"joint {shown(name)} has the axis 0 0 0, which is not a direction", "xyz")
         axis = (x, y, z) if x * x + y * y + z * z == 1.0 else unit_vector(x, y, z, floats)
-    limit = parts.get("limit")
-    if limit and kind in LIMITED and ("lower" in limit.attributes or "upper" in limit.attributes):
+    limit = parts.get("limit") if kind in ("revolute", "prismatic") else None
+    if limit and ("lower" in limit.attributes or "upper" in limit.attributes):
         (lower,), (upper,) = limit.numbers(1, "lower", "0"), limit.numbers(1, "upper", "0")
         if lower > upper:
             message = f"joint {shown(name)} has the limits {lower:g} .. {upper:g}, which nothing fits"

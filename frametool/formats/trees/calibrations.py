@@ -66,10 +66,8 @@ MOUNTS = {
 }
 POSES = {"transformation": QUATERNION, "transform": ("translation", "rotation")}
 SENSORS = "sensor.json"
-WRAPPERS = ("transforms", "extrinsics")  # an outermost key that is not a name
 PARENTS, CHILDREN = (tuple(dict.fromkeys(keys[at] for keys in FRAME_KEYS[:4])) for at in (0, 1))
 _OF_CAMERAS = ("rvec", "qvec", "tvec", "R", "T", "t")  # camera<-world in OpenCV and COLMAP, often the inverse
-_SELF = {"me": "cam", "imu": "imu", "body": "body"}
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
@@ -216,7 +214,7 @@ def _read_named(file: InputFile, options: Options) -> Iterator[Edge]:
         path: Path = ()
         if "angles" in top:
             reading.degrees = read_angle_unit(top.pop("angles"))
-        if len(top) == 1 and (wrapper := next(iter(top))) in WRAPPERS:
+        if len(top) == 1 and (wrapper := next(iter(top))) in ("transforms", "extrinsics"):  # which is no name
             value, path = top[wrapper], (wrapper,)
             top = dict(enumerate(value)) if type(value) is list else as_mapping(value, "poses by the names of frames")
         for name, entry in top.items():
@@ -268,7 +266,8 @@ def _entry(
         raise Misfit("neither position nor rotation; a pose has x, y, z, or a key like translation, and a rotation")
     if parent:
         return read.components, Meaning(parent, child, child)
-    meaning = meaning_of(child, dict.fromkeys(("before", "sensor"), "") | _SELF, options.answers.frames)
+    known = {"me": "cam", "before": "", "imu": "imu", "body": "body", "sensor": ""}
+    meaning = meaning_of(child, known, options.answers.frames)
     if isinstance(meaning, Unclear):
         raise meaning
     if meaning is None and (pair := [key for key in fields if key in _OF_CAMERAS]) and len(pair) == len(fields) == 2:

@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 _WORD = r"""("(?:[^"\\]|\\.)*+"|[A-Za-z_\d./]++)"""
 _ARROW = rf"""{_WORD}\s*->\s*(?={_WORD}\s*(\[(?:[^\]"]|"(?:[^"\\]|\\.)*+")*+\])?)"""
-_SETTING = ("graph", "node", "edge")  # words of graphviz that are not names
 _LISTED_FACTS = ("rate", "buffer_length", "most_recent_transform")
 _FACTS = (r"Average rate:\s*([\d.]+)", r"Buffer length:\s*([\d.]+)", r"Most recent transform:\s*([\d.]+)")
 
@@ -53,7 +52,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
     if not text.rstrip().endswith("}"):
         raise file.error("the drawing ends before its last }; is the file whole?")
     for node, line in _with_lines(rf"(?m)^[^\S\n]*{_WORD}\s*;\s*$", text):
-        if (name := _unquoted(node[1])) not in _SETTING:
+        if (name := _unquoted(node[1])) not in ("graph", "node", "edge"):  # words that set styles
             yield Edge(None, options.tally.names.bare(name), IDENTITY, line=line)
     for arrow, line in _with_lines(_ARROW, text):
         parent, child = (options.tally.names.bare(_unquoted(word)) for word in arrow.groups()[:2])

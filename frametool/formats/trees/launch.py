@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import Frames
     from frametool.grammar.edges import Edge, Options
 
-PACKAGES = ("tf", "tf2_ros")
-COMPOSABLE = "tf2_ros::StaticTransformBroadcasterNode"
 _PYTHON = re.compile(r"(?m)^ *(?:def |import |from \w[\w.]* import )")
 _SUBSTITUTION = re.compile(r"\$\([^()]*\)?")
 _NO, _YES = ("0", "false"), ("1", "true")
@@ -99,8 +97,8 @@ def _is_reported(action: Action) -> bool:
         words = command.split() if isinstance(command, str) else command if isinstance(command, list) else []
         return isinstance(command, Misfit) or any(str(word).rsplit("/", 1)[-1] == publisher.CALL for word in words)
     if action.kind == "composable_node":
-        return bool(fields.get("plugin") == COMPOSABLE)
-    is_call = fields.get("pkg") in PACKAGES and fields.get("exec", fields.get("type")) == publisher.CALL
+        return bool(fields.get("plugin") == "tf2_ros::StaticTransformBroadcasterNode")
+    is_call = fields.get("pkg") in ("tf", "tf2_ros") and fields.get("exec", fields.get("type")) == publisher.CALL
     return action.kind == "include" or (action.kind == "node" and is_call)
 
 

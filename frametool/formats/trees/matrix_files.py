@@ -159,8 +159,6 @@ def partner_of(key: str, others: Collection[str]) -> tuple[str, str, str] | None
 
 
 MATRIX = notation("matrix")
-WHOLE = ((4, 4), (3, 4))  # rows and columns of a whole pose
-LAST_ROW = ("0", "0", "0", "1")
 
 
 class Grid(NamedTuple):
@@ -219,10 +217,10 @@ def whole_pose(grid: Grid | None, *, twelve: bool) -> Grid | None:
         grid = grid._replace(rows=4, columns=4)
     elif grid is not None and grid.holds(12) and twelve:
         grid = grid._replace(rows=3, columns=4)
-    if grid is None or (grid.rows, grid.columns) not in WHOLE:
+    if grid is None or (grid.rows, grid.columns) not in ((4, 4), (3, 4)):
         return None
-    missing = 16 - len(grid.texts)
-    return Grid(4, 4, [*grid.texts, *LAST_ROW[:missing]], [*grid.places, *[()] * missing])
+    last = ["0", "0", "0", "1"] if len(grid.texts) == 12 else []
+    return Grid(4, 4, [*grid.texts, *last], [*grid.places, *[()] * len(last)])
 
 
 TAGS = frozenset(("!!opencv-matrix", "!!opencv-nd-matrix", "!!opencv-sparse-matrix"))

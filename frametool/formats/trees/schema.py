@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     Schema = dict[str, Any]
 
-DIALECT = "https://json-schema.org/draft/2020-12/schema"
 MESSAGE: Schema = {"type": ["object", "null"]}
 NUMBER: Schema = {"type": ["number", "string"]}
 NAME: Schema = {"type": ["string", "number", "boolean"], "description": "the name of a frame"}
@@ -47,7 +46,7 @@ def schema() -> Schema:
     keys = {key: _of_key(key) for key in sorted(KEYS | {"children"})}
     named = {"if": {"type": "object", "properties": {"parent": {"type": "string"}}, "required": ["parent"]}}
     return {
-        "$schema": DIALECT,
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "frametool: a tree of frames",
         "if": {"type": "object", "required": ["frames"]},
         "then": tree | {"propertyNames": {"enum": sorted(TREE_KEYS)}},

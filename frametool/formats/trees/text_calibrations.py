@@ -55,7 +55,6 @@ POSES = (
     *((name, "", "cam0", "cam0_rect", True) for name in RECTIFICATIONS),
     *((f"R_rect_0{i}", "", camera, f"{camera}_rect", True) for i, camera in enumerate(CAMERAS)),
 )
-_NO_NUMBERS = ("calib_time",)
 _COUNTS = (  # pattern of a name, number of values
     (r"P[0-3]|P_rect_0\d|Tr\w*", 12),
     (r"R|R_0\d|R0_rect|R_rect(?:_0\d)?|K_0\d", 9),
@@ -134,7 +133,7 @@ class Calibration:
         name = first[0].removesuffix(":")
         if not words or not re.fullmatch(r"\w+", name):
             raise line_error(self.file, line, 1, f"expected NAME: numbers, found {text.strip()[:40]!r}")
-        if name in _NO_NUMBERS:
+        if name == "calib_time":  # which is no number
             return
         if name in self.fields:
             raise line_error(self.file, line, 1, f"{name} appears twice; first in line {self.fields[name].line}")

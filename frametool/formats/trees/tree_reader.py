@@ -51,7 +51,6 @@ MOST_KEYS, MOST_CHARACTERS = 5, 80  # of a mapping in a message
 NO_NAME = "is in place of a frame's name: a root has no pose, its keys are its children"
 CAMERA_KEYS = ("model", "K", "D", "size", "skew", "xi", "alpha", "beta", "w", "axes", "R", "P")
 LOOSE = frozenset(("x", "roll", "yaw", "theta", "qw", "yaw_deg", "x_mm"))  # single numbers
-CHILDREN = frozenset(("children", *TIMED))
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
@@ -147,7 +146,7 @@ def _below(root: str, children: Any, path: Path, reading: Reading) -> Iterator[E
                     raise Misfit(f"{shown(child)} {NO_NAME}", key=True)
                 if names := NAMES.intersection(as_mapping(said, f"the pose of frame {shown(child)}")):
                     raise Misfit(f"{min(names)} is defined by the nesting; remove it", (min(names),), key=True)
-                pose = _pose(said, reading, CHILDREN)
+                pose = _pose(said, reading, {"children", *TIMED})
                 yield from _edges(said, pose, _above(pose, parent, said), child, here, reading)
             except Misfit as misfit:
                 reading.refuse(misfit.below(*here))
