@@ -85,7 +85,6 @@ class Template:
     pieces: what the result is made of; renamed: whose name it is that stood somewhere: of which entry, whether its
         parent or its name, and the scalar that it was
     notes: what is worth telling about all of them
-    of_places: those of them that hold for all
     leaves: of what is written anew, the scalars that differ: the stretch of each, and where it was learned
     """
 
@@ -94,8 +93,8 @@ class Template:
         self.text = text = known.text
         self.entries = tuple(known.entries)
         self.json, self.line = known.json, known.line
-        self.notes = list(known.row_notes())
-        self.of_places = [each for each in known.notes_at(0, known.source.first_column) if each.about in OF_PLACES]
+        every = known.notes_at(0, known.source.first_column)
+        self.notes = [*known.row_notes(), *(each for each in every if each.about in OF_PLACES)]
         self._root, self._request = known.root, known.request
         self._named: dict[tuple[int, Names], Names | None] = {}
         number = re.compile(JSON_NUMBER if self.json else YAML_NUMBER)
@@ -526,8 +525,6 @@ def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
 
 def is_text(block: bytes) -> bool:
     """Return True if bytes are UTF-8: an expression for bytes would let others pass."""
-    if block.isascii():
-        return True
     try:
         block.decode()
     except UnicodeDecodeError:

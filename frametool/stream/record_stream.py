@@ -277,16 +277,15 @@ class RecordBlocks:
                     made = Fault.of(run.block.line_of(row), *(reason or ("", "")))
                 self._alone(text, part, made, line, found, run.parts_of(row) if self.request.in_order else None)
             found.notes += run.notes
-            own = [*template.notes, *template.of_places] if len(cut.starts) else ()
-            found.notes += [each._replace(line=run.block.line_of(0)) for each in own]
+            if len(cut.starts):
+                found.notes += [each._replace(line=run.block.line_of(0)) for each in template.notes]
         return closed
 
 
 def _no_result(record: bytes, style: Style, *, json: bool) -> NoResult:
     """Return what a bad record says besides its numbers; in a table those are empty cells under names of their own."""
     try:
-        text = record.decode()
-        said = plain(parse_nodes(nulled(text, json=json) or text)[0])
+        said = plain(parse_nodes(nulled(record, json=json) or record.decode())[0])
     except (FormatError, UnicodeDecodeError, IndexError, TypeError):  # broken: no parser has taken it before
         said = None
     kept = said if type(said) is dict else {}

@@ -368,35 +368,28 @@ def stretches_of(
     """Cut a text into stretches, each number one of its own; return them with the pieces of the result."""
     stretches: list[tuple[int, int]] = []
     pieces: list[Piece] = []
-    slots = list(reversed(cuts))
-
-    def walk(start: int, end: int, *, shown: bool) -> None:
-        """Add the stretches from start to end; they are pieces of the result if they are shown."""
-        while start < end:
-            slot = slots[-1] if slots and slots[-1][1] <= end else None
-            stop = end if slot is None else slot[0] if slot[0] > start else slots.pop()[1]
-            stretches.append((start, stop))
-            if shown:
-                pieces.append(In(len(stretches) - 1))
-            start = stop
-
-    at = 0
-    for edit in sorted(edits, key=lambda each: (each.start, each.end)):
+    slots, at = list(reversed(cuts)), 0
+    for edit in (*sorted(edits, key=lambda each: (each.start, each.end)), Edit(length, length, ())):
         start = max(edit.start, at)
-        walk(at, start, shown=True)
-        pieces += edit.pieces
-        walk(start, max(edit.end, start), shown=False)
-        at = max(edit.end, start)
-    walk(at, length, shown=True)
+        for end, stays, added in ((start, True, edit.pieces), (max(edit.end, start), False, ())):
+            while at < end:
+                slot = slots[-1] if slots and slots[-1][1] <= end else None
+                stop = end if slot is None else slot[0] if slot[0] > at else slots.pop()[1]
+                stretches.append((at, stop))
+                if stays:
+                    pieces.append(In(len(stretches) - 1))
+                at = stop
+            pieces += added
     return stretches, pieces
 
 
-def nulled(text: str, *, json: bool) -> str | None:
-    """Return the text of a record with null in the place of our numbers; None if it has none that can be found."""
+def nulled(record: bytes, *, json: bool) -> str | None:
+    """Return a record with null in the place of our numbers; None if it has none that can be found."""
     try:
+        text = record.decode()
         json_documents(Source("", text)) if json else parse_documents(text, "")
         edits = [(node.start, node.end, "null") for root in parse_nodes(text) for node in numbers_in(root)]
-    except FormatError:
+    except (FormatError, UnicodeDecodeError):
         return None
     return replaced(text, edits) if edits else None
 
@@ -404,11 +397,7 @@ def nulled(text: str, *, json: bool) -> str | None:
 def null_of(record: bytes, *, json: bool) -> bytes:
     """Return what replaces a record without a result: its keys with null in the place of ours, or null."""
     body = record.rstrip(b"\r\n")
-    try:
-        text = nulled(body.decode(), json=json)
-    except UnicodeDecodeError:
-        text = None
-    return (b"null" if text is None else text.encode()) + record[len(body) :]
+    return (nulled(body, json=json) or "null").encode() + record[len(body) :]
 
 
 def column_in(text: bytes, place: int) -> int:
