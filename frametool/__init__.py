@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     from frametool.errors import FrametoolError as FrametoolError
     from frametool.fit.closed_forms import solve_mean as solve_mean
     from frametool.fit.closed_forms import solve_points as solve_points
+    from frametool.fit.comparison import align as align
+    from frametool.fit.comparison import compare as compare
+    from frametool.fit.comparison import resample as resample
     from frametool.fit.hand_eye import solve_hand_eye as solve_hand_eye
-    from frametool.fit.python_api import align as align
-    from frametool.fit.python_api import compare as compare
-    from frametool.fit.python_api import resample as resample
-    from frametool.fit.python_api import solve as solve
+    from frametool.fit.measured_tree import solve as solve
     from frametool.formats.cameras import load_camera as load_camera
     from frametool.formats.load import load as load
     from frametool.formats.robots.urdf import load_robot as load_robot
@@ -65,8 +65,9 @@ _HOMES = {
         "frametool.errors": "FrametoolError",
         "frametool.explain": "explain",
         "frametool.fit.closed_forms": "solve_mean solve_points",
+        "frametool.fit.comparison": "align compare resample",
         "frametool.fit.hand_eye": "solve_hand_eye",
-        "frametool.fit.python_api": "align compare resample solve",
+        "frametool.fit.measured_tree": "solve",
         "frametool.formats.cameras": "load_camera",
         "frametool.formats.load": "load",
         "frametool.formats.robots.urdf": "load_robot",

@@ -279,7 +279,7 @@ def mean_of_rows(gathered: Gathered, values: list[float] | None, *, robust: bool
     (metres, radians), (farthest, widest), covariance = found.rms, found.most, found.covariance
     extras: dict[str, Any] = {"count": len(found.used)} | ({"used": int(found.used.sum())} if robust else {})
     left_out: list[str] = []
-    for row in found.left_out.nonzero()[0].tolist() if robust else ():
+    for row in found.left_out.nonzero()[0].tolist():
         off = lsq.off_text(found.residuals[row], 2)
         left_out.append(f"{gathered.places[row]}: left out, {off} off (u {found.u[row]:.1f})")
     pose = Pose.of(found.transform.components)
@@ -290,8 +290,7 @@ def mean_of_rows(gathered: Gathered, values: list[float] | None, *, robust: bool
         extras |= {"angle_max": widest, "angle_max_deg": degrees(widest)}
     if covariance is not None:
         if gathered.placed:
-            roots = [sqrt(covariance[at, at]) for at in range(3)]
-            extras |= dict(zip(("std_x", "std_y", "std_z"), roots, strict=True))
+            extras |= {f"std_{axis}": sqrt(covariance[at, at]) for at, axis in enumerate("xyz")}
         if gathered.turned:
             angle = sqrt(covariance[3:, 3:].trace())
             extras |= {"std_angle": angle, "std_angle_deg": degrees(angle)}

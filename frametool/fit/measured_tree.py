@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from functools import cached_property
+from os import PathLike
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,19 +17,23 @@ import numpy as np
 from frametool.errors import Finding, NotConnected, ValueInvalid, alternatives, first_of, printable, shown, warn
 from frametool.fit import least_squares as lsq
 from frametool.fit.tree_problem import Fitted, Noise, TreeProblem, bodies_of, bridges, jacobians, of_body, top_of
-from frametool.frames.lookups import Frames, FrameTree
+from frametool.formats.load import FrameFile, load
+from frametool.frames.lookups import Frames, FrameTree, taken
 from frametool.frames.topology import Groups
 from frametool.geometry.conventions import axes_change
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 from frametool.lint.tree_diff import Tolerance
-from frametool.stream.measurements import Measurement, parted
+from frametool.stream.measurements import Measurement, parted, read_measurements
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
+    from typing import Any, TypeAlias
 
     from frametool.fit.tree_problem import Bodies
     from frametool.geometry.types import Array
+
+    Measured: TypeAlias = str | PathLike[str] | Iterable[tuple[str, str, Transform] | tuple[str, str, Transform, Any]]
 
 
 NEAR = Tolerance(0.01, math.radians(1.0))  # the tolerance without any sigmas
@@ -170,9 +175,9 @@ class TreeFit:
         tried = {fit.found.kept.tobytes()}
         while True:
             fits, noise, swaps, undecided = fit.verdicts()
-            for taken, left in ((noise, []), *(([row], [rival]) for row, rival in swaps)):
+            for back, out in ((noise, []), *(([row], [rival]) for row, rival in swaps)):
                 kept = fit.found.kept.copy()
-                kept[taken], kept[left] = True, False
+                kept[back], kept[out] = True, False
                 if kept.tobytes() not in tried:
                     break
             else:
@@ -230,8 +235,10 @@ class TreeFit:
 
     def _pose_without(self, rival: int, row: int) -> Transform:
         """Return the pose that a rival would measure if the rejected row placed the bodies below it."""
-        measured, pairs = self.problem.measured[row], self.problem.pairs
-        hanging = set(self.tree.beyond(rival))
+        measured, pairs, hanging = self.problem.measured[row], self.problem.pairs, set[int]()
+        for body in self.tree.order:
+            if self.tree.row[body] == rival or self.tree.above[body] in hanging:
+                hanging.add(body)
         parent, child = self.parents[row], self.children[row]
         if pairs[row][1] in hanging:
             moved = parent @ measured @ child.inverse()
@@ -337,3 +344,47 @@ class TreeSolution:
                 raise ValueInvalid(f"unknown frame {shown(frame)}{alternatives(frame, self.frames, 'frames')}")
         ends = ((self._number[frame], self._poses[self.frames.index(frame)]) for frame in (target, source))
         return self._fit.covariance(*ends)
+
+
+def solve(
+    measurements: Measured, *, root: str | None = None, fix: Iterable[FrameTree | str | PathLike[str]] = (),
+    robust: bool = True,
+) -> TreeSolution:  # fmt: skip
+    """Estimate the tree that fits measurements; outliers are rejected.
+
+    measurements: (parent, child, transform) or (parent, child, transform, covariance), the covariance as 36 numbers or
+        (6, 6); or the path of a file as for `frametool solve`
+    root: the frame in which the others are expressed; fix: trees, or paths of them, that are exact
+    Returns .tree, .covariance(target, source), .residuals (n, 6), .u, .used, .fits, .checked and more.
+    Raises ValueInvalid if frames are not connected or an outlier cannot be identified; FormatError.
+    """
+    trees = [each if isinstance(each, FrameTree) else load(each) for each in fix]
+    if moving := next((each for each in trees if each.moves), None):
+        raise ValueInvalid(f"{moving.name} moves; fixed frames must be static")
+    fixed = FrameTree("the fixed frames")
+    for tree in trees:
+        for track in tree.tracks():
+            own = Transform.of(*track.components), tree.covariances.get(track.child)
+            fixed.add(track.parent, track.child, *own)
+    if isinstance(measurements, str | PathLike):
+        rows = read_measurements([FrameFile(measurements)])
+    else:
+        rows = [_measurement(each, f"measurement {number}") for number, each in enumerate(measurements, 1)]
+    return solve_tree(rows, root=root, fixed=fixed, robust=robust)
+
+
+def _measurement(argument: Any, place: str) -> Measurement:
+    """Check one measurement passed from Python; raises ValueInvalid that names it."""
+    if isinstance(argument, Measurement):
+        return argument
+    if not (isinstance(argument, tuple | list) and len(argument) in (3, 4) and isinstance(argument[2], Transform)):
+        raise ValueInvalid(f"{place}: expected (parent, child, Transform) or with a covariance behind")
+    parent, child, transform = argument[:3]
+    if wrong := [name for name in (parent, child) if not (isinstance(name, str) and name)]:
+        raise ValueInvalid(f"{place}: a frame is named by a text, found {wrong[0]!r}")
+    if transform.shape:
+        raise ValueInvalid(f"{place}: expected one transform, got shape {transform.shape}")
+    try:
+        return Measurement(parent, child, transform.components, taken(argument[3] if len(argument) > 3 else None))
+    except ValueInvalid as error:
+        raise ValueInvalid(f"{place}: {error}") from None

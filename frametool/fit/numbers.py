@@ -198,14 +198,6 @@ def worlds(found: Comparison) -> tuple[str, str]:
     return ("ref", "est") if ref == est else (ref, est)
 
 
-def whole_estimate(found: Comparison) -> Trajectory:
-    """Return the whole estimate as it was compared: on the reference's clock, mounted and aligned."""
-    est = found.est
-    if est.stamps_ns is not None:
-        est = est._replace(stamps_ns=est.stamps_ns + found.offset_ns)
-    return found.fit.moved(est if found.mount is None else est.with_poses(est.poses @ found.mount))
-
-
 def _pose(pose: Transform) -> dict[str, Any]:
     return {"xyz": pose.xyz.tolist(), "quaternion": dict(zip("xyzw", pose.xyzw.tolist(), strict=True))}
 

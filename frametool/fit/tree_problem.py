@@ -52,13 +52,6 @@ class SpanningTree(NamedTuple):
             a = self.above[a]
         return rows
 
-    def beyond(self, row: int) -> list[int]:
-        """Return the bodies below a row."""
-        hang = [False] * len(self.order)
-        for body in self.order:
-            hang[body] = self.row[body] == row or (self.row[body] >= 0 and hang[self.above[body]])
-        return [body for body, hangs in enumerate(hang) if hangs]
-
 
 def spanning_tree(count: int, pairs: Pairs, rows: Iterable[int]) -> SpanningTree:
     """Return the tree of the first rows that close no loop (Kruskal); together the rows join all bodies."""

@@ -11,7 +11,8 @@ from worlds import ring
 
 from frametool.errors import ValueInvalid
 from frametool.fit.alignment import clock_offset
-from frametool.fit.comparison import AUTO, EVO, Comparison, Settings, compare, parse_delta
+from frametool.fit.comparison import AUTO, EVO, Comparison, Settings, parse_delta
+from frametool.fit.comparison import compared as compare
 from frametool.fit.hand_eye import solve_hand_eye
 from frametool.fit.measured_tree import solve_tree
 from frametool.frames.trajectory import Trajectory

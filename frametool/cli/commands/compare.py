@@ -207,10 +207,10 @@ def align_command(inputs: Inputs) -> int:
     into = Output(inputs, "poses") if inputs.output else None
     entry = Output(inputs.but(output=None, format_name=None) if into else inputs, "poses")
     (found,), skipped = comparisons(inputs.ref, [inputs.est], inputs)
-    from frametool.fit.numbers import whole_estimate, worlds
+    from frametool.fit.numbers import worlds
 
     named = inputs.names or worlds(found)
-    whole = whole_estimate(found)._replace(world=found.pairs.ref.world)
+    whole = found.whole_estimate()._replace(world=found.pairs.ref.world)
     if into is not None or entry.is_trajectory:
         write_trajectory(into or entry, whole)
     if not entry.is_trajectory:
@@ -314,7 +314,7 @@ def trajectory(inputs: Inputs, argument: str, fmt: str = "", on_error: str = STO
 
 def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Comparison], bool]:
     """Compare estimates with a reference as the options say, with warnings. Also: whether rows were skipped."""
-    from frametool.fit.comparison import EVO, SETTINGS, Settings, compare
+    from frametool.fit.comparison import EVO, SETTINGS, Settings, compared
 
     refuse_two_readers([ref, *ests])
     base = EVO if inputs.like else Settings()
@@ -335,7 +335,7 @@ def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Com
         if (reference.stamps_ns is None) != (estimate.stamps_ns is None):
             lacking = ref_name if reference.stamps_ns is None else name
             raise click.UsageError(f"{lacking} has no stamps, the other has; give them with --stamps FILE")
-        found.append(compare(reference, estimate, chosen, (ref_name, name)))
+        found.append(compared(reference, estimate, chosen, (ref_name, name)))
         for hint in found[-1].hints:
             warn(hint)
     return found, skipped
