@@ -17,7 +17,7 @@ from frametool.fit import least_squares as lsq
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
     from typing import TypeAlias
 
     from frametool.fit.least_squares import Mask, Rows
@@ -110,37 +110,28 @@ def solve_hand_eye(
         models = (samples.fitted(begin._replace(cut=cut), weights, steps) for cut in CUTS)
         return min(models, key=lambda fit: fit.misfit)
 
-    found = lsq.settled(
-        start, samples.residuals, lambda model,
-        weights: samples.fitted(model._replace(cut="target"), weights, ROUGH_STEPS), likeliest, unknown=6,
-        robust=robust,
-    )  # fmt: skip
+    def rough(model: _Model, weights: Array) -> _Model:
+        return samples.fitted(model._replace(cut="target"), weights, ROUGH_STEPS)
+
+    found = lsq.settled(start, samples.residuals, rough, likeliest, unknown=6, robust=robust)
     model = found.model
     s_t, s_r = model.sigmas.tolist()
     count, off = int(found.kept.sum()), lsq.lengths(found.residuals[found.kept]).T
     rms = np.sqrt((off**2).mean(1))
-    first, second, axis = turns = _turns(hand[found.kept])
-    if first < lsq.KEPT * s_r * sqrt(2.0):
+    turns = _turns(hand[found.kept])
+    if turns[0] < lsq.KEPT * s_r * sqrt(2.0):
         raise _unfitting(rms)
     _require_two_axes(turns, s_r, holder, names[2])
     covariance = lsq.inverse(model.hessian)
-    warnings = []
-    if second < SLIGHT:
-        small = f"{degrees(second):.1f} deg rms, first axis {axis} in {holder}"
-        warnings.append(f"turns about a second axis are small ({small}): turn more")
-    if count < FEWEST_CERTAIN:
-        both = " fit with and without --eye-to-hand, and" * bool(others.prod() <= BETTER**2 * medians.prod())
-        warnings.append(f"{count} samples{both} say little of their own noise: the sigmas are rough; take 8 or more")
-    if (factor := _scale(samples.at(found.kept), model.x)) != 1.0:
-        scaled = f"TARGET fits better with its places times {factor:.4g}"
-        warnings.append(f"{scaled}: another unit, or the size of a marker?")
+    both = " fit with and without --eye-to-hand, and" * bool(others.prod() <= BETTER**2 * medians.prod())
+    warnings = [*_warnings(samples.at(found.kept), model.x, turns, holder, both)]
     for warning in warnings:
         warn(warning)
     noise_at = "base" if eye_to_hand and model.cut == "gripper" else model.cut
     return HandEye(
         model.x.canonical(), model.z.canonical(), covariance[:6, :6], covariance[6:, 6:],
         None if s_t == s_r == lsq.LEAST else noise_at, found.kept, lsq.deviations(found.residuals, model.sigmas),
-        found.residuals, (s_t, s_r), 3 * count - 6, float(rms[0]), float(rms[1]), (first, second), warnings,
+        found.residuals, (s_t, s_r), 3 * count - 6, float(rms[0]), float(rms[1]), turns[:2], warnings,
     )  # fmt: skip
 
 
@@ -258,13 +249,22 @@ def _motions(gripper: Transform, camera: Transform) -> tuple[Transform, Transfor
     return gripper[i].inverse() @ gripper[j], camera[i] @ camera[j].inverse()
 
 
-def _scale(samples: _Samples, x: Transform) -> float:
-    """Return a factor on the target's translations that fits much better, else 1: (R_A - I) t_X - s R_X t_B = -t_A."""
+def _warnings(
+    samples: _Samples, x: Transform, turns: tuple[float, float, str], holder: str, both: str
+) -> Iterator[str]:  # fmt: skip
+    """Yield what limits the result; both: of a few samples that another setting fits too, else ""."""
+    if turns[1] < SLIGHT:
+        small = f"{degrees(turns[1]):.1f} deg rms, first axis {turns[2]} in {holder}"
+        yield f"turns about a second axis are small ({small}): turn more"
+    if (count := len(samples.gripper)) < FEWEST_CERTAIN:
+        yield f"{count} samples{both} say little of their own noise: the sigmas are rough; take 8 or more"
+    # does a factor on the target's translations fit better?  (R_A - I) t_X - s R_X t_B = -t_A
     a, b = _motions(*samples)
     lever, turned = (a.rotation.as_matrix() - np.eye(3)).reshape(-1, 3), x.rotation.apply(b.xyz).reshape(-1)
     place, plain = _least_squares(lever, turned - a.xyz.reshape(-1))
     place, scaled = _least_squares(np.column_stack([lever, -turned]), -a.xyz.reshape(-1))
-    return 1.0 if place[3] <= 0.0 or plain <= max(BETTER * scaled, lsq.LEAST) else float(place[3])
+    if place[3] > 0.0 and plain > max(BETTER * scaled, lsq.LEAST):
+        yield f"TARGET fits better with its places times {place[3]:.4g}: another unit, or the size of a marker?"
 
 
 def _least_squares(slopes: Array, wanted: Array) -> tuple[Array, float]:
