@@ -165,9 +165,14 @@ class FormatConverter:
         none = RowPoses(np.empty((0, 7)), None, np.empty(0, np.int64), [None], [None], {})
         yield none, Outcome(b"", lines=rows.lines, size=rows.taken)
         count = 0
-        for block, outcome in rows.blocks():
-            before, count = count, count + len(block.numbers)
-            poses = self._with_place(block)
+        for text in rows.texts:
+            run, outcome, cells = rows.of_text(text)
+            chosen, numbers = run.settled()
+            lines = run.block.places[chosen]
+            if b'"' in text:  # a cell may hold line ends
+                lines = np.array([*map(run.block.line_of, chosen.tolist())], np.int64)
+            before, count = count, count + len(numbers)
+            poses = self._with_place(rows.poses_of(run, chosen, numbers, cells.column, lines))
             if self.looks_up_places:
                 poses = poses._replace(parents=EARTH_FRAMES[:1])
             if file:

@@ -99,19 +99,6 @@ class NamedColumn(NamedTuple):
     unit: str
 
 
-def _grouped(names: Sequence[str]) -> Groups:
-    """Return the columns that may say a position on the Earth by what is before their names, and by field."""
-    groups: Groups = {}
-    for at, name in enumerate(names):
-        if name and (match := PATTERN.fullmatch(name)):
-            unit = (match[4] if match[4] is not None else match[3] or "").lower()
-            prefix, field = match[1].lower(), FIELDS[match[2].lower()]
-            if field == STATUS:  # of a NavSatFix: another may be anything
-                prefix = prefix.removesuffix("status.") if prefix.endswith("status.") else "another status"
-            groups.setdefault(prefix, {}).setdefault(field, NamedColumn(at, name, unit))
-    return groups
-
-
 def _find(groups: Groups, earth: Earth, expected: str) -> PoseColumns | None:
     """Find the one position on the Earth among columns, and a heading with it; None if absent.
 
@@ -183,7 +170,14 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
 
     Raises FormatError for half of one, for heights above the sea, and for a rotation whose axes nobody says.
     """
-    groups = _grouped(names)
+    groups: Groups = {}  # by what is before the names, and by field
+    for at, name in enumerate(names):
+        if name and (match := PATTERN.fullmatch(name)):
+            unit = (match[4] if match[4] is not None else match[3] or "").lower()
+            prefix, field = match[1].lower(), FIELDS[match[2].lower()]
+            if field == STATUS:  # of a NavSatFix: another may be anything
+                prefix = prefix.removesuffix("status.") if prefix.endswith("status.") else "another status"
+            groups.setdefault(prefix, {}).setdefault(field, NamedColumn(at, name, unit))
     every = sorted((spot, field) for spots in groups.values() for field, spot in spots.items())
     earth, expected = request.earth or Earth(), request.rows.given_place
     in_ecef = {spot.place for spot, field in every if field in ECEF_COLUMNS and not expected}

@@ -181,10 +181,8 @@ def stamp_keys(document: Any, holder: Path) -> Path:
 def _below(value: Any, keys: Sequence[str | int]) -> tuple[Any] | None:
     """Follow keys and indices down; None where one is not there."""
     for key in keys:
-        if type(value) is list and type(key) is int and key < len(value):
-            value = value[key]
-            continue
-        if type(value) is not dict or key not in value:
+        is_index = type(value) is list and type(key) is int and key < len(value)
+        if not (is_index or (type(value) is dict and key in value)):
             return None
         value = value[key]
     return (value,)

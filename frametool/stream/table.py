@@ -46,7 +46,7 @@ from frametool.text.spans import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterator, Sequence
+    from collections.abc import Callable, Generator, Sequence
 
     from frametool.stream.request import Request
     from frametool.text.lines import ByteStream
@@ -218,7 +218,7 @@ class Naming:
         return [*map("\0".join, zip(*texts, strict=True))] or [self.earth], BlockNames(), {}
 
     def _renamed(self, size: int, column: Callable[[int], Coded]) -> tuple[Sequence[str | None], BlockNames, Bad]:
-        """Return it of rows that name frames."""
+        """Read the names of rows that have columns of them, and rename them."""
         none = Coded([""], np.zeros(size, np.int64))
         parents, names = (none if place is None else column(place) for place in self.places)
         count = len(names.texts)
@@ -244,15 +244,6 @@ class Naming:
         known = [None if not text or self.counts(text) else text for text in parents.texts]
         frames = [self.earth] if self.earth else [known[code] for code in parents.codes.tolist()]
         return frames, BlockNames(pairs, results, of_row, dict(sorted(lost.items())[:1])), bad
-
-    def texts(self, names: BlockNames, rows: Ints) -> list[list[str | None]]:
-        """Return the parents of the results of rows, and what these are the poses of: one a row, or one for all.
-
-        Where rows name none, the frames of what is placed on the Earth are known, and those of an expression.
-        """
-        unnamed = (self.earth, None) if self.rename is None else self.rename(self.earth, None)
-        known = zip(self.places, unnamed, strict=True)
-        return [[name] if place is None else names.texts(role, rows) for role, (place, name) in enumerate(known)]
 
     def spans(self, cells: Cells, role: int, names: BlockNames) -> Spans:
         """Write names as cells; one that does not change stays as it is written."""
@@ -439,7 +430,12 @@ class PlannedRows:
         extra = [each for each in layout.columns if isinstance(each, New) and each.number >= own]
         extras |= {each.name: numbers[:, each.number] for each in extra}
         stamps = None if layout.time is None else block.stamps[0][rows]
-        parents, names = self.naming.texts(block.names, rows)
+        rename, earth = self.naming.rename, self.naming.earth
+        unnamed = (earth, None) if rename is None else rename(earth, None)  # known of places, and of an expression
+        parents, names = (
+            [name] if place is None else block.names.texts(role, rows)
+            for role, (place, name) in enumerate(zip(self.naming.places, unnamed, strict=True))
+        )
         return RowPoses(numbers[:, :own], stamps, lines, parents, names, extras)
 
 
@@ -496,13 +492,3 @@ class TableRows(PlannedRows):
                 new = str(part) if len(columns) > 1 else stamp_text(column.text(row).decode(), stamp, in_ns=in_ns)
                 edits.append((int(column.starts[row]) - MARGIN, int(column.ends[row]) - MARGIN, new.encode()))
         return replaced(text, edits)
-
-    def blocks(self) -> Iterator[tuple[RowPoses, Outcome]]:
-        """Yield the poses of all blocks."""
-        for text in self.texts:
-            run, outcome, cells = self.of_text(text)
-            rows, numbers = run.settled()
-            lines = run.block.places[rows]
-            if b'"' in text:  # a cell may hold line ends
-                lines = np.array([*map(run.block.line_of, rows.tolist())], np.int64)
-            yield self.poses_of(run, rows, numbers, cells.column, lines), outcome
