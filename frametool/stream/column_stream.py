@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from importlib import import_module
 from io import BytesIO
+from itertools import chain
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -270,7 +271,7 @@ class MergedClouds:
         """Yield what becomes of the batches of one file."""
         file, rows = self.parts[at]
         columns = rows.out_columns(named=True)
-        for batch in file.batches():
+        for batch in chain([file.nothing()], file.batches()):  # which names the columns even where there are no rows
             size, made = rows.in_other_format(columns, batch)
             typed = {
                 name: made[name] if kind is None else made[name]._replace(values=made[name].values.astype(kind))

@@ -400,11 +400,10 @@ class Request(NamedTuple):
     def of_inverses(self) -> Request:
         """Return what is done with the inverse of each row; its frames have changed places."""
         rename, operation = self.rename, self.operation
-
-        def renamed(parent: str | None, name: str | None) -> tuple[str | None, str | None]:
-            return rename(name, parent) if rename else (name, parent)
-
-        return self._replace(operation=operation._replace(inverse=not operation.inverse), rename=renamed)
+        return self._replace(
+            operation=operation._replace(inverse=not operation.inverse),
+            rename=lambda parent, name: rename(name, parent) if rename else (name, parent),
+        )
 
     @property
     def renaming(self) -> Rename | None:

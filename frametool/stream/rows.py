@@ -309,7 +309,6 @@ def read_stamps(cells: Sequence[Spans], *, in_ns: int) -> tuple[Ints, dict[int, 
     if len(cells) == 2:
         stamps, sure = stamps * BILLION + parsed[1][0], sure & parsed[1][1] & (stamps < _MOST_SECONDS)
 
-
     def read(row: int) -> int:
         texts = [each.text(row).decode("utf-8", "replace") for each in cells]
         return read_header_stamp(*texts) if len(texts) == 2 else read_stamp(texts[0], in_ns=in_ns)

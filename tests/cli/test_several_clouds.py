@@ -48,6 +48,12 @@ def test_source_is_the_frame_of_all_and_transform_moves_all(run: Run) -> None:
     assert rows(run, "too.ply") == MOVED + "11.0,0.0,0.0,7.0\n"
 
 
+def test_clouds_without_points_become_one_without_points(run: Run) -> None:
+    files = FILES | {"a.ply": ply("x y z"), "b.ply": ply("x y z")}
+    assert run("apply", "t.yaml", "map", "left", *BOTH, "-o", "all.ply", files=files).status == 0
+    assert rows(run, "all.ply") == "x,y,z\n"
+
+
 def test_one_by_one_gives_the_same_points(run: Run) -> None:
     run("apply", "t.yaml", "map", *BOTH, "--frames", "left,right", "-o", "all.ply", files=FILES)
     single = [
