@@ -371,10 +371,8 @@ def _within(name: str, least: float, most: float, words: str) -> Check:
 # --- the tables ---
 
 
-def _sums(kernel: Kernel) -> list[Overload]:
-    """Return the meanings that a sum and a difference share."""
-    rules = "number.u number.u -> number.u", "vector.a vector.a -> vector.a", "twist.a twist.a -> twist.a"
-    return [Overload(rule, kernel) for rule in (*rules, "point.a vector.a -> point.a")]
+# what a sum and a difference share
+SUMS = [f"{each} {each} -> {each}" for each in ("number.u", "vector.a", "twist.a")] + ["point.a vector.a -> point.a"]
 
 
 # operator -> what cannot be done, its meanings
@@ -394,21 +392,15 @@ OPERATORS: dict[str, tuple[str, Sequence[Overload]]] = {
         Overload("vector.a scale -> vector.a", plain(lambda x, y, z, n: (x / n, y / n, z / n)), _no_division),
     ]),
     "+": ("add {} and {}", [
-        *_sums(_PLUS),
-        Overload("vector.a point.a -> point.a", _PLUS),
-        Overload("free free -> point", _PLUS),
-    ]),
-    "-": ("subtract {} and {}", [*_sums(_MINUS), Overload("point.a point.a -> vector.a", _MINUS)]),
+        Overload(rule, _PLUS) for rule in (*SUMS, "vector.a point.a -> point.a", "free free -> point")]),
+    "-": ("subtract {} and {}", [Overload(rule, _MINUS) for rule in (*SUMS, "point.a point.a -> vector.a")]),
     "^": ("raise {} to {}: a power is that of a pose or a plain number, an exponent a plain number", [
         Overload("pose.ab plain -> pose.a", _part_of_motion),
         Overload("plain plain -> plain", _power, _no_power),
     ]),
     "negate": ("negate {}", [
-        Overload("number.u -> number.u", _NEGATED),
-        Overload("vector.a -> vector.a", _NEGATED),
-        Overload("twist.a -> twist.a", _NEGATED),
-        Overload("free -> point", _NEGATED),
-    ]),
+        Overload(rule, _NEGATED)
+        for rule in ("number.u -> number.u", "vector.a -> vector.a", "twist.a -> twist.a", "free -> point")]),
     "list": ("make a point (3 lengths) or twist (lengths, angles) of {count} numbers; rotations: {{rpy_deg: [..]}}", [
         Overload("scale scale scale -> point", _SAME),
         Overload("scale scale scale angle angle angle -> twist", _SAME),
@@ -420,16 +412,12 @@ REMEDIES = {
 }
 
 
-def _result(overloads: Sequence[Overload], sign: str, terms: Sequence[Term]) -> Term | None:
-    """Return the result of the first meaning that suits the arguments."""
-    return next((found for each in overloads if (found := each.result(sign, terms)) is not None), None)
-
-
 def operated(sign: str, *terms: Term) -> Term:
     """Return the result of an operator; raises CalcError."""
     refusal, overloads = OPERATORS[sign]
-    if (found := _result(overloads, sign, terms)) is not None:
-        return found
+    for each in overloads:  # the first that suits the arguments
+        if (found := each.result(sign, terms)) is not None:
+            return found
     remedy = next((text for kind, text in REMEDIES.items() if kind in [term.type.kind for term in terms]), "")
     raise CalcError(f"cannot {refusal.format(*(term.type.named for term in terms), count=len(terms))}{remedy}")
 
@@ -499,7 +487,8 @@ FUNCTIONS: dict[str, tuple[str, Sequence[Overload]]] = {
 def called(name: str, terms: Sequence[Term]) -> Term:
     """Return the result of a function; raises CalcError."""
     takes, overloads = FUNCTIONS[name]
-    if (found := _result(overloads, name, terms)) is not None:
-        return found
+    for each in overloads:
+        if (found := each.result(name, terms)) is not None:
+            return found
     what = first_of([term.type.named for term in terms], 3) or "nothing"
     raise CalcError(f"{name}() takes {takes}, found {what}")

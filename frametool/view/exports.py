@@ -79,7 +79,7 @@ def still_picture(
             tips = zip("xyz", flat.tips(pose), strict=True)
             shapes += (line([there, tip[:2]], axis, 2.0, 0.4, title=name) for axis, tip in tips)
             shapes.append(line([flat.origins[name][:2], there], "trail", 1.5))
-    for name in flat.nearest_last():
+    for name in flat.nearest_last:
         x, y, _ = flat.origins[name]
         shapes += (line([(x, y), tip[:2]], "xyz"[axis], 2.0, title=name) for axis, tip in flat.axes(name))
         shapes.append(dot(x, y, 2.2, "ink", name))

@@ -347,7 +347,8 @@ def write_png(picture: Picture) -> bytes:
     axes.axis("off")
     for order, (kind, run) in enumerate(groupby(picture.shapes, key=attrgetter("kind"))):
         if kind == "circle":  # at once, for there may be many
-            xs, ys, radii, colours = zip(*((*each.look.values(), _plain(each)) for each in run), strict=True)
+            found = ((*each.look.values(), NAMED.get(each.colour, (each.colour,))[0]) for each in run)
+            xs, ys, radii, colours = zip(*found, strict=True)
             sizes = [(2.0 * radius * POINTS) ** 2 for radius in radii]
             axes.scatter(xs, ys, s=sizes, c=colours, linewidths=0.0, zorder=order)
         else:
@@ -364,7 +365,7 @@ def write_png(picture: Picture) -> bytes:
 
 def _paint(axes: Any, shape: SvgElement, order: int) -> None:
     """Paint any other shape; gray images stay gray."""
-    look, style = shape.look, {"color": _plain(shape), "zorder": order}
+    look, style = shape.look, {"color": NAMED.get(shape.colour, (shape.colour,))[0], "zorder": order}
     match shape.kind:
         case "path":
             dashes = [each * POINTS for each in look["stroke-dasharray"]]
@@ -388,10 +389,6 @@ def _paint(axes: Any, shape: SvgElement, order: int) -> None:
             gray = {"cmap": "gray", "vmin": 0.0, "vmax": 1.0 if pixels.dtype.kind == "f" else 255.0}
             extent = look["x"], look["x"] + look["width"], look["y"] + look["height"], look["y"]
             axes.imshow(pixels, extent=extent, interpolation="none", zorder=order, **gray)
-
-
-def _plain(shape: SvgElement) -> str:
-    return NAMED.get(shape.colour, (shape.colour,))[0]
 
 
 # --- overlays: projected points on the camera's image, coloured by depth; pixels, the centre of the first one at 0, 0

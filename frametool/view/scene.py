@@ -256,7 +256,7 @@ class Projection:
     poses: of the drawn frames in `fixed`, by name
     trails: of the moving ones
     links: (parent, child) where both are drawn
-    origins: their pixels
+    origins: their pixels; nearest_last: the frames from the farthest to the nearest
     axis: length of a drawn axis in metres
     scale: pixels per metre
     view: the directions right, up and toward the eye
@@ -291,6 +291,7 @@ class Projection:
             0.4 * min(size[:2]) / (AXIS_PART * usual),  # one frame alone is not blown up
         )
         self.origins = {name: self.at(pose[:3]) for name, pose in self.poses.items()}
+        self.nearest_last = sorted(self.poses, key=lambda name: self.origins[name].depth)
         shortest, longest = (pixels / self.scale for pixels in size.axes)
         self.axis = min(max(AXIS_PART * usual, shortest), longest)
 
@@ -325,10 +326,6 @@ class Projection:
         r11, r12, r13, r21, r22, r23, r31, r32, r33 = quaternion.to_matrix(*rotation)
         columns = ((r11, r21, r31), (r12, r22, r32), (r13, r23, r33))
         return [self.at((x + self.axis * dx, y + self.axis * dy, z + self.axis * dz)) for dx, dy, dz in columns]
-
-    def nearest_last(self) -> list[str]:
-        """Return the frames from the farthest to the nearest."""
-        return sorted(self.poses, key=lambda name: self.origins[name].depth)
 
     def axes(self, name: str) -> list[tuple[int, Flat]]:
         """Return the axes 0, 1, 2 of a frame with their tips, from the farthest to the nearest."""
@@ -388,7 +385,7 @@ class Labels:
     def place_all(self) -> None:
         """Place a name next to each group of frames on one point inside the picture, nearest first."""
         groups: dict[tuple[int, int], tuple[Flat, list[str]]] = {}
-        for name in reversed(self._flat.nearest_last()):
+        for name in reversed(self._flat.nearest_last):
             point = self._flat.origins[name]
             if self._flat.holds(point):
                 groups.setdefault((round(point.x / SAME), round(point.y / SAME)), (point, []))[1].append(name)

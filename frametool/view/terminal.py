@@ -72,7 +72,7 @@ def terminal_lines(scene: FrameScene, columns: int, lines: int, eye: tuple[float
     for stretch in (stretch for stretches in flat.trails.values() for stretch in stretches):
         for begin, end in pairwise(map(flat.at, stretch)):
             _mark_line(canvas, flat, begin, end, "magenta", 2)
-    for name in flat.nearest_last():
+    for name in flat.nearest_last:
         for axis, tip in flat.axes(name):
             _mark_line(canvas, flat, flat.origins[name], tip, COLOURS[axis])
     labels = Labels(flat)
