@@ -74,6 +74,13 @@ def test_a_broken_pcd_is_one_line(run: Run, tmp_path: Path, data: bytes, message
     assert (done.data, done.status, errors) == (None, 1, [f"frametool: {message}"])
 
 
+def test_too_many_fields_without_counts_are_one_line(run: Run, tmp_path: Path) -> None:
+    many = {"FIELDS": "_", "SIZE": "1", "TYPE": "U"}
+    head = "".join(f"{key} {f'{word} ' * 65537}\n" for key, word in many.items())
+    done = move(run, tmp_path, "pcd", f"# .PCD v0.7\nVERSION 0.7\n{head}WIDTH 1\nHEIGHT 1\nPOINTS 1\nDATA binary\n".encode(), "--quiet")
+    assert (done.status, done.err) == (1, "frametool: in.pcd: more than 65536 values a point\n")
+
+
 @pytest.mark.parametrize(
     ("data", "message"),
     [
