@@ -6,8 +6,7 @@ What several lines of a batch read from the same files is read once for as long 
 from __future__ import annotations
 
 import os
-from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -23,13 +22,11 @@ from frametool.grammar.pose_algebra import Lookups
 from frametool.grammar.readers import EARTH_FRAMES, is_slashed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from frametool.formats.load import EdgePlace, FrameFile, Rules
     from frametool.formats.robots.model import Robot
     from frametool.frames.lookups import Frames
-
-    Value = TypeVar("Value")
 
 # field of Answers -> the parameters that say it; of the others the formats say whether they count, and what moves
 ASKED_OUTSIDE = ("time_offset", "frames", "camera_axes")
@@ -47,10 +44,9 @@ def load_tree(argument: str, more: Sequence[str] = (), *, streams: bool = False,
     """
     from frametool.formats.load import Rules  # not every command that may read trees does
 
-    arguments, alone, passed = (argument, *more), drawings and not more, inputs()
+    passed = inputs()
     rules = Rules(bool(passed.moving), passed.cache, bool(passed.normalize))
-    how = f"{rules!r} {streams} {alone}"
-    return _read_once(arguments, how, lambda: _loaded(opened(arguments, streams=streams, drawings=alone), rules))
+    return _load((argument, *more), rules, streams=streams, drawings=drawings and not more)[0]
 
 
 def load_sides(a: Sequence[str], b: Sequence[str], *, normalize: bool) -> list[tuple[Frames, dict[str, EdgePlace]]]:
@@ -60,31 +56,49 @@ def load_sides(a: Sequence[str], b: Sequence[str], *, normalize: bool) -> list[t
     refuse_two_readers((*a, *b))
     count = len(a) + len(b)
     every: list[FrameFile] = []
-
-    def side(arguments: Sequence[str], behind: int, earth: str) -> tuple[Frames, dict[str, EdgePlace]]:
-        where: dict[str, EdgePlace] = {}
-        every.extend(files := opened(arguments, behind=behind, of=count))
-        return _loaded(files, Rules(normalize=normalize, earth=earth), where), where
-
     sides: list[tuple[Frames, dict[str, EdgePlace]]] = []
     for arguments, behind in ((a, 0), (b, len(a))):
         earth = next((name for name in EARTH_FRAMES if sides and name in sides[0][0].frames), "")
-        options = f"{normalize} {behind} of {count} {earth}"
-        sides.append(_read_once(arguments, options, partial(side, arguments, behind, earth)))
+        sides.append(_load(arguments, Rules(normalize=normalize, earth=earth), every, behind=behind, of=count))
     if len(every) == count:  # in a batch they may have been read before, and looked at
         refuse_idle(every)
     return sides
 
 
-def _loaded(files: Sequence[FrameFile], rules: Rules, places: dict[str, EdgePlace] | None = None) -> Frames:
-    """Merge files that are open, and say what they were taken for."""
+def _load(
+    arguments: Sequence[str], rules: Rules, every: list[FrameFile] | None = None, **how: Any
+) -> tuple[Frames, dict[str, EdgePlace]]:
+    """Merge files into a tree; in a batch only if they have changed since they were read.  Also: each frame's place.
+
+    every: takes the files of this side of two; of one tree no place is returned
+    how: they are opened
+    """
     from frametool.formats.load import load_sources
 
-    tree = load_sources(files, rules, places)
-    if tree.moves:
-        inputs().ask("time_offset")
-    state(files, whole=places is None)
-    return tree
+    passed, idle = inputs(), {*inputs().idle}
+
+    def read() -> tuple[tuple[Frames, dict[str, EdgePlace]], set[str]]:
+        files = opened(arguments, **how)
+        places: dict[str, EdgePlace] = {}
+        tree = load_sources(files, rules, None if every is None else places)
+        if tree.moves:
+            passed.ask("time_offset")
+        if every is not None:
+            every.extend(files)
+        state(files, whole=every is None)
+        return (tree, places), idle - passed.idle.keys()
+
+    context = click.get_current_context(silent=True)
+    cache = None if context is None else context.find_object(ReadCache)
+    if cache is None:
+        return read()[0]
+    passed.reads_trees = True
+    named = [each if is_inline(each) else tree_file(each) for each in arguments]
+    key = tuple(named), f"{rules!r} {how} {[passed.peek(name) for name in OF_FILES]}"
+    paths = [each for each in named if not is_inline(each) and os.path.exists(each)]
+    found, asked = cache.read(key, paths, sum(map(len, {*named} - {*paths})), read)
+    passed.ask(*asked)
+    return found
 
 
 def lookups_in(tree: Frames, *, carried: bool) -> Lookups:
@@ -99,30 +113,6 @@ def refuse_idle(files: Sequence[FrameFile]) -> None:
     if inputs().topics and not any(file.topics.counts or file.topics.seen for file in files):
         named = listing(file.name for file in files)
         raise click.UsageError(f"--topic has no effect here: no topic is named in {named}")
-
-
-def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]) -> Value:
-    """Return what is read from files; in a batch, what was read from them before as long as they have not changed.
-
-    options: what says how, as well as the settings
-    """
-    context = click.get_current_context(silent=True)
-    cache = None if context is None else context.find_object(ReadCache)
-    if context is None or cache is None:
-        return read()
-    passed = inputs()
-    passed.reads_trees = True
-    named = [each if is_inline(each) else tree_file(each) for each in arguments]
-    idle = {*passed.idle}
-
-    def read_all() -> tuple[Value, set[str]]:
-        return read(), idle - passed.idle.keys()
-
-    key = tuple(named), f"{options} {[passed.peek(name) for name in OF_FILES]}"
-    files = [each for each in named if not is_inline(each) and os.path.exists(each)]
-    value, asked = cache.read(key, files, sum(map(len, {*named} - {*files})), read_all)
-    passed.ask(*asked)
-    return value
 
 
 def state(files: Sequence[FrameFile], *, whole: bool = True) -> None:

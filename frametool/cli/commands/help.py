@@ -214,7 +214,18 @@ def help_command(ctx: click.Context, inputs: Inputs) -> None:
     name = " ".join(words)
     named = _commands(ctx).get(name) if words[:1] and words[0] in COMMANDS else None
     if inputs.fmt == "json":
-        text = _json(ctx, name, named)
+        from frametool.documents.json import dump
+        from frametool.view.reports import format_entry
+
+        if name and not named:
+            hint = any_near(name, COMMANDS, "`frametool help` lists all")
+            raise click.UsageError(f"-f json is about commands, and {shown(name)} is not one{hint}")
+        every = [described(each, one, ctx) for each, one in ({name: named} if named else _commands(ctx)).items()]
+        whole = {
+            "version": __version__, "topics": topics() | MADE, "commands": every,
+            "formats": [*map(format_entry, FORMATS)], "exit_codes": _exit_codes(EXIT_CODES),
+        }  # fmt: skip
+        text = f"{dump(every[0] if named else whole)}\n"
     elif named and name not in topics():  # calc and formats are subjects too
         shared.show_help(click.Context(named, parent=ctx.parent, info_name=name), paged=True)
         return
@@ -241,21 +252,6 @@ def help_command(ctx: click.Context, inputs: Inputs) -> None:
     else:
         text = topic(name) if name in topics() else _search(ctx, name)
     show(text, paged=True)
-
-
-def _json(ctx: click.Context, name: str, named: click.Command | None) -> str:
-    from frametool.documents.json import dump
-    from frametool.view.reports import format_entry
-
-    if name and not named:
-        hint = any_near(name, COMMANDS, "`frametool help` lists all")
-        raise click.UsageError(f"-f json is about commands, and {shown(name)} is not one{hint}")
-    every = [described(each, one, ctx) for each, one in ({name: named} if named else _commands(ctx)).items()]
-    whole = {
-        "version": __version__, "topics": topics() | MADE, "commands": every, "formats": [*map(format_entry, FORMATS)],
-        "exit_codes": _exit_codes(EXIT_CODES),
-    }  # fmt: skip
-    return f"{dump(every[0] if named else whole)}\n"
 
 
 def _read_example(text: str) -> str:

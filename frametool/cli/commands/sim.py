@@ -165,29 +165,6 @@ class SimOutput:
             yield lambda step: [write(text) for text in writer.write(step)]
 
 
-def leader_of(inputs: Inputs) -> MakeLeader:
-    """Return the leader that the options name; in real time what comes from standard input acts when it arrives.
-
-    Raises FormatError; FileProblem; click.UsageError for a name that is neither a leader nor a file.
-    """
-    argument, seed, is_paced = inputs.leader, inputs.seed, inputs.realtime or inputs.live
-    if argument in drivers.LEADERS:
-        return drivers.built_in(argument, seed)
-    if argument == "-":
-        if sys.stdin is None:
-            raise FileProblem("standard input is closed")
-        say_if_typed()
-        if not is_paced:
-            return drivers.scripted(read_stream(sys.stdin.buffer, "stdin"))
-        mailbox = drivers.Mailbox()
-        mailbox.fill_from(read_stream(sys.stdin.buffer, "stdin", period_ns=0))
-        return mailbox
-    if not os.path.exists(argument) and not os.path.splitext(argument)[1]:
-        known = alternatives(argument, drivers.LEADERS, "leaders")
-        raise click.UsageError(f"no leader {shown(argument)}{known}, or a file")
-    return drivers.scripted(read_script(Source(argument, read_text(argument))))
-
-
 SUBCOMMANDS = {
     "follow": (__name__, "a leader, and one or more turtles that follow"),
     "run": (__name__, "a whole scene from one file"),
@@ -230,7 +207,23 @@ def follow(inputs: Inputs) -> None:
     on with --realtime, where they act when they come. A turtle at a wall is reported once, and every tick
     there is counted in the summary. Below 2 micrometres from its target a follower stands still.
     """
-    leader = leader_of(inputs)
+    argument, seed, is_paced = inputs.leader, inputs.seed, inputs.realtime or inputs.live
+    if argument in drivers.LEADERS:
+        leader = drivers.built_in(argument, seed)
+    elif argument == "-":
+        if sys.stdin is None:
+            raise FileProblem("standard input is closed")
+        say_if_typed()
+        if is_paced:  # commands act when they arrive
+            leader = mailbox = drivers.Mailbox()
+            mailbox.fill_from(read_stream(sys.stdin.buffer, "stdin", period_ns=0))
+        else:
+            leader = drivers.scripted(read_stream(sys.stdin.buffer, "stdin"))
+    else:
+        if not os.path.exists(argument) and not os.path.splitext(argument)[1]:
+            known = alternatives(argument, drivers.LEADERS, "leaders")
+            raise click.UsageError(f"no leader {shown(argument)}{known}, or a file")
+        leader = drivers.scripted(read_script(Source(argument, read_text(argument))))
     if inputs.explain_step is None:
         SimOutput(inputs).run(scene_of(inputs, leader))
         return
