@@ -31,7 +31,6 @@ from frametool.text.numbers import NotFinite, parse_length
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.cli.streaming import PoseTask
     from frametool.explain.derive import DerivationStyle, WrittenPose
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Components
@@ -52,7 +51,7 @@ _WRITTEN = f"formats: {', '.join(writers('arrays'))}"
 class BagOfClouds:
     """The clouds of a bag that -i names, and the files that they become."""
 
-    def __init__(self, task: PoseTask) -> None:
+    def __init__(self, task: streaming.PoseTask) -> None:
         """Open the bag and choose its topics; of --topic, what names no clouds is left to the tree."""
         from frametool.recordings.messages import cloud_topics
         from frametool.recordings.read import opened_recording
@@ -121,7 +120,7 @@ class BagOfClouds:
 class SeveralClouds:
     """Clouds of several -i that become one: each is expressed in a frame of its own, or all in SOURCE."""
 
-    def __init__(self, task: PoseTask) -> None:
+    def __init__(self, task: streaming.PoseTask) -> None:
         """Take --frames and the --in of clouds; the tree may not have them too.  Raises click.UsageError."""
         self.task, inputs = task, task.inputs
         self.paths: Sequence[str] = inputs.input_path
@@ -243,7 +242,7 @@ def apply_command(inputs: Inputs) -> int:
     return status
 
 
-def _derived(task: PoseTask, plan: DerivationStyle, way: Way, record: str | Source, kind: str) -> int:
+def _derived(task: streaming.PoseTask, plan: DerivationStyle, way: Way, record: str | Source, kind: str) -> int:
     """Write the derivation of one record."""
     from frametool.stream.written import ByTree, derive_record
 
@@ -270,12 +269,13 @@ class Way:
     has_source: whether all come from one frame
     counters: whether no frame has a number for its name
     rest: the arguments that are records
+    into: in which frame records are then expressed, for messages
     """
 
     tree: Frames | None = None
     has_source = counters = True
 
-    def __init__(self, task: PoseTask) -> None:
+    def __init__(self, task: streaming.PoseTask) -> None:
         """Read the pose of --transform."""
         inputs = task.inputs
         self.uncertain, self.rest = bool(inputs.covariance), inputs.arguments
@@ -286,12 +286,8 @@ class Way:
         if pose.covariance is not None and not self.uncertain:
             warn(f"{self.read.name}: its covariance is not used (--covariance)")
         self.target, self.source = pose.parent, pose.name
+        self.into = f" in {self.target}" if self.target else ""
         self.pose = pose if self.uncertain else pose._replace(covariance=None)
-
-    @property
-    def into(self) -> str:
-        """Return in which frame records are then expressed, for messages."""
-        return f" in {self.target}" if self.target else ""
 
     def from_frame(self, own: str | None, own_ns: int | None = None) -> Components:  # noqa: ARG002 - of a tree
         """Return what moves records from a frame, at a time or the latest."""
@@ -329,6 +325,7 @@ class TreeWay(Way):
         self.tree = tree = load_tree(arguments[0], inputs.more, streams=streams)
         self.lookups = lookups_in(tree, carried=self.uncertain)
         self.target: str = frame_name(arguments[1], tree)
+        self.into = f" in {self.target}"
         self.source = next((frame_name(each, tree) for each in named), None)
         if not {self.target, self.source or self.target} <= set(tree.frames):
             tree.lookup(self.target, self.source or self.target)  # raises, and names the nearest frames

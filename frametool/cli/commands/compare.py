@@ -254,8 +254,18 @@ def resample_command(inputs: Inputs) -> int:
         found = found.numbered()
     if every:
         stamps = stamps_every(found, every)
-    else:
-        stamps = stamps_at_rate(found, rate) if rate else _stamps(inputs, times or "")
+    elif rate:
+        stamps = stamps_at_rate(found, rate)
+    else:  # those of a trajectory, or a list of times
+        import numpy as np
+
+        try:
+            other, other_name, _ = trajectory(inputs, times or "")
+        except (FormatError, FileProblem):
+            stamps = np.array(options.read_times(times or "", stop), np.int64)
+        else:
+            refuse(other.stamps_ns is None, f"--at {times}: the poses there have no stamps")
+            stamps = _in_order(other, other_name).stamps_ns
     if not counted and (window := options.window_of(inputs)):
         inputs.ask("start", "stop")
         stamps = stamps[(window[0] <= stamps) & (stamps <= window[1])]
@@ -268,18 +278,6 @@ def resample_command(inputs: Inputs) -> int:
         say(f"note: {lost} of {len(stamps)} times {lies} outside {span} and {are} left out")
     write_trajectory(output, made._replace(stamps_ns=None) if counted else made)
     return ROWS_SKIPPED if skipped else 0
-
-
-def _stamps(inputs: Inputs, text: str) -> Any:
-    """Read the stamps of a trajectory, or a list of times."""
-    import numpy as np
-
-    try:
-        found, name, _ = trajectory(inputs, text)
-    except (FormatError, FileProblem):
-        return np.array(options.read_times(text, stop), np.int64)
-    refuse(found.stamps_ns is None, f"--at {text}: the poses there have no stamps")
-    return _in_order(found, name).stamps_ns
 
 
 def _in_order(found: Trajectory, name: str) -> Trajectory:

@@ -99,11 +99,6 @@ def _titles(label: str, titles: list[str], most: int = 12) -> str:
     return "".join([f"{label}:\n\n", *(f"  {each}\n" for each in titles[:most] + more)])
 
 
-def _joined(parts: dict[str, Any]) -> str:
-    """Return the texts that there is something to tell in, with a line between them."""
-    return "\n".join(text for text, found in parts.items() if found)
-
-
 def cookbook(words: tuple[str, ...]) -> str:
     """Return the answers whose question has these words, else those that have them in their text; or all questions."""
     known, holds = questions(), finder(words)
@@ -116,7 +111,7 @@ def cookbook(words: tuple[str, ...]) -> str:
     refuse(not asked, f"no question has {shown(' '.join(words))}; `frametool help cookbook` lists all")
     answers = "".join(f"{each}\n\n{known[each]}\n\n" for each in asked)
     files = "The files: `frametool examples -o examples` copies them into a folder `examples`.\n"
-    return answers + _joined({_titles("Also in", inside): inside, files: True})
+    return answers + (f"{_titles('Also in', inside)}\n" if inside else "") + files
 
 
 def _commands(ctx: click.Context) -> dict[str, click.Command]:
@@ -147,12 +142,13 @@ def _search(ctx: click.Context, name: str) -> str:
     if not (about or calls or formats or titles):
         hint = any_near(name.lower(), [*known, *MADE, *COMMANDS], "`frametool help` lists all topics")
         raise click.UsageError(f"no topic, command or text has {shown(name)}{hint}")
-    return _joined({
+    parts = {
         f"Topics with {shown(name)} (frametool help TOPIC):\n\n{_listed({each: known[each] for each in about})}": about,
         _wrapped(f"Commands (frametool help COMMAND): {', '.join(calls)}"): calls,
         _wrapped(f"File formats (frametool formats NAME): {', '.join(formats)}"): formats,
         _titles(f"Cookbook (frametool help cookbook {name})", titles): titles,
-    })  # fmt: skip
+    }  # fmt: skip
+    return "\n".join(text for text, found in parts.items() if found)
 
 
 def described(name: str, command: click.Command, ctx: click.Context) -> dict[str, Any]:

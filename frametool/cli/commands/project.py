@@ -19,7 +19,7 @@ from frametool.cli.trees import FRAME, frame_name
 from frametool.documents.source import InputFile, Source
 from frametool.errors import FormatError, ValueInvalid, listing, shown
 from frametool.geometry.rigid import EXACT
-from frametool.stream.request import Operation, Request
+from frametool.stream.request import Formula, Operation, Request
 from frametool.text.numbers import parse_length, parse_number
 
 if TYPE_CHECKING:
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from frametool.geometry.camera import Camera
     from frametool.geometry.types import Components
     from frametool.stream.pixels import Seen
-    from frametool.stream.request import Formula
 
 AXES = ("optical", "opengl", "flu")
 

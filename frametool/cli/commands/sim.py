@@ -24,7 +24,7 @@ from frametool.documents.source import Source, read_text
 from frametool.errors import FileProblem, alternatives, shown
 from frametool.frames.stamps import BILLION
 from frametool.sim import drivers
-from frametool.sim.scene import duration_ns, parse_spawn, read_scene, read_script, read_stream, tutorial
+from frametool.sim.scene import Scene, duration_ns, parse_spawn, read_scene, read_script, read_stream, tutorial
 from frametool.sim.simulate import EMITS, FORMS, RunSummary, StepWriter, event_log, simulate
 from frametool.sim.turtle import TICK_NS, VARIANTS
 from frametool.text.numbers import parse_number
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from frametool.sim.drivers import MakeLeader
-    from frametool.sim.scene import Scene
     from frametool.sim.simulate import Watch
 
 
