@@ -43,7 +43,19 @@ def read_rotations(
     inputs = tuple(numbers)
     shape = arrays.batch_shape(inputs)
     quaternions = np.empty((4, int(np.prod(shape))))
-    off, worst = _convert(notation, inputs, quaternions, degrees=degrees, normalize=normalize)
+    off, worst = None, 0.0  # the deviation of each row, inf if it is refused; None: nothing to report
+    with np.errstate(all="ignore"):
+        for place, block in arrays.cut(inputs):
+            grades, right, furthest = _repaired(notation.representation.batch, block, normalize=normalize)
+            worst = max(worst, furthest)
+            results = notation.to_quaternion(right, arrays, degrees=degrees)
+            if notation.representation.batch is None and not arrays.all_finite(results):
+                grades = np.where(np.isfinite(sum(results)), 0.0, np.inf)
+            for target, result in zip(quaternions, results, strict=True):
+                target[place] = result
+            if grades is not None:
+                off = np.zeros(quaternions.shape[1]) if off is None else off
+                off[place] = grades
     if off is None:
         return Rotations(tuple(quaternions), {}, NONE, worst)
     refused = np.flatnonzero(off == np.inf)
@@ -68,26 +80,6 @@ def require_rotations(notation: Notation, inputs: Components, name: str, *, norm
         share, first = f"{found.mended.size} of {np.prod(shape)} {rule.what}", at_row(name, found.mended[0], shape)
         warn(f"{name}: {share} are off by up to {found.off:.2g} (first: {first}) and were normalised")
     return tuple(part.reshape(shape) for part in found.quaternions)
-
-
-def _convert(
-    notation: Notation, inputs: Components, quaternions: Array, *, degrees: bool, normalize: bool
-) -> tuple[Array | None, float]:
-    """Fill quaternions (4, n); return the deviation per row (inf: refused; None: nothing to report) and the worst."""
-    off, worst = None, 0.0
-    with np.errstate(all="ignore"):
-        for place, block in arrays.cut(inputs):
-            grades, right, furthest = _repaired(notation.representation.batch, block, normalize=normalize)
-            worst = max(worst, furthest)
-            results = notation.to_quaternion(right, arrays, degrees=degrees)
-            if notation.representation.batch is None and not arrays.all_finite(results):
-                grades = np.where(np.isfinite(sum(results)), 0.0, np.inf)
-            for target, result in zip(quaternions, results, strict=True):
-                target[place] = result
-            if grades is not None:
-                off = np.zeros(quaternions.shape[1]) if off is None else off
-                off[place] = grades
-    return off, worst
 
 
 def _repaired(

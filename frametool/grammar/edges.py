@@ -206,7 +206,10 @@ class Topics:
     def agrees(self, topic: str, child: str) -> bool:
         """Return True if a frame came by this namespace before, or by none."""
         first = self._first.setdefault(child, topic)
-        return first == topic or _source_of(first) == _source_of(topic)
+        if first == topic:
+            return True
+        ends = [f"/{each}" for each in (first, topic)]  # `tf` and `tf_static` of one namespace belong together
+        return len({each.removesuffix("_static") if each.endswith("/tf_static") else each for each in ends}) == 1
 
     def conflict(self, topic: str, child: str) -> str:
         """Return an error if a frame comes from two namespaces, as with two robots; once for each frame."""
@@ -222,11 +225,6 @@ class Topics:
         if not self.chosen or not known or any(map(self.chooses, self.counts)):
             return ""
         return f"no transforms on {', '.join(sorted(self.chosen))}; topics: {listing(known, near=min(self.chosen))}"
-
-
-def _source_of(topic: str) -> str:
-    """Return the namespace of a topic: `tf` and `tf_static` of one namespace belong together."""
-    return topic.removesuffix("_static") if topic.endswith("/tf_static") or topic == "tf_static" else topic
 
 
 class Answers(NamedTuple):

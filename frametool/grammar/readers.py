@@ -77,7 +77,7 @@ class Misfit(ValueInvalid):
 
         error = format_error(source, (*document, *self.path), str(self), key=self.key)
         error.rule = self.rule
-        return error
+        return answerable(error) if isinstance(self, Unclear) else error
 
 
 class NotARotation(Misfit):
@@ -86,10 +86,6 @@ class NotARotation(Misfit):
 
 class Unclear(Misfit):
     """A value whose meaning has to be set by an option."""
-
-    def placed(self, source: Source, *document: int) -> FormatError:
-        """Return the error with line and column."""
-        return answerable(super().placed(source, *document))
 
 
 def answerable(error: FormatError) -> Unanswered:
