@@ -60,7 +60,12 @@ def read_rotations(
         return Rotations(tuple(quaternions), {}, NONE, worst)
     refused = np.flatnonzero(off == np.inf)
     flat = [np.broadcast_to(column, shape).reshape(-1) for column in inputs] if refused.size else []
-    reasons = {row: _reason(notation, [column[row] for column in flat], normalize) for row in refused.tolist()}
+    reasons = dict.fromkeys(refused.tolist(), "the numbers are not a rotation")
+    for row in reasons:
+        try:
+            notation.representation.checked([float(column[row]) for column in flat], normalize=normalize)
+        except ValueInvalid as error:
+            reasons[row] = str(error)
     quaternions[:, refused] = np.reshape(IDENTITY, (4, 1))
     return Rotations(tuple(quaternions), reasons, np.flatnonzero((off > SILENT) & (off < np.inf)), worst)
 
@@ -107,12 +112,3 @@ def _with_repaired(rule: BatchRule, block: Components, rough: Indices) -> Compon
     for column, values in zip(after, rule.repair(*(column[rough] for column in block), arrays), strict=True):
         column[rough] = values
     return after
-
-
-def _reason(notation: Notation, row: Sequence[float], normalize: bool) -> str:  # noqa: FBT001
-    """Return the reason why a row is not a rotation."""
-    try:
-        notation.representation.checked([float(part) for part in row], normalize=normalize)
-    except ValueInvalid as error:
-        return str(error)
-    return "the numbers are not a rotation"
