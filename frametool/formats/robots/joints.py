@@ -350,9 +350,7 @@ def _of_value(value: Any, path: Path, message: TextMessage, joints: Mapping[str,
             yield JointSample(key, mapping[key], stamp_ns, partial(_refused, message, (*path, key)))
 
 
-def _of_table(
-    file: InputFile, fmt: str, joints: Mapping[str, Joint], tally: Diagnostics
-) -> Iterator[JointSample]:
+def _of_table(file: InputFile, fmt: str, joints: Mapping[str, Joint], tally: Diagnostics) -> Iterator[JointSample]:
     """Yield the values of a table whose header names joints."""
     rows = line_texts(file.stream, file.name, tally)
     first, header = next(rows, (1, ""))
