@@ -207,9 +207,13 @@ def paired(
     return Pairs(*((made, kept) if walks_est else (kept, made)), possible, shared, name, gap_s)
 
 
-def between(dense: Trajectory, stamps_ns: Array, max_gap_ns: float) -> tuple[Trajectory, Array]:
-    """Return poses at the stamps within a trajectory and not in a gap, and the mask of these stamps."""
+def between(dense: Trajectory, stamps_ns: Array, max_gap_ns: float | None = None) -> tuple[Trajectory, Array]:
+    """Return poses at the stamps within a trajectory and not in a gap, and the mask of these stamps.
+
+    Interpolated linearly and by slerp; by default a gap is longer than 3 median intervals.
+    """
     own = dense.stamps_ns
+    max_gap_ns = GAP * interval(own) if max_gap_ns is None else max_gap_ns
     after = np.searchsorted(own, stamps_ns).clip(0, len(own) - 1)
     before = np.where(own[after] == stamps_ns, after, (after - 1).clip(0))
     gap = own[after] - own[before]
@@ -434,14 +438,6 @@ def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step:
 
 MOST = 100_000_000  # poses
 BILLION = 10**9
-
-
-def resampled(each: Trajectory, stamps_ns: Array, max_gap_ns: float | None = None) -> Trajectory:
-    """Return a trajectory at stamps within it: interpolated linearly and by slerp, as pairs are.
-
-    Stamps in gaps longer than max_gap_ns (default: 3 median intervals) have no pose.
-    """
-    return between(each, stamps_ns, GAP * interval(each.stamps_ns) if max_gap_ns is None else max_gap_ns)[0]
 
 
 def stamps_at_rate(each: Trajectory, rate_hz: float) -> Array:

@@ -480,7 +480,7 @@ def resample(
     else:
         step = None if every is None else parse_delta(every, ("m", "deg"))
         stamps = np.asarray(at, np.int64) if step is None else alignment.stamps_every(argument, step)
-    return alignment.resampled(argument, stamps, max_gap_ns)
+    return alignment.between(argument, stamps, max_gap_ns)[0]
 
 
 def _taken(argument: Given, name: str) -> Trajectory:

@@ -376,7 +376,15 @@ class RecordingReader:
         self.path, self.metadata, files = path, dict[str, Any](), [Path(path)]
         if files[0].is_dir():
             self.metadata = read_metadata((files[0] / METADATA).read_text(encoding="utf-8"), f"{path}/{METADATA}")
-            files = _files_of(files[0], self.metadata, opened)
+            files = [files[0] / PurePath(name).name for name in self.metadata["relative_file_paths"]]
+            if self.metadata.get("compression_mode", "").lower() == "file":  # unpacked while the recording is open
+                import zstandard
+
+                home, packed = Path(opened.enter_context(TemporaryDirectory(prefix="frametool."))), files
+                files = [home / each.stem for each in packed]
+                for whole, plain in zip(packed, files, strict=True):
+                    with zstandard.open(whole, "rb") as source, plain.open("wb") as target:
+                        shutil.copyfileobj(source, target)
         with files[0].open("rb") as first:
             self.is_ros1 = first.read(8) == b"#ROSBAG "
         self.files: list[Any] = []
@@ -450,21 +458,6 @@ def read_metadata(text: str, name: str) -> dict[str, Any]:
         raise ValueError(str(error)) from None
     found = next((each.value for each in documents if type(each.value) is dict), {})
     return dict(found.get(INFORMATION, found))
-
-
-def _files_of(folder: Path, metadata: dict[str, Any], opened: ExitStack) -> list[Path]:
-    """Return the files of a bag in their order; files that are compressed as a whole are unpacked while it is open."""
-    found = [folder / PurePath(name).name for name in metadata["relative_file_paths"]]
-    if metadata.get("compression_mode", "").lower() != "file":
-        return found
-    import zstandard
-
-    home, plain = Path(opened.enter_context(TemporaryDirectory(prefix="frametool."))), []
-    for path in found:
-        plain.append(home / path.stem)
-        with zstandard.open(path, "rb") as packed, plain[-1].open("wb") as file:
-            shutil.copyfileobj(packed, file)
-    return plain
 
 
 @contextmanager

@@ -245,7 +245,7 @@ def resample_command(inputs: Inputs) -> int:
     output = Output(inputs, "poses", otherwise=by_name(path, writers("poses")) or "csv")
     (fmt,) = options.for_each(inputs.input_formats, 1)
     found, name, skipped = trajectory(inputs, path, fmt, inputs.on_error)
-    from frametool.fit.alignment import resampled, stamps_at_rate, stamps_every
+    from frametool.fit.alignment import between, stamps_at_rate, stamps_every
 
     found = _in_order(found, name)
     counted = found.stamps_ns is None
@@ -269,7 +269,7 @@ def resample_command(inputs: Inputs) -> int:
     if not counted and (window := options.window_of(inputs)):
         inputs.ask("start", "stop")
         stamps = stamps[(window[0] <= stamps) & (stamps <= window[1])]
-    made = resampled(found, stamps, inputs.max_gap_ns)
+    made = between(found, stamps, inputs.max_gap_ns)[0]
     if lost := len(stamps) - made.size:
         first, last = map(int, found.stamps_ns[[0, -1]])
         in_gap = " or in a gap" * int(lost > ((stamps < first) | (stamps > last)).sum())
