@@ -260,15 +260,12 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
 
 
 def along(
-    shape: Shape, names: Sequence[str], places: tuple[int, ...], source: str
+    place: Place, shape: Shape, names: Sequence[str], places: tuple[int, ...], source: str
 ) -> tuple[tuple[int, ...], Shape]:
     """Return what the covariance with a place is expressed in; that of a NavSatFix is, where nothing else is there.
 
     Raises FormatError where nobody says so.
     """
-    place = shape.place
-    if place is None:
-        return places, shape
     fix = {int(match[1]): at for at, name in enumerate(names) if (match := FIX_ENTRY.fullmatch(name))}
     if not places and shape.kind == POINT and len(fix) == 9:  # field.position_covariance0, or [0]
         return tuple(fix[at] for at in range(9)), shape._replace(unit=place._replace(axes=ENU))

@@ -169,10 +169,10 @@ def covariance_columns(
     except NotARotation as error:
         raise FormatError(str(error), source=source, line=1) from None
     shape = shapes[0]
-    if shape.place is not None:
+    if own is not None:
         from frametool.stream.earth_columns import along
 
-        places, shape = along(shape, table.names or (), places, source)
+        places, shape = along(own, shape, table.names or (), places, source)
     if places and request.operation.formula is not None:
         warn(f"{source}: {LEFT_OUT.format('calc')}", rule="left-out")
     if places and request.gathered is not None:
