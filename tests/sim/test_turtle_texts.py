@@ -29,6 +29,7 @@ ECHO = "linear:\n  x: 2.0\n  y: 0.0\n  z: 0.0\nangular:\n  x: 0.0\n  y: 0.0\n  z
     "text",
     [
         "t,linear,angular\n0,2,0\n0.5,0,-1.5\n",
+        't,linear,angular\n# a comment may hold one "\n0,2,0\n0.5,0,-1.5\n',
         "# made by hand\n\nangular, turtle, linear, t\r\n0,a b,2,0\r\n# more\r\n-1.5,,0,0.5",
         "t,turtle,linear_x,angular_z,distance\n0,a,2,0,\n500000000ns,a,0,-1.5,",
         "- {t: 0, linear: 2, angular: 0}\n- {t: 0.5, linear: 0, angular: -1.5}\n",
