@@ -75,7 +75,8 @@ def _load(
     """
     from frametool.formats.load import load_sources
 
-    passed, idle = inputs(), {*inputs().idle}
+    passed = inputs()
+    idle = {*passed.idle}
 
     def read() -> tuple[tuple[Frames, dict[str, EdgePlace]], set[str]]:
         files = opened(arguments, **how)
