@@ -343,7 +343,7 @@ def _record(document: Any, place: RecordPlace, request: Request, reading: Readin
     path, has_poses = place.path, request.rows.poses > 0
     value = value_at(document, path)
     reading.here = here = (*above, *path)
-    operation, formula = request.operation, request.operation.formula
+    formula = request.operation.formula
     try:
         if type(value) is list:
             return _bare_list(value, here, reading, request)
@@ -357,8 +357,6 @@ def _record(document: Any, place: RecordPlace, request: Request, reading: Readin
         raise Misfit(f"an expression takes poses, points and vectors; this is a {record.shape.kind}", here)
     if has_poses and formula is not None and not (formula.reads_row or record.values or _is_holder(value)):
         record = record._replace(shape=Shape("", None))
-    if operation.only_adds:
-        within(above, _refuse_repeated, record, document, path, request)
     try:
         # what says a covariance: the record, or the mapping around it where a message has it so
         around = (path, path[:-1]) if path[-1:] == (record.shape.kind,) else (path,)
@@ -371,6 +369,8 @@ def _record(document: Any, place: RecordPlace, request: Request, reading: Readin
                 record = with_covariances(record, holder, each, place, above, request, reading)
                 break
         record = _with_asked(record, document, path, above, request)
+        if request.operation.only_adds:
+            _refuse_repeated(record, document, path, request)
         return _with_names(record, document, path, place.outer, above, request) if has_poses else record
     except Misfit as misfit:
         raise misfit.below(*above) from None

@@ -19,7 +19,7 @@ from frametool.lint.tree_diff import SAME, Apart, Difference
 from frametool.view.pose_text import WIDTH, in_width, largest_sigmas, sigmas_of
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.frames.track import Track
@@ -57,13 +57,15 @@ def columns(rows: Sequence[Sequence[str]], left: Sequence[bool]) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def folded(text: str, indent: str = "") -> list[str]:
-    """Wrap a text with a hanging indent; a word that is too long is shortened."""
-    words = (short(word, WIDTH - len(indent) - 2) for word in text.split(" "))
-    return wrap(
-        " ".join(words), WIDTH, initial_indent=indent, subsequent_indent=f"{indent}  ", break_long_words=False,
-        break_on_hyphens=False,
-    )  # fmt: skip
+def folded(text: str, indent: str = "") -> Iterator[str]:
+    """Wrap a text by display width, with a hanging indent; a word that is too long is shortened."""
+    line = indent
+    for word in (short(word, WIDTH - len(indent) - 2) for word in text.split(" ")):
+        if cells(line) + cells(word) >= WIDTH and line.strip():
+            yield line
+            line = f"{indent}  "
+        line += f" {word}" if line.strip("│ ") else word
+    yield line
 
 
 def short(name: str, width: int) -> str:
