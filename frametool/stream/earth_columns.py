@@ -437,11 +437,10 @@ def placed_record(
     values = (*numbers, *extra)
     record = empty._replace(shape=shape, values=values)
     if stays:
-        return record._replace(numbers=tuple((*empty.path, key) for key in keys), members=tuple(keys))
-    first, *others = keys
-    return record._replace(
-        numbers=(None,) * len(values), members=(first,), others=tuple(others), placed=tuple(keys)
-    )  # fmt: skip
+        own_keys = empty.keys._replace(members=tuple(keys))
+        return record._replace(numbers=tuple((*empty.path, key) for key in keys), keys=own_keys)
+    own_keys = empty.keys._replace(members=(keys[0],), others=tuple(keys[1:]), placed=tuple(keys))
+    return record._replace(numbers=(None,) * len(values), keys=own_keys)
 
 
 def _extra(pose: Pose, reading: Reading, request: Request, *, is_point: bool) -> tuple[float, ...]:

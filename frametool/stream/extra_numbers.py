@@ -56,7 +56,7 @@ def with_covariances(
     if request.gathered is not None:
         request.gathered.uncertain = True
     if request.gathered is not None or is_left_out:
-        return record._replace(others=(*record.others, *said))
+        return record._replace(keys=record.keys._replace(others=(*record.keys.others, *said)))
     if operation.keeps_frames and not (shape.inverse or (has_sigma and request.results.canonical)):
         for key in there * is_own:
             within((*around, key), _entries, holder[key], (36, 9))
@@ -77,8 +77,8 @@ def with_covariances(
         within(below, covariance.check, numbers)
         record = record._replace(
             shape=record.shape._replace(covariance=(*record.shape.covariance, len(numbers))),
-            numbers=record.numbers + paths, values=(*record.values, *numbers), covariances=(*record.covariances, key),
-            begins=(*record.begins, paths[0]),
+            numbers=record.numbers + paths, values=(*record.values, *numbers), begins=(*record.begins, paths[0]),
+            keys=record.keys._replace(covariances=(*record.keys.covariances, key)),
         )  # fmt: skip
     return record
 
@@ -130,7 +130,8 @@ def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Readi
     entries = entries if size == len(entries) else covariance.of_position(entries)
     return record._replace(
         shape=record.shape._replace(covariance=(size,), rewritten=True), numbers=(*record.numbers, *[None] * size),
-        values=(*record.values, *entries), others=(*record.others, *(flat or (covariance.SIGMA,))),
+        values=(*record.values, *entries),
+        keys=record.keys._replace(others=(*record.keys.others, *(flat or (covariance.SIGMA,)))),
     )  # fmt: skip
 
 
@@ -145,7 +146,7 @@ def with_scale(record: Record, value: Any, around: Path, above: Path, request: R
     return record._replace(
         shape=record.shape._replace(covariance=(*record.shape.covariance, 1)),
         numbers=(*record.numbers, (*above, *around, SCALE)),
-        values=(*record.values, scale), covariances=(*record.covariances, SCALE),
+        values=(*record.values, scale), keys=record.keys._replace(covariances=(*record.keys.covariances, SCALE)),
     )  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from frametool.errors import (
     shown,
     warn,
 )
-from frametool.formats.robots.joints import JointColumn, JointState, find_joint_columns
+from frametool.formats.robots.joints import SLACK, JointColumn, JointState, find_joint_columns
 from frametool.formats.robots.model import TURNING, JointValue, Robot
 from frametool.formats.table import FORMATS
 from frametool.ros import messages
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.geometry.types import Components, Namespace, Number
-
-SLACK = 1e-9  # by which a value may lie beyond a limit
 
 
 class JointRows(Formula):

@@ -75,7 +75,6 @@ NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS)).difference(LISTE
 KNOWN = frozenset((*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS))
 XYZ = ("x", "y", "z")
 MOST_KEYS = 8  # named in a message
-SIX_NUMBERS = 6  # of a twist or a wrench
 QUATERNION = (*XYZ, "w")
 USED = KNOWN.difference(NAME_KEYS).union(ROTATION_KEYS, (AXES_KEY, "sigma"), COVARIANCES, *PARTS.values())
 NUMBER_BEGINS = frozenset("+-.0123456789n")  # n: of nan
@@ -91,37 +90,45 @@ class Name(NamedTuple):
     paths: tuple[Path, ...] = ()
 
 
+class RecordKeys(NamedTuple):
+    """The keys under which a record says what it is.
+
+    position: "" where each of its numbers is a member of the record, whose keys are `members`
+    others: further keys that say the same rotation or position
+    flat: keys that hold one number of the rotation each; `rotation` is then the first of them
+    covariances: the keys of those whose numbers come last, or of a scale
+    placed: those of a position on the Earth and the rotation there, where the record's numbers are not theirs
+    """
+
+    position: str = ""
+    rotation: str = ""
+    others: tuple[str, ...] = ()
+    members: tuple[str, ...] = ()
+    flat: tuple[str, ...] = ()
+    covariances: tuple[str, ...] = ()
+    placed: tuple[str, ...] = ()
+
+
 class Record(NamedTuple):
     """One point, vector, pose, twist or wrench: what its numbers mean, where they are, which frames it names.
 
     path: of the mapping or list that holds the numbers
     numbers: the path of each; None for a number that is not written and counts as 0
     values: the numbers, in the order of `shape`
-    key: the key of the position; "" where each of its numbers is a member of the record, whose keys are `members`
-    rotation: the key of the rotation; others: further keys that say the same rotation or position
-    flat: keys that hold one number of the rotation each; `rotation` is then the first of them
-    covariances: the keys of those whose numbers come last, or of a scale
     begins: where each covariance of messages begins; those that begin with -1 are unknown, and none of these numbers
     stamps: the paths of seconds and nanoseconds in its header, then in those around it; stamp_ns: the time of the first
-    placed: the keys that say a position on the Earth and the rotation there, where its numbers are not theirs
     """
 
     path: Path
     shape: Shape
     numbers: tuple[Path | None, ...] = ()
     values: tuple[float, ...] = ()
-    key: str = ""
-    rotation: str = ""
-    others: tuple[str, ...] = ()
-    members: tuple[str, ...] = ()
-    flat: tuple[str, ...] = ()
+    keys: RecordKeys = RecordKeys()
     name: Name = Name()
     parent: Name = Name()
-    covariances: tuple[str, ...] = ()
     begins: tuple[Path, ...] = ()
     stamps: tuple[Path, ...] = ()
     stamp_ns: int | None = None
-    placed: tuple[str, ...] = ()
 
 
 class RecordPlace(NamedTuple):
@@ -361,7 +368,7 @@ def _record(document: Any, place: RecordPlace, request: Request, reading: Readin
         # what says a covariance: the record, or the mapping around it where a message has it so
         around = (path, path[:-1]) if path[-1:] == (record.shape.kind,) else (path,)
         keys = {*place.covariances, *COVARIANCE_KEYS}
-        for each in () if record.placed else around:
+        for each in () if record.keys.placed else around:
             holder = value_at(document, each)
             if type(holder) is dict and (not keys.isdisjoint(holder) or any(map(may_be_uncertain, holder))):
                 from frametool.stream.extra_numbers import with_covariances
@@ -393,7 +400,7 @@ def _only_asked(value: dict[str, Any], path: Path, request: Request) -> Record:
 
     record, header = Record(path, Shape("", None)), value.get("header")
     if messages.is_joint_state(value):
-        record = record._replace(members=tuple(key for key in messages.STATE_LISTS if key in value))
+        record = record._replace(keys=RecordKeys(members=tuple(key for key in messages.STATE_LISTS if key in value)))
         if type(header) is dict:
             record = record._replace(parent=_named(header, ("frame_id",), (*path, "header"), Name(), request))
     elif there := next((key for key in value if key in (*POSITION_KEYS, *ROTATION_KEYS)), None):
@@ -437,12 +444,12 @@ def _of_message(value: Any, place: RecordPlace, path: Path, reading: Reading, re
     if request.rows.kind not in ("", kind):
         raise Misfit(f"{field} cannot be taken for a {request.rows.kind}")
     if kind == VECTOR:
-        return _with_position(Record(path, Shape(kind), key=field), value[field], 1.0, partial=False)
+        return _with_position(Record(path, Shape(kind), keys=RecordKeys(field)), value[field], 1.0, partial=False)
     if known := value.get(place.covariances[0]):
         from frametool.stream.extra_numbers import is_unknown
 
         if within(place.covariances, is_unknown, known, (9,)):
-            return Record(path, Shape("", None), rotation=field)
+            return Record(path, Shape("", None), keys=RecordKeys(rotation=field))
     reading.degrees = request.rows.degrees
     within((field,), read_rotation, field, value[field], reading)
     record = _with_rotation(value[field], field, Record(path, Shape(POSE, None)), (field,), reading)
@@ -497,7 +504,7 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     is_usual = not (rows.kind or rows.given) and {each.spec for each in request.results.notations} <= {"quaternion"}
     is_kept = operation.changes_nothing and operation.formula is None and request.gathered is None
     stays = not turns and "header" in value and key in (POINT, VECTOR) and is_kept and is_usual
-    record = Record(path, Shape(key if stays else _kind(key, turns, request), None), key=key)
+    record = Record(path, Shape(key if stays else _kind(key, turns, request), None), keys=RecordKeys(key))
     if positions:
         record = _with_position(record, value[key], POINT_KEYS[key], partial="header" not in value)
     elif flat and flat.position:
@@ -516,7 +523,7 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     if (flag := value.get("inverse", "false")) not in ("true", "false"):
         raise Misfit(f"inverse must be true or false, found {kind(flag)}", ("inverse",))
     shape = record.shape._replace(inverse=flag == "true")
-    record = record._replace(shape=shape, others=(*rotations[1:], *positions[1:]))
+    record = record._replace(shape=shape, keys=record.keys._replace(others=(*rotations[1:], *positions[1:])))
     is_ecef = flat and flat.position and flat.position.prefix.lower().endswith("ecef_")
     place = request.rows.given_place or ("ecef" if is_ecef else "")
     return _given_on_earth(record, request.with_rows(given_place=place)) if place else record
@@ -552,7 +559,7 @@ def _pose_at_place(rest: dict[str, Any], path: Path, reading: Reading, request: 
     if not (rotations or positions or _flat_pose(bare, rotations)):
         return Pose(covariance=covariance), []
     record = _mapping(bare, path, reading, request.with_rows(kind=POSE))
-    keys = [*rotations, *positions, *record.members, *record.flat, *(["angles"] if "angles" in bare else ())]
+    keys = [*rotations, *positions, *record.keys.members, *record.keys.flat, *(["angles"] if "angles" in bare else ())]
     return pose_of(record, request)._replace(covariance=covariance), keys
 
 
@@ -618,7 +625,7 @@ def _flat_pose(value: dict[str, Any], rotations: list[str]) -> PoseColumns | Non
     others = NOTHING_BUT.difference(STALE) if "axis_x" in value else NOTHING_BUT
     names = [key for key in scalars if key not in others]  # that may be numbers of ours
     is_flat = not (rotations or any(key in POINT_KEYS for key in value))
-    if not (names or (is_flat and len(scalars) >= SIX_NUMBERS)):
+    if not (names or (is_flat and len(scalars) >= 6)):
         return None
     from frametool.stream.header import Columns, PoseColumns, find_six, has_pose_column, plain_pose
 
@@ -648,7 +655,7 @@ def _with_members(record: Record, value: dict[str, Any], columns: Columns) -> Re
     values = tuple(_number(value, name, None, metres=columns.unit == 1.0) for name in columns.names)
     paths = tuple((*record.path, name) for name in columns.names)
     shape = record.shape._replace(unit=columns.unit, absent=columns.absent)
-    return record._replace(shape=shape, numbers=paths, values=values, members=columns.names)
+    return record._replace(shape=shape, numbers=paths, values=values, keys=RecordKeys(members=columns.names))
 
 
 def _with_flat_rotation(
@@ -658,7 +665,7 @@ def _with_flat_rotation(
     from frametool.stream.header import Columns, row_shape
 
     names = rotation.names
-    if record.key:
+    if record.keys.position:
         flat = flat._replace(position=Columns((), (), unit=record.shape.unit))
     shape = row_shape(flat, request.with_rows(degrees=reading.degrees, kind=POSE))
     paths, values = ((), ()) if shape.whole else (record.numbers, record.values)
@@ -677,10 +684,9 @@ def _with_flat_rotation(
     if largest is not None and abs(angles[largest]) > TURN:
         name = names[shape.number_at(largest) - shape.position_size]
         reading.note(doubt(shape, angles[largest], KEYS_REMEDY), name, rule="degrees")
-    return record._replace(
-        shape=shape, numbers=(*paths, *((*record.path, name) for name in names)), values=every,
-        rotation=next(key for key in value if key in names), flat=names,
-    )  # fmt: skip
+    keys = record.keys._replace(rotation=next(key for key in value if key in names), flat=names)
+    paths = (*paths, *((*record.path, name) for name in names))
+    return record._replace(shape=shape, numbers=paths, values=every, keys=keys)
 
 
 def _number(
@@ -705,8 +711,8 @@ def _kind(key: str, rotations: object, request: Request) -> str:
 
 def _with_position(record: Record, value: Any, metre: float, *, partial: bool) -> Record:
     """Add the position: a list, or a map in which, if it may be partial, what is missing is 0."""
-    parts = round(1.0 / metre, 6)
-    paths, numbers = within((record.key,), _three, value, (*record.path, record.key), parts, partial=partial)
+    key, parts = record.keys.position, round(1.0 / metre, 6)
+    paths, numbers = within((key,), _three, value, (*record.path, key), parts, partial=partial)
     return record._replace(shape=record.shape._replace(unit=parts), numbers=paths, values=numbers)
 
 
@@ -737,7 +743,8 @@ def _with_rotation(value: Any, key: str, record: Record, below: Path, reading: R
         paths = tuple((*above, *each) if _is_there(value, each) else None for each in places[: len(texts)])
     # else the numbers say another unit than their key: the member is written anew
     shape = record.shape._replace(kind=POSE, notation=notation, degrees=degrees, whole=whole)
-    return record._replace(shape=shape, numbers=record.numbers + paths, values=(*record.values, *values), rotation=key)
+    keys, every = record.keys._replace(rotation=key), (*record.values, *values)
+    return record._replace(shape=shape, numbers=record.numbers + paths, values=every, keys=keys)
 
 
 def _is_there(value: Any, path: Path) -> bool:

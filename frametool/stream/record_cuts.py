@@ -226,7 +226,7 @@ class Template:
             fixed.update(record.numbers, record.begins)
         has_poses = any(record.shape.kind == POSE for record, *_ in self.entries)
         words = _WORDS if has_poses else _WORDS - {"scale"}  # of points that is data
-        placed = {(*record.path, key) for record, *_ in self.entries for key in record.placed}
+        placed = {(*record.path, key) for record, *_ in self.entries for key in record.keys.placed}
         number = JSON_NUMBER if self.json else YAML_NUMBER
         operation = self._request.operation
         passes = operation.keeps_frames and operation.formula is None and self._request.gathered is None
@@ -271,7 +271,7 @@ def _frames_of(root: Node, record: Record, request: Request, *, json: bool) -> l
 
     None where no other name may be: a name is written as plainly there as all that are alike are.
     """
-    is_placed = record.placed or record.shape.place or request.results.place or request.rows.given_place
+    is_placed = record.keys.placed or record.shape.place or request.results.place or request.rows.given_place
     found: list[Node | None] = []
     for name in (record.parent, record.name):
         is_one = name.text and len(name.paths) == 1 and request.rows.poses and not is_placed
@@ -518,7 +518,7 @@ def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
         edge_of=request.pose_from_frame if any(entry.edge is not None for entry in entries) else None,
         yaml=yaml,
         remedies=tuple(
-            KEYS_REMEDY if record.flat else f"write {record.rotation}_deg" for record, *_ in entries
+            KEYS_REMEDY if record.keys.flat else f"write {record.keys.rotation}_deg" for record, *_ in entries
         ),
     )
 

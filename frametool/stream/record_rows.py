@@ -50,9 +50,9 @@ class RecordRows:
         # few plain numbers, and no place on the Earth
         is_plain = template.regular and len({entry.record.path for entry in entries}) == len(entries) <= MOST_ENTRIES
         is_simple = is_plain and not any(
-            self.request.operation.reads_scale(entry.record.shape) or entry.record.shape.place or entry.record.placed
-            or entry.target.place or entry.target.scaled
-            for entry in entries
+            self.request.operation.reads_scale(record.shape) or record.shape.place or record.keys.placed
+            or target.place or target.scaled
+            for record, target, *_ in entries
         )  # fmt: skip
         for at, entry in enumerate(entries if is_simple else ()):
             target = self._target(entry.target, self.request.operation.result_kind(entry.record.shape.kind))

@@ -455,7 +455,8 @@ def _result(node: Node, unit: Path, made: Answer, request: Request, fmt: str) ->
     if kind in (POSE, ROTATION):
         placed, turned = target.unit is not None or target.whole, bool(target.notations)
         extras = _extras(made, request, 7) | with_stamp_ns(_rest(node, unit, record), fmt)
-        if record.key == VECTOR and placed and not turned and keeps_frames:  # nothing turns it, it is at no place
+        # a vector that nothing turns is at no place
+        if record.keys.position == VECTOR and placed and not turned and keeps_frames:
             return named | {VECTOR: [*parts[:3]]} | stamp | extras
         pose = Pose.of(parts[:7], entry.name, entry.parent)
         pose = pose._replace(position=pose.position if placed else None, rotation=pose.rotation if turned else None)
@@ -481,7 +482,7 @@ def _place_as_read(holder: Node, record: Record) -> dict[str, list[float]]:
     """Return lat, lon and alt where a record says them; nothing elsewhere."""
     from frametool.grammar.place import LLA_KEYS, read_at
 
-    keys = [key for key in (*record.members, *record.placed) if key in LLA_KEYS]
+    keys = [key for key in (*record.keys.members, *record.keys.placed) if key in LLA_KEYS]
     if not keys:
         return {}
     place, numbers = read_at({key: str(plain(holder.at((key,)))) for key in keys}, Reading(Source("", "")))
@@ -531,9 +532,8 @@ def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
 
     node: the thing that the record's result is; unit: the path of that
     """
-    # its pose, and what is no longer true of the result
-    used = {record.key, record.rotation, *record.others, *record.flat, *record.members, *record.placed, *NOT_PLAIN}
-    used.update(PARTS.get(record.shape.kind, ()))
+    keys, used = record.keys, {*NOT_PLAIN, *PARTS.get(record.shape.kind, ())}  # what is no longer true of the result
+    used |= {keys.position, keys.rotation, *keys.others, *keys.flat, *keys.members, *keys.placed}
     names = {path for each in (record.name, record.parent) for path in each.paths}
     rest: dict[str, Any] = {}
     for depth in range(len(unit), len(record.path) + 1):
@@ -541,7 +541,7 @@ def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
         holder = node.at(path[len(unit) :])
         if type(holder.value) is not dict:
             continue
-        on_the_way = {*record.path[depth : depth + 1], "header", *record.covariances}
+        on_the_way = {*record.path[depth : depth + 1], "header", *record.keys.covariances}
         for key, (_, value) in holder.value.items():
             is_used = key in on_the_way or (*path, key) in names or (path == record.path and key in used)
             if not is_used and key not in rest:
@@ -555,7 +555,7 @@ def _of_several(node: Node, unit: Path, answers: list[Answer], request: Request)
     found = {"frame": last.parent} | _header_stamp(last.record) | _rest(node, unit, last.record)
     for each in answers:
         record, numbers = each.entry.record, written(each)[: each.entry.target.size]
-        field = record.key or record.rotation
+        field = record.keys.position or record.keys.rotation
         if numbers:
             found.pop(field, None)
         found |= {f"{field}_{axis}": number for axis, number in zip("xyzw", numbers, strict=False)}
@@ -568,7 +568,7 @@ def _extras(made: Answer, request: Request, own: int) -> dict[str, Any]:
     shape = made.entry.record.shape
     numbers = iter([number + 0.0 for number in made.parts[own:]])
     extras = with_entries({name: next(numbers) for name in request.operation.extras(shape)})
-    for key, size in zip(made.entry.record.covariances, shape.covariance, strict=False):
+    for key, size in zip(made.entry.record.keys.covariances, shape.covariance, strict=False):
         entries = list(islice(numbers, size))
         extras[key] = entries if size > 1 else entries[0]
     return extras

@@ -170,7 +170,7 @@ def _pose(value: Any, path: Path, reading: Reading) -> Pose:
     if len(records) > 1 or found.rotation is None:
         what = "the pose has no rotation" if len(records) == 1 else f"expected one pose, found {len(records)}"
         raise Misfit(what, path)
-    if not {*COVARIANCE_KEYS}.isdisjoint(records[0].others) or records[0].shape.covariance:
+    if not {*COVARIANCE_KEYS}.isdisjoint(records[0].keys.others) or records[0].shape.covariance:
         reading.note("the covariance of a sample is not used: all count alike", rule="left-out")
     return found
 

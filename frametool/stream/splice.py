@@ -98,7 +98,7 @@ class Splicer:
             return self.edits
         # the numbers of a result are written where those of the record are, or its members anew
         if target.scaled:
-            self.dropped.update(self.record.covariances)  # the matrix says the scale
+            self.dropped.update(self.record.keys.covariances)  # the matrix says the scale
         elif not shape.rewritten:
             extras = len(self.request.extras(shape))
             self._numbers(range(shape.own_size, shape.own_size + sum(shape.covariance)), target.size + extras)
@@ -108,9 +108,9 @@ class Splicer:
         self._position()
         if shape.kind in TURNED:
             self._rotation()
-            self.dropped.update({*STALE, "inverse", *self.record.others} - set(self.record.flat))
+            self.dropped.update({*STALE, "inverse", *self.record.keys.others} - set(self.record.keys.flat))
         else:
-            self.dropped.update(self.record.others)
+            self.dropped.update(self.record.keys.others)
             self._add(self._extras(target.size))
         self._leave_out()
         return self.edits
@@ -119,7 +119,7 @@ class Splicer:
         """Return True if the rotation is written as it was read, number by number."""
         shape, target = self.record.shape, self.target
         same = [(shape.notation, shape.degrees)] == list(target.notations) if shape.notation else not target.notations
-        is_alone = self.record.flat == QUATERNION and target.unit is not None  # x y z w mean nothing with xyz
+        is_alone = self.record.keys.flat == QUATERNION and target.unit is not None  # x y z w mean nothing with xyz
         return same and shape.whole == target.whole and not (shape.inverse or is_alone)
 
     def _numbers(self, slots: Sequence[int], first: int) -> None:
@@ -133,18 +133,18 @@ class Splicer:
         """Write the position where it is, or as a member of its own; a whole matrix takes it in."""
         record, target, shape = self.record, self.target, self.record.shape
         kind = "xyz" if shape.kind == POSE else shape.kind
-        members, there = (record.key,) if record.key else record.members, shape.position_size
-        if record.key in (POINT, VECTOR) and record.key != kind:
-            node = self.members[record.key][0]
+        members, there = (record.keys.position,) if record.keys.position else record.keys.members, shape.position_size
+        if record.keys.position in (POINT, VECTOR) and record.keys.position != kind:
+            node = self.members[record.keys.position][0]
             text = f'"{kind}"' if self.json else kind
             self.edits.append(Edit(node.start, node.end, (Const(text.encode()),)))
         if shape.unit is None:
             if target.unit is not None:
-                self._lead(self._place("xyz"), record.rotation)
+                self._lead(self._place("xyz"), record.keys.rotation)
         elif target.unit is None:
             self.dropped.update(members)
         elif None in self.slots[:there] or (there < 3 and not target.absent) or target.place != shape.place:
-            self._replace(members[0], self._place(record.key or kind))
+            self._replace(members[0], self._place(record.keys.position or kind))
             self.dropped.update(members[1:])
         elif not self.request.keeps_position or shape.inverse:  # else it keeps its text
             self._numbers(range(there), 0)
@@ -172,19 +172,19 @@ class Splicer:
         first = count_of(target.unit)
         first -= sum(place < first for place in target.absent)
         slots = range(shape.position_size, shape.own_size)
-        key = record.rotation
+        key = record.keys.rotation
         members = self._members(first)
         if self._same_rotation() and None not in [self.slots[slot] for slot in slots]:
             self._numbers(slots, first)
             members = []
         elif key:
             self._replace(key, members.pop(0) if members else ())
-            self.dropped.update({"angles", *record.flat} - {key})
-        elif members and target.unit is None and (record.key or record.members):
-            key = record.key or record.members[0]  # in the place of the position, which it takes in
+            self.dropped.update({"angles", *record.keys.flat} - {key})
+        elif members and target.unit is None and (record.keys.position or record.keys.members):
+            key = record.keys.position or record.keys.members[0]  # in the place of the position, which it takes in
             self._replace(key, members.pop(0))
             self.dropped.discard(key)
-        self._add(members + self._extras(target.size), key or record.key)
+        self._add(members + self._extras(target.size), key or record.keys.position)
 
     def _members(self, first: int) -> list[tuple[Piece, ...]]:
         """Return one member for each key of a notation, and the flag of a lock."""
@@ -242,13 +242,13 @@ class Splicer:
         is_local = is_place or (place is not None and place.origin is not None)
         if record.parent.text and not record.parent.paths and not is_local:  # a place, which says its frame
             self._lead(self._member({parent: self.entry.parent}, 0))
-        if record.placed and record.name.text and not record.name.paths:
+        if record.keys.placed and record.name.text and not record.name.paths:
             self._lead(self._member({"name": self.entry.name}, 0))
-        if "header" in record.placed and record.stamp_ns is not None:
+        if "header" in record.keys.placed and record.stamp_ns is not None:
             self._lead(self._member({"stamp_ns": Verbatim(str(record.stamp_ns))}, 0))
         if self.request.rename is None:
             return
-        if not self.request.rows.poses and {"name", "parent"} & self.members.keys() - {*record.members}:
+        if not self.request.rows.poses and {"name", "parent"} & self.members.keys() - {*record.keys.members}:
             return  # in a row that was no pose they say something else
         self._name(record.name, self.entry.name, "name")
         if record.parent.paths or not record.parent.text:
@@ -303,11 +303,11 @@ class Splicer:
 
     def _anew(self) -> None:
         """Write all members of a result in place of a bare list, or of what said what a record was."""
-        record, target = self.record, self.target
+        target, keys = self.target, self.record.keys
         position = [self._place("xyz" if self.kind == POSE else self.kind)] if target.unit is not None else []
         members = [*position, *self._members(count_of(target.unit)), *self._extras(target.size)]
-        self.dropped |= {record.key, record.rotation, *record.others, *record.members, *record.flat, *STALE,
-                         "inverse", "angles"}  # fmt: skip
+        self.dropped |= {keys.position, keys.rotation, *keys.others, *keys.members, *keys.flat}
+        self.dropped |= {*STALE, "inverse", "angles"}
         pieces = [piece for member in members for piece in self._led(member)][1:]
         if not self.members:
             self.edits.append(Edit(self.node.start, self.node.end, (Const(b"{"), *pieces, Const(b"}"))))
