@@ -129,6 +129,20 @@ def test_the_package_stays_as_small_as_it_can_be_read() -> None:
     assert page_lines() <= MOST_OF_PAGES
 
 
+MOST_FIELDS = 12
+# a row of a registry, and what a comparison and a hand-eye solution found
+LONG_RECORDS = {"Representation": 19, "Comparison": 16, "HandEye": 14}
+
+
+def test_no_record_of_parameters_has_more_fields_than_one_keeps_in_mind() -> None:
+    found = {}
+    for node in [each for path in MODULES for each in ast.walk(tree_of(path)) if isinstance(each, ast.ClassDef)]:
+        if any(isinstance(base, ast.Name) and base.id == "NamedTuple" for base in node.bases):
+            count = sum(isinstance(each, ast.AnnAssign) for each in node.body)
+            found |= {node.name: count} if count > MOST_FIELDS else {}
+    assert found == LONG_RECORDS
+
+
 def loaded_by(*arguments: str, stdin: str = "") -> set[str]:
     """Name the modules that a command loads in a fresh interpreter."""
     code = (
