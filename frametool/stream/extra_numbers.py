@@ -198,9 +198,12 @@ def find_rates(
     for name, place in sorted(zip(names, range(len(names)), strict=True)):
         if (match := re.fullmatch(RATES, name)) and place not in taken:
             rates.setdefault(match.groups(""), []).append(place)
-    turned = [] if operation.mirrors else [tuple(each) for each in rates.values() if len(each) == 3]
+    turns = operation.turns and not operation.mirrors
+    turned = [tuple(each) for each in rates.values() if len(each) == 3 and turns]
     if stay := [names[at] for each in rates.values() if tuple(each) not in turned for at in each]:
-        warn(f"{source}: {listing(stay, 9)} keep to the old axes: poses and covariances turn alone")
+        apart = "stay as they are: points and poses move; --columns vx,vy,vz --as vector turns velocities"
+        why = "keep to the old axes: poses and covariances turn alone" if operation.turns else apart
+        warn(f"{source}: {listing(stay, 9)} {why}")
     kinds = [NORMAL if names[each[0]][0] in "vV" else RATE for each in turned]
     at_world = [names[at] for each, kind in zip(turned, kinds, strict=True) if kind == NORMAL for at in each]
     if at_world and operation.right:

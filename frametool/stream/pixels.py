@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 ALL, INSIDE, OUTSIDE, UNSIZED = "", "in the image", "outside it", "with a pixel"
 BEHIND, BEYOND, HORIZON = "behind the camera", "beyond the model", "above the horizon"
-FEWEST_POINTS = 3  # that show where a camera looks
 UNKNOWN = 2.0  # in_image where the size of the picture is not known
 TRUTHS, BITS = ("false", "true", "null"), ("0", "1", "")
 RAY = tuple(f"{part}_{axis}" for part in ("origin", "ray") for axis in "xyz")
@@ -51,7 +50,7 @@ class Seen(Formula):
     @property
     def is_mostly_behind(self) -> bool:
         """Return True if the camera may look another way than it was taken to."""
-        return 2 * self.counts[BEHIND] > self.counts[ALL] >= FEWEST_POINTS
+        return 2 * self.counts[BEHIND] > self.counts[ALL] >= 3
 
     def summary(self) -> str:
         """Return how many rows there were, and what became of them; "" where all have what they should."""

@@ -215,7 +215,7 @@ def _bare_numbers(value: list[Any]) -> Misfit:
     """Build the error for a list that may be anything."""
     spellings = {4: "{xyzw: [..]} or {wxyz: [..]}, or give --from"}
     write = spellings.get(len(value), "{rpy_deg: [..]}, {xyzw: [..]}, ..")
-    return Misfit(f"a bare list of {len(value)} numbers does not say what it is; write {write}")
+    return Misfit(f"a bare list of {len(value)} number{'s' * (len(value) != 1)} does not say what it is; write {write}")
 
 
 def _search(value: Any, path: Path, outer: tuple[Path, ...], request: Request) -> Iterator[RecordPlace]:

@@ -249,7 +249,6 @@ class MessageMover:
 
 
 MOVES = ", ".join(sorted(name.rpartition("/")[2] for name in MOVED_TYPES))
-OTHER_TRANSFORMS = "FrameTransform"  # of Foxglove, and lists of them
 TF_STATIC = KINDS["tf_static"]
 STEP = 1 << 10  # messages between two reports
 
@@ -315,7 +314,7 @@ class RecordRun:
             raise NoDataAt(f"{self.path}: no messages from {' to '.join(map(format_stamp, request.window))}; {there}")
         others = [each for each in reader.all if each not in reader.channels]
         for each in others if request.tree is not None or request.into else ():
-            if each.type.replace(".", "/").rpartition("/")[2].startswith(OTHER_TRANSFORMS):  # as protobuf's
+            if each.type.replace(".", "/").rpartition("/")[2].startswith("FrameTransform"):  # as protobuf's
                 raise FormatError(f"{each.topic} holds {each.type}: no transforms of recordings", source=self.path)
             if each.encoding == "ros1":
                 raise FormatError("messages of ROS 1 in MCAP are only copied, not read", source=self.path)

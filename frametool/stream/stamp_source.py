@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Components
 
-LARGEST = (1 << 63) - 1
 HEADER = "header.stamp"
 
 
@@ -77,7 +76,7 @@ def read_stamp(text: str, *, in_ns: int) -> int:
         tell_size(int(bare), each)
         bare += SUFFIXES[each]
     stamp_ns = parse_stamp(bare)
-    if abs(stamp_ns) > LARGEST:
+    if abs(stamp_ns) >= 1 << 63:
         remedy = "; are these some? then write ns behind them, or call them stamp_ns"
         raise ValueInvalid(f"{shown(text.strip())} is beyond 64 bits of nanoseconds{remedy}")
     return stamp_ns

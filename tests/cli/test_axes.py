@@ -260,6 +260,16 @@ def test_velocities_that_cannot_turn_are_told_to_stay(run: Any, names: str, chan
     assert "old axes" not in run("convert", "--all-axes", "ros_from_aircraft", stdin=LOG.format("a,b,c")).err
 
 
+def test_velocities_of_points_turn_with_the_world_and_stay_where_points_move(run: Any) -> None:
+    text = "t,x,y,z,vx,vy,vz\n1,9,5,-2,3,4,0\n"
+    assert run("convert", "--all-axes", "ros_from_aircraft", stdin=text).out.splitlines()[1] == "1,5.0,9.0,2.0,4.0,3.0,0.0"
+    moved = run("apply", "--transform", "{rpy_deg: [0, 0, 90]}", stdin=text)
+    assert (moved.status, moved.out.splitlines()[1]) == (0, "1,-5.0,9.0,-2.0,3,4,0")
+    assert "vx, vy, vz stay as they are: points and poses move; --columns vx,vy,vz --as vector turns velocities" in moved.err
+    turned = run("apply", "--transform", "{rpy_deg: [0, 0, 90]}", "--columns", "vx,vy,vz", "--as", "vector", stdin=text)
+    assert (turned.out.splitlines()[1], turned.err) == ("1,9,5,-2,-4.0,3.0,0.0", "")
+
+
 @pytest.mark.parametrize("keys", ['"vx": 1, "vy": 2, "vz": 3', '"velocity": [1, 2, 3]', '"angular_velocity": [1, 2, 3]'])
 def test_records_do_not_keep_velocities_in_the_old_axes(run: Any, keys: str) -> None:
     line = f'{{"xyz": [1, 2, 3], "xyzw": [0, 0, 0, 1], {keys}}}\n'
