@@ -135,7 +135,7 @@ LONG_RECORDS = {"Representation": 19, "Comparison": 16, "HandEye": 14}
 
 
 def test_no_record_of_parameters_has_more_fields_than_one_keeps_in_mind() -> None:
-    found = {}
+    found: dict[str, int] = {}
     for node in [each for path in MODULES for each in ast.walk(tree_of(path)) if isinstance(each, ast.ClassDef)]:
         if any(isinstance(base, ast.Name) and base.id == "NamedTuple" for base in node.bases):
             count = sum(isinstance(each, ast.AnnAssign) for each in node.body)
