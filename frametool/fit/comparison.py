@@ -233,10 +233,11 @@ def compared(
             by_alignment[kind] = sqrt((gap**2).sum() / len(gap))
         except Unaligned:
             by_alignment[kind] = None
-    long, second, _ = principal_axes(first.ref.xyz)
     noise = by_alignment["sim3"]  # what is not significant is not, even for a fit with a scale
-    if fitting.align in ("se3", "sim3") and noise is not None and second < min(NEAR_A_LINE * noise, SLENDER * long):
-        hints.append("positions lie nearly on a line: the turn about it rests on noise")
+    if fitting.align in ("se3", "sim3") and noise is not None:
+        long, second, _ = principal_axes(first.ref.xyz)
+        if second < min(NEAR_A_LINE * noise, SLENDER * long):
+            hints.append("positions lie nearly on a line: the turn about it rests on noise")
     walked = pairs.ref if reporting.pairs_from == "reference" else moved
     return Comparison(
         names, sizes, 0 if ref.stamps_ns is None else int(np.ptp(ref.stamps_ns)), settings, est, pairs, moved,

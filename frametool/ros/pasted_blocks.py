@@ -67,7 +67,7 @@ _BEGIN = re.compile(
 
 def may_be_pasted(text: str) -> bool:
     """Return True if the beginning of a text may be a pasted print."""
-    return bool(_BEGIN.match(text) or re.search(_TRANSLATION, text[:4096]))
+    return bool(_BEGIN.match(text) or re.search(_TRANSLATION, text[:4096])) or _mended(text) != text
 
 
 def in_grammar(
@@ -93,7 +93,9 @@ def in_grammar(
         values = values or _published(source, normalize=normalize) or _unless_grammar(source, default, points=points)
     except ValueInvalid as error:
         raise FormatError(str(error), source=source.name) from error
-    return None if values is None else Pasted(source.name, "\n".join(map(dump, values)))
+    if values is not None:
+        return Pasted(source.name, "\n".join(map(dump, values)))
+    return Source(source.name, mended) if (mended := _mended(text)) != text else None
 
 
 def _unless_grammar(source: Source, default: Notation | None, *, points: bool) -> list[Any] | None:
@@ -153,3 +155,16 @@ def _published(source: Source, *, normalize: bool) -> list[Any]:
         numbers = [*map(repr, pose.components)]
         values.append({"name": pose.name, "parent": pose.parent, "xyz": numbers[:3], "xyzw": numbers[3:]})
     return values
+
+
+def _mended(text: str) -> str:
+    """Restore the indentation that a selection from the middle of a line has lost before its first word."""
+    first, newline, rest = text.partition("\n")
+    lines = [line for line in rest.split("\n")[:200] if line.strip() and not line.startswith("---")]
+    if not lines or not re.fullmatch(r"[A-Za-z_]\w*:( .*)?", first.rstrip()):
+        return text
+    indents = [len(line) - len(line.lstrip(" ")) for line in lines]
+    holds = not first.rstrip().endswith(":")
+    if not min(indents) or not (holds or indents[0] > min(indents)):
+        return text
+    return " " * min(indents) + first + newline + rest

@@ -235,6 +235,8 @@ class FormatConverter:
         module, request = import_module(FORMATS[self.fmt].reader), self.request
         if request.rows.frames:
             raise ValueInvalid("poses do not say their frame; name SOURCE")
+        if request.operation.columns:
+            raise FormatError(f"{self.fmt} lists poses and has no columns; convert it to csv first", source=self.source)
         if request.rows.poses > 1:
             raise FormatError(f"{self.fmt} lists one pose after the other; two a row are wanted", source=self.source)
         faults: list[Fault] = []

@@ -410,3 +410,18 @@ def test_a_recording_with_one_trajectory_is_that_trajectory(run: Run, tmp_path: 
     assert run("convert", "-i", DRONE[0], "-o", bag, files=FILES).status == 0
     wanted = found(run, *DRONE)["ate"]
     assert found(run, bag, DRONE[1])["ate"] == found(run, f"{bag}:/pose", DRONE[1])["ate"] == wanted
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+@pytest.mark.parametrize("align", ["none", "origin", "yaw"])
+def test_few_poses_are_compared_where_nothing_has_to_be_fitted_to_a_line(run: Run, rows: int, align: str) -> None:
+    text = "".join(f"{at} {at} 0 0 0 0 0 1\n" for at in range(rows))
+    done = run("compare", "a.tum", "b.tum", "--align", align, files={"a.tum": text, "b.tum": text})
+    assert (done.status, "Traceback" in done.err) == (int(align == "yaw" and rows == 1), False)
+
+
+def test_what_cannot_be_written_is_refused_in_one_line(run: Run) -> None:
+    done = run("compare", *DRONE, "--rows", "-f", "markdown", files=FILES)
+    assert (done.status, "--rows are written as csv, json or yaml, not as markdown" in done.err) == (2, True)
+    listed = run("calc", "row.x", "-i", "images.txt", files={"images.txt": "1 1 0 0 0 1 2 3 1 a.png\n\n"})
+    assert (listed.status, "colmap lists poses and has no columns; convert it to csv first" in listed.err) == (1, True)

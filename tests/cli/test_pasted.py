@@ -64,6 +64,16 @@ At time 0.0
   0.000  0.000  1.000  2.000
   0.000  0.000  0.000  1.000
 """
+FRAGMENT = f"""translation:
+        x: 0.5
+        y: -1.0
+        z: 2.0
+      rotation:
+        x: 0.0
+        y: 0.0
+        z: {HALF!r}
+        w: {HALF!r}
+"""
 
 # the same turn at a place
 PLACED = {
@@ -84,6 +94,7 @@ PLACED = {
     "tf2_echo of ROS 2 Jazzy": BLOCK_2,
     "tf2_echo of ROS 1, from behind the first dash": BLOCK_1.partition("\n- ")[2],
     "tf2_echo of ROS 2, without dashes": BLOCK_2.partition("\n- ")[2].replace("\n- ", "\n"),
+    "rostopic echo Noetic, from the middle of a line": FRAGMENT,
     "rclpy Jazzy, repr of a Transform": "geometry_msgs.msg.Transform(translation=geometry_msgs.msg.Vector3(x=0.5, y=-1.0, "
     f"z=2.0), rotation=geometry_msgs.msg.Quaternion(x=0.0, y=0.0, z={HALF!r}, w={HALF!r}))",
     "a URDF, the origin of a joint": '<origin xyz="0.5 -1 2" rpy="0 0 1.5707963267948966" />',

@@ -90,6 +90,15 @@ def test_a_scan_becomes_columns_and_columns_a_scan(run: Run, tmp_path: Path) -> 
     assert np.array_equal(found.red, given.red)
 
 
+def test_a_scan_of_which_nothing_changes_is_written_again(run: Run, tmp_path: Path) -> None:
+    laspy = pytest.importorskip("laspy")
+    (tmp_path / "a.las").write_bytes(data := scan())
+    done = run("convert", "-i", str(tmp_path / "a.las"), "-o", str(tmp_path / "b.las"))
+    assert done.status == 0, done.err
+    again, given = laspy.read(tmp_path / "b.las"), laspy.read(io.BytesIO(data))
+    assert (np.array_equal(again.xyz, given.xyz), np.array_equal(again.red, given.red)) == (True, True)
+
+
 def test_points_without_a_return_have_no_place_in_a_scan_and_are_told(run: Run, tmp_path: Path) -> None:
     laspy = pytest.importorskip("laspy")
     points = POINTS.copy()

@@ -172,6 +172,7 @@ def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], ro
 
     fmt = output.style.format
     if rows:
+        refuse(fmt in ("markdown", "latex"), f"--rows are written as csv, json or yaml, not as {fmt}")
         several = len(found) > 1
         records = [{"est": each.names[1]} | row if several else row for each in found for row in rows_of(each, rows)]
         output.style = output.style.changed(format="csv" if fmt == "text" else fmt)

@@ -169,7 +169,8 @@ class LasWriter:
         columns = [each for each in self.columns if each.passed is None]
         new = {column.name: np.asarray(each.values) for column, each in zip(columns, made, strict=True)}
         new |= {name: new[name].astype(np.float64) for name in XYZ if name in new}
-        there = np.all([np.isfinite(new[name]) for name in XYZ if name in new], axis=0)
+        moved = [np.isfinite(new[name]) for name in XYZ if name in new]  # none where all of them stay
+        there = np.all(moved or [np.ones(batch.size if rows is None else len(rows), np.bool_)], axis=0)
         if not there.all():
             self.left_out += int(np.count_nonzero(~there))
             new = {name: values[there] for name, values in new.items()}
