@@ -216,8 +216,8 @@ def machine_text(term: Term, style: Style) -> str:
         from frametool.stream.writers import write_poses
 
         return write_poses([result], style)
-    if "arrays" in FORMATS[style.format].writes:
-        raise ValueInvalid(f"{style.format} holds columns of numbers: calc writes rows of -i in it, not single values")
+    if not {"arrays", "recording"}.isdisjoint(FORMATS[style.format].writes):
+        raise ValueInvalid(f"{style.format} holds columns or messages: calc writes rows of -i in it, not single values")
     module = import_module(FORMATS[style.format].writer)
     if isinstance(result, Result):
         return str(module.write_poses([result], style))

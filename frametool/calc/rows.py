@@ -12,7 +12,7 @@ from copy import copy
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.calc.evaluate import AXES, PLACED, Scope, evaluate_line, literal, term_of_pose
-from frametool.calc.functions import ANGLES, LIST, NUMBER, POINT, POSE, TREE, VECTOR, RowValues, Term, Type, in_radians
+from frametool.calc.functions import ANGLES, LIST, NUMBER, POINT, POSE, VECTOR, RowValues, Term, Type, in_radians
 from frametool.calc.parser import RADIAN, CalcError, Line, needs_time, reads_row, walk
 from frametool.documents.source import Source, opened
 from frametool.errors import FormatError, FrametoolError
@@ -157,8 +157,8 @@ class RowExpressions(Formula):
 
     def _names(self, own: str, type_: Type) -> tuple[str, ...]:
         """Return the names of the numbers of a value: NAME, or NAME_x, NAME_y .."""
-        if type_.kind in (TREE, LIST):
-            raise CalcError(f"a {type_.kind} cannot be added to rows")
+        if type_.kind not in (NUMBER, POSE, *NAMES):
+            raise CalcError(f"a{'n' * (type_.kind[:1] == 'a')} {type_.kind} cannot be added to rows")
         if type_.kind == NUMBER:
             return (f"{own or RESULT}{'_deg' * (self.degrees and type_.unit == RADIAN)}",)
         if type_.kind == POSE:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.errors import ValueInvalid, warn
-from frametool.fit.least_squares import align_vectors, length, solve_normal
+from frametool.fit.least_squares import align_vectors, length, require_near, solve_normal
 from frametool.frames.trajectory import BODY, WORLD, Trajectory
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
@@ -458,6 +458,7 @@ def _count(steps: float) -> int:
 
 def stamps_every(each: Trajectory, delta: Delta) -> Array:
     """Return the stamps at which a trajectory has covered whole multiples of a step of path or rotation."""
+    require_near(each.xyz, each.body)
     along = delta.along(each)
     if along is None:
         raise ValueInvalid(f"steps of {delta} need rotations")

@@ -39,7 +39,10 @@ def propagate(jacobian: Rows, entries: Entries) -> Components:
     flat = [number for row in jacobian for number in row]
     whole = np.stack(np.broadcast_arrays(*flat, *entries), axis=-1)
     side = len(jacobian[0])
-    j, a = (part.reshape(*whole.shape[:-1], -1, side) for part in np.split(whole, [len(flat)], axis=-1))
+    j, a = (
+        part.reshape(*whole.shape[:-1], part.shape[-1] // side, side)
+        for part in np.split(whole, [len(flat)], axis=-1)
+    )
     with np.errstate(all="ignore"):  # values that are not finite are refused when they are written
         found = _product(_product(j, a), np.swapaxes(j, -1, -2))
     rows = found.tolist() if found.ndim == 2 else np.moveaxis(found, (-2, -1), (0, 1))

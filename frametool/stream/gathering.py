@@ -79,6 +79,8 @@ class Gathered:
 
     def groups(self) -> Iterator[tuple[str, Gathered]]:
         """Yield the poses by their labels, in the order in which these came."""
+        if not self._extra:
+            raise ValueInvalid("what was pasted has no columns or keys to group it by; leave --by out")
         rows, labels = self.transforms, np.concatenate(self._extra).tolist()
         for label in dict.fromkeys(labels):
             at = [row for row, each in enumerate(labels) if each == label]
