@@ -160,8 +160,6 @@ def answer(entry: Entry, stamp: Sequence[str], request: Request) -> Answer:
             raise
     if request.window and at_ns is not None and not request.window[0] <= at_ns <= request.window[1]:
         raise Outside("beyond --start or --stop")
-    if operation.looks_back:
-        raise ValueInvalid("cannot be compared with the one before: only whole messages can, without other lines")
     parts = operation.result(
         shape, entry.record.values, edge, floats,
         rotation=lambda own: checked_rotation(shape, own, normalize=request.rows.normalize)[0],
