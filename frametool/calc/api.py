@@ -216,8 +216,9 @@ def machine_text(term: Term, style: Style) -> str:
         from frametool.stream.writers import write_poses
 
         return write_poses([result], style)
-    if not {"arrays", "recording"}.isdisjoint(FORMATS[style.format].writes):
-        raise ValueInvalid(f"{style.format} holds columns or messages: calc writes rows of -i in it, not single values")
+    held = {"arrays": "columns of numbers", "recording": "messages"}
+    if what := next((held[each] for each in FORMATS[style.format].writes if each in held), ""):
+        raise ValueInvalid(f"{style.format} holds {what}: calc writes rows of -i in it, not single values")
     module = import_module(FORMATS[style.format].writer)
     if isinstance(result, Result):
         return str(module.write_poses([result], style))

@@ -112,7 +112,7 @@ ENTRIES = ",".join(f"c{row}{column}" for row in range(1, 7) for column in range(
 @pytest.mark.parametrize(
     ("arguments", "stdin", "status", "words"),
     [
-        (["calc", "{xyz: [1, 2, 3]}", "-f", "mcap", "-o", "z.mcap"], "", 1, "mcap holds columns or messages"),
+        (["calc", "{xyz: [1, 2, 3]}", "-f", "mcap", "-o", "z.mcap"], "", 1, "mcap holds messages"),
         (["calc", "row"], json.dumps(IMU) + "\n", 1, "an attitude cannot be added to rows"),
         (["mean", "-", "--by", "t"], '<origin xyz="1 2 3" rpy="0 0 1"/>\n', 1, "leave --by out"),
         (["invert", "--on-error", "null", "-f", "json"], f"x,y,z,qx,qy,qz,qw,{ENTRIES}\na\n", 3, "expected 43 cells, found 1"),

@@ -115,7 +115,7 @@ MOST_LINES = {  # code lines of a room, and behind it what is aimed at; a featur
     "view": 1_878,  # 1 800; the report of compare 294
     "explain": 874,  # 1 000
 }
-MOST_IN_ALL = 38_155  # the aim is 37 000
+MOST_IN_ALL = 38_156  # the aim is 37 000
 MOST_FILES = 202  # 190
 MOST_OF_PAGES = 1_900
 
