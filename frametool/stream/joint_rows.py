@@ -115,7 +115,7 @@ def names_in(begin: bytes, fmt: str, source: str, wanted: str, *, header: bool =
         from frametool.stream.table import open_table
 
         table, _ = open_table(begin, fmt, header=header, source=source)
-        return table.names or tuple(map(str, range(1, table.width + 1)))
+        return table.called
     part = next(iter(Splitter(fmt).parts(begin)[0]), None)
     text = "" if part is None else begin[part.start : part.end].decode("utf-8", "replace")
     documents = parse_documents(without_noise(text) if fmt == "yaml" else text, source)

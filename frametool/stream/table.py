@@ -87,6 +87,11 @@ class Table(NamedTuple):
             return split_delimited(block, self.delimiter, self.width)
         return split_blank(block, self.width, comment=COMMENT)
 
+    @property
+    def called(self) -> tuple[str, ...]:
+        """Return what columns are called: their names, or their numbers from 1."""
+        return self.names or tuple(map(str, range(1, self.width + 1)))
+
     def name(self, place: int) -> str:
         """Name a column for messages."""
         return self.names[place] if self.names else f"column {place + 1}"
@@ -400,7 +405,7 @@ class PlannedRows:
     @property
     def columns(self) -> str:
         """List the columns there are."""
-        return listed(self.table.names or ("columns without names",))
+        return listed(self.table.called)
 
     def ran(self, block: Block) -> Run:
         """Return what becomes of a block, with its warnings in order."""

@@ -62,7 +62,7 @@ def plan_table(
         poses = [_without_position(poses[0], request, table, source)]
     if wrong := next((each.wrong for pose in poses for each in pose if each and each.wrong), ""):
         raise FormatError(wrong, source=source, line=1)
-    asked = tuple(_place(name, _names_or_numbers(table), source) for name in request.operation.columns)
+    asked = tuple(_place(name, table.called, source) for name in request.operation.columns)
     kinded = zip(poses, request.rows.kinds or (request.rows.kind,) * len(poses), strict=True)
     shapes = tuple(row_shape(pose, request.with_rows(kind=kind)) for pose, kind in kinded)
     if formula is not None:  # the numbers that it asks for come last
@@ -194,7 +194,7 @@ def _without_position(pose: PoseColumns, request: Request, table: Table, source:
         return pose
     if pose.rotation is None:
         wanted = "; give --from REP or --columns" if request.rows.given is None else ""
-        found = f"no columns of a rotation among: {listed(table.names or ('columns without names',))}{wanted}"
+        found = f"no columns of a rotation among: {listed(table.called)}{wanted}"
         raise FormatError(found, source=source, line=1)
     leaves_plane = pose.position and not pose.position.wrong and pose.position.absent and request.results.notations
     is_whole = len(request.results.notations) == 1 and request.results.notations[0].representation.whole is not None
@@ -248,7 +248,7 @@ def _stamp_columns(
     """
     name = request.timed.name if request.timed else request.rows.extra_column
     if name is not None:
-        time = _place(name, _names_or_numbers(table), source)
+        time = _place(name, table.called, source)
         if request.gathered is None:  # else it is a weight
             try:
                 in_nanoseconds(table.name(time))
@@ -261,11 +261,6 @@ def _stamp_columns(
     if not (table.names or request.rows.columns) and min(places, default=0) == 1:
         usual = 0  # what is before the numbers that --from speaks of
     return (None, None) if usual in frames else (usual, below)
-
-
-def _names_or_numbers(table: Table) -> Sequence[str]:
-    """Return what columns are called: their names, or their numbers from 1."""
-    return table.names or tuple(map(str, range(1, table.width + 1)))
 
 
 def _columns(
@@ -325,7 +320,7 @@ def _columns(
     if adds:  # behind those that stay, or in the place of those of their names
         gives_way = (request.operation.shown or PLAIN).replaces
         more = {getattr(each, "name", at) if gives_way else at: each for at, each in enumerate(added)}
-        mixed = [more.pop(name, kept) for name, kept in zip(_names_or_numbers(table), columns, strict=True)]
+        mixed = [more.pop(name, kept) for name, kept in zip(table.called, columns, strict=True)]
         return [*mixed, *more.values()]
     return [column for place, old in enumerate(columns) for column in at.get(place, [old])]
 

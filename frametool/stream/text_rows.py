@@ -33,7 +33,6 @@ MORE_NUMBERS = 0.7310585786300049
 STAMP_NS = 1234567890987654321
 PARENT, NAME = "@@parent@@", "@@name@@"
 LEAF = re.compile(r"73105857(\d{7})")  # a whole number: in JSON it needs no quotes either
-LAST_ASCII = 127
 
 
 class Syntax(NamedTuple):
@@ -124,7 +123,7 @@ class AlikeRows(NamedTuple):
             if quotes[mark]:
                 counts = np.concatenate([[0], np.cumsum(np.isin(cells.data, [*syntax.unsafe]), dtype=np.int32)])
                 is_unsafe = (counts[cells.ends] > counts[cells.starts]).any()
-                passes = (is_cell or not (cells.data > LAST_ASCII).any()) and not is_unsafe
+                passes = (is_cell or not (cells.data > 127).any()) and not is_unsafe
             elif is_cell:
                 passes = not (cells.data[cells.starts] == ord("n")).any()  # it may be null
             else:
