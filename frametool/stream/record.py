@@ -501,20 +501,20 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     is_sure = type(sigma) is dict and any(each[:3] in ("rpy", "rol", "pit", "yaw") for each in sigma)
     turns = turned or (not operation.moves and is_sure)
     # a PointStamped or Vector3Stamped stays one where it is written anew and nobody asked for a rotation
-    is_usual = not (rows.kind or rows.given) and {each.spec for each in request.results.notations} <= {"quaternion"}
     is_kept = operation.changes_nothing and operation.formula is None and request.gathered is None
-    stays = not turns and "header" in value and key in (POINT, VECTOR) and is_kept and is_usual
+    stays = not turns and "header" in value and key in (POINT, VECTOR) and is_kept and not (rows.kind or rows.given)
+    stays = stays and {each.spec for each in request.results.notations} <= {"quaternion"}
     record = Record(path, Shape(key if stays else _kind(key, turns, request), None), keys=RecordKeys(key))
     if positions:
         record = _with_position(record, value[key], POINT_KEYS[key], partial="header" not in value)
     elif flat and flat.position:
         record = _with_members(record, value, flat.position)
-    reading.degrees = read_angle_unit(value["angles"]) if "angles" in value else request.rows.degrees
+    reading.degrees = read_angle_unit(value["angles"]) if "angles" in value else rows.degrees
     if flat and flat.rotation:
         record = _with_flat_rotation(record, value, flat, flat.rotation, reading, request)
     elif rotations:
         row = ROTATION_KEYS.get(rotations[0])
-        if not (request.operation.multiples and row and row.representation.whole):
+        if not (operation.multiples and row and row.representation.whole):
             within((rotations[0],), read_rotation, rotations[0], value[rotations[0]], reading)
         record = _with_rotation(value[rotations[0]], rotations[0], record, (rotations[0],), reading)
     if len(rotations) > 1 or len(positions) > 1:

@@ -429,14 +429,14 @@ class RecordRun:
 
     def _copied(self, advance: Advance) -> Iterator[Recorded]:
         """Yield the messages of the copy: with new values of edges, or in another frame; some are left out."""
-        edges, types, bare = {edge.child: edge for edge in self.plan.replaced}, self.reader.types, self.edges.names.bare
+        edges, types, names = {edge.child: edge for edge in self.plan.replaced}, self.reader.types, self.edges.names
         for message in self._messages(advance):
             channel, data = message.channel, message.data
             if not (self.window[0] <= message.log_ns <= self.window[1] or channel.is_static):
                 continue
             if channel in self.used and any(name.encode() in data for name in edges):
                 found = types.read(channel, data)
-                named = [(edges.get(bare(each.child_frame_id)), each.transform) for each in found.transforms]
+                named = [(edges.get(names.bare(each.child_frame_id)), each.transform) for each in found.transforms]
                 for edge, part in named:
                     if edge is not None:
                         put(part.translation, edge.numbers[:3])

@@ -121,9 +121,10 @@ class AlikeRows(NamedTuple):
         cells = block.extras[mark]
         if quotes is not None and isinstance(cells, Spans):
             if quotes[mark]:
-                counts = np.concatenate([[0], np.cumsum(np.isin(cells.data, [*syntax.unsafe]), dtype=np.int32)])
-                is_unsafe = (counts[cells.ends] > counts[cells.starts]).any()
-                passes = (is_cell or not (cells.data > 127).any()) and not is_unsafe
+                passes = is_cell or not (cells.data > 127).any()
+                if passes:
+                    counts = np.concatenate([[0], np.cumsum(np.isin(cells.data, [*syntax.unsafe]), dtype=np.int32)])
+                    passes = not (counts[cells.ends] > counts[cells.starts]).any()
             elif is_cell:
                 passes = not (cells.data[cells.starts] == ord("n")).any()  # it may be null
             else:

@@ -238,8 +238,7 @@ def gathered(steps: Iterable[tuple[RowPoses | None, Outcome]], bad: BadRows, col
 
 def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows, asked: Request) -> Trajectory:
     """Gather the rows of a table, of columns of numbers, or of a file that lists poses."""
-    row = FORMATS[fmt].rows
-    counts = row is not None and bool(row.counted)
+    counts = bool(FORMATS[fmt].rows.counted)
     own = answers if counts or fmt == "csv" else answers._replace(stamps="")
     request = asked._replace(operation=Operation(moves=True), rename=lambda parent, name: (parent, name))
     converter = FormatConverter(fmt, request, file.name, Style("tum"), own)
