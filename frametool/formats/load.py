@@ -286,8 +286,8 @@ class TreeBuilder:
             self._moves.add(child)
         if len(whole) == len(found):
             return
-        falls = any(map(gt, piece.stamps_ns, islice(piece.stamps_ns, 1, None)))
-        if falls and isinstance(piece, Samples) and piece.child not in self._late:
+        later = islice(piece.stamps_ns, 1, None)
+        if isinstance(piece, Samples) and piece.child not in self._late and any(map(gt, piece.stamps_ns, later)):
             self._late.add(piece.child)
             warn(f"{file.name}: stamps of {shown(piece.child)} are out of order; sorted")
         for edge in piece.edges():

@@ -177,7 +177,8 @@ def complaint(*entries: float, normalize: bool) -> ValueInvalid | None:
         return None
     elif is_multiple(*products, ldexp(1.0, min(-2 * exponent, 1000))):
         size = ldexp(sqrt(sum(products[:3]) / 3.0), exponent)
-        problem = f"matrix is {size:.6g} times a rotation: a similarity, not a pose (compose --scale takes it)"
+        problem = f"matrix is {size:.6g} times a rotation: a similarity, not a pose"
+        problem += " (--scale of compose, invert and apply takes it)"
     else:
         near = is_near(*gram(*matrix))
         if near and normalize:

@@ -130,7 +130,7 @@ def taken(numbers: Any, size: int = POSE) -> Components:
         array = np.asarray(numbers, np.float64)
     except (TypeError, ValueError):
         array = np.empty((0, 0))
-    if array.ndim == 0 or array.shape[1:] not in ((), (side,)):
+    if array.ndim == 0 or array.shape[1:] not in ((), (1,), (side,)):
         raise ValueInvalid(f"covariance must be {size} numbers or {side} rows of {side}")
     if array.size != size:
         raise ValueInvalid(wrong_count(array.size, (size,)))

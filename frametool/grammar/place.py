@@ -217,6 +217,8 @@ def _utm(value: Any, reading: Reading) -> Spot:
         what = f"unknown key {shown(unknown[0])} of utm; it has zone, easting, northing, alt"
         raise Misfit(what, (unknown[0],), key=True)
     default = reading.earth.zone if reading.earth else None
+    if ZONE in named and type(value[named[ZONE]]) is not str:
+        raise Misfit(f"expected a zone like 32N, found {kind(value[named[ZONE]])}", (named[ZONE],))
     zone = within((named[ZONE],), zone_number, value[named[ZONE]]) if ZONE in named else default
     if zone is None:
         raise Misfit("utm needs its zone: 32N, or 32S south of the equator")

@@ -170,7 +170,7 @@ def _data_lines(piece: Piece, tally: Diagnostics) -> Iterator[tuple[int, str]]:
 def _csv(stream: BinaryIO, name: str, tally: Diagnostics) -> Iterator[TextMessage | FormatError]:
     """Read rows: under a header of `rostopic echo -p`, `%time,..`, or without one, of `ros2 topic echo --csv`.
 
-    An error for a row that does not fit its header, or that is neither a pose nor transforms.
+    Yields an error for a row that does not fit its header, or that is neither a pose nor transforms.
     """
     header: list[str] = []
     for number, line in line_texts(stream, name, tally):

@@ -127,7 +127,7 @@ def test_normalising_helps_neither_zero_nor_nan(given: Any) -> None:
     ("entries", "message"),
     [
         (np.diag([1.0, 1.0, -1.0]), r"left-handed \(mirrored\)"),
-        (2.0 * np.eye(3), r"matrix is 2 times a rotation: a similarity, not a pose \(compose --scale takes it\)$"),
+        (2.0 * np.eye(3), r"matrix is 2 times a rotation: a similarity, not a pose \(--scale of compose, invert and apply takes it\)$"),
         (np.diag([1.0, 1.0, 2.0]), r"orthonormal only to 3 \(sheared or scaled unevenly\)$"),
         (np.diag([1.0, 1.0, 1.1]), r"orthonormal only to 0.21 \(normalize it with --normalize\)$"),
         (np.zeros((3, 3)), r"matrix 0 0 0, 0 0 0, 0 0 0 is singular"),

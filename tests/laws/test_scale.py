@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ways import Run
 
 TURN = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
-BY_A_MATRIX = "matrix is 2 times a rotation: a similarity, not a pose (compose --scale takes it)"
+BY_A_MATRIX = "matrix is 2 times a rotation: a similarity, not a pose (--scale of compose, invert and apply takes it)"
 BY_A_KEY = "scale: a similarity, not a pose; apply --transform, compose and invert take it"
 TAKE_IT = ("invert", "compose")
 POSES: dict[str, dict[str, Any]] = {

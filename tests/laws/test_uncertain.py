@@ -229,7 +229,7 @@ def test_a_matrix_is_a_similarity_where_it_is_asked_for(run: Run) -> None:
     for argument in (json.dumps({"matrix": matrix}), "[[0,-2,0,1],[2,0,0,0],[0,0,2,0],[0,0,0,1]]"):
         assert json.loads(run("invert", "--scale", argument, "-f", "json").out)["scale"] == 0.5
         assert json.loads(run("apply", "--scale", "--transform", argument, "1", "1", "1", "-f", "json").out)["point"] == [-1.0, 2.0, 2.0]
-        assert "matrix is 2 times a rotation: a similarity, not a pose (compose --scale takes it)" in run("invert", argument).err
+        assert "matrix is 2 times a rotation: a similarity, not a pose (--scale of compose, invert and apply takes it)" in run("invert", argument).err
     cells = {f"m{i + 1}{j + 1}": matrix[i][j] for i in range(4) for j in range(4)}
     rows = ",".join(cells) + "\n" + ",".join(map(str, cells.values())) + "\n"
     back = np.linalg.inv(np.array(matrix, float))

@@ -137,6 +137,7 @@ class SeveralClouds:
         """Move all and write them as one; return the exit status."""
         from frametool.formats.detect import detect
         from frametool.stream.column_stream import MergedClouds
+
         count, frames, output, on_error = len(self.paths), self.frames, self.task.output, self.task.inputs.on_error
         is_open = way.has_source == bool(frames) or len(frames) not in (0, count)
         refuse(is_open, f"name SOURCE, the frame of all clouds, or --frames A,B with one for each of the {count}")

@@ -64,8 +64,6 @@ def check_command(inputs: Inputs) -> int:
     refuse_two_readers((*files, *measured))
     findings: list[Finding] = []
     if inputs.each:  # that a file holds no frames, or is of an unknown format, is a warning
-        from frametool.lint.rules import check
-
         for number, name in enumerate(files):
             try:
                 recordings = opened([name], behind=number, of=len(files))

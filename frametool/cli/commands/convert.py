@@ -139,9 +139,7 @@ def _found(poses: Sequence[Pose], find: str, tolerance: float, style: Style) -> 
     return style.changed(notations=tuple(notation(f"{'euler_deg' if degrees else 'euler'}:{each}") for each in axes))
 
 
-def _change_of_axes(
-    axes: str | None, world: str | None, both: str | None
-) -> tuple[str | None, str | None, Operation]:
+def _change_of_axes(axes: str | None, world: str | None, both: str | None) -> tuple[str | None, str | None, Operation]:
     """Return what --axes and --world-axes name, or --all-axes for both, and the operation that it is."""
     from frametool.geometry.conventions import both_sides, sides_of
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     Eye = tuple[float, float]
 
+
 @command_named("tree", own=("notations", "joints"))
 @argument("tree", FILE)
 @option("--at TIME", "seconds, nanoseconds with ns  [default: latest of each edge]", read_time)

@@ -203,10 +203,10 @@ def read_value(joint: Joint, value: Any, source: Source, *, normalize: bool = Fa
 
     source: where it is, for messages.  Raises Misfit with the path below the value, and ValueInvalid.
     """
+    if not joint.posed and isinstance(value, (JointValue, float)):
+        return value if isinstance(value, JointValue) else JointValue(value)
     which = f"joint {shown(joint.name)}"
     if not joint.posed:
-        if isinstance(value, (JointValue, float)):
-            return value if isinstance(value, JointValue) else JointValue(value)
         if type(value) is not str:
             expected = "metres, or 2cm" if joint.kind == "prismatic" else "radians, or 30deg"
             raise Misfit(f"{which} is {joint.kind}: expected {expected}, found {kind(value)}")
