@@ -45,6 +45,7 @@ class XmlFile:
         snippet = pointer(line_of(text[0], 1), column)
         return FormatError(message, source=self.name, line=line, column=column, snippet=snippet, rule=rule)
 
+
 _ENDS_EARLY = 3  # expat's code for "no element found", also used for truncated text
 
 

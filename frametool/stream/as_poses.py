@@ -314,7 +314,8 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
         nameless = {
             row: Fault(line + int(block.lines[row]), column, "no name of a frame")
             for role, column in named.items()
-            for row, name in enumerate(block.for_each((block.parents, block.names)[role]))
+            for names in [block.for_each((block.parents, block.names)[role])]
+            for row, name in enumerate(() if all(names) else names)
             if not name
         }
         for fault in [*(each._replace(line=line + each.line) for each in outcome.faults), *nameless.values()]:

@@ -196,7 +196,6 @@ class ColumnRows(PlannedRows):
         weights[invalid] = 0.0
         return [weights], dict.fromkeys(np.flatnonzero(invalid).tolist(), (name, "not finite"))
 
-
     def in_other_format(self, columns: Sequence[OutColumn], batch: Batch) -> tuple[int, dict[str, Made]]:
         """Return how many results a batch has, and their columns by name, for a file of another format."""
         results = self.of_batch(batch)

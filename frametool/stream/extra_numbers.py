@@ -201,7 +201,7 @@ def find_rates(
     turns = operation.turns and not operation.mirrors
     turned = [tuple(each) for each in rates.values() if len(each) == 3 and turns]
     if stay := [names[at] for each in rates.values() if tuple(each) not in turned for at in each]:
-        apart = "stay as they are: points and poses move; --columns vx,vy,vz --as vector turns velocities"
+        apart = f"stay as they are: points and poses move; --columns {','.join(stay[:3])} --as vector turns velocities"
         why = "keep to the old axes: poses and covariances turn alone" if operation.turns else apart
         warn(f"{source}: {listing(stay, 9)} {why}")
     kinds = [NORMAL if names[each[0]][0] in "vV" else RATE for each in turned]

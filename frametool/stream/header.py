@@ -39,7 +39,6 @@ LETTERS = {
 }
 NO_UNIT = ("", "-", "1")
 MOST_SHOWN, MOST_LISTED = 8, 40  # columns in a message
-LONGEST_RANGE = 40  # characters: more digits name no column
 # behind an underscore: these are units of no length, and those are lengths that nobody should have to guess
 UNITS = re.compile(r"_(deg|rad|mm|cm|um|m)(?![^\W_])|_(km|in|ft|s)$")
 TOKEN = re.compile(r"[^\W_]+")
@@ -217,9 +216,9 @@ def find_rotations(header: Header, expected: Notation | None) -> list[Columns]:
         return nearest
     alone = []  # columns that say a rotation by themselves, where none of the others is there: `yaw`, `theta`
     for row in rows:
-        others = {(each.prefix, each.suffix) for each in header.match(row.columns, partly=True) if any(each.spots[:-1])}
         for match in [each for word in row.alone for each in header.match((word,), (0,))]:
-            if header.is_plain(match) and (match.prefix, match.suffix) not in others:
+            partly = [each for each in header.match(row.columns, partly=True) if any(each.spots[:-1])]
+            if header.is_plain(match) and match[2:4] not in [each[2:4] for each in partly]:  # of other affixes
                 spots = (*[None] * (len(row.columns) - 1), *match.spots)
                 alone.append(_rotation(match._replace(spots=spots), row, expected))
     return alone
@@ -278,7 +277,7 @@ def _several(
 ) -> list[PoseColumns]:
     """Put each rotation with the position that shares most of its affixes; raises FormatError for another count."""
     poses, left = list[PoseColumns](), list(positions)
-    for rotation in rotations:  # each with the position that shares most of its affixes
+    for rotation in rotations:
         near = max(
             () if rotation.whole else left, default=None,
             key=lambda at: (at.suffix == rotation.suffix, len(commonprefix([at.prefix, rotation.prefix]))),  # noqa: RUF071
@@ -489,7 +488,7 @@ def places_named(spec: str, names: Sequence[str] | None, width: int) -> tuple[Se
     places = list[int]()
     for word in map(str.strip, spec.split(",")):
         first, dash, last = word.partition("-")
-        is_range = first.isdecimal() and (last.isdecimal() if dash else not last) and len(word) < LONGEST_RANGE
+        is_range = first.isdecimal() and (last.isdecimal() if dash else not last) and len(word) < 40
         low, high = (int(first), int(last or first)) if is_range else (0, 0)
         if word in numbers:
             places.append(numbers[word])

@@ -181,7 +181,7 @@ def _turning_along(
         named = ", ".join(map(" ".join, there))
         raise Misused(f"{named} would keep to the old axes; --columns x,y,z turns the points alone, apply all of them")
     found = [(tuple(map(names.index, each)), NORMAL) for each in there if operation.moves]
-    if operation.turns or (operation.moves and not known.isdisjoint(("vx", "wx"))):
+    if operation.turns or (operation.moves and not known.isdisjoint(("vx", "wx", "body_vx"))):
         from frametool.stream.extra_numbers import find_rates
 
         found += find_rates(names, poses[0].places, operation, source)

@@ -91,7 +91,7 @@ def join(columns: Sequence[Spans]) -> bytes:
 class Cells(NamedTuple):
     """The lines of a block and the cells of those with the expected number of cells.
 
-    data: the block between margins (see spans.py); all offsets refer to it
+    data: the block between margins (see MARGIN); all offsets refer to it
     line_starts, line_ends: (lines,), a line's first byte and the one after its line end
     counts: (lines,), cells in each line; 0 for an empty line or a comment
     rows: (n,), the lines with the expected number of cells, and starts, ends: (n, columns), their ranges

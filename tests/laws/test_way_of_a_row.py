@@ -48,9 +48,9 @@ class Cost(NamedTuple):
 
 
 MOST = {
-    "one CSV point": Cost(functions=499, files=48, lines=3528),  # the aim: 320 functions, 30 files
-    "40 JSON records": Cost(functions=468, files=46, lines=3276),  # 340, 32
-    "40 JSON records to CSV": Cost(functions=471, files=46, lines=3273),  # 340, 32
+    "one CSV point": Cost(functions=498, files=48, lines=3528),  # the aim: 320 functions, 30 files
+    "40 JSON records": Cost(functions=467, files=46, lines=3276),  # 340, 32
+    "40 JSON records to CSV": Cost(functions=470, files=46, lines=3273),  # 340, 32
     "TUM to KITTI": Cost(functions=408, files=38, lines=2774),  # 320, 30
     "YAML lookup": Cost(functions=298, files=34, lines=1908),  # 220, 28
     "convert of numbers": Cost(functions=133, files=21, lines=840),  # 120, 20
