@@ -13,6 +13,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid, warn
 from frametool.fit.least_squares import align_vectors, length, require_near, solve_normal
+from frametool.frames.stamps import BILLION
 from frametool.frames.trajectory import BODY, WORLD, Trajectory
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
@@ -437,7 +438,6 @@ def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step:
 
 
 MOST = 100_000_000  # poses
-BILLION = 10**9
 
 
 def stamps_at_rate(each: Trajectory, rate_hz: float) -> Array:

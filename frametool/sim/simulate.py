@@ -325,7 +325,7 @@ SHORT = {
 
 
 class StepWriter:
-    """Writes the contents of steps: emit is one of EMITS, style.form one of FORMS.
+    """Writes the contents of steps: emit is one of EMITS, style.format one of FORMS.
 
     leaders: the commands of leaders too, not only of followers.  labelled: name the turtle in a comment of a YAML
     message.
