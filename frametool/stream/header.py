@@ -212,16 +212,15 @@ def find_rotations(header: Header, expected: Notation | None) -> list[Columns]:
         for place in each.places:
             best[place] = min(best.get(place, size), size)
     nearest = [each for size, each in spread if size <= min(map(best.__getitem__, each.places))]
-    if nearest:
-        return nearest
-    alone = []  # columns that say a rotation by themselves, where none of the others is there: `yaw`, `theta`
-    for row in rows:
-        for match in [each for word in row.alone for each in header.match((word,), (0,))]:
-            partly = [each for each in header.match(row.columns, partly=True) if any(each.spots[:-1])]
-            if header.is_plain(match) and match[2:4] not in [each[2:4] for each in partly]:  # of other affixes
-                spots = (*[None] * (len(row.columns) - 1), *match.spots)
-                alone.append(_rotation(match._replace(spots=spots), row, expected))
-    return alone
+    alone = list[Columns]()  # of columns that say one by themselves, where none of the others is there: `yaw`, `theta`
+    for row in () if nearest else rows:
+        lone = [each for word in row.alone for each in header.match((word,), (0,)) if header.is_plain(each)]
+        if lone:
+            others = {each[2:4] for each in header.match(row.columns, partly=True) if any(each.spots[:-1])}  # affixes
+            rest = (None,) * (len(row.columns) - 1)
+            rotations = [each._replace(spots=(*rest, *each.spots)) for each in lone if each[2:4] not in others]
+            alone += [_rotation(each, row, expected) for each in rotations]
+    return nearest or alone
 
 
 SEARCHED = {frozenset(row.columns): row for row in reversed(ROTATIONS.values()) if row.searched}
