@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from frametool.stream.record_results import BlockResults, ResultWriter
     from frametool.stream.record_values import Value
     from frametool.stream.request import Operation
-    from frametool.stream.row_poses import RowPoses
+    from frametool.stream.rows import RowPoses
 
 
 def _place(fmt: str, output: str | None) -> str:
@@ -341,7 +341,7 @@ class Blocks:
         """Return the text of some results."""
         from frametool.stream.as_poses import writer_for
         from frametool.stream.row_layout import POSE
-        from frametool.stream.row_poses import block_of, block_of_points
+        from frametool.stream.rows import block_of, block_of_points
 
         output, kind = self.output, POSE
         if self.writer is None:

@@ -20,7 +20,7 @@ from frametool.formats.rows.column_file import STAMP_NS, WHOLE, Made, OutColumn,
 from frametool.formats.table import FORMATS
 from frametool.geometry import arrays
 from frametool.stream.row_layout import POSE, SIX, TWIST, WRENCH, six_names
-from frametool.stream.row_poses import NO_STAMP, is_typed, objects, plain_cells, text_of, texts_of
+from frametool.stream.rows import NO_STAMP, is_typed, objects, plain_cells, text_of, texts_of
 from frametool.stream.writers import PoseWriter
 from frametool.text.parse import parse_floats
 from frametool.text.spans import Spans
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from frametool.formats.rows.column_file import ColumnWriter, Kind
     from frametool.grammar.result import Style
-    from frametool.stream.row_poses import Cells, RowPoses
+    from frametool.stream.rows import Cells, RowPoses
 
 SPARE = 64  # characters that a text may have where not all rows were seen
 DOUBLE, FLAG = np.dtype(np.float64), np.dtype(np.bool_)

@@ -42,8 +42,7 @@ from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, BadRow, Fault, Outcome, RowNote
 from frametool.stream.request import Request, RowOptions
 from frametool.stream.row_layout import POINT, POSE, Shape, Target
-from frametool.stream.row_poses import RowPoses, kept
-from frametool.stream.rows import Block, spans_of
+from frametool.stream.rows import Block, RowPoses, kept, spans_of
 from frametool.stream.table import PlannedRows, TableRows
 from frametool.stream.writers import LEARNED, RowsWriter, SingleWriter, TextWriter
 

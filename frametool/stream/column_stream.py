@@ -23,8 +23,7 @@ from frametool.stream.array_writer import ColumnsWriter
 from frametool.stream.faults import SKIP, STOP, Fault, Outcome, RowNote
 from frametool.stream.layout import Fixed, Kept, Named, New, quoted
 from frametool.stream.request import VELOCITIES, Operation, Request
-from frametool.stream.row_poses import RowPoses, objects, taken
-from frametool.stream.rows import Block, coded_texts
+from frametool.stream.rows import Block, RowPoses, coded_texts, objects, taken
 from frametool.stream.table import PlannedRows, Table
 
 if TYPE_CHECKING:

@@ -183,7 +183,7 @@ def _of_edges(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
 def _of_table(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
     """Yield the rows of a table."""
     from frametool.stream.as_poses import FormatConverter
-    from frametool.stream.row_poses import values_of
+    from frametool.stream.rows import values_of
 
     converter = FormatConverter(file.format, request._replace(operation=MOVED), file.name)
     bare, line = file.tally.names.bare, 0

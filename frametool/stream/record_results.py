@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Generator, Iterable, Iterator, Sequence
 
     from frametool.stream.record_values import Value
-    from frametool.stream.row_poses import RowPoses
+    from frametool.stream.rows import RowPoses
     from frametool.stream.text_rows import AlikeRows
     from frametool.text.spans import Ints, Spans
 

@@ -12,7 +12,7 @@ from frametool.geometry import arrays, earth, quaternion
 from frametool.grammar.readers import EARTH_FRAMES
 from frametool.recordings.write import KINDS, RecordingFile, check_stamps, filled, serialised
 from frametool.stream.row_layout import POINT, POSE
-from frametool.stream.row_poses import RowPoses, plain_cells
+from frametool.stream.rows import RowPoses, plain_cells
 from frametool.stream.writers import refuse_scale_in
 
 if TYPE_CHECKING:

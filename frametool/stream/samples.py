@@ -31,7 +31,7 @@ from frametool.stream.record import find_records, pose_of, value_at
 from frametool.stream.record_values import read_text
 from frametool.stream.request import Operation, Request, RowOptions
 from frametool.stream.row_layout import IDENTITY, POSE
-from frametool.stream.row_poses import RowPoses, block_of, plain_cells
+from frametool.stream.rows import RowPoses, block_of, plain_cells
 from frametool.stream.table import open_table
 from frametool.stream.trajectories import TREE, gathered
 from frametool.text.numbers import parse_number

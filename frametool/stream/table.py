@@ -28,8 +28,18 @@ from frametool.stream.header import Columns, PoseColumns, has_pose_column, liste
 from frametool.stream.layout import ADDED, NAMED, Layout, New, quoted
 from frametool.stream.request import VELOCITIES
 from frametool.stream.row_layout import NORMAL, POSE, RATE, Shape
-from frametool.stream.row_poses import RowPoses, taken
-from frametool.stream.rows import Block, BlockNames, Coded, coded, read_extra, read_stamps, spans_of, written
+from frametool.stream.rows import (
+    Block,
+    BlockNames,
+    Coded,
+    RowPoses,
+    coded,
+    read_extra,
+    read_stamps,
+    spans_of,
+    taken,
+    written,
+)
 from frametool.stream.stamp_source import replaced, stamp_text
 from frametool.stream.table_plan import plan_table
 from frametool.text.lines import read_blocks, whole_lines

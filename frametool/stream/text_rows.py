@@ -16,8 +16,17 @@ from frametool.documents.yaml_writer import quoted as quoted_in_yaml
 from frametool.formats.rows.csv import cell, quoted
 from frametool.grammar.result import Result
 from frametool.stream.row_layout import AS_READ
-from frametool.stream.row_poses import RowPoses, kept, objects, plain_cells, text_of, texts_of
-from frametool.stream.rows import constant, number_spans, spans_of
+from frametool.stream.rows import (
+    RowPoses,
+    constant,
+    kept,
+    number_spans,
+    objects,
+    plain_cells,
+    spans_of,
+    text_of,
+    texts_of,
+)
 from frametool.text.spans import Floats, Ints, Spans
 
 if TYPE_CHECKING:

@@ -31,7 +31,7 @@ from frametool.stream.faults import BadRows, Outcome, run
 from frametool.stream.header import listed
 from frametool.stream.record_stream import run_records
 from frametool.stream.request import Operation, Request, RowOptions
-from frametool.stream.row_poses import RowPoses, block_of, objects, plain_cells
+from frametool.stream.rows import RowPoses, block_of, objects, plain_cells
 from frametool.stream.rows import read_stamps as read_columns
 from frametool.stream.table import open_table
 from frametool.text.spans import without_quotes

@@ -35,8 +35,17 @@ from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream.layout import Const, In, Out, Piece
 from frametool.stream.record_results import BlockResults, Documents, csv_rows
 from frametool.stream.row_layout import POSE, SIX, Target
-from frametool.stream.row_poses import block_of, kept, spelled, texts_of, values_of
-from frametool.stream.rows import assemble, number_spans, separators, spans_of
+from frametool.stream.rows import (
+    assemble,
+    block_of,
+    kept,
+    number_spans,
+    separators,
+    spans_of,
+    spelled,
+    texts_of,
+    values_of,
+)
 from frametool.stream.text_rows import MORE_NUMBERS, NAME, NUMBERS, PARENT, STAMP_NS, AlikeRows, Marked, leaf_mark
 from frametool.text.spans import Floats, Spans, join
 
@@ -44,7 +53,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from frametool.geometry.types import Components
-    from frametool.stream.row_poses import RowPoses
+    from frametool.stream.rows import RowPoses
 
 LEARNED = ("csv", "json", "yaml")
 LOSABLE = {"frames": "names of frames", "stamps": "stamps"}

@@ -14,7 +14,7 @@ from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
 from frametool.stream.row_layout import NOWHERE
-from frametool.stream.row_poses import block_of
+from frametool.stream.rows import block_of
 from frametool.stream.writers import RowsWriter
 
 if TYPE_CHECKING:
