@@ -21,10 +21,10 @@ from frametool.formats.table import FORMATS
 from frametool.grammar.readers import NORMALS, in_nanoseconds
 from frametool.stream.array_writer import ColumnsWriter
 from frametool.stream.faults import SKIP, STOP, Fault, Outcome, RowNote
-from frametool.stream.layout import Fixed, Kept, Named, New, quoted
 from frametool.stream.request import VELOCITIES, Operation, Request
 from frametool.stream.rows import Block, RowPoses, coded_texts, objects, taken
 from frametool.stream.table import PlannedRows, Table
+from frametool.stream.table_plan import Fixed, Kept, Named, New, quoted
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Sequence

@@ -51,8 +51,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from frametool.geometry.types import Components, Rigid
-    from frametool.stream.layout import Piece
-    from frametool.stream.row_layout import Target
+    from frametool.stream.row_layout import Piece, Target
 
 COLUMNS_REMEDY = "give --deg, or name the columns _deg"
 

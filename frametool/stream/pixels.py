@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion, rigid
-from frametool.stream.layout import Word
 from frametool.stream.request import Formula, Shown
-from frametool.stream.row_layout import POINT, POSE
+from frametool.stream.row_layout import POINT, POSE, Word
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -20,9 +20,8 @@ from frametool.grammar.pose import DESCRIPTIVE, LISTED_WORDS, POSE_KEYS, ROTATIO
 from frametool.grammar.readers import AXES_KEY, NAME_KEYS, PARENT_KEYS, Path, may_be_uncertain
 from frametool.stream.evaluate import Plan
 from frametool.stream.faults import NULL, SKIP, Fault
-from frametool.stream.layout import Const, In, Renamed
 from frametool.stream.record import KEYS_REMEDY, POINT_KEYS, Record
-from frametool.stream.row_layout import POSE
+from frametool.stream.row_layout import POSE, Const, In, Renamed
 from frametool.stream.rows import Block, read_extra
 from frametool.stream.splice import OURS, column_in, quoted_name, stretches_of
 from frametool.stream.splitter import DOCUMENTS, LINES, Part, Splitter

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from frametool.stream.record_values import Value
     from frametool.stream.rows import RowPoses
-    from frametool.stream.text_rows import AlikeRows
+    from frametool.stream.writers import AlikeRows
     from frametool.text.spans import Ints, Spans
 
 
@@ -93,7 +93,7 @@ class Documents(ResultWriter):
         lines = [(place, (self.parting + write_poses([value], self.style)).encode()) for place, value in block.values]
         groups = []
         for batch in block.batches:
-            from frametool.stream.text_rows import JSON, YAML
+            from frametool.stream.writers import JSON, YAML
 
             text = self.parting + write_poses([batch.marked.value], self.exact)
             syntax = YAML if self.style.format == "yaml" else JSON
@@ -117,7 +117,7 @@ def csv_rows(block: BlockResults, columns: dict[str, None], style: Style) -> byt
         if alike is None:
             lines.append((place, row([cells.get(name, "") for name in columns], style).encode()))
         else:
-            from frametool.stream.text_rows import in_table
+            from frametool.stream.writers import in_table
 
             groups.append((alike.places, alike.text(in_table(cells, columns, style), style)))
     return text_in_order(lines, groups)

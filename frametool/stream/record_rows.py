@@ -22,7 +22,7 @@ from frametool.stream.record_cuts import Cut, Template, names_of, plan_of
 from frametool.stream.record_values import MOST_ENTRIES, SPELLED, Answer, stamp_key, unit_of, values_of_unit
 from frametool.stream.row_layout import POINT, POSE, ROTATION, VECTOR, Target
 from frametool.stream.rows import RowPoses, read_stamps
-from frametool.stream.text_rows import LEAF, MORE_NUMBERS, NAME, NUMBERS, PARENT, STAMP_NS, AlikeRows, Marked, leaf_mark
+from frametool.stream.writers import LEAF, MORE_NUMBERS, NAME, NUMBERS, PARENT, STAMP_NS, AlikeRows, Marked, leaf_mark
 from frametool.text.spans import MARGIN, Bytes, Spans
 
 if TYPE_CHECKING:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from frametool.stream.record_cuts import Hit, RecordCutter
     from frametool.stream.record_rows import RecordRows
     from frametool.stream.request import Request
-    from frametool.stream.text_rows import AlikeRows
+    from frametool.stream.writers import AlikeRows
     from frametool.text.lines import ByteStream
 
 _LEADING_COMMA = re.compile(rb"\A((?:\xef\xbb\xbf)?\s*\[?\s*),\s*")

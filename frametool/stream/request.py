@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from frametool.geometry.place import Earth, Place
     from frametool.geometry.types import Components, Namespace, Number, Rigid
     from frametool.stream.gathering import Gathered
-    from frametool.stream.layout import Word
+    from frametool.stream.row_layout import Word
     from frametool.stream.stamp_source import Timed
 
     Rename: TypeAlias = Callable[[str | None, str | None], tuple[str | None, str | None]]

@@ -337,3 +337,81 @@ def doubt(shape: Shape, angle: float, remedy: str) -> str:
     """Wonder whether an angle beyond a full turn is meant in degrees."""
     name = shape.notation.representation.name if shape.notation else ""
     return f"{name} {angle:g} is more than a full turn in radians; degrees? {remedy}"
+
+
+# --- the pieces that the text of a row is made of ---
+
+
+class In(NamedTuple):
+    """A stretch of the input, by its index among the spans a format found."""
+
+    part: int
+
+
+class Out(NamedTuple):
+    """Numbers of the result, from the first up to before the last, each followed by `between` but for the last."""
+
+    first: int
+    last: int
+    between: bytes = b","
+
+
+class Word(NamedTuple):
+    """A number of the result as the word that it encodes, between quotes or not: the zone of UTM."""
+
+    number: int
+    words: tuple[str, ...]
+    quote: bytes = b""
+
+    def text(self, number: float) -> bytes:
+        """Return the word of a number."""
+        return self.quote + self.words[int(number)].encode() + self.quote
+
+
+class Item(Word):
+    """A number of a list with what is around it, or another text where it is not a number.
+
+    words: the text before it, the one behind it, the other one, and the format of the number
+    """
+
+    def text(self, number: float) -> bytes:
+        """Return the text of a number."""
+        before, behind, other, fmt = self.words
+        if number != number:  # noqa: PLR0124 - nan
+            return other.encode()
+        return f"{before}{number_text(number, fmt, self.quote.decode())}{behind}".encode()
+
+
+def number_text(number: float, fmt: str, exponent: str) -> str:
+    """Write a number in a format of Python's; exponent: what 1e-05 has for its e, in YAML `.0e`."""
+    text = format(number, fmt)
+    return text if "." in text else text.replace("e", exponent)
+
+
+class Instead(NamedTuple):
+    """A name of the result in place of a stretch of the input, which stays where there is no result."""
+
+    part: int
+    new: int
+
+
+class Renamed(NamedTuple):
+    """The name of a frame in the result, in place of the one that begins at `at` in the text that was learned."""
+
+    at: int
+    text: bytes
+
+
+class Const(NamedTuple):
+    """The same text in every row."""
+
+    text: bytes
+
+
+class IfLocked(NamedTuple):
+    """Text that is only in rows whose angles are not unique."""
+
+    text: bytes
+
+
+Piece: TypeAlias = In | Out | Const | IfLocked | Instead | Word | Renamed

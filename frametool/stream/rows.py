@@ -22,8 +22,7 @@ from frametool.frames.stamps import BILLION, nanoseconds_each, tell_size
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.readers import in_nanoseconds
 from frametool.grammar.result import NoResult, Result, with_entries
-from frametool.stream.layout import Const, IfLocked, In, Instead, Out, Piece, Word
-from frametool.stream.row_layout import AS_READ, NOWHERE, PARTS, POSE
+from frametool.stream.row_layout import AS_READ, NOWHERE, PARTS, POSE, Const, IfLocked, In, Instead, Out, Piece, Word
 from frametool.stream.stamp_source import read_header_stamp, read_stamp
 from frametool.text.numbers import parse_number
 from frametool.text.parse import LOWEST, parse_floats, trimmed
@@ -49,7 +48,9 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components
     from frametool.stream.faults import Fault
     from frametool.stream.request import Request
+
     Cells: TypeAlias = Spans | NDArray[Any]
+
 
 class BlockNames(NamedTuple):
     """The names of a block's rows.
@@ -365,7 +366,7 @@ def _integer(data: Bytes, ends: Ints, length: Ints) -> tuple[Ints, Flags]:
     return total.view(np.int64), (wrong == 0) & (upper < _MOST_UPPER)
 
 
-# The rows of a table as blocks of poses: for trees, and for results in another format than the table's.
+# --- what became of rows: poses for trees and for other formats; single results as such blocks and back ---
 
 NO_STAMP = np.iinfo(np.int64).min  # of a bad row that is kept
 

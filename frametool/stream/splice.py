@@ -19,10 +19,25 @@ from frametool.grammar.pose import LISTED_WORDS, ROTATION_KEYS, Pose
 from frametool.grammar.readers import AXES_KEY, EARTH_FRAMES, PLACE_KEYS
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream.faults import Fault
-from frametool.stream.layout import Const, IfLocked, In, Item, Out, Piece, Renamed, Word, number_text
 from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ, Name, outermost
 from frametool.stream.record_values import Answer, Entry, RecordText, json_documents, without_noise, written
-from frametool.stream.row_layout import POINT, POSE, SIX, TURNED, VECTOR, count_of
+from frametool.stream.row_layout import (
+    POINT,
+    POSE,
+    SIX,
+    TURNED,
+    VECTOR,
+    Const,
+    IfLocked,
+    In,
+    Item,
+    Out,
+    Piece,
+    Renamed,
+    Word,
+    count_of,
+    number_text,
+)
 from frametool.stream.stamp_source import replaced
 
 if TYPE_CHECKING:

@@ -25,7 +25,6 @@ from frametool.grammar.readers import EARTH_FRAMES, NORMALS, in_nanoseconds, sta
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import STOP, Fault, Outcome, RowNote
 from frametool.stream.header import Columns, PoseColumns, has_pose_column, listed
-from frametool.stream.layout import ADDED, NAMED, Layout, New, quoted
 from frametool.stream.request import VELOCITIES
 from frametool.stream.row_layout import NORMAL, POSE, RATE, Shape
 from frametool.stream.rows import (
@@ -41,7 +40,7 @@ from frametool.stream.rows import (
     written,
 )
 from frametool.stream.stamp_source import replaced, stamp_text
-from frametool.stream.table_plan import plan_table
+from frametool.stream.table_plan import ADDED, NAMED, Layout, New, plan_table, quoted
 from frametool.text.lines import read_blocks, whole_lines
 from frametool.text.spans import (
     MARGIN,
