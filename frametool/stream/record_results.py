@@ -93,11 +93,8 @@ class Documents(ResultWriter):
         lines = [(place, (self.parting + write_poses([value], self.style)).encode()) for place, value in block.values]
         groups = []
         for batch in block.batches:
-            from frametool.stream.writers import JSON, YAML
-
             text = self.parting + write_poses([batch.marked.value], self.exact)
-            syntax = YAML if self.style.format == "yaml" else JSON
-            groups.append((batch.places, batch.text([(text, syntax)], self.style)))
+            groups.append((batch.places, batch.as_documents(text, self.style)))
         found = text_in_order(lines, groups)
         begun, self.begun = self.begun, self.begun or bool(found)
         return found if begun else found[len(self.parting) :]
@@ -117,9 +114,7 @@ def csv_rows(block: BlockResults, columns: dict[str, None], style: Style) -> byt
         if alike is None:
             lines.append((place, row([cells.get(name, "") for name in columns], style).encode()))
         else:
-            from frametool.stream.writers import in_table
-
-            groups.append((alike.places, alike.text(in_table(cells, columns, style), style)))
+            groups.append((alike.places, alike.as_cells(cells, columns, style)))
     return text_in_order(lines, groups)
 
 

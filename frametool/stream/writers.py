@@ -377,7 +377,20 @@ class AlikeRows(NamedTuple):
         """Return some of the rows."""
         return AlikeRows(self.marked, self.places[rows], self.numbers[rows], kept(self.block, rows))
 
-    def text(self, parts: Sequence[tuple[str, Syntax]], style: Style) -> list[Spans]:
+    def as_documents(self, text: str, style: Style) -> list[Spans]:
+        """Return the rows as JSON or YAML; text: that of the result with marks."""
+        return self._text([(text, YAML if style.format == "yaml" else JSON)], style)
+
+    def as_cells(self, cells: Mapping[str, Any], columns: Iterable[str], style: Style) -> list[Spans]:
+        """Return the rows as lines of CSV; cells: those of the result with marks."""
+        parts: list[tuple[str, Syntax]] = []
+        exact = style.changed(precision=None, screen=False)
+        for at, name in enumerate(columns):
+            value = cells.get(name, "")
+            parts += [("," * (at > 0) + cell(value, exact), IN_CELL if isinstance(value, (dict, list)) else CELL)]
+        return self._text([*parts, ("\n", CELL)], style)
+
+    def _text(self, parts: Sequence[tuple[str, Syntax]], style: Style) -> list[Spans]:
         """Return the rows as text; parts: the text of the result with marks, and how scalars are written in it."""
         columns, (size, width) = self.marked.numbers, self.numbers.shape
         is_yaml = style.format == "yaml"
@@ -490,13 +503,3 @@ class AlikeRows(NamedTuple):
         extras = {key: objects(self._said(each)) for key, each in value.extras.items() if key != "stamp_ns"}
         lines = np.arange(len(self.places))
         return RowPoses(self.numbers[:, :7] + 0.0, self.block.stamps_ns, lines, parents, names, extras)
-
-
-def in_table(cells: Mapping[str, Any], columns: Iterable[str], style: Style) -> list[tuple[str, Syntax]]:
-    """Return a line of CSV of the cells of a result with marks."""
-    parts: list[tuple[str, Syntax]] = []
-    exact = style.changed(precision=None, screen=False)
-    for at, name in enumerate(columns):
-        value = cells.get(name, "")
-        parts += [("," * (at > 0) + cell(value, exact), IN_CELL if isinstance(value, (dict, list)) else CELL)]
-    return [*parts, ("\n", CELL)]
