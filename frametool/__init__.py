@@ -21,11 +21,6 @@ if TYPE_CHECKING:
     from frametool.cli.embedded import Ran as Ran
     from frametool.cli.embedded import run as run
     from frametool.derivation import explain as explain
-    from frametool.earth import earth_pose as earth_pose
-    from frametool.earth import ecef_from_lla as ecef_from_lla
-    from frametool.earth import lla_from_ecef as lla_from_ecef
-    from frametool.earth import lla_from_utm as lla_from_utm
-    from frametool.earth import utm_from_lla as utm_from_lla
     from frametool.errors import FrametoolError as FrametoolError
     from frametool.fit.closed_forms import solve_mean as solve_mean
     from frametool.fit.closed_forms import solve_points as solve_points
@@ -42,6 +37,11 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import FrameTree as FrameTree
     from frametool.frames.trajectory import Trajectory as Trajectory
     from frametool.geometry.camera import Camera as Camera
+    from frametool.geometry.earth import earth_pose as earth_pose
+    from frametool.geometry.earth import ecef_from_lla as ecef_from_lla
+    from frametool.geometry.earth import lla_from_ecef as lla_from_ecef
+    from frametool.geometry.earth import lla_from_utm as lla_from_utm
+    from frametool.geometry.earth import utm_from_lla as utm_from_lla
     from frametool.geometry.rotation import Rotation as Rotation
     from frametool.geometry.transform import Transform as Transform
     from frametool.lint.tree_diff import diff as diff
@@ -61,7 +61,6 @@ _HOMES = {
         "frametool.calc": "calc",
         "frametool.cli.embedded": "Ran run",
         "frametool.covariance": "covariance",
-        "frametool.earth": "earth_pose ecef_from_lla lla_from_ecef lla_from_utm utm_from_lla",
         "frametool.errors": "FrametoolError",
         "frametool.explain": "explain",
         "frametool.fit.closed_forms": "solve_mean solve_points",
@@ -76,6 +75,7 @@ _HOMES = {
         "frametool.frames.lookups": "FrameTree",
         "frametool.frames.trajectory": "Trajectory",
         "frametool.geometry.camera": "Camera",
+        "frametool.geometry.earth": "earth_pose ecef_from_lla lla_from_ecef lla_from_utm utm_from_lla",
         "frametool.geometry.rotation": "Rotation",
         "frametool.geometry.transform": "Transform",
         "frametool.lint.tree_diff": "diff",

@@ -20,7 +20,7 @@ from make_trajectories import FOLDER, SECONDS, truth
 from recorded import SECOND, START, Maker, Sent, write
 
 from frametool import Rotation, Transform
-from frametool.earth import earth_pose, lla_from_ecef
+from frametool.geometry.earth import earth_pose, lla_from_ecef
 
 ODOM = Transform(Rotation.from_rpy([0.0, 0.0, 0.5]), [12.0, -3.0, 0.0])  # map<-odom
 IMU = (0.1, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0)

@@ -1,9 +1,17 @@
-"""Kernels of positions on the Earth, WGS84: latitude and longitude in degrees, metres above the ellipsoid, ECEF, UTM.
+"""Positions on the Earth, WGS84: latitude and longitude in degrees, metres above the ellipsoid, ECEF, UTM, local axes.
 
-`ecef` is the Earth's frame: x to lat 0 lon 0, z to the north pole.  Only + - * / and square roots, and this package's
-own sines and arc tangents: floats and arrays give the same bits.  Invalid positions become NaN; `check_lla`,
-`check_ecef`, `check_utm` and `check_grid` raise the reason.  Knows numbers only; components are floats or arrays of one
-shape.
+    import frametool
+    ecef_from_map = frametool.earth_pose(48.1, 11.5, 520.0)            # axes east, north, up at this position
+    xyz = frametool.ecef_from_lla(48.1, 11.5, 521.0)
+    ecef_from_map.inverse().apply(xyz)                                  # 1 m up
+
+`ecef` is the Earth's frame: x to lat 0 lon 0, z to the north pole.  alt is metres above the ellipsoid, as in NavSatFix,
+not above sea level.  lat is in [-90, 90], lon in [-180, 360] as input and (-180, 180] as output.
+
+Kernels: only + - * / and square roots, and this package's own sines and arc tangents: floats and arrays give the same
+bits.  Invalid positions become NaN; `check_lla`, `check_ecef`, `check_utm` and `check_grid` raise the reason.  Knows
+numbers only; components are floats or arrays of one shape.  The public functions at the end take lists and arrays too,
+which broadcast; a single position is plain floats, without numpy.  They raise ValueInvalid for an invalid position.
 
 A zone of UTM is a number, 1 to 60, negative for the south: 32.0 is 32N, -32.0 is 32S; lat 0 is north.  Krueger's series
 to n^6, whose truncation is below a nanometre 30 degrees from the meridian.
@@ -17,15 +25,17 @@ from __future__ import annotations
 from math import factorial, isnan, nan
 
 from frametool.errors import ValueInvalid, shown
-from frametool.geometry import floats, quaternion
+from frametool.geometry import floats, quaternion, validation
 from frametool.geometry.floats import RADIAN, SQRT_HALF, bearing, half_sincos_deg, incline, nearest, polynomial
 from frametool.geometry.quaternion import TINY
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from typing import Any
 
-    from frametool.geometry.types import Four, Functions, N, Seven, Three, Two
+    from frametool.geometry.transform import Transform
+    from frametool.geometry.types import Components, Four, Functions, N, Numbers, Seven, Three, Two
 
 A, F = 6378137.0, 1.0 / 298.257223563  # the equator's radius in metres, and the flattening
 E2, EC = F * (2.0 - F), 1.0 - F  # the eccentricity squared; the polar radius over the equator's
@@ -374,3 +384,88 @@ def check_grid(zone: float, easting: float, northing: float) -> None:
     if isnan(sum(lat_lon(zone, easting, northing, floats))):
         place = f"utm {ZONES[int(zone)]} {easting!r} {northing!r}"
         raise ValueInvalid(f"{place} is beyond 84 N, 80 S or 30 degrees of the meridian; easting and northing swapped?")
+
+
+# --- the public functions ---
+
+
+def ecef_from_lla(lat: Numbers, lon: Numbers, alt: Numbers = 0.0) -> Any:
+    """Return x, y, z in metres: three floats for one position, an array (..., 3) for many."""
+    argument = _columns(lat=lat, lon=lon, alt=alt)
+    found = validation.checked(ecef, 3, argument, "place", check_lla)
+    return found if validation.single(found) else validation.stacked(found)
+
+
+def lla_from_ecef(xyz: Numbers) -> Any:
+    """Return lat, lon, alt from x, y, z in metres, shape (..., 3), 100 km or more from the centre; lon 0 at a pole."""
+    return validation.checked(lla, 3, validation.columns(xyz, 3, "xyz"), "xyz", check_ecef)
+
+
+def earth_pose(
+    lat: Numbers, lon: Numbers, alt: Numbers = 0.0, axes: str = "enu", *, zone: Numbers | str | None = None
+) -> Transform:
+    """Return ecef_from_axes: the pose in ECEF of axes at a position; at a pole lon defines them.
+
+    axes: `enu` (x east, y north, z up), `ned` (north, east, down), `grid` (along the grid of UTM, z up) or `ecef`
+    zone: that of the grid, such as `32N`; by default the standard zone
+    """
+    from frametool.geometry.transform import Transform
+
+    argument = _columns(lat=lat, lon=lon, alt=alt)
+    if axes not in AXES:
+        raise ValueInvalid(f"unknown axes {shown(axes)}; axes: {', '.join(AXES)}")
+    if axes == "grid":
+        zoned = _zone(zone, *argument[:2]), *argument
+        return Transform.of(*validation.checked(grid_pose, 7, zoned, "place", check_utm))
+    if zone is not None:
+        raise ValueInvalid(f"zone {shown(zone)} is one of a grid; axes {axes!r} have none")
+
+    def kernel(lat: Any, lon: Any, alt: Any, xp: Any) -> Components:
+        return pose(lat, lon, alt, axes, xp)
+
+    return Transform.of(*validation.checked(kernel, 7, argument, "place", check_lla))
+
+
+def utm_from_lla(lat: Numbers, lon: Numbers, zone: Numbers | str | None = None) -> Any:
+    """Return zone, easting, northing, convergence in degrees and grid scale.
+
+    zone: fixed, such as `32N`, up to 30 degrees from its meridian; by default the standard zone, including the
+    exceptions of Norway and Svalbard.  Convergence is the angle of grid north clockwise of true north: yaw in grid =
+    yaw in enu + convergence.
+    """
+    argument = _columns(lat=lat, lon=lon)
+    zoned = _zone(zone, *argument), *argument
+    found = validation.checked(utm, 4, zoned, "place", check_utm)
+    if validation.single(found):
+        return (ZONES[int(zoned[0])], *found)
+    import numpy as np
+
+    names = np.array(ZONES)[np.asarray(zoned[0]).astype(np.int64)]
+    return (np.full(found[0].shape, names), *found)
+
+
+def lla_from_utm(zone: Numbers | str, easting: Numbers, northing: Numbers) -> Any:
+    """Return lat, lon of positions in a zone, such as `32N` (`32S` south of the equator), or with a zone each."""
+    argument = _zone(zone), *_columns(easting=easting, northing=northing)
+    return validation.checked(lat_lon, 2, argument, "utm", check_grid)
+
+
+def _columns(**values: Numbers) -> Components:
+    """Return numbers of one position as floats, of many as arrays that broadcast; checked to be finite."""
+    return tuple(validation.scalars(value, name) for name, value in values.items())
+
+
+def _zone(argument: Any, *place: Any) -> Any:
+    """Return the number of a zone, or of many; by default that of the position, if it is known."""
+    if argument is None and place:
+        return validation.number(standard_zone, place)
+    if not isinstance(argument, (list, tuple)) and not getattr(argument, "shape", ()):
+        return zone_number(argument)
+    import numpy as np
+
+    try:
+        names = np.asarray(argument).astype(str)
+    except ValueError:
+        raise ValueInvalid("zone: the rows differ in length; expected an array of names such as 32N") from None
+    numbers = {name: zone_number(name) for name in dict.fromkeys(names.ravel().tolist())}
+    return np.array([numbers[name] for name in names.ravel().tolist()]).reshape(names.shape)

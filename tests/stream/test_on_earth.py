@@ -19,8 +19,7 @@ import yaml
 from mpmath import mpf
 
 import frametool
-from frametool import earth
-from frametool.geometry import quaternion
+from frametool.geometry import earth, quaternion
 from frametool.stream.as_poses import NO_ROTATION
 
 if TYPE_CHECKING:
