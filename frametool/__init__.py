@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from frametool.calc.api import calc as calc
     from frametool.cli.embedded import Ran as Ran
     from frametool.cli.embedded import run as run
-    from frametool.derivation import explain as explain
     from frametool.errors import FrametoolError as FrametoolError
     from frametool.fit.closed_forms import solve_mean as solve_mean
     from frametool.fit.closed_forms import solve_points as solve_points
@@ -46,6 +45,7 @@ if TYPE_CHECKING:
     from frametool.geometry.transform import Transform as Transform
     from frametool.lint.tree_diff import diff as diff
     from frametool.sim.drivers import FollowController as FollowController
+    from frametool.sim.followed import explain as explain
     from frametool.sim.followed import follow_steps as follow_steps
     from frametool.sim.scene import tutorial as tutorial
     from frametool.sim.simulate import simulate as simulate
@@ -58,11 +58,10 @@ __version__ = "0.2.0"
 
 _HOMES = {
     name: module for module, names in {
-        "frametool.calc": "calc",
+        "frametool.calc.api": "calc",
         "frametool.cli.embedded": "Ran run",
         "frametool.covariance": "covariance",
         "frametool.errors": "FrametoolError",
-        "frametool.explain": "explain",
         "frametool.fit.closed_forms": "solve_mean solve_points",
         "frametool.fit.comparison": "align compare resample",
         "frametool.fit.hand_eye": "solve_hand_eye",
@@ -80,7 +79,7 @@ _HOMES = {
         "frametool.geometry.transform": "Transform",
         "frametool.lint.tree_diff": "diff",
         "frametool.sim.drivers": "FollowController",
-        "frametool.sim.followed": "follow_steps",
+        "frametool.sim.followed": "explain follow_steps",
         "frametool.sim.scene": "tutorial",
         "frametool.sim.simulate": "simulate",
         "frametool.sim.turtle": "Turtle Twist",

@@ -9,5 +9,4 @@ import sys
 
 from frametool.explain import CallableRoom
 
-entry = "frametool.calc.api"
 sys.modules[__name__].__class__ = CallableRoom

@@ -1,6 +1,6 @@
 """Derivations of results, step by step with the numbers of a run, as text or Markdown.
 
-The package is callable: `frametool.explain(..)` is that of `frametool.derivation`.
+The package is callable: `frametool.explain(..)` is that of `frametool.sim.followed`, also where this room was imported.
 """
 
 from __future__ import annotations
@@ -9,19 +9,16 @@ import sys
 from types import ModuleType
 from typing import Any
 
-entry = "frametool.derivation"
-
 
 class CallableRoom(ModuleType):
-    """A package that can be called: it runs the function with its own name in the module `entry`."""
-
-    entry: str
+    """A package that can be called: it runs the public function of its name."""
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
         """Call the function."""
-        from importlib import import_module
+        import frametool
 
-        return getattr(import_module(self.entry), self.__name__.rpartition(".")[2])(*arguments, **options)
+        function: Any = frametool.__getattr__(self.__name__.rpartition(".")[2])
+        return function(*arguments, **options)
 
 
 sys.modules[__name__].__class__ = CallableRoom

@@ -1,20 +1,46 @@
-"""The derivation of one control step of the followers of a run."""
+"""`frametool.explain`: the derivation of an operation, as its command prints it with --explain.
+
+Also the derivation of one control step of the followers of a run.
+"""
 
 from __future__ import annotations
 
 import math
+import sys
 from bisect import bisect_right
+from inspect import signature
 from operator import itemgetter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid, printable
-from frametool.explain.derive import CLOSE, METRES, REPORT, DerivationStyle, DerivationWrong, explained, row, spans
+from frametool.documents.source import Source
+from frametool.errors import ValueInvalid, alternatives, printable, shown
+from frametool.explain import derive
+from frametool.explain.derive import (
+    CLOSE,
+    METRES,
+    REPORT,
+    DerivationStyle,
+    DerivationWrong,
+    WrittenPose,
+    explained,
+    row,
+    spans,
+)
+from frametool.explain.run import DIGITS
+from frametool.frames.lookups import Frames
 from frametool.frames.stamps import BILLION, format_stamp
+from frametool.geometry.representations import notation, notations
+from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Transform
+from frametool.grammar.pose import Pose
+from frametool.grammar.result import Style
 from frametool.sim.drivers import ARRIVED, frame_of
 from frametool.sim.simulate import IssuedCommand, simulate
+from frametool.stream.request import RowOptions
+from frametool.stream.written import ByTree, derive_record, written_poses
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from frametool.explain.render import Explanation
     from frametool.explain.run import Sheet, Values
@@ -87,23 +113,26 @@ def _at(samples: Sequence[Sample], at_ns: int) -> Sighting:
     return at_ns, before, None if before[0] == at_ns or after == len(samples) else samples[after]
 
 
-def derive_follow(plan: DerivationStyle, steps: Sequence[FollowStep]) -> Explanation:
-    """Derive the commands of followers at one step."""
+def derive_follow(plan: DerivationStyle, steps: FollowStep | Sequence[FollowStep]) -> Explanation:
+    """Derive the commands of followers at one step; raises ValueInvalid for anything but the steps of followers."""
+    found = [steps] if isinstance(steps, FollowStep) else list(steps) if isinstance(steps, (list, tuple)) else []
+    if not found or not all(isinstance(each, FollowStep) for each in found):
+        raise ValueInvalid(f"expected the steps of follow_steps, found {shown(steps)}")
 
     def write(sheet: Sheet) -> None:
         rows = []
-        for step in steps:
+        for step in found:
             _derive(sheet, step)
             twist, name = step.command.twist, printable(step.command.turtle)
-            label = f"{name} " if len(steps) > 1 else ""
+            label = f"{name} " if len(found) > 1 else ""
             rows += [
                 row(f"{label}linear_x", [""], [twist.linear_x], "m/s"),
                 row(f"{label}angular_z", [""], [twist.angular_z], "rad/s"),
                 row(f"{label}distance", [""], [step.command.distance or 0.0], METRES),
             ]
-        sheet.result(f"the command of {', '.join(printable(step.command.turtle) for step in steps)}", rows)
+        sheet.result(f"the command of {', '.join(printable(step.command.turtle) for step in found)}", rows)
 
-    return explained(plan, f"follow, step {steps[0].number}", write)
+    return explained(plan, f"follow, step {found[0].number}", write)
 
 
 def _derive(sheet: Sheet, step: FollowStep) -> None:
@@ -148,3 +177,90 @@ def _add_place(sheet: Sheet, values: Values, seen: Sighting, name: str, index: s
     values |= spans(begin_ns, end_ns, at_ns) | {"turns": float(turns), "between": float(then is not None)}
     at, begin, end = map(format_stamp, (at_ns, begin_ns, end_ns))
     sheet.play("follow place", values, name=name, i=index, at=at, begin=begin, end=end)
+
+
+# --- `frametool.explain` ---
+
+INLINE = "argument"
+
+
+def explain(
+    operation: str, *operands: Any, to: str = "quaternion", precision: int | None = DIGITS, degrees: bool = False,
+    keep_sign: bool = False, **options: Any,
+) -> Explanation:  # fmt: skip
+    """Derive an operation step by step: formula, formula with these numbers, value with its unit.
+
+        print(frametool.explain("convert", {"rpy_deg": [10, 20, 30]}, to="matrix"))
+        frametool.explain("lookup", tree, "map", "camera", at_ns=2_500_000_000).markdown()
+
+    operation, operands: convert POSE; compose POSE ..; invert POSE; relative A B; interpolate A B FRACTION;
+        lookup TREE TARGET SOURCE (at_ns, source_at_ns, fixed); apply TREE TARGET SOURCE RECORD (at_ns, kind) or apply
+        POSE RECORD (kind); follow STEPS of `follow_steps`.  A POSE is a mapping, its text, a Transform or a Rotation.
+    to: notations separated by commas.  precision: significant digits, None for all.  degrees: bare angles are in
+        degrees, in and out.
+    Raises ValueInvalid; also the errors of the operation.
+    """
+    if operation not in OPERATIONS:
+        raise ValueInvalid(f"no operation {shown(operation)}{alternatives(operation, OPERATIONS, 'operations')}")
+    if precision is not None and precision < 1:
+        raise ValueInvalid(f"precision counts significant digits, 1 or more; found {precision}")
+    chosen = tuple(each for spec in to.split(",") for each in notations(spec.strip()))
+    plan = DerivationStyle(Style("text", chosen, degrees=degrees, keep_sign=keep_sign), precision)
+    derivation, poses = OPERATIONS[operation]
+    try:
+        signature(derivation).bind(plan, *operands, **options)
+    except TypeError as error:
+        raise ValueInvalid(f"explain {operation}: {error}") from None
+    written = [_pose(each, degrees=degrees) for each in operands[:poses]]
+    return derivation(plan, *written, *operands[poses:], **options)
+
+
+def _pose(value: Any, *, degrees: bool) -> WrittenPose:
+    """Read one pose: a mapping, its text, a Transform or a Rotation.
+
+    Raises ValueInvalid, FormatError.
+    """
+    if isinstance(value, (str, dict, list)):
+        found = written_poses(_source(value), degrees=degrees)
+        if len(found) != 1:
+            raise ValueInvalid(f"a derivation is of one pose, {INLINE} holds {len(found)}")
+        return found[0]
+    if not isinstance(value, (Transform, Rotation)) or value.shape:
+        raise ValueInvalid(f"expected one pose: a mapping, its text, a Transform or a Rotation; found {value!r:.60}")
+    pose = Pose.of(value.components) if isinstance(value, Transform) else Pose(None, value.components)
+    x, y, z, *rotation = pose.components
+    return WrittenPose(pose, notation("quaternion"), rotation, position=(x, y, z))
+
+
+def _source(value: Any) -> Source:
+    """Return a text, or a mapping or list as text."""
+    from frametool.documents.json import dump
+
+    return Source(INLINE, value if isinstance(value, str) else dump(value))
+
+
+def _apply(plan: DerivationStyle, *operands: Any, at_ns: int | None = None, kind: str = "") -> Explanation:
+    by_tree = bool(operands) and isinstance(operands[0], Frames)
+    if len(operands) not in ((3, 4) if by_tree else (2,)):
+        raise ValueInvalid("apply takes TREE TARGET [SOURCE] RECORD, or POSE RECORD")
+    degrees = plan.style.degrees
+    if by_tree:
+        tree, target, *source, record = operands
+        way: ByTree | WrittenPose = ByTree(tree, target, source[0] if source else None, at_ns)
+    else:
+        pose, record = operands
+        way = _pose(pose, degrees=degrees)
+    if not isinstance(record, (str, dict)):
+        try:
+            x, y, z = map(float, record)
+        except (TypeError, ValueError):
+            raise ValueInvalid(f"expected three numbers or a mapping, found {shown(record)}") from None
+        record = {kind or "point": [x, y, z]}
+    return derive_record(plan, way, _source(record), RowOptions(kind=kind, degrees=degrees))
+
+
+OPERATIONS: dict[str, tuple[Callable[..., Explanation], int]] = {  # and how many of the operands are poses
+    "convert": (derive.convert, 1), "compose": (derive.compose, sys.maxsize), "invert": (derive.invert, 1),
+    "relative": (derive.relative, 2), "interpolate": (derive.interpolate, 2), "lookup": (derive.lookup, 0),
+    "apply": (_apply, 0), "follow": (derive_follow, 0),
+}  # fmt: skip
