@@ -85,7 +85,7 @@ def places_of(notations: Sequence[Notation]) -> tuple[tuple[Notation, ...], Plac
 
 def mapping_of(texts: Sequence[str], name: str) -> str:
     """Write bare numbers of a place as the mapping that says the same; raises click.UsageError for another count."""
-    from frametool.documents.json import dump
+    from frametool.documents.writers import dump_json
 
     row, arithmetic = POSITIONS[name], kernels(name)
     zoned = name == UTM and len(texts) == 3 and earth().zone is not None
@@ -93,4 +93,4 @@ def mapping_of(texts: Sequence[str], name: str) -> str:
     if not (arithmetic.least or len(fields)) - zoned <= len(texts) <= len(fields):
         raise click.UsageError(f"{name} has {len(row.names)} numbers ({' '.join(row.names)}); found {len(texts)}")
     members: Any = dict(zip(fields, texts, strict=False))
-    return dump({name: members} if arithmetic.is_nested else members)
+    return dump_json({name: members} if arithmetic.is_nested else members)

@@ -134,7 +134,7 @@ def without_inverse(argument: str) -> tuple[str, bool]:
 
 def _inverses(source: Source, request: Request) -> Source:
     """Return a text with the inverse of each pose of another one: what `invert -f json` writes of it."""
-    from frametool.documents.json import dump
+    from frametool.documents.writers import dump_json
     from frametool.geometry.representations import notation
     from frametool.grammar.result import Style
     from frametool.stream.record_values import results
@@ -147,7 +147,7 @@ def _inverses(source: Source, request: Request) -> Source:
     ).of_inverses()  # fmt: skip
     style = Style("json", (notation("quaternion"),), keep_sign=True)
     found: Iterable[Any] = results(source, asked, style)
-    return Pasted(source.name, "\n".join(dump(each.mapping(style)) for each in found))
+    return Pasted(source.name, "\n".join(dump_json(each.mapping(style)) for each in found))
 
 
 def source_of(argument: str | Source) -> Source:

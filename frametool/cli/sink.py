@@ -289,14 +289,14 @@ def say_error(error: FrametoolError, *, in_json: bool, fate: str = "") -> None:
     """
     fate = f" ({fate})" if fate else ""
     if in_json:
-        from frametool.documents.json import dump
+        from frametool.documents.writers import dump_json
 
         message, details = str(error), dict(error.details())
         if PLACES:
             own = {key: details.pop(key) for key in ("source", "line", "column") if key in details}
             message = f"{'{source}:{line}: '.format(**PLACES[-1])}{message}"
             details = {**PLACES[-1], **({"input": own} if own else {}), **details}
-        tell(dump({"error": error.kind, "message": f"{message}{fate}", **details}))
+        tell(dump_json({"error": error.kind, "message": f"{message}{fate}", **details}))
         return
     say(f"{error}{getattr(error, 'remedy', '')}{fate}")
     if snippet := getattr(error, "snippet", ""):

@@ -17,7 +17,7 @@ from bisect import bisect_right
 from contextlib import contextmanager, suppress
 from functools import cached_property
 from io import BufferedReader, BytesIO, FileIO
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, cast
 
 from frametool import sizes
 from frametool.errors import LONGEST_NAME, FileProblem, FormatError, cells, shown
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
     from os import PathLike
     from typing import BinaryIO, TypeVar
+
+    from frametool.text.lines import ByteStream
 
     Value = TypeVar("Value")
     Path: TypeAlias = tuple[str | int, ...]
@@ -251,21 +253,6 @@ def not_text(data: bytes) -> str:
     return "not text but binary data" if controls > max(2, most) else ""
 
 
-def check_text(source: Source) -> None:
-    """Refuse a text that is too long or has halves of surrogate pairs, which no encoding can write."""
-    if len(source.text) > sizes.MOST_CHARACTERS:
-        problem = f"longer than {sizes.MOST_CHARACTERS} characters, the most in one file; split it"
-        raise FormatError(problem, source=source.name)
-    if len(source.text) > sizes.MOST_VALUES and source.text.count(",") + source.text.count("\n") > sizes.MOST_VALUES:
-        problem = f"more than {sizes.MOST_VALUES} commas and line ends, the most in one file; split it"
-        raise FormatError(problem, source=source.name)
-    try:
-        source.text.encode()
-    except UnicodeEncodeError as error:
-        odds = ord(source.text[error.start])
-        raise error_at(source, error.start, f"not UTF-8: half a character (U+{odds:04X})") from None
-
-
 def places_of(text: str, offsets: Sequence[int]) -> list[tuple[int, int]]:
     """Return line and column of each offset, in one pass over the text.
 
@@ -384,3 +371,56 @@ def repeated_key(source: Source, events: Iterable[Event]) -> FormatError:
             opened.append({} if kind == MAP else None)
         key_next = opened[-1] is not None and not (kind == LEAF and key_next)
     return error_at(source, 0, "a key appears twice")
+
+
+# --- text in pieces that end at a document or a line: recordings of any size in bounded memory ---
+
+
+class Piece(NamedTuple):
+    """Complete documents or lines of a text, and the number of their first line, from 1."""
+
+    text: str
+    line: int
+
+
+def lines(stream: BinaryIO, name: str, whole: Callable[[bytes], int] | None = None) -> Iterator[Piece]:
+    """Split a stream after line ends; a piece has as many lines as arrived in one block.
+
+    whole: as in `read_blocks`.  Line ends become those of Unix, which does not change line numbers.
+    Raises FormatError if it is not UTF-8, and for a line or document that is too long.
+    """
+    from frametool.text.lines import read_blocks, whole_lines
+
+    line = 1
+    blocks = read_blocks(cast("ByteStream", stream), whole=whole or whole_lines, longest=sizes.MOST_CHARACTERS)
+    for block in blocks:
+        if block.startswith(UTF16):  # which has other line ends
+            block += b"".join(blocks)  # noqa: PLW2901
+        with counted_from(line):
+            text = decode(block, name)
+        yield Piece(text.replace("\r\n", "\n") if "\r" in text else text, line)
+        line += text.count("\n")
+
+
+def documents(stream: BinaryIO, name: str) -> Iterator[Piece]:
+    """Split a stream after lines that end in `---`; a piece has as many documents as arrived in one block."""
+    return lines(stream, name, _whole_documents)
+
+
+def _whole_documents(text: bytes) -> int:
+    """Return the number of bytes up to the last line that ends in `---`; negative: that many lines have none.
+
+    `ros2 topic echo` appends the three dashes to its note about a lost message.
+    """
+    ends = (text.rfind(end) + len(end) for end in (b"---\n", b"---\r\n") if end in text)
+    return max(ends, default=-1 - text.rfind(b"\n"))
+
+
+@contextmanager
+def counted_from(line: int) -> Iterator[None]:
+    """Make errors of a piece name the line in the whole file; `line` is the number of the piece's first line."""
+    try:
+        yield
+    except FormatError as error:
+        error.line += line - 1 if error.line else 0
+        raise

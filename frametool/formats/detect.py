@@ -85,7 +85,7 @@ class Beginning:
     @cached_property
     def json_paths(self) -> set[str]:
         """Return the paths of the keys of JSON; lists on the path do not count."""
-        from frametool.documents.json import looks_like_json
+        from frametool.documents.document import looks_like_json
 
         found: set[str] = set()
         inner: list[tuple[str, Any]] = [("", self.value)] if looks_like_json(self.text[:LOOKED_AT]) else []

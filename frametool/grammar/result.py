@@ -284,8 +284,8 @@ def rotation_entry(pose: Pose, notation: Notation, style: Style) -> tuple[str, A
 
 def mapping_of_numbers(texts: Sequence[str], default: Notation | None) -> str:
     """Return the mapping with the same meaning as bare numbers that `pose_of_numbers` has read."""
-    from frametool.documents.json import dump
     from frametool.documents.source import Verbatim
+    from frametool.documents.writers import dump_json
 
     rep = default or notation_of(texts)
     whole = rep.representation.whole
@@ -294,7 +294,7 @@ def mapping_of_numbers(texts: Sequence[str], default: Notation | None) -> str:
     numbers: Any = list(map(Verbatim, texts))  # texts in place of numbers, read as such
     mapping = {"xyz": numbers[:-size]} if len(texts) > size else {}
     mapping[rep.representation.name + unit] = rep.spelled(numbers[-size:])
-    return dump(mapping)
+    return dump_json(mapping)
 
 
 METRES = 3
@@ -348,15 +348,14 @@ def _rounded(value: float, decimals: int) -> str:
 
 def write_poses(results: Iterable[Result | dict[str, Any]], style: Style) -> str:
     """Return one line per result in JSON, else the results as documents separated by `---`."""
+    from frametool.documents.writers import dump_json, dump_yaml
+
     is_json = style.format == "json"
-    if is_json:
-        from frametool.documents.json import dump
-    else:
-        from frametool.documents.yaml_writer import dump
+    dump, end = (dump_json, "\n") if is_json else (dump_yaml, "")
     texts = []
     for each in results:
         record = each.mapping(style) if isinstance(each, Result) else each
-        texts.append(dump(record, style.number) + "\n" * is_json)
+        texts.append(dump(record, style.number) + end)
     return ("" if is_json else "---\n").join(texts)
 
 
@@ -365,12 +364,10 @@ write_points = write_poses
 
 def write_tree(tree: Frames, style: Style) -> str:
     """Return the tree in list form, roots first; JSON on one line."""
+    from frametool.documents.writers import dump_json, flow
+
     if style.format == "json":
-        from frametool.documents.json import dump
-
-        return f"{dump({'frames': list(tree_entries(tree, style))}, style.number)}\n"
-    from frametool.documents.yaml_writer import flow
-
+        return f"{dump_json({'frames': list(tree_entries(tree, style))}, style.number)}\n"
     entries = "".join(f"  - {flow(entry, style.number)}\n" for entry in tree_entries(tree, style))
     return f"frames:\n{entries}"
 

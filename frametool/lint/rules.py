@@ -12,7 +12,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import locate_many, parse_documents
-from frametool.documents.json import dump
+from frametool.documents.writers import dump_json
 from frametool.errors import BadTopology, Finding, FormatError, Misused, Unanswered, first_of, shown
 from frametool.formats.detect import by_sign
 from frametool.formats.load import FrameFile, refuse_unknown_joints
@@ -103,7 +103,7 @@ def write_json(findings: Iterable[Finding]) -> str:
     text = ""
     for each in findings:
         place = {"file": each.source, "line": each.line or None, "column": each.column or None}
-        text += f"{dump(place | {'level': level(each), 'rule': each.rule, 'message': each.message})}\n"
+        text += f"{dump_json(place | {'level': level(each), 'rule': each.rule, 'message': each.message})}\n"
     return text
 
 

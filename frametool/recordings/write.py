@@ -21,7 +21,7 @@ from weakref import finalize
 
 import numpy as np
 
-from frametool.documents.yaml_writer import dump
+from frametool.documents.writers import dump_yaml
 from frametool.errors import FileProblem, FrametoolError, ValueInvalid, printable, shown
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import floats, quaternion
@@ -244,11 +244,11 @@ class RecordingFile:
             else:
                 metadata = self._metadata(before or {})
                 if itself or self.format == BAG2:
-                    self._writer.add_metadata(read.ITSELF, {read.SERIALIZED: dump(metadata)})
+                    self._writer.add_metadata(read.ITSELF, {read.SERIALIZED: dump_yaml(metadata)})
                 self._writer.finish()
                 self._stream.close()
         if self.format == BAG2:
-            about = dump({read.INFORMATION: metadata}).encode()
+            about = dump_yaml({read.INFORMATION: metadata}).encode()
             for name, piece in (read.METADATA, about), (f"{NAME}.mcap", self._file.read(PIECE)):
                 first = FirstPiece(piece)
                 first.name = name
@@ -347,7 +347,7 @@ def new_channel(kind: Kind, topic: str, *, ros1: bool, like: Iterable[Channel] =
         made = Qos(QosHistory.KEEP_LAST, 1, QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL, for_ever, for_ever,
                    QosLiveliness.AUTOMATIC, for_ever, avoid_ros_namespace_conventions=False)  # fmt: skip
         by_numbers = any(BY_NUMBERS.search(each.said.get(QOS, "")) for each in like)
-        said[QOS] = str(dump_qos_v8([made])) if by_numbers else dump(dump_qos_v9([made]))
+        said[QOS] = str(dump_qos_v8([made])) if by_numbers else dump_yaml(dump_qos_v9([made]))
     if same:
         schema, digest = same.schema, same.digest
     return Channel(topic, kind.type, "ros1" if ros1 else read.CDR, schema, said, digest)

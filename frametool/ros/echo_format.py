@@ -16,9 +16,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.json import dump as json_dump
 from frametool.documents.source import Verbatim
-from frametool.documents.yaml_writer import dump, quoted
+from frametool.documents.writers import dump_json, dump_yaml, quoted
 from frametool.errors import ValueInvalid
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry.representations import notation
@@ -58,7 +57,7 @@ def write_tree(tree: FrameTree, style: Style) -> str:
 def message_text(message: dict[str, Any], style: Style) -> str:
     """Return one message and the line that ends it."""
     if style.format == "foxglove":
-        return f"{json_dump(message, style.number)}\n"
+        return f"{dump_json(message, style.number)}\n"
     return "".join(f"{line}\n" for line in _lines(_respelled(message, style.format), style)) + "---\n"
 
 
@@ -140,9 +139,9 @@ def _scalar(value: Any, style: Style) -> str:
         return str(value)
     if style.format == "ros1":
         if isinstance(value, str):
-            return json_dump(value)
+            return dump_json(value)
         return style.number(value) if isinstance(value, float) else str(value)
     if not isinstance(value, str):
-        return dump(value, style.number).rstrip("\n")
+        return dump_yaml(value, style.number).rstrip("\n")
     safe = quoted(value)
     return safe if safe == value or not value.isprintable() else "'" + value.replace("'", "''") + "'"

@@ -32,9 +32,8 @@ from itertools import accumulate
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool import sizes
-from frametool.documents.document import Piece, counted_from, documents, lines, parse_documents
-from frametool.documents.json import JSON_NUMBER
-from frametool.documents.source import InputFile, Source
+from frametool.documents.document import JSON_NUMBER, parse_documents
+from frametool.documents.source import InputFile, Piece, Source, counted_from, documents, lines
 from frametool.errors import FormatError, ValueInvalid, first_of, shown
 from frametool.frames.stamps import BILLION
 from frametool.geometry import floats, quaternion

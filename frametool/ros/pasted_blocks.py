@@ -18,8 +18,9 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.json import dump, looks_like_json, parse_json
+from frametool.documents.document import parse_json
 from frametool.documents.source import Pasted, Source, Verbatim
+from frametool.documents.writers import dump_json
 from frametool.errors import FormatError, ValueInvalid, shown, warn
 from frametool.frames.stamps import parse_stamp
 from frametool.grammar.pasted import DECIMAL, NUMBER, pasted_poses
@@ -94,13 +95,13 @@ def in_grammar(
     except ValueInvalid as error:
         raise FormatError(str(error), source=source.name) from error
     if values is not None:
-        return Pasted(source.name, "\n".join(map(dump, values)))
+        return Pasted(source.name, "\n".join(map(dump_json, values)))
     return Source(source.name, mended) if (mended := _mended(text)) != text else None
 
 
 def _unless_grammar(source: Source, default: Notation | None, *, points: bool) -> list[Any] | None:
     """Return the values of pasted numbers; of JSON only what the grammar would refuse."""
-    read = parse_json(source) if looks_like_json(source.text) else None
+    read = parse_json(source)
     lists = (each for each in read or () if type(each) is list and each and type(each[0]) is list)
     has_matrix = any((len(each), len(each[0])) in ((3, 3), (4, 4)) for each in lists)
     if (points and read is not None) or (has_matrix and default is None):

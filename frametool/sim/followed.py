@@ -234,9 +234,9 @@ def _pose(value: Any, *, degrees: bool) -> WrittenPose:
 
 def _source(value: Any) -> Source:
     """Return a text, or a mapping or list as text."""
-    from frametool.documents.json import dump
+    from frametool.documents.writers import dump_json
 
-    return Source(INLINE, value if isinstance(value, str) else dump(value))
+    return Source(INLINE, value if isinstance(value, str) else dump_json(value))
 
 
 def _apply(plan: DerivationStyle, *operands: Any, at_ns: int | None = None, kind: str = "") -> Explanation:

@@ -24,9 +24,9 @@ from functools import partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.documents.document import Piece, counted_from, format_error, parse_documents
-from frametool.documents.document import lines as pieces_of_lines
-from frametool.documents.source import Source, error_at, read_text
+from frametool.documents.document import format_error, parse_documents
+from frametool.documents.source import Piece, Source, counted_from, error_at, read_text
+from frametool.documents.source import lines as pieces_of_lines
 from frametool.errors import FormatError, ValueInvalid, alternatives, shown
 from frametool.formats.detect import detect
 from frametool.formats.rows.csv import split_line

@@ -19,7 +19,7 @@ from heapq import heapify, heappop, heapreplace
 from itertools import count
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.documents.json import dump
+from frametool.documents.writers import dump_json
 from frametool.errors import LookupFailed, ValueInvalid, printable
 from frametool.formats.rows.csv import row
 from frametool.frames.buffer import TransformBuffer
@@ -352,7 +352,7 @@ class StepWriter:
                     head = f"# {printable(labels['turtle'])} at {labels['t']} s\n" if self._labelled and labels else ""
                     yield head + message_text(message, style)
                 case "json":
-                    yield f"{dump(labels | message, style.number)}\n"
+                    yield f"{dump_json(labels | message, style.number)}\n"
                 case "csv":
                     yield row(cells.values(), style)
                 case _:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frametool import sizes
-from frametool.documents.json import dump
 from frametool.documents.source import Verbatim
+from frametool.documents.writers import dump_json
 from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.formats.rows.column_file import STAMP_NS, WHOLE, Made, OutColumn, not_finite
 from frametool.formats.table import FORMATS
@@ -153,7 +153,7 @@ class ColumnsWriter:
             if kinds:
                 return OutColumn(name, kinds[0])
         is_json = any(isinstance(value, (dict, list)) for value in there)
-        text = dump if is_json else text_of
+        text = dump_json if is_json else text_of
         longest = max((len(text(value)) for value in there), default=1)
         return OutColumn(name, None, None, longest, is_json)
 
@@ -161,7 +161,7 @@ class ColumnsWriter:
         """Return a column of a block in its type; raises ValueInvalid for a cell that is of another one."""
         cells, kind = made.values, column.kind
         if kind is None:
-            text = dump if column.is_json else text_of
+            text = dump_json if column.is_json else text_of
             return Made(["" if value is None else text(value) for value in _values(cells)])
         if is_typed(cells):
             if kind == DOUBLE and not _is_exact(cells.dtype, [cells]) and cells.dtype.kind in WHOLE:

@@ -16,7 +16,7 @@ import re
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.documents.json import JSON_NUMBER
+from frametool.documents.document import JSON_NUMBER
 from frametool.errors import FormatError, Misused, ValueInvalid, shown, warn
 from frametool.geometry import uncertainty
 from frametool.geometry.earth import AXES as AXES_AT

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from frametool.documents.json import JSON_NUMBER
+from frametool.documents.document import JSON_NUMBER
 from frametool.errors import FrametoolError
 from frametool.grammar.pose import DESCRIPTIVE, LISTED_WORDS, POSE_KEYS, ROTATION_KEYS
 from frametool.grammar.readers import AXES_KEY, NAME_KEYS, PARENT_KEYS, Path, may_be_uncertain

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.documents.document import Node, parse_nodes
-from frametool.documents.json import dump
+from frametool.documents.writers import dump_json
 from frametool.errors import FrametoolError
 from frametool.formats.rows.csv import cells_of
 from frametool.geometry import floats
@@ -152,7 +152,8 @@ class RecordRows:
         if is_spelled:
             cells = value.mapping(style) if isinstance(value, Result) else value
             try:
-                dump(cells_of(value, style) if style.format == "csv" else cells, lambda each: f"{numbers[repr(each)]}")
+                in_columns = cells_of(value, style) if style.format == "csv" else cells
+                dump_json(in_columns, lambda each: f"{numbers[repr(each)]}")
             except KeyError:
                 return None  # a number of it is none of the columns
         return found

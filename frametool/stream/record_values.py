@@ -14,16 +14,18 @@ from math import isfinite, isinf
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import (
+    JSON_NUMBER,
     Aliased,
     Document,
     Node,
+    check_text,
     locate_many,
     parse_documents,
     parse_nodes,
     refuse_alias,
+    strict_json,
 )
-from frametool.documents.json import JSON_NUMBER, strict_json
-from frametool.documents.source import Source, Verbatim, check_text
+from frametool.documents.source import Source, Verbatim
 from frametool.errors import Finding, FormatError, FrametoolError, Misused, ValueInvalid, shown, warn
 from frametool.formats.table import is_recording
 from frametool.geometry import floats

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from frametool.documents.json import JSON_NUMBER, dump
+from frametool.documents.document import JSON_NUMBER
 from frametool.documents.source import Verbatim
+from frametool.documents.writers import dump_json
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.frames.stamps import BILLION, nanoseconds_each, tell_size
 from frametool.grammar.pose import SCALE, Pose
@@ -576,7 +577,7 @@ def texts_of(cells: Cells) -> list[str]:
 
 def text_of(value: Any) -> str:
     """Return a plain value as a text, "" for none."""
-    return "" if value is None else dump(value) if isinstance(value, (dict, list)) else str(value)
+    return "" if value is None else dump_json(value) if isinstance(value, (dict, list)) else str(value)
 
 
 def plain_cells(cells: Cells) -> list[Any]:

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import Aliased, Node, parse_documents, parse_nodes
 from frametool.documents.source import Source, Verbatim, decode
-from frametool.documents.yaml_writer import dump as yaml
-from frametool.documents.yaml_writer import flow, quoted
+from frametool.documents.writers import dump_json, dump_yaml, flow, quoted
 from frametool.errors import FormatError, FrametoolError
 from frametool.geometry.representations import ROTATIONS
 from frametool.grammar.pose import LISTED_WORDS, ROTATION_KEYS, Pose
@@ -286,13 +285,12 @@ class Splicer:
     def _member(self, entry: dict[str, Any], first: int) -> tuple[Piece, ...]:
         """Write members in the record's style, each number a piece."""
         if self.json:
-            from frametool.documents.json import dump
 
-            text = dump(entry, lambda _: MARK)[1:-1]
+            text = dump_json(entry, lambda _: MARK)[1:-1]
         elif self.flow:
             text = flow(entry, lambda _: MARK)[1:-1]
         else:
-            text = yaml(entry, lambda _: MARK).rstrip("\n").replace("\n", self.between)
+            text = dump_yaml(entry, lambda _: MARK).rstrip("\n").replace("\n", self.between)
         pieces: list[Piece] = []
         for number, part in enumerate(text.split(MARK), self.first + first):
             pieces += [Const(part.encode())] * bool(part) + [Out(number, number + 1, b"")]
@@ -352,9 +350,7 @@ def quoted_name(node: Node, name: str, *, json: bool) -> str:
         return "'" + name.replace("'", "''") + "'"
     if not json and (node.quote != '"' or not node.value):
         return quoted(name) if name else "''"
-    from frametool.documents.json import dump
-
-    return dump(name)
+    return dump_json(name)
 
 
 def rendered(known: RecordText, answers: Sequence[Answer]) -> bytes:

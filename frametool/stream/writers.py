@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.documents import json
 from frametool.documents.source import Verbatim
-from frametool.documents.yaml_writer import quoted as quoted_in_yaml
+from frametool.documents.writers import dump_json
+from frametool.documents.writers import quoted as quoted_in_yaml
 from frametool.errors import ValueInvalid, listing, warn
 from frametool.formats.rows.csv import cell, cells_of, quoted, row
 from frametool.formats.rows.pose_rows import (
@@ -335,9 +335,9 @@ class Syntax(NamedTuple):
 
 
 CELL = Syntax("", b'",\\\r\n', lambda value: quoted(text_of(value)))
-IN_CELL = Syntax('""', b'"\\', lambda value: json.dump(value).replace('"', '""'))
-JSON = Syntax('"', b'"\\', json.dump)
-YAML = Syntax('"', bytes(range(128)), lambda value: quoted_in_yaml(value) if type(value) is str else json.dump(value))
+IN_CELL = Syntax('""', b'"\\', lambda value: dump_json(value).replace('"', '""'))
+JSON = Syntax('"', b'"\\', dump_json)
+YAML = Syntax('"', bytes(range(128)), lambda value: quoted_in_yaml(value) if type(value) is str else dump_json(value))
 
 
 class Marked(NamedTuple):

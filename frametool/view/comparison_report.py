@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from frametool import __version__
-from frametool.documents.json import dump
+from frametool.documents.writers import dump_json
 from frametool.errors import printable
 from frametool.fit.numbers import SHORT, number_at
 from frametool.formats.rows.csv import write_points
@@ -212,7 +212,7 @@ def write_report(found: Sequence[Comparison], fmt: str, command: str) -> str:
         text=escape(text), figures=drawn,
     )  # fmt: skip
     samples = {"unit": unit, "curves": [_samples(each, paths, seen, charts[0]) for each in curves]}
-    held = {"numbers": f"[{', '.join(map(dump, numbers))}]", "samples": json.dumps(samples)}
+    held = {"numbers": f"[{', '.join(map(dump_json, numbers))}]", "samples": json.dumps(samples)}
     return pictures.write_html(title, body, script="tables.js report.js", data=held)
 
 

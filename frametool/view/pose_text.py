@@ -8,7 +8,7 @@ from shutil import get_terminal_size
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.documents.json import dump
+from frametool.documents.writers import dump_json
 from frametool.errors import printable
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
@@ -184,7 +184,7 @@ def _two_digits(value: float, unit: str) -> str:
 
 def _said(value: Any) -> str:
     """Write what accompanies numbers."""
-    return printable(dump(value) if isinstance(value, (dict, list)) else "" if value is None else str(value))
+    return printable(dump_json(value) if isinstance(value, (dict, list)) else "" if value is None else str(value))
 
 
 def _layout(lines: Sequence[NumberLine], style: Style, label: int = 0) -> str:

@@ -14,8 +14,8 @@ from hypothesis import strategies as some
 from frametool import sizes
 from frametool.documents import yaml as yaml_documents
 from frametool.documents.document import explain_scalar, format_error, locate_many, parse_documents, parse_nodes
-from frametool.documents.json import dump
 from frametool.documents.source import decode, read_text
+from frametool.documents.writers import dump_json
 from frametool.errors import FileProblem, FormatError
 
 if TYPE_CHECKING:
@@ -370,5 +370,5 @@ def test_many_frames_are_read() -> None:
 
 @pytest.mark.parametrize("text", ["", "base_link", "-1.5", 'a"b', "a\\b", "a/b", "\u00e9", "\x7f", "\n", "\ud800", *map(chr, range(128))])
 def test_texts_are_written_as_json_writes_them(text: str) -> None:
-    assert json.loads(dump(text)) == text
-    assert dump(text) == json.dumps(text, ensure_ascii=not text.isprintable())
+    assert json.loads(dump_json(text)) == text
+    assert dump_json(text) == json.dumps(text, ensure_ascii=not text.isprintable())

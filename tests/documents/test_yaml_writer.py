@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 
 from frametool.documents.document import parse_documents
-from frametool.documents.yaml_writer import dump
+from frametool.documents.writers import dump_yaml
 from frametool.errors import ValueInvalid
 
 ODD_NAMES = (
@@ -113,7 +113,7 @@ def numbers_read(value: object, like: object) -> object:
 
 def reread(value: object) -> object:
     """Write and read with our own reader."""
-    (document,) = parse_documents(dump(value), "written")
+    (document,) = parse_documents(dump_yaml(value), "written")
     return numbers_read(document.value, as_text(value))
 
 
@@ -122,9 +122,9 @@ def test_a_name_reads_back_as_the_same_text_wherever_it_stands(name: str) -> Non
     names = [name] if name else []
     value = {"names": [name, name], "parent": name, "list": [{"name": name, "of": {"name": name}}]}
     keyed = {each: {each: 1.0, "below": {each: [1.0]}} for each in names}
-    assert yaml.safe_load(dump(value)) == value
+    assert yaml.safe_load(dump_yaml(value)) == value
     assert reread(value) == value
-    assert yaml.safe_load(dump(keyed) if keyed else "{}") == keyed
+    assert yaml.safe_load(dump_yaml(keyed) if keyed else "{}") == keyed
     assert not keyed or reread(keyed) == keyed
 
 
@@ -137,14 +137,14 @@ VALUES = some.recursive(SCALARS, lambda inner: some.lists(inner) | some.dictiona
 @settings(max_examples=60, deadline=None)
 @given(some.dictionaries(NAMES, VALUES, min_size=1))
 def test_any_value_reads_back_equal(value: dict[str, object]) -> None:
-    assert yaml.safe_load(dump(value)) == value
+    assert yaml.safe_load(dump_yaml(value)) == value
     assert reread(value) == as_text(value)
 
 
 @settings(max_examples=150, deadline=None)
 @given(FLOATS)
 def test_a_float_reads_back_to_the_same_bits(value: float) -> None:
-    assert yaml.safe_load(dump([value]))[0].hex() == value.hex()
+    assert yaml.safe_load(dump_yaml([value]))[0].hex() == value.hex()
 
 
 def test_the_look_is_blocks_with_short_leaves_on_one_line() -> None:
@@ -156,7 +156,7 @@ def test_the_look_is_blocks_with_short_leaves_on_one_line() -> None:
         "frames": [{"name": "on", "parent": "world"}],
         "empty": {},
     }
-    assert dump(value) == (
+    assert dump_yaml(value) == (
         "name: camera\n"
         "xyz: [1.0, 2.0e-05, 3.0]\n"
         "quaternion: {x: 0.0, y: 0.0, z: 0.0, w: 1.0}\n"
@@ -167,10 +167,10 @@ def test_the_look_is_blocks_with_short_leaves_on_one_line() -> None:
 
 
 def test_a_number_may_be_written_with_fixed_decimals() -> None:
-    assert dump({"xyz": [1.0, 2.5]}, "{:.3f}".format) == "xyz: [1.000, 2.500]\n"
+    assert dump_yaml({"xyz": [1.0, 2.5]}, "{:.3f}".format) == "xyz: [1.000, 2.500]\n"
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), "\ud83d"])
 def test_what_would_not_read_back_is_not_written(value: object) -> None:
     with pytest.raises(ValueInvalid):
-        dump([value])
+        dump_yaml([value])

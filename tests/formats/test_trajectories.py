@@ -661,10 +661,10 @@ def test_a_topic_of_poses_is_a_frame_that_moves_if_it_was_named(kind: str, run: 
 
 @pytest.mark.parametrize("kind", POSES)
 def test_poses_as_the_echo_tools_print_them_are_a_frame_that_moves(kind: str, run: Run) -> None:
-    from frametool.documents.yaml_writer import dump
+    from frametool.documents.writers import dump_yaml
 
     child = "base" if kind == "Odometry" else "body"
-    done = run("lookup", "a.txt", "odom", child, "--topic", "/any", "-f", "json", files={"a.txt": dump(POSES[kind]) + "---\n"})
+    done = run("lookup", "a.txt", "odom", child, "--topic", "/any", "-f", "json", files={"a.txt": dump_yaml(POSES[kind]) + "---\n"})
     assert json.loads(done.out)["xyz"] == [1.0, 2.0, 3.0], done.err
 
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from flow import MOVE, asked, convert, flow
 
-from frametool.documents.json import dump
 from frametool.documents.source import Verbatim
+from frametool.documents.writers import dump_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -74,7 +74,7 @@ BLOCK = "header:\n  frame_id: a\npose:\n  position:\n    x: {x}\n    y: {y}\n   
 def document(record: Any, form: str) -> str:
     """Write a record on a line of JSON, or as a document of YAML with a number a line."""
     position, orientation = record["pose"]["position"], record["pose"]["orientation"]
-    return f"{dump(record)}\n" if form == "json" else f"{BLOCK.format(**position, q=dump(orientation))}---\n"
+    return f"{dump_json(record)}\n" if form == "json" else f"{BLOCK.format(**position, q=dump_json(orientation))}---\n"
 
 
 @pytest.mark.parametrize("form", ["json", "yaml"])

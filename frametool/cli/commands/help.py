@@ -210,7 +210,7 @@ def help_command(ctx: click.Context, inputs: Inputs) -> None:
     name = " ".join(words)
     named = _commands(ctx).get(name) if words[:1] and words[0] in COMMANDS else None
     if inputs.fmt == "json":
-        from frametool.documents.json import dump
+        from frametool.documents.writers import dump_json
         from frametool.view.reports import format_entry
 
         if name and not named:
@@ -221,7 +221,7 @@ def help_command(ctx: click.Context, inputs: Inputs) -> None:
             "version": __version__, "topics": topics() | MADE, "commands": every,
             "formats": [*map(format_entry, FORMATS)], "exit_codes": _exit_codes(EXIT_CODES),
         }  # fmt: skip
-        text = f"{dump(every[0] if named else whole)}\n"
+        text = f"{dump_json(every[0] if named else whole)}\n"
     elif named and name not in topics():  # calc and formats are subjects too
         shared.show_help(click.Context(named, parent=ctx.parent, info_name=name), paged=True)
         return
@@ -231,10 +231,10 @@ def help_command(ctx: click.Context, inputs: Inputs) -> None:
     elif words[0] == "cookbook":
         text = cookbook(words[1:])
     elif name == "schema":
-        from frametool.documents.json import dump
+        from frametool.documents.writers import dump_json
         from frametool.formats.trees.schema import schema
 
-        text = f"{dump(schema())}\n"
+        text = f"{dump_json(schema())}\n"
     elif name == "common":  # the options that are in groups, each as the first command has it that does
         first, found = shared.HEADINGS[0], dict[str, Any]()
         for command in _commands(ctx).values():

@@ -16,8 +16,7 @@ from functools import partial
 from math import radians
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.documents.document import format_error, locate_many, parse_documents
-from frametool.documents.json import looks_like_json
+from frametool.documents.document import format_error, locate_many, looks_like_json, parse_documents
 from frametool.errors import FormatError, Unanswered, ValueInvalid, did_you_mean, listing, shown
 from frametool.formats.robots.joints import JointState
 from frametool.formats.robots.model import Joint, Link

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frametool import sizes
-from frametool.documents.json import dump
 from frametool.documents.source import InputFile, Verbatim
+from frametool.documents.writers import dump_json
 from frametool.errors import FileProblem, ValueInvalid, shown, warn
 from frametool.formats.rows import column_file
 from frametool.frames.stamps import SUFFIXES
@@ -134,7 +134,7 @@ class ArrowBatch(column_file.Batch):
     def texts(self, place: int) -> list[str]:
         """Return a column as texts, "" for null; nested values as JSON, bytes that are not UTF-8 as \\xff."""
         values = ["" if value is None else value for value in self.values(place)]
-        return [value if isinstance(value, str) else dump(value) for value in values]
+        return [value if isinstance(value, str) else dump_json(value) for value in values]
 
     def values(self, place: int) -> list[Any]:
         """Return a column as plain values: numbers, texts, None, and nested values, as objects or as JSON."""

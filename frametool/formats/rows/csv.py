@@ -125,7 +125,7 @@ def cell(value: Any, style: Style) -> str:
     if isinstance(value, float):
         return style.number(value)
     if isinstance(value, (dict, list, bool)):
-        from frametool.documents.json import dump
+        from frametool.documents.writers import dump_json
 
-        return quoted(dump(value, style.number))
+        return quoted(dump_json(value, style.number))
     return quoted("" if value is None else str(value))

@@ -38,7 +38,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import parse_documents
 from frametool.documents.source import InputFile
-from frametool.documents.yaml_writer import flow, quoted
+from frametool.documents.writers import flow, quoted
 from frametool.errors import FormatError, ValueInvalid, bare, listing, shown, warn
 from frametool.formats.trees.matrix_files import FRAME_KEYS, Meaning, directed, meaning_of
 from frametool.formats.trees.tree_reader import XYZ, document_edges, named

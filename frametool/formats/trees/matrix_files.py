@@ -26,8 +26,8 @@ from math import degrees
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.source import TAG
+from frametool.documents.writers import flow, quoted
 from frametool.documents.xml import Element, read_xml
-from frametool.documents.yaml_writer import flow, quoted
 from frametool.errors import FormatError, ValueInvalid, bare, first_of, listing, shown, warn
 from frametool.formats.table import DIRECTIONS
 from frametool.formats.trees.tree_reader import document_edges, dotted, named, remember

@@ -1,10 +1,10 @@
-"""Write plain values as YAML text, without the YAML library, in one style.
+"""Write plain values as YAML, without the YAML library and in one style, and as JSON on one line.
 
     name: camera
     xyz: [1.0, 2.0e-05, 3.0]
     quaternion: {x: 0.0, y: 0.0, z: 0.0, w: 1.0}
 
-Text is quoted wherever YAML 1.1 or 1.2 would read something else than that text.
+Text is quoted wherever YAML 1.1 or 1.2 would read something else than that text.  The caller formats floats.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _WIDEST_FLOW_MAP = 8
 _INFINITE = float("inf")
 
 
-def dump(value: Any, number: Callable[[float], str] = repr) -> str:
+def dump_yaml(value: Any, number: Callable[[float], str] = repr) -> str:
     """Write dicts, lists, text, numbers, booleans and None as one YAML document.
 
     Lists of scalars and small maps of numbers are on one line, everything else in blocks.
@@ -113,3 +113,22 @@ def _block(value: Any, number: Callable[[float], str]) -> Iterator[str]:
         yield head if line is None else f"{head} {line}"
         if line is None:
             yield from (f"  {below}" for below in _block(each, number))
+
+
+def dump_json(value: Any, number: Callable[[float], str] = repr) -> str:
+    """Write plain values as JSON on one line; `number` formats the floats.
+
+    `json.dumps` does not allow that.
+    """
+    if isinstance(value, (float, Verbatim)):
+        return number(value) if isinstance(value, float) else str(value)
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{dump_json(key)}: {dump_json(each, number)}" for key, each in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(dump_json(each, number) for each in value) + "]"
+    if isinstance(value, str) and value.isascii() and value.isprintable() and '"' not in value and "\\" not in value:
+        return f'"{value}"'  # most texts, without importing json
+    import json
+
+    is_plain = not isinstance(value, str) or value.isprintable()
+    return json.dumps(value, ensure_ascii=not is_plain)  # escapes control characters and lone surrogates
