@@ -44,11 +44,11 @@ if TYPE_CHECKING:
     from frametool.geometry.rotation import Rotation as Rotation
     from frametool.geometry.transform import Transform as Transform
     from frametool.lint.tree_diff import diff as diff
-    from frametool.sim.drivers import FollowController as FollowController
     from frametool.sim.followed import explain as explain
     from frametool.sim.followed import follow_steps as follow_steps
     from frametool.sim.scene import tutorial as tutorial
     from frametool.sim.simulate import simulate as simulate
+    from frametool.sim.turtle import FollowController as FollowController
     from frametool.sim.turtle import Turtle as Turtle
     from frametool.sim.turtle import Twist as Twist
     from frametool.stream.engines import apply_arrow as apply_arrow
@@ -78,11 +78,10 @@ _HOMES = {
         "frametool.geometry.rotation": "Rotation",
         "frametool.geometry.transform": "Transform",
         "frametool.lint.tree_diff": "diff",
-        "frametool.sim.drivers": "FollowController",
         "frametool.sim.followed": "explain follow_steps",
         "frametool.sim.scene": "tutorial",
         "frametool.sim.simulate": "simulate",
-        "frametool.sim.turtle": "Turtle Twist",
+        "frametool.sim.turtle": "FollowController Turtle Twist",
         "frametool.stream.engines": "apply_arrow",
         "frametool.stream.trajectories": "load_trajectory",
     }.items() for name in names.split()

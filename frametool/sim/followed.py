@@ -34,8 +34,8 @@ from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Style
-from frametool.sim.drivers import ARRIVED, frame_of
-from frametool.sim.simulate import IssuedCommand, simulate
+from frametool.sim.simulate import IssuedCommand, frame_of, simulate
+from frametool.sim.turtle import ARRIVED
 from frametool.stream.request import RowOptions
 from frametool.stream.written import ByTree, derive_record, written_poses
 

@@ -31,22 +31,33 @@ from frametool.errors import FormatError, ValueInvalid, alternatives, shown
 from frametool.formats.detect import detect
 from frametool.formats.rows.csv import split_line
 from frametool.frames.stamps import BILLION, FURTHEST_NS, format_stamp, parse_time
-from frametool.grammar.readers import Misfit, Path, as_mapping, kind, read_number, read_numbers, within
+from frametool.grammar.readers import Misfit, Path, as_mapping, kind, read_numbers, within
 from frametool.ros.message_stream import NOISE
-from frametool.sim.drivers import KEYS, LAWS, LEADERS, TARGETS, FollowController, built_in, scripted
-from frametool.sim.turtle import CENTRE, SERVICES, VARIANTS, Twist, complete
+from frametool.sim.turtle import (
+    CENTRE,
+    KEYS,
+    LAWS,
+    LEADERS,
+    SERVICES,
+    TARGETS,
+    VARIANTS,
+    FollowController,
+    Twist,
+    built_in,
+    complete,
+    scripted,
+)
 from frametool.text.numbers import parse_number, read_number_or_angle
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-    from typing import TypeVar
 
-    from frametool.sim.drivers import MakeLeader, TimedTwist
+    from frametool.sim.turtle import MakeLeader
 
     Place = tuple[float, float, float]  # metres, radians
-    Value = TypeVar("Value")
+    TimedTwist = tuple[int, Twist]
 
-TUTORIAL_SPAWN: Place = (4.0, 2.0, 0.0)
+DURATION_NS = 20 * BILLION
 
 
 class Follow(NamedTuple):
@@ -84,7 +95,7 @@ class Scene(NamedTuple):
 
     turtles: Sequence[SceneTurtle]
     calls: Sequence[ServiceCall] = ()
-    duration_ns: int | None = 20 * BILLION
+    duration_ns: int | None = DURATION_NS
     variant: str = "ros1"
     holonomic: bool = False
 
@@ -96,7 +107,7 @@ class Scene(NamedTuple):
 
 def tutorial(
     *, leader: MakeLeader | str = "still", law: FollowController | str = "ros1",
-    spawn: Place = TUTORIAL_SPAWN, followers: int = 1, target: str = "leader", delay: float = 0.0,
+    spawn: Place = (4.0, 2.0, 0.0), followers: int = 1, target: str = "leader", delay: float = 0.0,
     duration: float | None = 20.0, turtlesim: str = "ros1", holonomic: bool = False, seed: int = 0,
 ) -> Scene:
     """Return the tutorial's scene: turtle1 in the centre, turtle2 at `spawn` follows it, turtle3 follows turtle2, ...
@@ -133,21 +144,6 @@ LONGEST = FURTHEST_NS // BILLION  # seconds: the range of the buffer's stamps
 FLAGS = {"true": "1", "false": "0"}  # as in turtlesim's services
 
 
-def read_as(value: Any, parse: Callable[[str], Value], what: str) -> Value:
-    """Read a text; `what` is the expected value in errors."""
-    if type(value) is not str:
-        raise Misfit(f"expected {what}, found {kind(value)}")
-    return parse(value)
-
-
-def one_of(value: Any, names: Collection[str]) -> str:
-    """Read one of several words."""
-    word = read_as(value, str, f"one of {', '.join(names)}")
-    if word not in names:
-        raise ValueInvalid(f"unknown {shown(word)}{alternatives(word, names, 'choices')}")
-    return word
-
-
 def known_keys(value: Any, keys: Collection[str], what: str) -> dict[str, Any]:
     """Return a value that must be a mapping with some of these keys."""
     mapping = as_mapping(value, what)
@@ -174,19 +170,40 @@ def _whole(text: str, most: int) -> int:
     return int(text)
 
 
-read_angle = partial(
-    read_as, parse=partial(read_number_or_angle, degrees=False), what="an angle in radians, or like 90deg"
-)
-read_time = partial(read_as, parse=_time, what="a time in seconds")
-read_flag = partial(read_as, parse=lambda text: parse_number(FLAGS.get(text) or text), what="true or false")
+CHOICES = {"turtlesim": VARIANTS, "law": (*LAWS,), "target": TARGETS}
+# key, also of a service's argument or a command -> how its text is read, and what it is; others are numbers
+READERS: dict[str, tuple[Callable[[str], Any], str]] = {
+    "duration": (_duration, "a duration in seconds, or inf"),
+    "seed": (partial(_whole, most=1 << 64), "a whole number"),
+    **{key: (str, f"one of {', '.join(words)}") for key, words in CHOICES.items()},
+    **dict.fromkeys(("t", "delay"), (_time, "a time in seconds")),
+    **dict.fromkeys(("turtle", "name", "follow"), (str, "a turtle's name")),
+    **dict.fromkeys(
+        ("theta", "angular"), (partial(read_number_or_angle, degrees=False), "an angle in radians, or like 90deg")
+    ),
+    **dict.fromkeys(("holonomic", "off"), (lambda text: parse_number(FLAGS.get(text) or text), "true or false")),
+    **dict.fromkeys(("r", "g", "b", "width"), (partial(_whole, most=255), "a whole number 0 .. 255")),
+}
+
+
+def read_value(key: str, value: Any) -> Any:
+    """Read the value of a key; a place is a list."""
+    if key == "spawn":
+        return read_place(value)
+    parse, what = READERS.get(key, (parse_number, "a number"))
+    if type(value) is not str or not value:
+        raise Misfit(f"expected {what}, found {kind(value or None)}")
+    if value not in (words := CHOICES.get(key, (value,))):
+        raise ValueInvalid(f"unknown {shown(value)}{alternatives(value, words, 'choices')}")
+    return parse(value)
 
 
 def read_place(value: Any) -> Place:
     """Read [x, y] or [x, y, theta]: metres, radians; the angle may have a unit."""
     if type(value) is not list or len(value) not in (2, 3):
         raise Misfit(f"expected [x, y, theta], found {kind(value)}")
-    x, y = (within((index,), read_number, value[index]) for index in (0, 1))
-    return x, y, within((2,), read_angle, value[2]) if len(value) == 3 else 0.0
+    x, y, *theta = (within((at,), read_value, ("x", "y", "theta")[at], each) for at, each in enumerate(value))
+    return x, y, theta[0] if theta else 0.0
 
 
 def parse_spawn(text: str) -> Place:
@@ -291,22 +308,18 @@ def _pieces(lines: Iterable[str]) -> Iterator[tuple[Piece, bool]]:
         text = line.rstrip("\r\n")
         if NOISE(text) is not None:
             text = "---" if text.endswith("---") else ""
-        if not held and (not text.strip() or text.startswith("#")):
+        if not held and (not text.strip() or text.startswith(("#", "..."))):
             continue
         if is_table is None:
             is_table = detect(text.encode(), "rows", "records", otherwise="yaml") == "csv"
         alone = _WORD(text) is not None or (text.startswith("{") and text.rstrip().endswith("}"))
-        if is_table or not (alone or text.startswith(("---", "..."))):
-            held.append(text)
-            if is_table and "\n".join(held).count('"') % 2 == 0:
-                yield Piece("\n".join(held), number - len(held) + 1), True
-                held.clear()
-            continue
-        if any(map(str.strip, held)):
+        if alone and held and not is_table:
             yield Piece("\n".join(held), number - len(held)), False
-        held.clear()
-        if alone:
-            yield Piece(text, number), False
+            held.clear()
+        held.append(text)
+        if "\n".join(held).count('"') % 2 == 0 if is_table else alone or text.startswith(("---", "...")):
+            yield Piece("\n".join(held), number - len(held) + 1), is_table
+            held.clear()
     if held:
         yield Piece("\n".join(held), number - len(held) + 1), bool(is_table)
 
@@ -336,16 +349,14 @@ def _entry(value: Any) -> tuple[int | None, Twist]:
         raise Misfit(f"neither linear nor angular; {EXPECTED}")
     ahead, aside = within(("linear",), _axes, entry.get("linear", "0"), 0, 1)
     turning, _ = within(("angular",), _axes, entry.get("angular", "0"), 2, 2)
-    if "linear_y" in entry:
-        aside = within(("linear_y",), read_number, entry["linear_y"])
-    stamp_ns = within(("t",), read_time, entry["t"]) if "t" in entry else None
-    return stamp_ns, Twist(ahead, turning, aside)
+    others = {key: within((key,), read_value, key, entry[key]) for key in ("linear_y", "t") if key in entry}
+    return others.get("t"), Twist(ahead, turning, others.get("linear_y", aside))
 
 
 def _axes(value: Any, first: int, second: int) -> tuple[float, float]:
     """Read one number, or two axes of a vector; the others have no meaning for a turtle."""
     if type(value) is str:
-        return read_number(value), 0.0
+        return parse_number(value), 0.0
     numbers = read_numbers(value, AXES, partial=True)
     return numbers[first], numbers[second]
 
@@ -366,38 +377,10 @@ FOLLOW_KEYS = ("follow", "law", *CONTROLLER_KEYS, "target", "delay")
 TURTLE_KEYS = ("spawn", "leader", *FOLLOW_KEYS)
 
 
-def _name(value: Any) -> str:
-    if type(value) is not str or not value:
-        raise Misfit(f"expected a turtle's name, found {kind(value or None)}")
-    return value
-
-
-# key, also of a service's argument -> its reader; others are numbers
-READERS: dict[str, Callable[[Any], Any]] = {
-    "duration": partial(read_as, parse=_duration, what="a duration in seconds, or inf"),
-    "turtlesim": partial(one_of, names=VARIANTS),
-    "holonomic": read_flag,
-    "seed": partial(read_as, parse=partial(_whole, most=1 << 64), what="a whole number"),
-    "spawn": read_place,
-    "follow": _name,
-    "law": partial(one_of, names=LAWS),
-    "target": partial(one_of, names=TARGETS),
-    "delay": read_time,
-    "t": read_time,
-    "turtle": _name,
-    "name": _name,
-    "theta": read_angle,
-    "angular": read_angle,
-    "off": read_flag,
-    **dict.fromkeys(
-        ("r", "g", "b", "width"), partial(read_as, parse=partial(_whole, most=255), what="a whole number 0 .. 255")
-    ),
-}
-
-
-def _field(mapping: Mapping[str, Any], key: str, default: Any = None) -> Any:
-    """Read the value of a key, or its default."""
-    return within((key,), READERS.get(key, read_number), mapping.get(key, default))
+def _fields(value: Any, keys: Collection[str], what: str, raw: Collection[str] = ()) -> dict[str, Any]:
+    """Read a mapping with some of these keys; `raw` are left as they are."""
+    mapping = known_keys(value, keys, what)
+    return {key: each if key in raw else within((key,), read_value, key, each) for key, each in mapping.items()}
 
 
 def read_scene(source: Source, *, seed: int | None = None) -> Scene:
@@ -416,11 +399,9 @@ def read_scene(source: Source, *, seed: int | None = None) -> Scene:
 
 
 def _scene(value: Any, source: Source, seed: int | None) -> Scene:
-    scene = known_keys(value, SCENE_KEYS, "a scene {turtles: .., events: .., duration: ..}")
+    scene = _fields(value, SCENE_KEYS, "a scene {turtles: .., events: .., duration: ..}", ("turtles", "events"))
     if "turtles" not in scene:
         raise Misfit(f"no turtles; expected {', '.join(SCENE_KEYS)}")
-    own = _field(scene, "seed", "0")
-    variant, holonomic = _field(scene, "turtlesim", "ros1"), bool(_field(scene, "holonomic", "false"))
     events = scene.get("events") or []
     if type(events) is not list:
         raise Misfit(f"expected a list of {{t: .., SERVICE: {{..}}}}, found {kind(events)}", ("events",))
@@ -428,34 +409,34 @@ def _scene(value: Any, source: Source, seed: int | None) -> Scene:
         within(("events", at), _call, entry)._replace(place=f"{source.name}, event {at + 1}")
         for at, entry in enumerate(events)
     ]
+    seed = scene.get("seed", 0) if seed is None else seed
     entries = within(("turtles",), as_mapping, scene["turtles"], "the turtles by name")
-    turtles = [
-        within(("turtles", name), _turtle, name, entry or {}, source, own if seed is None else seed)
-        for name, entry in entries.items()
-    ]
-    return Scene(turtles, calls, _field(scene, "duration", "20"), variant, holonomic)
+    turtles = [within(("turtles", name), _turtle, name, entry or {}, source, seed) for name, entry in entries.items()]
+    variant, holonomic = scene.get("turtlesim", "ros1"), bool(scene.get("holonomic"))
+    return Scene(turtles, calls, scene.get("duration", DURATION_NS), variant, holonomic)
 
 
 def _turtle(name: str, value: Any, source: Source, seed: int) -> SceneTurtle:
-    entry = known_keys(value, TURTLE_KEYS, "a turtle {spawn: [x, y, theta], leader: .. or follow: ..}")
+    entry = _fields(value, TURTLE_KEYS, "a turtle {spawn: [x, y, theta], leader: .. or follow: ..}", ("leader",))
     if name in ("", "world"):
         raise Misfit(f"a turtle cannot be called {shown(name)}", key=True)
-    spawn = _field(entry, "spawn", [repr(CENTRE), repr(CENTRE), "0"])
-    if "follow" in entry and "leader" in entry:
-        raise Misfit("a turtle has a leader script or follows another, not both", ("leader",), key=True)
+    driver: MakeLeader | Follow | None = None
     if "follow" in entry:
-        if (leader := _field(entry, "follow")) == name:
+        if "leader" in entry:
+            raise Misfit("a turtle has a leader script or follows another, not both", ("leader",), key=True)
+        if entry["follow"] == name:
             raise Misfit(f"{name} cannot follow itself", ("follow",))
-        law = _field(entry, "law", "ros1")
-        numbers = {key: _field(entry, key) for key in CONTROLLER_KEYS if key in entry}
+        law = entry.get("law", "ros1")
+        numbers = {key: entry[key] for key in CONTROLLER_KEYS if key in entry}
         for key, number in numbers.items():
             within((key,), FollowController, law, **{key: number})
-        target, delay_ns = _field(entry, "target", "leader"), _field(entry, "delay", "0")
-        return SceneTurtle(name, spawn, Follow(leader, FollowController(law, **numbers), target, delay_ns))
-    if stray := [key for key in entry if key in FOLLOW_KEYS]:
+        controller = FollowController(law, **numbers)
+        driver = Follow(entry["follow"], controller, entry.get("target", "leader"), entry.get("delay", 0))
+    elif stray := [key for key in entry if key in FOLLOW_KEYS]:
         raise Misfit(f"{stray[0]} says how to follow; add follow: NAME", (stray[0],), key=True)
-    drive = within(("leader",), _leader, entry["leader"], source, seed) if "leader" in entry else None
-    return SceneTurtle(name, spawn, drive)
+    elif "leader" in entry:
+        driver = within(("leader",), _leader, entry["leader"], source, seed)
+    return SceneTurtle(name, entry.get("spawn", (CENTRE, CENTRE, 0.0)), driver)
 
 
 def _leader(value: Any, source: Source, seed: int) -> MakeLeader:
@@ -482,7 +463,6 @@ def _call(value: Any) -> ServiceCall:
     arguments = entry[service]
     if service == "kill" and type(arguments) is str:
         arguments = {"name": arguments}
-    known = within((service,), known_keys, arguments or {}, SERVICES[service], f"the arguments of {service}")
-    read = {key: within((service,), _field, known, key) for key in known}
+    read = within((service,), _fields, arguments or {}, SERVICES[service], f"the arguments of {service}")
     within((service,), complete, service, read)
-    return ServiceCall(_field(entry, "t"), service, read)
+    return ServiceCall(within(("t",), read_value, "t", entry["t"]), service, read)

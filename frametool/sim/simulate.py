@@ -15,8 +15,10 @@ its parent.
 from __future__ import annotations
 
 import math
+from collections import Counter, deque
 from heapq import heapify, heappop, heapreplace
 from itertools import count
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.writers import dump_json
@@ -25,28 +27,52 @@ from frametool.formats.rows.csv import row
 from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import BILLION
 from frametool.frames.topology import seconds
+from frametool.geometry.transform import Transform
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
 from frametool.ros.echo_format import message_text, transform_stamped
-from frametool.sim.drivers import CARROT_NS, EndOfRun, Heading, frame_of, offset, planar
-from frametool.sim.scene import Follow, Scene, ServiceCall
-from frametool.sim.turtle import TICK_NS, Pen, ServiceRefused, TurtlePose, TurtleState, Twist, WallHit, World
+from frametool.sim.scene import Follow, Scene
+from frametool.sim.turtle import TICK_NS, EndOfRun, Heading, ServiceRefused, TurtlePose, TurtleState, Twist, World
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterator
 
-    from frametool.geometry.transform import Transform
-    from frametool.sim.drivers import MakeLeader
+    from frametool.sim.turtle import MakeLeader, Pen, WallHit
 
     Process = Iterator[int]  # yields the nanoseconds at which it is to be resumed; ends when it has finished
     Watch = Callable[["SimulationStep"], object]
     Record = dict[str, Any]
-    # an event of a step: cells by column, for text and CSV; the ROS message, for YAML and JSON; what that does not say
-    Emission = tuple[Record, Record, Record]
 
 WORLD = "world"
 CACHE_NS = 10 * BILLION  # tf's own default
-TICKS, CARROTS, CALLS, LEADERS, CONTROLLERS = range(5)  # the order of processes that are due at the same time
+TICKS, CARROTS, LEADERS, CONTROLLERS = range(4)  # the order of processes that are due at the same time
+
+
+CARROT_NS = BILLION // 10  # between two broadcasts of a carrot
+CARROT_ASIDE = 2.0  # metres
+CARROT_CIRCLE = 10.0  # metres
+
+
+def frame_of(turtle: str, target: str) -> str:
+    """Return the frame that is looked up: the turtle, or its carrot (turtle1's is carrot1)."""
+    if target == "leader":
+        return turtle
+    return f"carrot{turtle[6:]}" if turtle[:6] == "turtle" and turtle[6:].isdigit() else f"{turtle}_carrot"
+
+
+def offset(target: str, now_ns: int) -> tuple[float, float]:
+    """Return the position of a target in its leader's frame, in metres."""
+    if target == "leader":
+        return 0.0, 0.0
+    if target == "carrot":
+        return 0.0, CARROT_ASIDE
+    angle = now_ns / BILLION * math.pi
+    return CARROT_CIRCLE * math.sin(angle), CARROT_CIRCLE * math.cos(angle)
+
+
+def planar(x: float, y: float, theta: float) -> Transform:
+    """Return a pose in the plane as a transform."""
+    return Transform.of(x, y, 0.0, 0.0, 0.0, math.sin(theta / 2.0), math.cos(theta / 2.0))
 
 
 class IssuedCommand(NamedTuple):
@@ -109,7 +135,7 @@ class Simulation:
         self.buffer = TransformBuffer(keep_ns=max(CACHE_NS, longest + BILLION))
         self.step = SimulationStep(0)
         self.states: dict[str, TurtleState] = {}
-        self.calls: list[ServiceCall] = []
+        self._calls = deque(sorted(scene.calls, key=attrgetter("t_ns")))  # that have not been sent yet
         for turtle in scene.turtles:
             self.world.spawn(*turtle.spawn, turtle.name)
 
@@ -123,18 +149,18 @@ class Simulation:
         for now_ns in count(0, TICK_NS):
             yield now_ns
             step, world = self.step, self.world
-            for call in self.calls:
+            while self._calls and self._calls[0].t_ns < now_ns:
+                call = self._calls.popleft()
                 try:
                     message = world.call(call.service, **call.arguments)
                 except ServiceRefused as refusal:
                     message = f"{call.place}: {refusal}" if call.place else str(refusal)
                 step.log += [message] if message else []
-            self.calls.clear()
             step.is_tick = True
             if now_ns:
                 step.walls = world.tick(now_ns)
             step.clears = world.clears
-            for name, turtle in world.turtles.items():
+            for name, turtle in sorted(world.turtles.items()):
                 pose = step.poses[name] = turtle.pose
                 step.states[name] = turtle.state
                 step.pens[name] = turtle.pen
@@ -156,7 +182,6 @@ def simulate(scene: Scene) -> Iterator[SimulationStep]:
     processes = [(TICKS, simulation.ticks())]
     carrots = {(follow.leader, follow.target) for follow in scene.followers.values() if follow.target != "leader"}
     processes += ((CARROTS, _carrot(simulation, leader, target)) for leader, target in sorted(carrots))
-    processes += ((CALLS, _service_call(simulation, call)) for call in scene.calls)
     for name, _, driver in scene.turtles:
         if isinstance(driver, Follow):
             if driver.leader == name:
@@ -188,12 +213,6 @@ def _carrot(simulation: Simulation, turtle: str, target: str) -> Process:
         yield now_ns
         x, y = offset(target, now_ns)
         simulation.broadcast(turtle, frame_of(turtle, target), planar(x, y, 0.0))
-
-
-def _service_call(simulation: Simulation, call: ServiceCall) -> Process:
-    """Send one service call; the world processes it at its next tick."""
-    yield call.t_ns
-    simulation.calls.append(call)
 
 
 def _leader(simulation: Simulation, name: str, make: MakeLeader) -> Process:
@@ -260,7 +279,7 @@ class RunSummary:
         """Create the summary of a run that has not begun."""
         self.reach = reach
         self.t_ns: int | None = None  # of the last step
-        self.walls: dict[str, int] = {}
+        self.walls: Counter[str] = Counter()
         self.distances: dict[str, float] = {}
         self.reached_ns: dict[str, int] = {}
         self._follows = scene.followers
@@ -268,8 +287,7 @@ class RunSummary:
     def watch(self, step: SimulationStep) -> None:
         """Add a step."""
         self.t_ns = step.t_ns
-        for hit in step.walls:
-            self.walls[hit.turtle] = self.walls.get(hit.turtle, 0) + 1
+        self.walls.update(hit.turtle for hit in step.walls)
         for name, follow in self._follows.items():
             if name in step.states and follow.leader in step.states:
                 own, leader, (x, y) = step.states[name], step.states[follow.leader], offset(follow.target, step.t_ns)
@@ -295,8 +313,7 @@ class RunSummary:
                 distance = f"final distance to {target} {self.distances[name]:.4f} m"
             yield printable(f"{name}: {distance}; {soon}")
         hits = ", ".join(f"{printable(name)} {count}" for name, count in sorted(self.walls.items()))
-        total = f"{sum(self.walls.values())}{f' ({hits})' if hits else ''}"
-        yield f"{seconds(self.t_ns)} s simulated; wall hits: {total}"
+        yield f"{seconds(self.t_ns)} s simulated; wall hits: {self.walls.total()}{f' ({hits})' * bool(hits)}"
 
 
 def event_log(say: Callable[[str], None]) -> Watch:
@@ -304,12 +321,12 @@ def event_log(say: Callable[[str], None]) -> Watch:
     at_wall: set[str] = set()
 
     def watch(step: SimulationStep) -> None:
+        nonlocal at_wall
         new = (str(hit) for hit in step.walls if hit.turtle not in at_wall)
         for line in (*step.log, *new):
             say(f"{step.t_ns / BILLION:.3f} s: {line}")
         if step.is_tick:
-            at_wall.clear()
-            at_wall.update(hit.turtle for hit in step.walls)
+            at_wall = {hit.turtle for hit in step.walls}
 
     return watch
 
@@ -324,32 +341,27 @@ SHORT = {
 }  # fmt: skip
 
 
-class StepWriter:
-    """Writes the contents of steps: emit is one of EMITS, style.format one of FORMS.
+def step_writer(
+    emit: str, style: Style, *, leaders: bool = False, labelled: bool = False
+) -> Callable[[SimulationStep], Iterator[str]]:
+    """Return what yields each record of a step, the first one below the header if the format has one.
 
-    leaders: the commands of leaders too, not only of followers.  labelled: name the turtle in a comment of a YAML
-    message.
+    emit: one of EMITS; style.format: one of FORMS.  leaders: the commands of leaders too, not only of followers.
+    labelled: name the turtle in a comment of a YAML message.
     """
+    digits = 3 if style.precision is None else style.precision
+    is_headed = style.format not in ("text", "csv")
 
-    def __init__(self, emit: str, style: Style, *, leaders: bool = False, labelled: bool = False) -> None:
-        """Store what is written and how."""
-        self._emissions = _EMISSIONS["all commands" if leaders and emit == "commands" else emit]
-        self._style = style
-        self._labelled = labelled
-        self._headed = False
-
-    def write(self, step: SimulationStep) -> Iterator[str]:
-        """Yield each record of a step, the first one below the header if the format has one."""
-        style = self._style
-        digits = 3 if style.precision is None else style.precision
-        for cells, message, labels in self._emissions(step, style):
-            if not self._headed and style.format in ("text", "csv"):
+    def write(step: SimulationStep) -> Iterator[str]:
+        nonlocal is_headed
+        for cells, message, labels in _emitted(step, emit, style, leaders=leaders):
+            if not is_headed:
+                is_headed = True
                 names = {name: SHORT.get(name, name) for name in cells}
                 yield row(cells, style) if style.format == "csv" else _aligned(names)
-            self._headed = True
             match style.format:
                 case "yaml":
-                    head = f"# {printable(labels['turtle'])} at {labels['t']} s\n" if self._labelled and labels else ""
+                    head = f"# {printable(labels['turtle'])} at {labels['t']} s\n" if labelled and labels else ""
                     yield head + message_text(message, style)
                 case "json":
                     yield f"{dump_json(labels | message, style.number)}\n"
@@ -362,6 +374,8 @@ class StepWriter:
                         texts[name] = f"{round(cell, digits) + 0.0:.{digits}f}" if isinstance(cell, float) else text
                     yield _aligned(texts | {"t": f"{cells['t']:.3f}"})
 
+    return write
+
 
 def _aligned(texts: Record) -> str:
     """Format a line, each cell right-aligned in its column."""
@@ -370,39 +384,27 @@ def _aligned(texts: Record) -> str:
     return " ".join(f"{text:>{widths[name]}}" for name, text in texts.items()) + "\n"
 
 
-def _commands(commands: Iterable[IssuedCommand]) -> Iterator[Emission]:
-    """Yield commands, as geometry_msgs/Twist."""
-    for command in commands:
-        ahead, turning, aside = command.twist
-        labels = {"t": command.t_ns / BILLION, "turtle": command.turtle}
-        seen = zip(("leader_x", "leader_y", "leader_theta"), command.leader or (None, None, None), strict=True)
-        cells = {"linear_x": ahead, "angular_z": turning, "distance": command.distance, **dict(seen)}
-        message = {"linear": {"x": ahead, "y": aside, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": turning}}
-        yield labels | cells | command.state._asdict(), message, labels
-
-
-def _poses(step: SimulationStep, _: Style) -> Iterator[Emission]:
-    """Yield the poses of a tick, as turtlesim/Pose; turtles at time 0 have not moved yet."""
-    for name, pose in step.poses.items() if step.t_ns else ():
-        if not all(map(math.isfinite, pose)):
-            when = f"{name} at {step.t_ns / BILLION:g} s"
-            raise ValueInvalid(f"{when}: its speed does not fit the float32 of a pose message")
-        labels, message = {"t": step.t_ns / BILLION, "turtle": name}, pose._asdict()
-        yield labels | message, message, labels
-
-
-def _transforms(step: SimulationStep, style: Style) -> Iterator[Emission]:
-    """Yield the transforms that were published, as geometry_msgs/TransformStamped."""
-    for stamp_ns, parent, child, transform in step.broadcasts:
-        numbers = zip(("x", "y", "z", "qx", "qy", "qz", "qw"), transform.components, strict=True)
-        cells = {"t": stamp_ns / BILLION, "parent": parent, "child": child, **dict(numbers)}
-        result = Result(Pose.of(transform.components, child, parent), {"stamp_ns": stamp_ns})
-        yield cells, transform_stamped(result, style), {}
-
-
-_EMISSIONS: dict[str, Callable[[SimulationStep, Style], Iterator[Emission]]] = {
-    "commands": lambda step, _: _commands(step.commands),
-    "all commands": lambda step, _: _commands([*step.led, *step.commands]),
-    "poses": _poses,
-    "tf": _transforms,
-}
+def _emitted(
+    step: SimulationStep, emit: str, style: Style, *, leaders: bool
+) -> Iterator[tuple[Record, Record, Record]]:
+    """Yield the events of a step: cells by column, for text and CSV; the ROS message; what that does not say."""
+    t = step.t_ns / BILLION
+    if emit == "tf":  # geometry_msgs/TransformStamped
+        for stamp_ns, parent, child, transform in step.broadcasts:
+            numbers = zip(("x", "y", "z", "qx", "qy", "qz", "qw"), transform.components, strict=True)
+            result = Result(Pose.of(transform.components, child, parent), {"stamp_ns": stamp_ns})
+            yield {"t": t, "parent": parent, "child": child, **dict(numbers)}, transform_stamped(result, style), {}
+    elif emit == "poses":  # turtlesim/Pose; turtles at time 0 have not moved yet
+        for name, pose in step.poses.items() if step.t_ns else ():
+            if not all(map(math.isfinite, pose)):
+                raise ValueInvalid(f"{name} at {t:g} s: its speed does not fit the float32 of a pose message")
+            labels = {"t": t, "turtle": name}
+            yield labels | pose._asdict(), pose._asdict(), labels
+    else:  # geometry_msgs/Twist
+        for command in [*(step.led if leaders else ()), *step.commands]:
+            ahead, turning, aside = command.twist
+            labels = {"t": t, "turtle": command.turtle}
+            seen = zip(("leader_x", "leader_y", "leader_theta"), command.leader or (None, None, None), strict=True)
+            cells = {"linear_x": ahead, "angular_z": turning, "distance": command.distance, **dict(seen)}
+            message = {"linear": {"x": ahead, "y": aside, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": turning}}
+            yield labels | cells | command.state._asdict(), message, labels

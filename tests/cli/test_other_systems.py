@@ -19,7 +19,7 @@ from shell import ENVIRONMENT, ROOT
 from frametool import cli
 from frametool.cli.commands import COMMANDS as NAMES
 from frametool.formats import table
-from frametool.sim.drivers import Mailbox, keyboard
+from frametool.sim.turtle import keyboard
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -93,7 +93,7 @@ def test_a_system_without_what_posix_has_writes_files_and_text_for_people(tmp_pa
 def test_keys_that_cannot_be_read_one_by_one_are_asked_for_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "termios", None)
     with pytest.raises(Exception, match=r"^single keys are read on Linux and macOS alone; pipe key names into frametool sim"):
-        keyboard(Mailbox(), headings=False).__enter__()
+        keyboard(headings=False).__enter__()
 
 
 @pytest.mark.parametrize(("arguments", "status"), [(("sim", "teleop"), 2), (("sim", "follow", "--leader", "-"), 5)])

@@ -13,10 +13,9 @@ from typing import Any
 
 import pytest
 
-from frametool.sim.drivers import FollowController, scripted
 from frametool.sim.scene import tutorial
 from frametool.sim.simulate import SimulationStep, simulate
-from frametool.sim.turtle import SIZE, Twist
+from frametool.sim.turtle import SIZE, FollowController, Twist, scripted
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 FOLLOW = json.loads((GOLDEN / "turtle_follow.json").read_text())

@@ -11,10 +11,9 @@ import pytest
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid
 from frametool.grammar.result import Style
-from frametool.sim.drivers import scripted
 from frametool.sim.scene import read_scene, tutorial
-from frametool.sim.simulate import FORMS, StepWriter, simulate
-from frametool.sim.turtle import FASTEST_TURN, Turtle, Twist, World
+from frametool.sim.simulate import FORMS, simulate, step_writer
+from frametool.sim.turtle import FASTEST_TURN, Turtle, Twist, World, scripted
 from frametool.view.pictures import ticks
 
 if TYPE_CHECKING:
@@ -64,9 +63,9 @@ def test_any_value_of_an_option_is_used_or_refused_in_one_line(run: Run, name: s
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_pose_whose_speed_does_not_fit_float32_is_refused_and_named(form: str) -> None:
-    writer = StepWriter("poses", Style(form))
+    records = step_writer("poses", Style(form))
     scene = tutorial(leader=scripted([(0, Twist(1e40, 0.0))]), followers=0, duration=1.0)
-    written = (text for step in simulate(scene) for text in writer.write(step))
+    written = (text for step in simulate(scene) for text in records(step))
     with pytest.raises(ValueInvalid, match=r"^turtle1 at 0\.016 s: its speed does not fit the float32"):
         list(written)
 

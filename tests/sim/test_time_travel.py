@@ -14,10 +14,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from frametool.sim.drivers import scripted
 from frametool.sim.scene import tutorial
 from frametool.sim.simulate import IssuedCommand, simulate
-from frametool.sim.turtle import Twist
+from frametool.sim.turtle import Twist, scripted
 
 MILLISECOND = 1_000_000
 SCRIPT = json.loads((Path(__file__).parents[1] / "golden" / "turtle_follow.json").read_text())["leader"]

@@ -3,25 +3,35 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import pytest
 
 from frametool.errors import ValueInvalid
-from frametool.sim.drivers import LAWS, LEADERS, FollowController, Heading, Mailbox, scripted, typed_commands
 from frametool.sim.scene import Follow, Scene, SceneTurtle, ServiceCall, tutorial
 from frametool.sim.simulate import RunSummary, Simulation, SimulationStep, simulate
 from frametool.sim.turtle import (
     CENTRE,
+    LAWS,
+    LEADERS,
     SIZE,
     TICK_NS,
     TIMEOUT_NS,
+    FollowController,
+    Heading,
     ServiceRefused,
     Turtle,
     TurtleState,
     Twist,
     World,
+    arriving,
+    scripted,
     single,
+    typed_commands,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 SECOND = 1_000_000_000
 
@@ -329,32 +339,26 @@ def test_a_script_out_of_order_is_refused() -> None:
         commands(tutorial(leader=leader, duration=5.0))
 
 
-def test_a_mailbox_gives_the_newest_command_that_is_due_and_turns_to_headings() -> None:
-    mailbox = Mailbox()
-    mailbox.post(Twist(1.0, 0.0))
-    mailbox.post(Heading(1.0))
-    mailbox.post(Twist(2.0, 0.0), SECOND)
-    scene = tutorial(leader=mailbox, followers=0, duration=0.5)
+def test_of_commands_that_arrive_the_newest_that_is_due_acts_and_turns_to_headings() -> None:
+    leader = arriving([(0, Twist(1.0, 0.0)), (0, Heading(1.0)), (SECOND, Twist(2.0, 0.0))])
+    scene = tutorial(leader=leader, followers=0, duration=0.5)
     assert last_of(scene)[1].poses["turtle1"].angular_velocity == 1.0
 
 
 def test_an_arrow_is_a_command_and_the_key_q_ends_the_run() -> None:
     typed = typed_commands([b"\x1b[A?", b"fq\x1b[B"], headings=False)
     assert next(typed) == (0, Twist(2.0, 0.0))
-    mailbox = Mailbox()
-    mailbox.fill_from(typed)
-    assert max((step.t_ns for step in simulate(tutorial(leader=mailbox, duration=600.0))), default=0) < 600 * SECOND
+    scene = tutorial(leader=arriving(typed), duration=600.0)
+    assert max((step.t_ns for step in simulate(scene)), default=0) < 600 * SECOND
 
 
-def test_a_mailbox_tells_what_went_wrong_while_it_was_filled() -> None:
-    def broken() -> object:
+def test_what_ends_the_commands_that_arrive_ends_the_run() -> None:
+    def broken() -> Iterator[tuple[int, Twist]]:
         yield 0, Twist(1.0, 0.0)
         raise ValueInvalid("torn")
 
-    mailbox = Mailbox()
-    mailbox.fill_from(broken())  # type: ignore[arg-type]
     with pytest.raises(ValueInvalid, match="torn"):
-        for _ in simulate(tutorial(leader=mailbox, duration=None)):
+        for _ in simulate(tutorial(leader=arriving(broken()), duration=None)):
             pass
 
 

@@ -11,10 +11,9 @@ import yaml
 from frametool.documents.source import Source
 from frametool.errors import FormatError
 from frametool.grammar.result import Style
-from frametool.sim.drivers import KEYS, FollowController, scripted
 from frametool.sim.scene import Follow, read_commands, read_scene, read_script, tutorial
-from frametool.sim.simulate import EMITS, SHORT, RunSummary, StepWriter, simulate
-from frametool.sim.turtle import CENTRE, Twist
+from frametool.sim.simulate import EMITS, SHORT, RunSummary, simulate, step_writer
+from frametool.sim.turtle import CENTRE, KEYS, FollowController, Twist, scripted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -39,6 +38,7 @@ ECHO = "linear:\n  x: 2.0\n  y: 0.0\n  z: 0.0\nangular:\n  x: 0.0\n  y: 0.0\n  z
         '[{"t": 0, "linear": 2}, {"t": 0.5, "angular": {"z": -1.5}}]',
         '[\n {"t": 0, "linear": [2, 0, 0]},\n {"t": 0.5, "angular": -1.5}\n]\n',
         "t: 0\nlinear: {x: 2}\n---\n---\nt: 0.5\nturtle: turtle1\nangular: {z: -1.5}\n---\n",
+        "--- {t: 0, linear: 2}\n--- {t: 0.5, angular: -1.5}\n",
     ],
 )
 def test_a_leader_file_is_read_in_any_form(text: str) -> None:
@@ -178,8 +178,8 @@ def test_a_mistake_in_a_scene_is_placed(text: str, message: str) -> None:
 
 def written(emit: str, form: str) -> str:
     """Return a short run as text."""
-    writer = StepWriter(emit, Style(form))
-    return "".join(text for step in simulate(tutorial(leader="circle", duration=0.2)) for text in writer.write(step))
+    records = step_writer(emit, Style(form))
+    return "".join(text for step in simulate(tutorial(leader="circle", duration=0.2)) for text in records(step))
 
 
 @pytest.mark.parametrize("emit", EMITS)
@@ -190,8 +190,8 @@ def test_yaml_and_json_say_the_same(emit: str) -> None:
 
 
 def test_a_message_of_several_turtles_says_whose_it_is() -> None:
-    writer = StepWriter("commands", Style("yaml"), labelled=True)
-    texts = [text for step in simulate(tutorial(followers=2, duration=0.0)) for text in writer.write(step)]
+    records = step_writer("commands", Style("yaml"), labelled=True)
+    texts = [text for step in simulate(tutorial(followers=2, duration=0.0)) for text in records(step)]
     assert [text.splitlines()[0] for text in filter(None, texts)] == ["# turtle2 at 0.0 s", "# turtle3 at 0.0 s"]
     assert len(read_script(Source("commands", "".join(texts)))) == 2
 
@@ -210,8 +210,8 @@ def test_a_leader_reads_what_a_follower_commanded() -> None:
     given = [each for step in simulate(tutorial(duration=0.2)) for each in step.commands]
     expected = [(each.t_ns, each.twist) for each in given]
     for form in ("json", "csv"):
-        writer = StepWriter("commands", Style(form))
-        text = "".join(part for step in simulate(tutorial(duration=0.2)) for part in writer.write(step))
+        records = step_writer("commands", Style(form))
+        text = "".join(part for step in simulate(tutorial(duration=0.2)) for part in records(step))
         assert read_script(Source("commands", text)) == expected
 
 
@@ -220,8 +220,8 @@ def test_a_turtles_name_is_quoted_in_csv_where_a_reader_would_split_it(name: str
     scene = tutorial(duration=0.2)
     turtles = [scene.turtles[0], scene.turtles[1]._replace(name=name)]
     steps = list(simulate(scene._replace(turtles=turtles)))
-    writer = StepWriter("commands", Style("csv"))
-    text = "".join(part for step in steps for part in writer.write(step))
+    records = step_writer("commands", Style("csv"))
+    text = "".join(part for step in steps for part in records(step))
     rows = list(csv.reader(text.splitlines(keepends=True)))
     assert {len(row) for row in rows} == {10 + 1}
     assert {row[1] for row in rows[1:]} == {name}
@@ -234,10 +234,10 @@ def test_a_name_with_control_characters_reaches_no_terminal_raw() -> None:
     names = [leader._replace(name="a\x1b[31m"), follower._replace(name="b\n\x07", driver=Follow("a\x1b[31m", FollowController()))]
     scene = scene._replace(turtles=names)
     summary, texts = RunSummary(scene), []
-    writers = [StepWriter("commands", Style(form), labelled=True) for form in ("text", "yaml")]
+    writers = [step_writer("commands", Style(form), labelled=True) for form in ("text", "yaml")]
     for step in simulate(scene):
         summary.watch(step)
-        texts += [text for writer in writers for text in writer.write(step)]
+        texts += [text for records in writers for text in records(step)]
         texts += map(str, step.walls)
     shown = "".join([*texts, *summary.lines()])
     assert "a\\x1b[31m" in shown

@@ -23,17 +23,17 @@ from frametool.cli.streaming import explain_option, significant
 from frametool.documents.source import Source, read_text
 from frametool.errors import FileProblem, alternatives, shown
 from frametool.frames.stamps import BILLION
-from frametool.sim import drivers
+from frametool.sim import turtle as drivers
 from frametool.sim.scene import Scene, duration_ns, parse_spawn, read_scene, read_script, read_stream, tutorial
-from frametool.sim.simulate import EMITS, FORMS, RunSummary, StepWriter, event_log, simulate
+from frametool.sim.simulate import EMITS, FORMS, RunSummary, event_log, simulate, step_writer
 from frametool.sim.turtle import TICK_NS, VARIANTS
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from frametool.sim.drivers import MakeLeader
     from frametool.sim.simulate import Watch
+    from frametool.sim.turtle import MakeLeader
 
 
 _of_turtles = partial(option, under="Turtles")
@@ -158,10 +158,10 @@ class SimOutput:
             yield event_log(say)
         if self.output is not None or not (self.live and sys.stdout.isatty()):
             several = self.leaders or self.emit == "poses" or len(scene.followers) > 1
-            writer = StepWriter(self.emit, self.style, leaders=self.leaders, labelled=several)
+            records_of = step_writer(self.emit, self.style, leaders=self.leaders, labelled=several)
             write = stack.enter_context(writing(self.output, force=self.force))
             # each record at once, so that a reader at the other end of a pipe sees it
-            yield lambda step: [write(text) for text in writer.write(step)]
+            yield lambda step: [write(text) for text in records_of(step)]
 
 
 SUBCOMMANDS = {
@@ -214,8 +214,7 @@ def follow(inputs: Inputs) -> None:
             raise FileProblem("standard input is closed")
         say_if_typed()
         if is_paced:  # commands act when they arrive
-            leader = mailbox = drivers.Mailbox()
-            mailbox.fill_from(read_stream(sys.stdin.buffer, "stdin", period_ns=0))
+            leader = drivers.arriving(read_stream(sys.stdin.buffer, "stdin", period_ns=0))
         else:
             leader = drivers.scripted(read_stream(sys.stdin.buffer, "stdin"))
     else:
@@ -297,8 +296,7 @@ def teleop(inputs: Inputs) -> None:
     g t r e d c v b around f turn to a heading. When stdout is no terminal, every command goes there.
     """
     refuse(sys.stdin is None or not sys.stdin.isatty(), f"standard input is no terminal; {drivers.INSTEAD}")
-    mailbox = drivers.Mailbox()
-    output, scene = SimOutput(inputs.but(live=True), leaders=True), scene_of(inputs, mailbox)
+    output = SimOutput(inputs.but(live=True), leaders=True)
     STATE.cleans_up = True  # the terminal's keys
-    with drivers.keyboard(mailbox, headings=scene.variant == "ros2"):
-        output.run(scene)
+    with drivers.keyboard(headings=inputs.turtlesim == "ros2") as leader:
+        output.run(scene_of(inputs, leader))
