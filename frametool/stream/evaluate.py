@@ -32,17 +32,7 @@ from frametool.stream.row_layout import (
     doubt,
     wrong_tail,
 )
-from frametool.stream.rows import (
-    Block,
-    assemble,
-    chosen,
-    coded,
-    number_spans,
-    numbered,
-    read_each,
-    separators,
-    texts_as_rows,
-)
+from frametool.stream.rows import Block, assemble, chosen, coded, numbered, read_each, texts_as_rows
 from frametool.text.numbers import parse_number, read_number_or_angle
 from frametool.text.parse import half_units, parse_floats
 from frametool.text.spans import Flags, Floats, Ints, Spans
@@ -450,14 +440,12 @@ class Run:
             unchanged = [(place, text) for place, text in unchanged if place < end]
         groups = []
         if len(self.rows) and not self.request.gathered:
-            results, locked, values = self.results, self.locked, None
+            results, locked, asked = self.results, self.locked, self.request.results
             if len(self.rows) < self.count:  # else nothing is copied
                 results, locked = results[self.rows], locked[self.rows]
                 parts = [chosen(part, self.rows) for part in parts]
-            if after := separators(plan.pieces):
-                shown = results[:, : len(after)]
-                values = number_spans(shown, self.request.results.precision, after, yaml=plan.yaml, null=plan.null)
-            groups.append((places[self.rows], assemble(plan.pieces, parts, values, locked, results)))
+            text = assemble(plan.pieces, parts, results, locked, asked.precision, yaml=plan.yaml, null=plan.null)
+            groups.append((places[self.rows], text))
         if self.request.on_error == NULL and self.reasons:
             rows = np.array(sorted(self.reasons), np.int64)
             parts = [chosen(part, rows) for part in self.block.parts]

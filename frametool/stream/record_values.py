@@ -30,16 +30,7 @@ from frametool.errors import Finding, FormatError, FrametoolError, Misused, Valu
 from frametool.formats.table import is_recording
 from frametool.geometry import floats
 from frametool.grammar.pose import SCALE, Pose
-from frametool.grammar.readers import (
-    Misfit,
-    NotARotation,
-    Path,
-    Reading,
-    in_nanoseconds,
-    stamp_column,
-    tell,
-    within,
-)
+from frametool.grammar.readers import Misfit, NotARotation, Path, Reading, in_nanoseconds, stamp_column, tell, within
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream.faults import ZONES, RowNote
 from frametool.stream.record import STALE, Record, find_records, pose_of, value_at

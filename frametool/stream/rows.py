@@ -19,26 +19,16 @@ from frametool.documents.document import JSON_NUMBER
 from frametool.documents.source import Verbatim
 from frametool.documents.writers import dump_json
 from frametool.errors import FrametoolError, ValueInvalid
-from frametool.frames.stamps import BILLION, nanoseconds_each, tell_size
+from frametool.frames.stamps import BILLION
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.readers import in_nanoseconds
 from frametool.grammar.result import NoResult, Result, with_entries
 from frametool.stream.row_layout import AS_READ, NOWHERE, PARTS, POSE, Const, IfLocked, In, Instead, Out, Piece, Word
 from frametool.stream.stamp_source import read_header_stamp, read_stamp
 from frametool.text.numbers import parse_number
-from frametool.text.parse import LOWEST, parse_floats, trimmed
-from frametool.text.spans import MARGIN, Bytes, Flags, Floats, Ints, Spans, Words, framed, join, windows, without_quotes
-from frametool.text.write import (
-    TENS,
-    ZEROS,
-    first_point,
-    fixed_spans,
-    not_digits,
-    read_eight_digits,
-    replaced,
-    rounded_to_single,
-    shortest_spans,
-)
+from frametool.text.parse import FURTHEST, parse_floats, parse_stamps
+from frametool.text.spans import MARGIN, Floats, Ints, Spans, framed, join, without_quotes
+from frametool.text.write import fixed_spans, replaced, rounded_to_single, shortest_spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -193,19 +183,22 @@ def separators(pieces: Iterable[Piece]) -> bytes:
 
 
 def assemble(
-    pieces: Sequence[Piece], parts: Sequence[Spans], values: Spans | None, locked: Ints, results: Floats | None = None,
-    null: bytes = b"",
+    pieces: Sequence[Piece], parts: Sequence[Spans], results: Floats | None, locked: Ints, precision: int | None = None,
+    *, yaml: bool = False, null: bytes = b"nan",
 ) -> list[Spans]:  # fmt: skip
     """Return the spans, in order, that make up the rows.
 
-    values: the texts of the results; locked: (n,) 1 where angles are not unique
-    results: those numbers; without values and results each of them is null, and names stay as they are read
+    results: (n, k) the numbers, as `number_spans` writes them; without any, each is null and names stay as they are
+    locked: (n,) 1 where angles are not unique
     """
-    found = []
-    size, has_none = len(locked), values is None and results is None
+    found, size = list[Spans](), len(locked)
+    after = b"" if results is None else separators(pieces)
+    values = None
+    if results is not None and after:
+        values = number_spans(results[:, : len(after)], precision, after, yaml=yaml, null=null)
     for piece in pieces:
         if isinstance(piece, (In, Instead)):
-            found.append(parts[piece.part if isinstance(piece, In) or has_none else piece.new])
+            found.append(parts[piece.part if isinstance(piece, In) or results is None else piece.new])
         elif isinstance(piece, Out) and values is not None:
             own = slice(piece.first, piece.last)
             starts, ends = values.starts[:, own], values.ends[:, own].copy()
@@ -282,14 +275,6 @@ def _in_order(groups: Sequence[tuple[Ints, list[Spans]]]) -> bytes:
 
 # --- stamps and weights ---
 
-_WORDS = 3
-_LONGEST = 8 * _WORDS
-_MOST = (1 << 63) - 1
-_MOST_SECONDS = _MOST // BILLION
-_MOST_UPPER = (1 << 63) // 10**16
-_NINE = 9  # decimals of a second in nanoseconds
-
-
 def read_extra(cells: Sequence[Spans], request: Request, name: str) -> tuple[Any, dict[int, tuple[str, str]]]:
     """Read the stamps of rows, or the weights or labels of those that are gathered; give also which rows have none.
 
@@ -316,55 +301,16 @@ def read_stamps(cells: Sequence[Spans], *, in_ns: int) -> tuple[Ints, dict[int, 
     in_ns: how many nanoseconds a whole number of one column is; 0 are decimal seconds, and what ends in `ns` is some
     Gives the stamps, and why a row has none; what is not plainly written is read one by one.
     """
-    parsed = [_parse_plain(each.data, *trimmed(*each), in_ns=in_ns if len(cells) == 1 else 1) for each in cells]
+    parsed = [parse_stamps(each, in_ns=in_ns if len(cells) == 1 else 1) for each in cells]
     stamps, sure = parsed[0]
     if len(cells) == 2:
-        stamps, sure = stamps * BILLION + parsed[1][0], sure & parsed[1][1] & (stamps < _MOST_SECONDS)
+        stamps, sure = stamps * BILLION + parsed[1][0], sure & parsed[1][1] & (stamps < FURTHEST)
 
     def read(row: int) -> int:
         texts = [each.text(row).decode("utf-8", "replace") for each in cells]
         return read_header_stamp(*texts) if len(texts) == 2 else read_stamp(texts[0], in_ns=in_ns)
 
     return stamps, read_each(stamps, np.flatnonzero(~sure).tolist(), read)
-
-
-def _parse_plain(data: Bytes, starts: Ints, ends: Ints, *, in_ns: int) -> tuple[Ints, Flags]:
-    """Read digits with at most a point among them; give the nanoseconds and which of them are sure."""
-    suffixed = (data.take(ends - 1) == ord("s")) & (data.take(ends - 2) == ord("n")) & (ends - starts > 2)
-    ends = ends - 2 * suffixed
-    characters = windows(data, _LONGEST)[starts].view("<u8").reshape(-1, _WORDS)
-    before = first_point(characters[:, _WORDS - 1])
-    for word in reversed(range(_WORDS - 1)):
-        here = first_point(characters[:, word])
-        before = np.where(here < 8, here, before + 8)
-    points = starts + np.minimum(before, ends - starts)  # all characters are before the point that is not there
-    whole, sure = _integer(data, points, points - starts)
-    decimals = np.maximum(ends - points - 1, 0)
-    digits, fine = _integer(data, ends, decimals)
-    finer = TENS.take(decimals - _NINE, mode="clip")  # what is finer than a nanosecond must be 0
-    below = digits // finer * TENS.take(_NINE - decimals, mode="clip")
-    sure &= fine & (digits % finer == 0) & (ends - starts <= _LONGEST) & (ends - starts > (points < ends))
-    is_whole = points == ends
-    each = np.where(suffixed, 1, in_ns or np.where(is_whole, nanoseconds_each(whole), BILLION))
-    sure &= (is_whole | ~(suffixed | bool(in_ns))) & (whole < _MOST // each)
-    by_size = np.flatnonzero(sure & (each != BILLION) & ~suffixed) if not in_ns else ()
-    for row in by_size[:1]:
-        tell_size(int(whole[row]), int(each[row]))
-    return whole * each + below, sure
-
-
-def _integer(data: Bytes, ends: Ints, length: Ints) -> tuple[Ints, Flags]:
-    """Read so many digits before `ends`, not above 63 bits."""
-    characters = windows(data, _LONGEST)[ends - _LONGEST].view("<u8").reshape(-1, _WORDS)
-    words, wrong = [], np.zeros(len(ends), np.uint64)
-    for word in range(_WORDS):
-        digits = characters[:, word] ^ ZEROS
-        digits &= ~LOWEST.take(8 * (_WORDS - word) - length, mode="clip")
-        wrong |= not_digits(digits)
-        words.append(read_eight_digits(digits))
-    upper, middle, lower = words
-    total: Words = (upper * np.uint64(10**8) + middle) * np.uint64(10**8) + lower
-    return total.view(np.int64), (wrong == 0) & (upper < _MOST_UPPER)
 
 
 # --- what became of rows: poses for trees and for other formats; single results as such blocks and back ---

@@ -49,7 +49,6 @@ from frametool.stream.rows import (
     number_spans,
     objects,
     plain_cells,
-    separators,
     spans_of,
     spelled,
     text_of,
@@ -187,7 +186,7 @@ class TextWriter(SingleWriter):
         pose = turned(self.style, (tx, ty, tz, *quaternion.unit(x, y, z, w, arrays)))
         tx, ty, tz, x, y, z, w = rigid.inverse(*pose) if FORMATS[self.style.format].rows.inverse else pose
         turn = (x, y, z, w) if self.style.keep_sign else quaternion.from_quaternion(x, y, z, w, arrays)
-        values = np.array(fmt.numbers(tx, ty, tz, *turn)).T + 0.0  # none is -0.0
+        values = np.column_stack(fmt.numbers(tx, ty, tz, *turn)) + 0.0  # none is -0.0
         refuse_infinite(values)
         stamps, numbers = block.stamps_ns, [*range(before + fmt.first, before + fmt.first + size)]
         times = [at * BILLION for at in range(before, before + size)] if stamps is None else stamps.tolist()
@@ -215,8 +214,7 @@ class TextWriter(SingleWriter):
                 texts = [b"%d" % each for each in (times if piece == "nanoseconds" else numbers)]
             pieces.append(In(len(parts)))
             parts.append(spans_of(texts))
-        written = number_spans(np.ascontiguousarray(values), self.style.precision, separators(pieces))
-        text = join(assemble(pieces, parts, written, np.zeros(size, np.int64)))
+        text = join(assemble(pieces, parts, values, np.zeros(size, np.int64), self.style.precision))
         return text if before else fmt.head + text[len(fmt.between) :]
 
 

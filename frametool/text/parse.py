@@ -1,4 +1,4 @@
-"""Text to floats in bulk, each rounded like Python's `float`; and floats of seconds to nanoseconds.
+"""Text to floats in bulk, each rounded like Python's `float`; and seconds, as text or as floats, to nanoseconds.
 
 The common cell (a sign, up to eight digits, a point and up to 24 digits) is read in words of eight characters; blanks
 around it and an exponent need a second pass. Python's own reader decides if the result is too near to the middle of
@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from frametool.frames.stamps import BILLION
+from frametool.frames.stamps import BILLION, nanoseconds_each, tell_size
 from frametool.text import write
 from frametool.text.numbers import half_unit
-from frametool.text.spans import Bytes, Flags, Floats, Ints, Spans, windows
+from frametool.text.spans import Bytes, Flags, Floats, Ints, Spans, Words, windows
 from frametool.text.write import TENS, ZEROS, halves, not_digits, product_error, read_eight_digits, shortest_decimals
 
 _NUMBER = re.compile(rb"[ \t]*[+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]+)?[ \t]*")
@@ -218,6 +218,7 @@ def _split_integer(numbers: Ints) -> tuple[Floats, Floats]:
 NINE = 9  # decimals of a second in nanoseconds
 MOST = np.iinfo(np.int64).max
 FURTHEST = float(MOST // BILLION)  # seconds
+_STAMP_WORDS = 3
 
 
 def nanoseconds_of(seconds: Floats) -> tuple[Ints, Flags]:
@@ -241,3 +242,47 @@ def nanoseconds_of(seconds: Floats) -> tuple[Ints, Flags]:
         stamps[row] = round(Decimal(repr(float(size[row]))) * BILLION)
     stamps[size == 0.0] = 0
     return np.where(seconds < 0.0, -stamps, stamps), none
+
+
+def parse_stamps(cells: Spans, *, in_ns: int) -> tuple[Ints, Flags]:
+    """Read cells (n,) of digits with at most a point among them as nanoseconds; give also which of them are sure.
+
+    in_ns: how many nanoseconds a whole number is; 0 are decimal seconds, or what its size says.  Blanks around a cell
+    and `ns` behind it are allowed.
+    """
+    data, (starts, ends) = cells.data, trimmed(*cells)
+    suffixed = (data.take(ends - 1) == ord("s")) & (data.take(ends - 2) == ord("n")) & (ends - starts > 2)
+    ends = ends - 2 * suffixed
+    characters = windows(data, 8 * _STAMP_WORDS)[starts].view("<u8").reshape(-1, _STAMP_WORDS)
+    before = write.first_point(characters[:, -1])
+    for word in reversed(range(_STAMP_WORDS - 1)):
+        here = write.first_point(characters[:, word])
+        before = np.where(here < 8, here, before + 8)
+    points = starts + np.minimum(before, ends - starts)  # all characters are before the point that is not there
+    whole, sure = _read_integer(data, points, points - starts)
+    decimals = np.maximum(ends - points - 1, 0)
+    digits, fine = _read_integer(data, ends, decimals)
+    finer = TENS.take(decimals - NINE, mode="clip")  # what is finer than a nanosecond must be 0
+    below = digits // finer * TENS.take(NINE - decimals, mode="clip")
+    sure &= fine & (digits % finer == 0) & (ends - starts <= 8 * _STAMP_WORDS) & (ends - starts > (points < ends))
+    is_whole = points == ends
+    each = np.where(suffixed, 1, in_ns or np.where(is_whole, nanoseconds_each(whole), BILLION))
+    sure &= (is_whole | ~(suffixed | bool(in_ns))) & (whole < MOST // each)
+    by_size = np.flatnonzero(sure & (each != BILLION) & ~suffixed) if not in_ns else ()
+    for row in by_size[:1]:
+        tell_size(int(whole[row]), int(each[row]))
+    return whole * each + below, sure
+
+
+def _read_integer(data: Bytes, ends: Ints, length: Ints) -> tuple[Ints, Flags]:
+    """Read so many digits before `ends`, and return which numbers are digits alone, not above 63 bits."""
+    characters = windows(data, 8 * _STAMP_WORDS)[ends - 8 * _STAMP_WORDS].view("<u8").reshape(-1, _STAMP_WORDS)
+    words, wrong = [], np.zeros(len(ends), np.uint64)
+    for word in range(_STAMP_WORDS):
+        digits = characters[:, word] ^ ZEROS
+        digits &= ~LOWEST.take(8 * (_STAMP_WORDS - word) - length, mode="clip")
+        wrong |= not_digits(digits)
+        words.append(read_eight_digits(digits))
+    upper, middle, lower = words
+    total: Words = (upper * np.uint64(10**8) + middle) * np.uint64(10**8) + lower
+    return total.view(np.int64), (wrong == 0) & (upper < (1 << 63) // 10**16)
