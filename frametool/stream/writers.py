@@ -46,7 +46,6 @@ from frametool.stream.rows import (
     block_of,
     constant,
     kept,
-    number_spans,
     objects,
     plain_cells,
     spans_of,
@@ -390,28 +389,28 @@ class AlikeRows(NamedTuple):
 
     def _text(self, parts: Sequence[tuple[str, Syntax]], style: Style) -> list[Spans]:
         """Return the rows as text; parts: the text of the result with marks, and how scalars are written in it."""
-        columns, (size, width) = self.marked.numbers, self.numbers.shape
-        is_yaml = style.format == "yaml"
-        numbers = number_spans(self.numbers, style.precision, b"," * width, yaml=is_yaml) if width else None
+        columns, size = self.marked.numbers, len(self.places)
         marks = rf"(?<![\w.+-])(?:{'|'.join([*map(re.escape, columns), str(STAMP_NS)])})(?![\w.+-])"
-        found, waiting = list[Spans](), ""
+        pieces, spans, waiting = list[Piece](), list[Spans](), ""
         for text, syntax in parts:
             quote = f"(?:{syntax.quote})?"
             scalars = f"{quote}(?:{LEAF.pattern.replace('(', '(?:')}|{PARENT}|{NAME}){quote}"
             for piece in re.split(f"({marks}|{scalars})", text):
                 mark, around = piece.strip('"'), ""
-                if numbers is not None and mark in columns:
-                    at = columns[mark]
-                    made = Spans(numbers.data, numbers.starts[:, at], numbers.ends[:, at] - 1)
+                if mark in columns:
+                    made: Piece = Out(columns[mark], columns[mark] + 1)
                 elif mark in (PARENT, NAME, str(STAMP_NS)) or LEAF.fullmatch(mark):
-                    made, around = self._scalar(mark, syntax)
+                    scalar, around = self._scalar(mark, syntax)
+                    made, spans = In(len(spans)), [*spans, scalar]
                 else:
                     waiting += piece
                     continue
                 waiting += around
-                found += [constant(waiting.encode(), size), made] if waiting else [made]
+                pieces += [Const(waiting.encode()), made] if waiting else [made]
                 waiting = around
-        return [*found, constant(waiting.encode(), size)] if waiting else found
+        pieces += [Const(waiting.encode())] if waiting else []
+        locked = np.zeros(size, np.int64)
+        return assemble(pieces, spans, self.numbers, locked, style.precision, yaml=style.format == "yaml")
 
     def _scalar(self, mark: str, syntax: Syntax) -> tuple[Spans, str]:
         """Return what is in the place of a mark, as it is written there, and the quotes around it."""
