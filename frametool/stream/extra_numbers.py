@@ -201,7 +201,9 @@ def find_rates(
     turns = operation.turns and not operation.mirrors
     turned = [tuple(each) for each in rates.values() if len(each) == 3 and turns]
     if stay := [names[at] for each in rates.values() if tuple(each) not in turned for at in each]:
-        apart = f"stay as they are: points and poses move; --columns {','.join(stay[:3])} --as vector turns velocities"
+        three = next((",".join(names[at] for at in each) for each in rates.values() if len(each) == 3), "")
+        remedy = f"; --columns {three} --as vector turns velocities" * bool(three)
+        apart = f"stay as they are: points and poses move{remedy}"
         why = "keep to the old axes: poses and covariances turn alone" if operation.turns else apart
         warn(f"{source}: {listing(stay, 9)} {why}")
     kinds = [NORMAL if names[each[0]][0] in "vV" else RATE for each in turned]

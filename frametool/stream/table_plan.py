@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import suppress
 from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
@@ -252,7 +253,7 @@ def _turning_along(
         named = ", ".join(map(" ".join, there))
         raise Misused(f"{named} would keep to the old axes; --columns x,y,z turns the points alone, apply all of them")
     found = [(tuple(map(names.index, each)), NORMAL) for each in there if operation.moves]
-    if operation.turns or (operation.moves and not known.isdisjoint(("vx", "wx", "body_vx"))):
+    if operation.turns or (operation.moves and re.search(r"(?i) (?:body[_.])?[vw]x\b", f" {' '.join(names)}")):
         from frametool.stream.extra_numbers import find_rates
 
         found += find_rates(names, poses[0].places, operation, source)

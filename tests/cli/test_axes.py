@@ -270,6 +270,13 @@ def test_velocities_of_points_turn_with_the_world_and_stay_where_points_move(run
     assert (turned.out.splitlines()[1], turned.err) == ("1,9,5,-2,-4.0,3.0,0.0", "")
 
 
+def test_velocities_that_stay_are_told_with_their_units_and_whether_they_can_turn(run: Any) -> None:
+    units = run("apply", "--transform", "{rpy_deg: [0, 0, 90]}", stdin="x,y,z,vx [m/s],vy [m/s],vz [m/s]\n9,5,-2,3,4,0\n")
+    assert "vx [m/s], vy [m/s], vz [m/s] stay as they are: points and poses move; --columns vx [m/s],vy [m/s],vz [m/s]" in units.err
+    two = run("apply", "--transform", "{rpy_deg: [0, 0, 90]}", stdin="x,y,z,vx,vy\n9,5,-2,3,4\n")
+    assert two.err == "frametool: warning: stdin: vx, vy stay as they are: points and poses move\n"
+
+
 @pytest.mark.parametrize("keys", ['"vx": 1, "vy": 2, "vz": 3', '"velocity": [1, 2, 3]', '"angular_velocity": [1, 2, 3]'])
 def test_records_do_not_keep_velocities_in_the_old_axes(run: Any, keys: str) -> None:
     line = f'{{"xyz": [1, 2, 3], "xyzw": [0, 0, 0, 1], {keys}}}\n'
