@@ -17,7 +17,7 @@ nanoseconds. Names are loaded when first used: `import frametool` alone loads ne
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from frametool import covariance as covariance
-    from frametool.calc.api import calc as calc
+    from frametool.calc.evaluate import calc as calc
     from frametool.cli.embedded import Ran as Ran
     from frametool.cli.embedded import run as run
     from frametool.errors import FrametoolError as FrametoolError
@@ -58,7 +58,7 @@ __version__ = "0.2.0"
 
 _HOMES = {
     name: module for module, names in {
-        "frametool.calc.api": "calc",
+        "frametool.calc.evaluate": "calc",
         "frametool.cli.embedded": "Ran run",
         "frametool.covariance": "covariance",
         "frametool.errors": "FrametoolError",

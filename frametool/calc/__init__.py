@@ -1,6 +1,6 @@
 """Expressions over poses, points and numbers, whose frames are checked like units.
 
-The package is callable, because `frametool.calc(..)` and `frametool.calc.api` share a name.
+The package is callable, because `frametool.calc(..)` and `frametool.calc.evaluate` share a name.
 """
 
 from __future__ import annotations

@@ -7,6 +7,8 @@ vector or a twist in the notation of results.
     evaluate_line(read_line("inv(map<-base_link) * (map<-tool)"), scope).type      # base_link<-tool
     {xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}    {name: tool, parent: wrist, xyz: [0, 0, 0.1]}
     {frame: map, point: [1, 2, 3]}           {twist: [1, 0, 0, 0, 0, 0.5]}
+
+Also `frametool.calc(..)`: expressions in Python, whose values carry their frames.
 """
 
 from __future__ import annotations
@@ -14,26 +16,29 @@ from __future__ import annotations
 import re
 from contextlib import contextmanager
 from math import pi
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from frametool.calc import functions
-from frametool.calc.functions import FUNCTIONS, LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TWIST, VECTOR, Term, Type
+from frametool.calc.functions import FUNCTIONS, LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TREE, TWIST, VECTOR, Term, Type
 from frametool.calc.parser import PLAIN, RESERVED, UNITS, Branch, CalcError, Line, NoTree, frame_text, parse_line
 from frametool.documents.document import parse_documents
 from frametool.documents.source import Source, error_at
-from frametool.errors import FormatError, FrametoolError, did_you_mean, shown, warn
+from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown, warn
+from frametool.frames.lookups import Frames
 from frametool.geometry import floats
 from frametool.geometry.representations import EARTH_FRAMES
+from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Transform
 from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose, read_pose
 from frametool.grammar.readers import Misfit, Reading, kind, may_be_on_earth, read_numbers, slash_note, within
+from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.calc.functions import RowValues
-    from frametool.frames.lookups import Frames
     from frametool.geometry.place import Earth
-    from frametool.geometry.types import Components
+    from frametool.geometry.types import Array, Components
 
 NAME = "literal"
 AXES = ("x", "y", "z")
@@ -352,3 +357,145 @@ def completions(scope: Scope, text: str, before: str) -> list[str]:
         return [f"{head}<-{frame}" for frame in frames if frame.startswith(tail)]
     words = () if asked else (*scope.names, *(f"{name}(" for name in FUNCTIONS), *WORDS)
     return [word for word in (*words, *(f"{frame}<-" for frame in frames)) if word.startswith(text)]
+
+
+# --- in Python: `frametool.calc(..)`, and values that carry their frames ---
+
+
+class Measure(float):
+    """A number with a unit: `m`, `rad`, `s`; "" for a plain one.  Angles are in radians."""
+
+    __slots__ = ("unit",)
+    unit: str
+
+    def __new__(cls, value: float, unit: str) -> Self:
+        """Store both."""
+        made = super().__new__(cls, value)
+        made.unit = unit
+        return made
+
+    def __reduce__(self) -> tuple[type[Self], tuple[float, str]]:
+        """Allow copying and pickling with the unit."""
+        return type(self), (float(self), self.unit)
+
+
+class Framed:
+    """A value with its frames: a pose `target<-source`, or a point, vector, twist or angles in `target`.
+
+    kind: pose, point, vector, twist, angles.  An unknown frame is None.
+    """
+
+    __slots__ = ("_term",)
+
+    def __init__(self, term: Term) -> None:
+        """Wrap the result of an expression."""
+        self._term = term
+
+    @property
+    def kind(self) -> str:
+        """The kind of the value."""
+        return self._term.type.kind
+
+    @property
+    def target(self) -> str | None:
+        """The frame in which it is expressed."""
+        return self._term.type.target
+
+    @property
+    def source(self) -> str | None:
+        """The frame whose pose it is."""
+        return self._term.type.source
+
+    @property
+    def components(self) -> Components:
+        """Its numbers, floats or arrays; those of a pose are tx, ty, tz, x, y, z, w."""
+        return self._term.at(None)
+
+    @property
+    def transform(self) -> Transform:
+        """The transform target_from_source of a pose."""
+        if self.kind != POSE:
+            raise ValueInvalid(f"{self._term.type.named} is not a pose")
+        return Transform.of(*self.components)
+
+    @property
+    def xyz(self) -> Array:
+        """The position of a pose or point, or the vector, shape (..., 3)."""
+        return _stacked(self.components[:3])
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:  # noqa: FBT001 - numpy's signature
+        """Return its numbers, shape (..., n); of a pose the 4x4 matrix."""
+        found = self.transform.as_matrix() if self.kind == POSE else _stacked(self.components)
+        return found if dtype is None else found.astype(dtype, copy=bool(copy))
+
+    def __repr__(self) -> str:
+        """Show kind, frames and numbers."""
+        frames = str(self._term.type) if self.kind == POSE else f"in {frame_text(self.target)}"
+        return f"<{self.kind} {frames} {self.components}>"
+
+
+def _stacked(parts: Components) -> Array:
+    import numpy as np
+
+    return np.stack(np.broadcast_arrays(*parts), axis=-1)
+
+
+def calc(
+    text: str, /, *, tree: Frames | None = None, degrees: bool = False, normalize: bool = False, **names: Any
+) -> Any:
+    """Return the value of an expression such as `inv(map<-base_link) * (map<-tool)`; see `help calc`.
+
+    tree: for look-ups without a tree name.  names: values for use in the expression: trees, transforms, rotations,
+    numbers, three numbers (a point), six (a twist), lists of transforms, results of other expressions.
+    degrees, normalize: how literals of poses are read.
+    Returns a Measure, which is a float, or a Framed: `.transform`, `.xyz`, `.target`, `.source`; of a list a list.
+    Raises CalcError for frames or units that do not match, LookupFailed.
+    """
+    terms = {name: term_of(name, value) for name, value in names.items()}
+    scope = Scope(tree=tree, names=terms, degrees=degrees, normalize=normalize)
+    for name in names:
+        read_line(f"{name}=0")  # refuses reserved names
+    return _result(evaluate_line(read_line(text), scope))
+
+
+def _result(term: Term) -> Any:
+    """Return the Python value of a term."""
+    if term.type.kind == TREE:
+        return term.tree
+    if term.type.kind == LIST:
+        return [*map(_result, term.items)]
+    if term.type.kind != NUMBER:
+        return Framed(term)
+    (value,) = functions.numbers_in(term)
+    return Measure(value, term.type.unit) if type(value) is float else value
+
+
+def term_of(name: str, value: Any) -> Term:
+    """Convert a Python value; of arrays (..., 3) is points, (..., 6) twists, others numbers."""
+    if isinstance(value, Framed):
+        found = value._term  # noqa: SLF001 - its own module
+    elif isinstance(value, Frames):
+        found = Term(Type(TREE), (), tree=value)
+    elif isinstance(value, Transform):
+        found = Term(Type(POSE), value.components)
+    elif isinstance(value, Rotation):
+        found = Term(Type(POSE), (0.0, 0.0, 0.0, *value.components))
+    elif isinstance(value, Measure):
+        found = Term(Type(NUMBER, unit=value.unit), (float(value),))
+    elif isinstance(value, (int, float)) and not isinstance(value, bool):
+        found = Term(Type(NUMBER), (parse_number(repr(float(value))),))  # refuses values that are not finite
+    elif isinstance(value, (list, tuple)) and value and isinstance(value[0], (Transform, Framed)):
+        found = Term(Type(LIST), (), items=tuple(term_of(name, each) for each in value))
+    else:
+        import numpy as np
+
+        try:
+            array = np.asarray(None if isinstance(value, bool) else value, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ValueInvalid(f"{name}: an expression knows nothing of {shown(type(value).__name__)}") from None
+        if not np.isfinite(array).all():
+            raise ValueInvalid(f"{name}: the numbers are not finite")
+        kind = {3: POINT, 6: TWIST}.get(array.shape[-1] if array.ndim else 1, NUMBER)
+        columns = (array,) if kind == NUMBER else np.moveaxis(array, -1, 0)
+        found = Term(Type(kind), tuple(float(part) if part.ndim == 0 else part for part in columns))
+    return found._replace(text=name)

@@ -246,6 +246,15 @@ def in_radians(term: Term) -> Term:
     return made(term.type._replace(degrees=False), lambda angle, _: (angle * TO_RADIANS,), term)
 
 
+def numbers_in(term: Term, row: RowValues | None = None, *, degrees: bool = False) -> Components:
+    """Return the numbers of a value, angles in degrees or radians; one written in degrees is exact."""
+    is_angle = degrees and (term.type.kind == ANGLES or term.type.unit == RADIAN)
+    if is_angle and term.type.degrees:
+        return term.at(row)
+    numbers = in_radians(term).at(row)
+    return tuple(number * floats.RADIAN for number in numbers) if is_angle else numbers
+
+
 # --- kernels: they take the numbers of all arguments, and the namespace of their functions ---
 
 

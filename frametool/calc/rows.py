@@ -12,11 +12,10 @@ from copy import copy
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.calc.evaluate import AXES, PLACED, Scope, evaluate_line, literal, term_of_pose
-from frametool.calc.functions import ANGLES, LIST, NUMBER, POINT, POSE, VECTOR, RowValues, Term, Type, in_radians
+from frametool.calc.functions import ANGLES, LIST, NUMBER, POINT, POSE, VECTOR, RowValues, Term, Type, numbers_in
 from frametool.calc.parser import RADIAN, CalcError, Line, needs_time, reads_row, walk
 from frametool.documents.source import Source, opened
 from frametool.errors import FormatError, FrametoolError
-from frametool.geometry.floats import RADIAN as DEGREES
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import COVARIANCE_KEYS
 from frametool.grammar.readers import Misfit, may_be_on_earth
@@ -169,14 +168,9 @@ class RowExpressions(Formula):
 
     def _numbers(self, term: Term, row: RowValues) -> Sequence[Number]:
         """Return the numbers of a value in their written units."""
-        type_ = term.type
-        if type_.kind == POSE:
+        if term.type.kind == POSE:
             return self.target.written(term.at(row), row.xp)
-        is_angle = self.degrees and (type_.kind == ANGLES or type_.unit == RADIAN)
-        if is_angle and type_.degrees:
-            return term.at(row)
-        numbers = in_radians(term).at(row)
-        return tuple(number * DEGREES for number in numbers) if is_angle else numbers
+        return numbers_in(term, row, degrees=self.degrees)
 
 
 def poses_of_table(path: str, fmt: str, *, normalize: bool, degrees: bool) -> Term:

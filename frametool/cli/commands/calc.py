@@ -6,14 +6,14 @@ import os
 import re
 import sys
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.calc.api import line_of_value, machine_table, machine_text, plain_result
-from frametool.calc.evaluate import BETWEEN_WORDS, Scope, completions, evaluate_line, read_line
-from frametool.calc.functions import FUNCTIONS, LIST, POINT, POSE, TREE, VECTOR, Term, Type, wanted
-from frametool.calc.parser import Line, mentions_row, walk
+from frametool.calc.evaluate import BETWEEN_WORDS, Scope, completions, evaluate_line, read_line, term_of
+from frametool.calc.functions import ANGLES, FUNCTIONS, LIST, NUMBER, POINT, POSE, VECTOR, Term, numbers_in, wanted
+from frametool.calc.parser import RADIAN, Line, mentions_row, walk
 from frametool.cli.command import Command, Inputs, Text, argument, command_named, option, refuse
 from frametool.cli.commands.help import topic
 from frametool.cli.options import COLUMN, pose_result_options, reading_options
@@ -23,8 +23,10 @@ from frametool.cli.sink import say_error, tell, writing
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.trees import load_tree
 from frametool.documents.source import HEAD, decode, opened, read_text
-from frametool.errors import FrametoolError
-from frametool.formats.table import FORMATS
+from frametool.errors import FrametoolError, ValueInvalid, printable
+from frametool.formats.rows.csv import write_poses as write_rows
+from frametool.formats.table import FORMATS, is_trajectory
+from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
 from frametool.grammar.result import write_poses as write_documents
 from frametool.stream.faults import STOP, Fault
@@ -68,7 +70,7 @@ def file_named_in(text: str, scope: Scope) -> Term | None:
         from frametool.formats.load import load_sources
 
         tree = load_sources([source]) if source and path == "-" else load_tree(path, streams=True)
-        found = Term(Type(TREE), (), tree=tree)
+        found = term_of(name, tree)
     scope.names[name] = found._replace(text=name)
     return scope.names[name]
 
@@ -87,6 +89,23 @@ def _offer_words(ctx: click.Context, incomplete: str) -> Mapping[str, str]:
 EXPRESSION = Text(offers=_offer_words)
 
 
+def plain_result(term: Term, style: Style) -> Any:
+    """Return a value as a result: a pose as a Result, a number bare, anything else as a mapping."""
+    type_, numbers = term.type, numbers_in(term, degrees=style.degrees)
+    frame = {} if type_.target is None else {"frame": type_.target}
+    if type_.kind == POSE:
+        return Result(Pose.of(numbers, type_.source, type_.target))
+    if type_.kind == NUMBER:
+        return float(numbers[0])
+    if type_.kind == ANGLES:
+        return frame | {"rpy_deg" if style.degrees else "rpy": list(numbers)}
+    if type_.kind == POINT and style.place is not None:
+        from frametool.grammar.place import point_entry
+
+        return point_entry(type_.target, numbers, style.place)
+    return frame | {type_.kind: list(numbers)}
+
+
 def value_texts(terms: Iterable[Term], style: Style) -> Iterator[str]:
     """Yield the text of each value in the format of a style, what parts it from the one before included.
 
@@ -94,11 +113,11 @@ def value_texts(terms: Iterable[Term], style: Style) -> Iterator[str]:
     """
     values = (item for term in terms for item in (term.items if term.type.kind == LIST else (wanted(term),)))
     if style.format == "csv":
-        yield machine_table(list(values), style)
+        yield write_rows((_cells(value, style) for value in values), style)
         return
     before = ""
     for value in values:
-        text = _for_a_person(value, style) if style.format == "text" else machine_text(value, style)
+        text = _for_people(value, style) if style.format == "text" else _for_programs(value, style)
         if before and style.format == "yaml":
             yield "---\n"
         elif before and style.format == "text" and (before.count("\n") > 1 or text.count("\n") > 1):
@@ -107,22 +126,60 @@ def value_texts(terms: Iterable[Term], style: Style) -> Iterator[str]:
         before = text
 
 
-def _for_a_person(term: Term, style: Style) -> str:
+def _for_people(term: Term, style: Style) -> str:
     """Describe one value."""
     from frametool.view.pose_text import write_points, write_poses
 
-    type_ = term.type
+    def text(values: Sequence[float]) -> str:
+        return "  ".join(style.number(value + 0.0) for value in values)
+
+    type_, result = term.type, plain_result(term, style)
+    radians, degrees = (text(numbers_in(term, degrees=each)) for each in (False, True))
+    frame = "" if type_.target is None else f" in {printable(type_.target)}"
+    if type_.kind == POSE and (type_.target is None) == (type_.source is None):
+        return write_poses([result], style)
     if type_.kind == POSE:
-        result = plain_result(term, style)
-        if (type_.target is None) == (type_.source is None):
-            return write_poses([result], style)
         return f"{type_}\n{write_poses([Result(result.pose._replace(name=None, parent=None), result.extras)], style)}"
-    if type_.kind in (POINT, VECTOR):
-        result = plain_result(term, style)
-        if type_.kind not in result:  # at a place on the Earth
-            return write_documents([result], style)
-        return write_points([result], style)
-    return line_of_value(term, style)
+    if type_.kind in (POINT, VECTOR):  # at a place on the Earth a mapping
+        return (write_points if type_.kind in result else write_documents)([result], style)
+    if type_.unit == RADIAN:
+        return f"{degrees} deg  ({radians} rad)\n" if style.degrees else f"{radians} rad  ({degrees} deg)\n"
+    if type_.kind == NUMBER:
+        return f"{radians} {type_.unit}".rstrip() + "\n"
+    if type_.kind == ANGLES:
+        return f"rpy  {radians}  rad{frame}\n     {degrees}  deg\n"
+    twist = term.at(None)
+    return f"linear  {text(twist[:3])}  m\nangular  {text(twist[3:])}  rad{frame}\n"
+
+
+def _for_programs(term: Term, style: Style) -> str:
+    """Write one value as a document or line of a machine format."""
+    fmt, result, kind = style.format, plain_result(term, style), term.type.kind
+    if kind == POSE and is_trajectory(fmt):
+        from frametool.stream.writers import write_poses
+
+        return write_poses([result], style)
+    held = {"arrays": "columns of numbers", "recording": "messages"}
+    if what := next((held[each] for each in FORMATS[fmt].writes if each in held), ""):
+        raise ValueInvalid(f"{fmt} holds {what}: calc writes rows of -i in it, not single values")
+    if kind not in (POSE, POINT, VECTOR) and fmt not in ("json", "yaml"):
+        raise ValueInvalid(f"{fmt} has no form for {term.type.named}; write it as text, json, yaml or csv")
+    module = import_module(FORMATS[fmt].writer)
+    return str((module.write_poses if kind == POSE else module.write_points)([result], style))
+
+
+def _cells(term: Term, style: Style) -> Any:
+    """Return one value as a row of a table: each number in its own column."""
+    from frametool.calc.rows import NAMES, RESULT
+
+    result = plain_result(term, style)
+    if isinstance(result, Result) or (style.place is not None and term.type.kind == POINT):
+        return result
+    if isinstance(result, float):
+        return {RESULT: result}
+    *frame, (key, numbers) = result.items()
+    names = [name + "_deg" * (key == "rpy_deg") for name in NAMES[term.type.kind]]
+    return dict(frame) | dict(zip(names, numbers, strict=True))
 
 
 def shown_of(values: Iterable[tuple[Line, Term]]) -> Iterator[Term]:
