@@ -18,8 +18,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from frametool import covariance as covariance
     from frametool.calc.evaluate import calc as calc
-    from frametool.cli.embedded import Ran as Ran
-    from frametool.cli.embedded import run as run
+    from frametool.cli.commands.batch import Ran as Ran
+    from frametool.cli.commands.batch import run as run
     from frametool.errors import FrametoolError as FrametoolError
     from frametool.fit.closed_forms import solve_mean as solve_mean
     from frametool.fit.closed_forms import solve_points as solve_points
@@ -59,7 +59,7 @@ __version__ = "0.2.0"
 _HOMES = {
     name: module for module, names in {
         "frametool.calc.evaluate": "calc",
-        "frametool.cli.embedded": "Ran run",
+        "frametool.cli.commands.batch": "Ran run",
         "frametool.covariance": "covariance",
         "frametool.errors": "FrametoolError",
         "frametool.fit.closed_forms": "solve_mean solve_points",

@@ -16,7 +16,7 @@ from hypothesis import settings
 from sized import set_sizes
 
 from frametool import cli
-from frametool.cli.embedded import reader, streams, writer
+from frametool.cli.commands.batch import reader, streams, writer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

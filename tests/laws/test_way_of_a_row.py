@@ -86,7 +86,7 @@ def test_a_row_meets_no_more_code_than_before(run: Callable[..., Any], way: str)
 def cost_in_silence(arguments: list[str]) -> Cost:
     """Count what the command line calls with nothing on its input; what it writes is dropped."""
     from frametool import cli
-    from frametool.cli.embedded import reader, streams, writer
+    from frametool.cli.commands.batch import reader, streams, writer
 
     with streams(reader(io.BytesIO()), writer(io.BytesIO())):
         return cost(lambda: cli.run(arguments))

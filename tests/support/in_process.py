@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from unittest import mock
 
 from frametool import cli
-from frametool.cli.embedded import Terminal, reader, streams, writer
+from frametool.cli.commands.batch import Terminal, reader, streams, writer
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool import cli
-from frametool.cli.embedded import reader, streams, writer
+from frametool.cli.commands.batch import reader, streams, writer
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

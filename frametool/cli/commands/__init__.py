@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool import __version__
-from frametool.cli.command import WithHelp, show_help
+from frametool.cli.command import OPTIONAL, WithHelp, show_help
 from frametool.cli.sink import writing
 from frametool.errors import SHOWN, FileProblem, Misused, any_near, did_you_mean, shown
 
@@ -38,7 +38,7 @@ COMMANDS = {
     "view": ("frametool.cli.commands.tree", "frames in 3D: in the terminal, as an interactive page, as a picture"),
     "check": ("frametool.cli.commands.check", "mistakes in trees and recordings"),
     "diff": ("frametool.cli.commands.check", "what differs between two trees, calibrations or recordings"),
-    "static": ("frametool.cli.commands.static", "static_transform_publisher arguments, written and read"),
+    "static": ("frametool.cli.commands.tree", "static_transform_publisher arguments, written and read"),
     "fk": ("frametool.cli.commands.lookup", "where TIP of a robot is seen from BASE, for joint values"),
     "solve": ("frametool.cli.commands.solve", "transforms estimated from measurements: trees, cameras, matched points"),
     "apply": ("frametool.cli.commands.apply", "points, vectors and poses moved into another frame"),
@@ -51,7 +51,7 @@ COMMANDS = {
     "echo": ("frametool.cli.commands.lookup", "where SOURCE is seen from TARGET as a recording plays"),
     "record": ("frametool.cli.commands.record", "a recording with other edges, frames of poses or time span"),
     "monitor": ("frametool.cli.commands.check", "rate, interval, gaps and jumps of each edge of a recording"),
-    "formats": ("frametool.cli.commands.formats", "the file formats that are read and written, and what they mean"),
+    "formats": ("frametool.cli.commands.check", "the file formats that are read and written, and what they mean"),
     "examples": ("frametool.cli.commands.help", "the example files and the cookbook, printed or copied"),
     "help": ("frametool.cli.commands.help", "topics, the cookbook, and any word: pose, axes, extrinsics"),
     "sim": ("frametool.cli.commands.sim", "turtlesim and its followers, without ROS and without a screen"),
@@ -216,18 +216,40 @@ def answered(call: Callable[[], object], arguments: Sequence[str]) -> int:
     except click.ClickException as error:
         raise Misused(_usage(error, arguments)) from None
     except FileProblem as error:
-        from frametool.cli.replaced import replacement
-
         if gone := replacement(arguments):  # its value was taken for a file
             raise Misused(gone) from error
         raise
     return result if isinstance(result, int) else 0
 
 
+# an option, alone or behind its command, an option with a value, or a subcommand -> what to use instead
+REPLACED = {
+    "--jobs": "split the input, `split -n l/8 ROWS part. && ls part.* | xargs -P 8 -I{} frametool .. -i {} -o {}.out`",
+    "sim sweep": 'a loop in Python over `frametool.simulate(..)` of `FollowController("ros1", gain_linear=2)`',
+    "view --live": "the page plays what moves, `frametool view TREE --open`",
+    "--explain=latex": "--explain=markdown has the formulas as LaTeX; pandoc makes a document of it",
+    "view --sliders": "a robot's page has its sliders; --no-sliders leaves them out",
+    "compare --end": "--stop says the same",
+    "align --end": "--stop says the same",
+    "--tf2": "numbers are tf2's anyway; --cache 10 keeps as much as its buffer, --moving reads one stamp as it does",
+    "--explain-full": "--explain writes every product",
+    "--array": 'NPZ is not read; one NPY for each array, `numpy.save("NEW.npy", numpy.load("OLD.npz")["NAME"])`',
+    **{f"{name} {value}": f"{name}={value}" for name, values in OPTIONAL.items() for value in values},
+}
+
+
+def replacement(arguments: Sequence[str]) -> str | None:
+    """Return the sentence on the first word of a command line that went; None where all are in use."""
+    for before, word in pairwise(("", *arguments)):
+        option = word.partition("=")[0]
+        for name in (option, word, f"{before} {word}", f"{arguments[0]} {option}"):
+            if name in REPLACED:
+                return f"{name} is gone: {REPLACED[name]}"
+    return None
+
+
 def _usage(error: click.ClickException, arguments: Sequence[str]) -> str:
     """Put a usage error on one line that ends in where help is; what it quotes of the arguments is cut."""
-    from frametool.cli.replaced import replacement
-
     ctx = getattr(error, "ctx", None)
     message = error.format_message().replace("\n", " ").rstrip(".")
     if isinstance(error, click.NoSuchOption):  # each version of click has its own words

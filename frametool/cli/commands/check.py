@@ -1,4 +1,4 @@
-"""What is to be said of files: `check` finds mistakes, `diff` differences, `monitor` rates, gaps and jumps."""
+"""What is to be said of files: `check` finds mistakes, `diff` differences, `monitor` gaps; `formats` what they mean."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from functools import partial
 from math import radians
 from typing import TYPE_CHECKING
 
+from frametool.cli import options
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, refuse_two_readers
-from frametool.cli.options import at_ns, file_options, list_options, offset_option, read_time, result_options
 from frametool.cli.output import Output
-from frametool.cli.sink import folded, in_colour, say, say_error, say_first, writing
+from frametool.cli.sink import folded, in_colour, say, say_error, say_first, show, writing
 from frametool.cli.trees import FRAME, frame_name, load_sides, opened, state
 from frametool.errors import Finding, FormatError, listing, warn
+from frametool.formats.table import FORMATS
 from frametool.lint.rules import RULES, WRITERS, check, github_command, level, monitor
 from frametool.lint.tree_diff import Tolerance, diff, entry, parse_tolerance
 
@@ -45,7 +46,7 @@ def _rules(formatter: click.HelpFormatter, everything: bool) -> None:
 @option("--tolerance LENGTH,ANGLE", "their allowed deviation  [3 sigmas, or 10mm,1deg]", requires=("measured",),
         kind=partial(parse_tolerance, otherwise=Tolerance(0.01, radians(1.0))))  # fmt: skip
 @option("--each", "check each file separately; one without frames is a warning")
-@file_options
+@options.file_options
 def check_command(inputs: Inputs) -> int:
     """Look for mistakes in FILES, trees and recordings, read as one tree.
 
@@ -123,13 +124,14 @@ EXIT_CODES = "Exit codes: 0 the same, 1 different, 2 trouble of any kind, with f
 @argument("b", FILE)
 @option("--with-a FILE", "merge this file into A; may be repeated", multiple=True)
 @option("--with-b FILE", "merge this file into B; may be repeated", multiple=True)
-@option("--at TIME", "compare at this time: seconds, nanoseconds with ns  [default: the latest of each]", read_time)
+@option("--at TIME", "compare at this time: seconds, nanoseconds with ns  [default: the latest of each]",
+        options.read_time)  # fmt: skip
 @option("--seen-from FRAME", "also show motion as seen from this frame  [default: the root of A]", FRAME)
 @option("--tolerance LENGTH,ANGLE", "largest difference that is ignored, e.g. 1mm,0.1deg  [default: 1e-9 m, 1e-9 rad]",
     parse_tolerance, default=Tolerance())  # fmt: skip
 @option("--all", "also list the frames that did not move", name="everything")
-@file_options
-@list_options("github")
+@options.file_options
+@options.list_options("github")
 def diff_command(inputs: Inputs) -> int:
     """Compare two trees, calibrations or recordings, A and B, in any formats.
 
@@ -151,7 +153,7 @@ def diff_command(inputs: Inputs) -> int:
     sides = (inputs.a, *inputs.with_a), (inputs.b, *inputs.with_b)
     (one, of_one), (other, of_other) = load_sides(*sides, normalize=inputs.normalize)
     start = inputs.seen_from and frame_name(inputs.seen_from, one)
-    comparison = diff(one, other, at_ns=at_ns(inputs.at), seen_from=start, tolerance=inputs.tolerance)
+    comparison = diff(one, other, at_ns=options.at_ns(inputs.at), seen_from=start, tolerance=inputs.tolerance)
     inputs.note(*comparison.notes)
     differences = [*comparison.differences, *(comparison.unmoved if inputs.everything else ())]
     if output.style.format == "github":
@@ -187,9 +189,9 @@ YEAR_S = 31_557_600
 @argument("recording")
 @argument("frames", nargs=-1, metavar="[TARGET SOURCE]")
 @option("--with FILE", "read this file too; may be repeated", name="more", multiple=True, under="Files")
-@offset_option
-@file_options
-@result_options("report")
+@options.offset_option
+@options.file_options
+@options.result_options("report")
 def monitor_command(inputs: Inputs) -> int:
     """Print the rate, count, first and last stamp, largest gap, delay and jumps of each edge of RECORDING.
 
@@ -219,3 +221,32 @@ def monitor_command(inputs: Inputs) -> int:
         say("note: stamps and the recorder's clock are years apart (simulated time?): the delays say nothing")
     output.report(report)
     return FAILED if clashes else 0
+
+
+@command_named("formats")
+@argument("name", options.format_among(FORMATS, "known"), required=False)
+@options.list_options()
+def formats_command(inputs: Inputs) -> None:
+    """List the file formats that are read and written: suffixes, meaning of the numbers, required options.
+
+    \b
+      frametool formats
+      frametool formats yaml
+      frametool formats -f json
+
+    The names are those of --in and -f. `asks for` lists options for what a format does not specify. A format is
+    detected by content first, then by the suffix of the file; --in NAME overrides this. NAME shows one format in full,
+    with an example if there is one. `frametool help formats` explains the options that files need.
+    """
+    from frametool.view.reports import format_entry, write_format, write_formats
+
+    output, name = Output(inputs, "report", otherwise="text"), inputs.name
+    entries = list(map(format_entry, FORMATS if name is None else [name]))
+    if output.style.format == "text":
+        text = write_formats(entries) if name is None else write_format(entries[0])
+        show(text, paged=True) if output.path is None else output.text(text)
+        return
+    if output.style.format == "csv":  # a list is one cell
+        for entry in entries:
+            entry |= {key: " ".join(value) for key, value in entry.items() if isinstance(value, tuple)}
+    output.report(entries)

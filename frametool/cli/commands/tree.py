@@ -1,20 +1,27 @@
-"""The frames of a tree: `tree` draws or writes them, `view` plots them in the terminal, as a page, as a picture."""
+"""The frames of a tree: `tree` draws or writes them, `static` as arguments of a program of ROS, `view` plots them."""
 
 from __future__ import annotations
 
 import os
+import re
 import sys
 from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse
-from frametool.cli.options import at_ns, color_option, moving_options, place_options, pose_result_options, read_time
+from frametool.cli import options
+from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, together
+from frametool.cli.output import Output
+from frametool.cli.poses import misuse_unless_rotations
 from frametool.cli.sink import refuse_existing, say, writing
 from frametool.cli.trees import FRAME, frame_name, load_tree, opened, tree_file
-from frametool.errors import FormatError, listing, shown
+from frametool.documents.source import Source
+from frametool.errors import FormatError, ValueInvalid, listing, shown
+from frametool.frames.lookups import FrameTree
 from frametool.frames.stamps import format_stamp
+from frametool.grammar.readers import Reading
+from frametool.ros.publisher import FLAGS, moving_frames, read_flags, read_positional
 
 if TYPE_CHECKING:
     from frametool.formats.robots.model import Solid
@@ -25,10 +32,10 @@ if TYPE_CHECKING:
 
 @command_named("tree", own=("notations", "joints"))
 @argument("tree", FILE)
-@option("--at TIME", "seconds, nanoseconds with ns  [default: latest of each edge]", read_time)
-@color_option
-@moving_options
-@pose_result_options("tree", "trajectory")
+@option("--at TIME", "seconds, nanoseconds with ns  [default: latest of each edge]", options.read_time)
+@options.color_option
+@options.moving_options
+@options.pose_result_options("tree", "trajectory")
 def tree_command(inputs: Inputs) -> None:
     """Draw the frames of TREE with their poses in their parents; moving frames with rate and interval.
 
@@ -44,15 +51,56 @@ def tree_command(inputs: Inputs) -> None:
     is the listing of tf2's all_frames_as_yaml. --at draws the tree at one time. Files of these two have no poses: only
     names and rates are shown.
     """
-    from frametool.cli.output import Output
-
     output = Output(inputs, "tree", "trajectory")
     place, drawn = output.style.place, output.style.format in ("yaml", "json", "text", "dot", "mermaid")
     if place is not None and (not drawn or place.origin is not None):
         raise click.UsageError(f"--to {place.name}: trees say places by lla or utm, in yaml, json, text and drawings")
     frames = load_tree(inputs.tree, inputs.more, drawings=True)
-    stamp = at_ns(inputs.at)
+    stamp = options.at_ns(inputs.at)
     output.tree(frames if stamp is None else frames.tree_at(stamp), inputs.color)
+
+
+ABOUT = "as static_transform_publisher has it"
+
+
+@command_named("static")
+@argument("arguments", nargs=-1, metavar="[TREE | X Y Z .. PARENT CHILD]")
+@together(*(option(f"--{name} {'FRAME' if name.endswith('id') else 'N'}", ABOUT) for name in FLAGS))
+@options.reading_options
+@options.pose_result_options("tree")
+def static_command(inputs: Inputs) -> None:
+    """Write the static_transform_publisher arguments of a TREE, or read such arguments into a tree.
+
+    \b
+      frametool static robot.yaml
+      frametool static robot.yaml --format static1 --to rpy
+      frametool static --x 0.1 --yaw 1.5 --frame-id base --child-frame-id camera
+      frametool static 0.1 0 0.2 1.5 0 0 base camera --format json
+
+    A tree is written one line per edge, static2 (flags) unless --format says static1 (x y z qx qy qz qw PARENT CHILD)
+    or another. With --to rpy angles are written: --roll --pitch --yaw, and yaw pitch roll in static1, in radians.
+    Arguments that are read, in either spelling, become a tree entry: the pose of the child in its parent. Their angles
+    are in radians, like the tool's; --deg applies to the result.
+    """
+    flags = {name: value for name in FLAGS if (value := getattr(inputs, name.replace("-", "_"))) is not None}
+    arguments = inputs.arguments
+    if len(arguments) == 1 and re.match(r"\s*[-+.\d]+\s", arguments[0]) and not os.path.exists(arguments[0]):
+        arguments = re.sub(r"\\\s", " ", arguments[0]).split()  # in quotes
+    if not flags and len(arguments) == 1:
+        output = Output(inputs, "tree", otherwise="static2")
+        tree = load_tree(arguments[0])
+        if tree.moves:
+            raise ValueInvalid(moving_frames(track.child for track in tree.tracks() if not track.is_static))
+        output.tree(tree)
+        return
+    output = Output(inputs, "tree")
+    tree = FrameTree("arguments")
+    refuse(flags and arguments, f"extra arguments {shown(' '.join(arguments))} beside the flags")
+    reading = Reading(Source("arguments", ""), normalize=inputs.normalize)
+    with misuse_unless_rotations(reading):
+        pose = read_flags(flags, reading) if flags else read_positional(arguments, reading)
+    tree.add_components(pose.parent or "", pose.name or "", pose.components)
+    output.tree(tree)
 
 
 FORMS = ("text", "html", "svg", "glb", "png")
@@ -71,18 +119,19 @@ def _eye(text: str) -> Eye:
 @argument("target", FRAME, required=False)
 @argument("source", FRAME, required=False)
 @option("--frame FIXED", "reference frame  [default: TARGET, or the root of most frames]", FRAME, name="fixed")
-@option("--at TIME", "seconds, nanoseconds with ns  [default: first time at which all edges have data]", read_time)
+@option("--at TIME", "seconds, nanoseconds with ns  [default: first time at which all edges have data]",
+        options.read_time)  # fmt: skip
 @option("--below FRAME", "only this frame and its descendants", FRAME)
 @option("--only REGEX", "only frames whose name matches")
 @option("--path", "only the frames between TARGET and SOURCE", name="path_only")
 @option("--from EYE", "slanted, front, side, top, or AZ,EL in degrees", _eye, name="eye", default="slanted")
-@moving_options
+@options.moving_options
 @option("-f --format", "format of the picture  [default: by the suffix of --output, else text]", FORMS, name="fmt")
-@place_options
+@options.place_options
 @option("--overlay", "compare TREE with a second tree, TARGET: what has moved?")
 @option("--no-sliders", "leave out the sliders for the joints of a robot", name="no_sliders")
 @option("--open", "show the page in the browser", name="opens")
-@color_option
+@options.color_option
 def view_command(inputs: Inputs) -> None:
     """Plot the frames of TREE: in the terminal, as an interactive HTML page, as SVG, PNG, or GLB for 3-D programs.
 
@@ -114,7 +163,7 @@ def view_command(inputs: Inputs) -> None:
     ends = {} if overlay else {"target": target, "source": source}
     names = ends | {"fixed": inputs.fixed, "below": inputs.below}
     named: Any = {key: name and frame_name(name, frames) for key, name in names.items()}
-    scene = FrameScene(frames, at_ns=at_ns(inputs.at), only=inputs.only, path_only=inputs.path_only, **named)
+    scene = FrameScene(frames, at_ns=options.at_ns(inputs.at), only=inputs.only, path_only=inputs.path_only, **named)
     gone = [name for name, track in scene.tracks.items() if not track.covers(scene.at_ns or 0)]
     if gone and chosen != "html":  # which goes to the nearest time
         say(f"note: no data of {listing(gone, 5)} at {format_stamp(scene.at_ns or 0)}: not drawn, nor what hangs there")
