@@ -37,7 +37,6 @@ TOP = 2  # lines of a table up to its first row: what is bad there may be bad in
 BAGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
 _MAGICS: list[Any] = [what for name in BAGS for kind, what in FORMATS[name].magic if kind == "magic"]
 RECORDS = readers("records")
-FORMS = OPTIONAL["--explain"]
 ONE_RECORD = "--explain derives one record; write it as an argument"
 
 
@@ -442,8 +441,9 @@ class PoseTask(Stream):
             from frametool.explain.derive import DerivationStyle
 
             if self.output.chosen not in (None, "text"):
-                written = f"{', '.join(FORMS)}, not {self.output.chosen}"
-                raise click.UsageError(f"--explain writes {written}; leave one of them out")
+                written = ", ".join(OPTIONAL["--explain"])
+                both = f"--explain writes {written}, not {self.output.chosen}"
+                raise click.UsageError(f"{both}; leave one of them out")
             self.plan = DerivationStyle(self.output.style, significant(inputs.precision))
 
     def request(

@@ -10,7 +10,7 @@ from written import HOSTILE, ROTATIONS, SPECS, pose, rotation, seeded
 
 import frametool
 from frametool import explain
-from frametool.cli import streaming
+from frametool.cli.command import OPTIONAL
 from frametool.explain.render import FORMS, as_latex, as_text
 from frametool.explain.run import evaluated, parsed
 
@@ -96,7 +96,7 @@ def test_a_formula_is_the_same_arithmetic_in_text_and_latex(formula: str, text: 
 
 
 def test_the_forms_of_the_option_are_those_there_are() -> None:
-    assert list(FORMS) == list(streaming.FORMS)
+    assert list(FORMS) == list(OPTIONAL["--explain"])
     with pytest.raises(frametool.FrametoolError, match="unknown format 'html'; formats: markdown, text"):
         MADE[0].render("html")
 
