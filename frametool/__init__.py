@@ -23,11 +23,7 @@ if TYPE_CHECKING:
     from frametool.errors import FrametoolError as FrametoolError
     from frametool.fit.closed_forms import solve_mean as solve_mean
     from frametool.fit.closed_forms import solve_points as solve_points
-    from frametool.fit.comparison import align as align
-    from frametool.fit.comparison import compare as compare
-    from frametool.fit.comparison import resample as resample
     from frametool.fit.hand_eye import solve_hand_eye as solve_hand_eye
-    from frametool.fit.measured_tree import solve as solve
     from frametool.formats.cameras import load_camera as load_camera
     from frametool.formats.load import load as load
     from frametool.formats.robots.urdf import load_robot as load_robot
@@ -52,7 +48,11 @@ if TYPE_CHECKING:
     from frametool.sim.turtle import Turtle as Turtle
     from frametool.sim.turtle import Twist as Twist
     from frametool.stream.engines import apply_arrow as apply_arrow
+    from frametool.stream.measurements import solve as solve
+    from frametool.stream.trajectories import align as align
+    from frametool.stream.trajectories import compare as compare
     from frametool.stream.trajectories import load_trajectory as load_trajectory
+    from frametool.stream.trajectories import resample as resample
 
 __version__ = "0.2.0"
 
@@ -63,9 +63,7 @@ _HOMES = {
         "frametool.covariance": "covariance",
         "frametool.errors": "FrametoolError",
         "frametool.fit.closed_forms": "solve_mean solve_points",
-        "frametool.fit.comparison": "align compare resample",
         "frametool.fit.hand_eye": "solve_hand_eye",
-        "frametool.fit.measured_tree": "solve",
         "frametool.formats.cameras": "load_camera",
         "frametool.formats.load": "load",
         "frametool.formats.robots.urdf": "load_robot",
@@ -83,7 +81,8 @@ _HOMES = {
         "frametool.sim.simulate": "simulate",
         "frametool.sim.turtle": "FollowController Turtle Twist",
         "frametool.stream.engines": "apply_arrow",
-        "frametool.stream.trajectories": "load_trajectory",
+        "frametool.stream.measurements": "solve",
+        "frametool.stream.trajectories": "align compare load_trajectory resample",
     }.items() for name in names.split()
 }  # fmt: skip
 __all__ = ["__version__", *_HOMES]  # noqa: PLE0604 - its keys are strings

@@ -1,7 +1,7 @@
 """Pairing of trajectories, clock offsets, and alignment by a transform and a scale.
 
-Poses are paired at common stamps, or with the nearest ones; those of a gripper and of a target too.  Clocks:
-t_ref = t_est + offset.  point_in_ref = scale * ref_from_est.apply(point_in_est): p' = c R p + t, R' = R R_i.
+Poses are paired at common stamps, or with the nearest ones.  Clocks: t_ref = t_est + offset.
+point_in_ref = scale * ref_from_est.apply(point_in_est): p' = c R p + t, R' = R R_i.
 """
 
 from __future__ import annotations
@@ -11,18 +11,17 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.errors import ValueInvalid, warn
+from frametool.errors import ValueInvalid
 from frametool.fit.least_squares import align_vectors, length, require_near, solve_normal
 from frametool.frames.stamps import BILLION
-from frametool.frames.trajectory import BODY, WORLD, Trajectory
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
-from frametool.stream.samples import HandEyeSamples
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from frametool.fit.comparison import Delta
+    from frametool.frames.trajectory import Trajectory
     from frametool.geometry.types import Array, Indices
 
 
@@ -153,7 +152,6 @@ def lever_arm(kind: str, ref: Trajectory, est: Trajectory, up: Array) -> Array:
 
 
 GAP = 3  # median intervals between two neighbours that may be interpolated
-NEAR_NS = 50_000_000  # maximum between stamps of a gripper and a target that are paired
 
 
 class Pairs(NamedTuple):
@@ -200,7 +198,7 @@ def paired(
         name, gap_s = "ref" if walks_est else "est", gap_ns / 1e9 if isfinite(gap_ns) else None
     else:
         other = other.at(np.argsort(other.stamps_ns, kind="stable"))
-        index, off = _nearest(other.stamps_ns, walked.stamps_ns)
+        index, off = nearest(other.stamps_ns, walked.stamps_ns)
         index, kept = index[off <= max_diff_ns], walked.at(off <= max_diff_ns)
         made, shared = other.at(index), len(index) - len(np.unique(index))
     is_inside = (est.stamps_ns.min() <= ref.stamps_ns) & (ref.stamps_ns <= est.stamps_ns.max())
@@ -228,7 +226,7 @@ def between(dense: Trajectory, stamps_ns: Array, max_gap_ns: float | None = None
     return start.with_poses(start.poses.interpolate(end.poses, fraction))._replace(stamps_ns=at), found
 
 
-def _nearest(own: Array, stamps_ns: Array) -> tuple[Indices, Array]:
+def nearest(own: Array, stamps_ns: Array) -> tuple[Indices, Array]:
     """Return the index of the nearest of some sorted stamps, the earlier one of a tie, and how far off it is."""
     after = np.searchsorted(own, stamps_ns).clip(0, len(own) - 1)
     before = (after - 1).clip(0)
@@ -239,43 +237,6 @@ def _nearest(own: Array, stamps_ns: Array) -> tuple[Indices, Array]:
 def interval(stamps_ns: Array) -> float:
     """Return the median interval between stamps; infinite for a single one."""
     return float(np.median(np.diff(stamps_ns))) if len(stamps_ns) > 1 else float("inf")
-
-
-def paired_samples(
-    gripper: Trajectory, target: Trajectory, files: tuple[str, str], max_gap_ns: int | None
-) -> HandEyeSamples:
-    """Pair poses: the gripper's at the target's stamps, or by row if not both have stamps.
-
-    Within the maximum gap the gripper is interpolated, else the nearest pose within the gap is used.
-    Raises ValueInvalid if nothing pairs.
-    """
-    names = [name if each.world != WORLD or each.body != BODY else None
-             for each in (gripper, target) for name in (each.world, each.body)]  # fmt: skip
-    for each, file in ((gripper, files[0]), (target, files[1])):
-        if each.xyzw is None:
-            raise ValueInvalid(f"{file}: positions alone are not poses: rotations are needed here")
-    if gripper.stamps_ns is None or target.stamps_ns is None:
-        if gripper.size != target.size:
-            counts = f"{files[0]} has {gripper.size} poses, {files[1]} {target.size}"
-            raise ValueInvalid(f"{counts}, and no stamps to pair them")
-        kept: Indices = np.arange(target.size)
-    else:
-        gap_ns, dense = NEAR_NS if max_gap_ns is None else max_gap_ns, gripper.in_order()
-        made, is_between = between(dense, target.stamps_ns, gap_ns)
-        index, off = _nearest(dense.stamps_ns, target.stamps_ns)
-        gripper = dense.at(index)
-        gripper.xyz[is_between], gripper.xyzw[is_between] = made.xyz, made.xyzw
-        kept = np.flatnonzero(np.logical_or(is_between, off <= gap_ns))
-        gap = f"{gap_ns / 1e6:g} ms"
-        if not len(kept):
-            apart = f"their stamps are {float(off.min()) / 1e9:.3f} s apart at least; one clock? --max-gap"
-            raise ValueInvalid(f"no pose of {files[0]} is within {gap} of one of {files[1]}: {apart}")
-        if alone := target.size - len(kept):
-            warn(f"{files[1]}: {alone} of {target.size} poses have none of {files[0]} within {gap}: unpaired")
-    places = [f"{files[1]} row {row + 1}" for row in kept.tolist()]
-    if target.lines is not None:
-        places = [f"{files[1]}:{line}" for line in target.lines[kept].tolist()]
-    return HandEyeSamples(gripper.at(kept).poses, target.at(kept).poses, places, tuple(names), files)
 
 
 LIMIT_S = 10.0

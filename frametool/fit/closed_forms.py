@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from itertools import chain
-from math import degrees, log, sqrt
-from typing import TYPE_CHECKING, Any, NamedTuple
+from math import log, sqrt
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from frametool.fit.least_squares import Mask, Rows
     from frametool.geometry.types import Array, Numbers
-    from frametool.grammar.result import Result
-    from frametool.stream.gathering import Gathered
 
 
 FEWEST_POSES = 3  # with two poses the outlier cannot be identified
@@ -267,33 +265,3 @@ def _points(values: Numbers, name: str) -> Array:
     validation.all_finite((xyz,), name)
     lsq.require_near(xyz, name)
     return xyz
-
-
-def mean_of_rows(gathered: Gathered, values: list[float] | None, *, robust: bool) -> tuple[Result, list[str]]:
-    """Return the mean of gathered poses, with its spread, and a message for each outlier."""
-    from frametool.grammar.pose import Pose
-    from frametool.grammar.result import Result, uncertain
-
-    weights = gathered.weights if values is None else values
-    found = solve_mean(gathered.transforms, weights=weights, robust=robust)
-    (metres, radians), (farthest, widest), covariance = found.rms, found.most, found.covariance
-    extras: dict[str, Any] = {"count": len(found.used)} | ({"used": int(found.used.sum())} if robust else {})
-    left_out: list[str] = []
-    for row in found.left_out.nonzero()[0].tolist():
-        off = lsq.off_text(found.residuals[row], 2)
-        left_out.append(f"{gathered.places[row]}: left out, {off} off (u {found.u[row]:.1f})")
-    pose = Pose.of(found.transform.components)
-    if gathered.placed:
-        extras |= {"distance_rms": metres, "distance_max": farthest}
-    if gathered.turned:
-        extras |= {"angle_rms": radians, "angle_rms_deg": degrees(radians)}
-        extras |= {"angle_max": widest, "angle_max_deg": degrees(widest)}
-    if covariance is not None:
-        if gathered.placed:
-            extras |= {f"std_{axis}": sqrt(covariance[at, at]) for at, axis in enumerate("xyz")}
-        if gathered.turned:
-            angle = sqrt(covariance[3:, 3:].trace())
-            extras |= {"std_angle": angle, "std_angle_deg": degrees(angle)}
-        extras |= uncertain((covariance if gathered.turned else covariance[:3, :3]).ravel().tolist())
-    position, rotation = pose.position if gathered.placed else None, pose.rotation if gathered.turned else None
-    return Result(Pose(position, rotation, None, gathered.frame), extras), left_out

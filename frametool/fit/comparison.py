@@ -1,39 +1,31 @@
-"""Compare a trajectory with a reference: pairing, clock offset, mounting, alignment, and errors.
-
-In Python: `compare`, `align` and `resample` take trajectories or files.
-"""
+"""Compare a trajectory with a reference: pairing, clock offset, mounting, alignment, and errors."""
 
 from __future__ import annotations
 
 import re
 from math import radians, sqrt
-from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import ValueInvalid, alternatives, shown, warn
+from frametool.errors import ValueInvalid, shown
 from frametool.fit import alignment
 from frametool.fit.alignment import ALIGNMENTS, Fit, Pairs, Unaligned, clock_offset, fitted, lever_arm, principal_axes
 from frametool.fit.least_squares import require_near
 from frametool.fit.numbers import ROUNDING, absolute_errors, all_pairs, chained, relative_errors, segment_errors
-from frametool.frames.stamps import BILLION, format_stamp
+from frametool.frames.stamps import format_stamp
 from frametool.frames.trajectory import Trajectory, way
 from frametool.geometry import earth
 from frametool.geometry.place import ENU, Origin
+from frametool.geometry.representations import EARTH_FRAMES
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
-from frametool.grammar.readers import EARTH_FRAMES
-from frametool.stream.trajectories import load_trajectory
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-    from typing import TypeAlias
+    from collections.abc import Iterator, Sequence
 
     from frametool.fit.numbers import AbsoluteErrors, RelativeErrors, SegmentErrors
     from frametool.geometry.types import Array
-
-    Given: TypeAlias = Trajectory | str | PathLike[str]
 
 AUTO = "auto"
 CLEAR = 0.5  # score of a reliable clock offset
@@ -414,88 +406,3 @@ def _relative(
             yield delta, relative_errors(ref, est, *ends)
         elif reporting.deltas:
             hints.append(f"rpe {delta} is left out: {why}")
-
-
-class Alignment(NamedTuple):
-    """The estimate's world in the reference's, p' = scale R p + t; moved is the whole aligned estimate."""
-
-    transform: Transform
-    scale: float
-    offset_s: float
-    moved: Trajectory
-
-
-def compare(
-    ref: Given, est: Given, *, offset: float | str | None = None, align: str | None = None,
-    mount: Transform | str | None = None, deltas: Iterable[str] | None = None, like: str | None = None, **more: Any,
-) -> Comparison:  # fmt: skip
-    """Compare a trajectory with a reference.
-
-    ref, est: a Trajectory, or the path of a file as for `load_trajectory`
-    offset: seconds by which est's clock lags, or "auto"; align: se3, sim3, yaw, origin or none
-    mount: pose of the reference sensor in est's body, or "auto"; deltas: as "1m", "10frames", "1s", "5deg"; like: "evo"
-    more: other fields of the groups of `frametool.fit.comparison.Settings`; align_first as "10s", times in nanoseconds
-    Raises ValueInvalid if the two have no stamps in common, or a fit is not determined; FormatError.
-    """
-    if like not in (None, "evo"):
-        raise ValueInvalid(f"like {like!r}: only evo is known")
-    argument = {"align": align, "mount": mount, **more}
-    if unknown := [name for name in argument if name not in SETTINGS]:
-        raise TypeError(f"compare has no {unknown[0]!r}{alternatives(unknown[0], SETTINGS, 'settings')}")
-    if offset is not None:
-        argument["offset"] = AUTO if offset == AUTO else round(float(offset) * BILLION)
-    if deltas is not None:
-        argument["deltas"] = tuple(map(parse_delta, deltas))
-    if isinstance(first := argument.get("align_first"), str):
-        argument["align_first"] = parse_delta(first, ("m", "s", "frames"))
-    chosen = {name: value for name, value in argument.items() if value is not None}
-    base = EVO if like else Settings()
-    names = [name if isinstance(each, Trajectory) else fspath(each) for each, name in ((ref, "ref"), (est, "est"))]
-    return compared(_taken(ref, "ref"), _taken(est, "est"), base.changed(**chosen), (names[0], names[1]))
-
-
-def align(ref: Given, est: Given, **settings: Any) -> Alignment:
-    """Align a trajectory with a reference; settings as for `compare`."""
-    found = compare(ref, est, **settings)
-    return Alignment(found.fit.transform, found.fit.scale, found.offset_ns / BILLION, found.whole_estimate())
-
-
-def resample(
-    trajectory: Given, *, rate: float | None = None, at: Sequence[int] | None = None, every: str | None = None,
-    max_gap_ns: float | None = None,
-) -> Trajectory:  # fmt: skip
-    """Interpolate a trajectory: `rate` poses per second, `at` stamps in nanoseconds, or `every` "1m" or "5deg".
-
-    Times beyond its ends, or in gaps longer than max_gap_ns (default: 3 median intervals), have no pose.
-    """
-    argument = _taken(trajectory, "trajectory")
-    for hint in argument.disorder("trajectory"):
-        warn(hint)
-    argument = argument.in_order()
-    if sum(each is not None for each in (rate, at, every)) != 1:
-        raise ValueInvalid("give one of rate, at and every")
-    if argument.stamps_ns is None:
-        raise ValueInvalid("a trajectory without stamps is not resampled")
-    if rate is not None:
-        stamps = alignment.stamps_at_rate(argument, rate)
-    else:
-        step = None if every is None else parse_delta(every, ("m", "deg"))
-        stamps = np.asarray(at, np.int64) if step is None else alignment.stamps_every(argument, step)
-    return alignment.between(argument, stamps, max_gap_ns)[0]
-
-
-def _taken(argument: Given, name: str) -> Trajectory:
-    """Read a path; check and convert the arrays of a trajectory."""
-    if not isinstance(argument, Trajectory):
-        return load_trajectory(argument)
-    xyz = np.asarray(argument.xyz, np.float64)
-    if xyz.ndim != 2 or xyz.shape[1] != 3 or not len(xyz) or not np.isfinite(xyz).all():
-        raise ValueInvalid(f"{name}.xyz: finite positions of shape (n, 3) are wanted, found shape {xyz.shape}")
-    xyzw = None if argument.xyzw is None else np.stack(Rotation.from_quaternion(argument.xyzw).components, -1)
-    stamps = None if argument.stamps_ns is None else np.asarray(argument.stamps_ns)
-    for field, values in (("xyzw", xyzw), ("stamps_ns", stamps)):
-        if values is not None and len(values) != len(xyz):
-            raise ValueInvalid(f"{name}.{field}: {len(values)} rows for {len(xyz)} positions")
-    if stamps is not None and stamps.dtype.kind not in "iu":
-        raise ValueInvalid(f"{name}.stamps_ns: integer nanoseconds are wanted, found {stamps.dtype}")
-    return argument._replace(xyz=xyz, xyzw=xyzw, stamps_ns=None if stamps is None else stamps.astype(np.int64))

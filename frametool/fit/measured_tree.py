@@ -7,33 +7,68 @@ whose outlier cannot be identified is an error.  Covariances are first order, th
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from functools import cached_property
-from os import PathLike
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from frametool.errors import Finding, NotConnected, ValueInvalid, alternatives, first_of, printable, shown, warn
 from frametool.fit import least_squares as lsq
 from frametool.fit.tree_problem import Fitted, Noise, TreeProblem, bodies_of, bridges, jacobians, of_body, top_of
-from frametool.formats.load import FrameFile, load
-from frametool.frames.lookups import Frames, FrameTree, taken
+from frametool.frames.lookups import Frames, FrameTree
 from frametool.frames.topology import Groups
 from frametool.geometry.conventions import axes_change
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 from frametool.lint.tree_diff import Tolerance
-from frametool.stream.measurements import Measurement, parted, read_measurements
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-    from typing import Any, TypeAlias
+    from collections.abc import Callable, Sequence
 
     from frametool.fit.tree_problem import Bodies
-    from frametool.geometry.types import Array
+    from frametool.geometry.types import Array, Rigid
 
-    Measured: TypeAlias = str | PathLike[str] | Iterable[tuple[str, str, Transform] | tuple[str, str, Transform, Any]]
+
+class Measurement(NamedTuple):
+    """The pose of a child in its parent, as somebody measured it.
+
+    components: tx, ty, tz, x, y, z, w; metres
+    covariance: 36 numbers as ROS orders them, in the parent's axes; None where nobody gave it
+    place: where it is, `m.yaml:12`, and its column behind that where several are on a line
+    written: how its rotation was written, "rpy" or "rotvec", with the three numbers as read, in radians
+    """
+
+    parent: str
+    child: str
+    components: Rigid
+    covariance: tuple[float, ...] | None = None
+    place: str = ""
+    id: str | None = None
+    written: tuple[str, tuple[float, float, float]] | None = None
+
+    @property
+    def transform(self) -> Transform:
+        """Return parent_from_child."""
+        return Transform.of(*self.components)
+
+    def turned(self, x: float, y: float, z: float, w: float) -> Transform:
+        """Return it with another quaternion."""
+        return Transform.of(*self.components[:3], x, y, z, w)
+
+    def shifted(self, factor: float) -> Transform:
+        """Return it with its translation times a factor."""
+        x, y, z, *turn = self.components
+        return Transform.of(x * factor, y * factor, z * factor, *turn)
+
+    def reread(self, change: Callable[[float], float]) -> Transform | None:
+        """Return it with the numbers of its rotation changed; None where it was not written in angles."""
+        if self.written is None:
+            return None
+        kind, angles = self.written
+        read = Rotation.from_rpy if kind == "rpy" else Rotation.from_rotvec
+        return self.turned(*read([change(angle) for angle in angles]).components)
 
 
 NEAR = Tolerance(0.01, math.radians(1.0))  # the tolerance without any sigmas
@@ -84,6 +119,12 @@ def best_blunder(measurement: Measurement, pose: Transform, information: Array) 
         return None
     as_good = (lsq.sigmas(off - off[best], information) <= ALIKE) & (u <= FITTING)
     return list(meant)[int(as_good.argmax())]
+
+
+def parted(place: str) -> tuple[str, int, int]:
+    """Take a place apart: file, line, column; 0 where it does not say that."""
+    file, line, column = re.fullmatch(r"(?s)(.*?)(?::(\d+))?(?::(\d+))?", place).groups("0")  # type: ignore[union-attr]
+    return file, int(line), int(column)
 
 
 def loops(
@@ -344,47 +385,3 @@ class TreeSolution:
                 raise ValueInvalid(f"unknown frame {shown(frame)}{alternatives(frame, self.frames, 'frames')}")
         ends = ((self._number[frame], self._poses[self.frames.index(frame)]) for frame in (target, source))
         return self._fit.covariance(*ends)
-
-
-def solve(
-    measurements: Measured, *, root: str | None = None, fix: Iterable[FrameTree | str | PathLike[str]] = (),
-    robust: bool = True,
-) -> TreeSolution:  # fmt: skip
-    """Estimate the tree that fits measurements; outliers are rejected.
-
-    measurements: (parent, child, transform) or (parent, child, transform, covariance), the covariance as 36 numbers or
-        (6, 6); or the path of a file as for `frametool solve`
-    root: the frame in which the others are expressed; fix: trees, or paths of them, that are exact
-    Returns .tree, .covariance(target, source), .residuals (n, 6), .u, .used, .fits, .checked and more.
-    Raises ValueInvalid if frames are not connected or an outlier cannot be identified; FormatError.
-    """
-    trees = [each if isinstance(each, FrameTree) else load(each) for each in fix]
-    if moving := next((each for each in trees if each.moves), None):
-        raise ValueInvalid(f"{moving.name} moves; fixed frames must be static")
-    fixed = FrameTree("the fixed frames")
-    for tree in trees:
-        for track in tree.tracks():
-            own = Transform.of(*track.components), tree.covariances.get(track.child)
-            fixed.add(track.parent, track.child, *own)
-    if isinstance(measurements, str | PathLike):
-        rows = read_measurements([FrameFile(measurements)])
-    else:
-        rows = [_measurement(each, f"measurement {number}") for number, each in enumerate(measurements, 1)]
-    return solve_tree(rows, root=root, fixed=fixed, robust=robust)
-
-
-def _measurement(argument: Any, place: str) -> Measurement:
-    """Check one measurement passed from Python; raises ValueInvalid that names it."""
-    if isinstance(argument, Measurement):
-        return argument
-    if not (isinstance(argument, tuple | list) and len(argument) in (3, 4) and isinstance(argument[2], Transform)):
-        raise ValueInvalid(f"{place}: expected (parent, child, Transform) or with a covariance behind")
-    parent, child, transform = argument[:3]
-    if wrong := [name for name in (parent, child) if not (isinstance(name, str) and name)]:
-        raise ValueInvalid(f"{place}: a frame is named by a text, found {wrong[0]!r}")
-    if transform.shape:
-        raise ValueInvalid(f"{place}: expected one transform, got shape {transform.shape}")
-    try:
-        return Measurement(parent, child, transform.components, taken(argument[3] if len(argument) > 3 else None))
-    except ValueInvalid as error:
-        raise ValueInvalid(f"{place}: {error}") from None

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from typing import Any
 
+    from frametool.fit.measured_tree import Measurement
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Array
-    from frametool.stream.measurements import Measurement
 
     Pairs = Sequence[tuple[int, int]]
 

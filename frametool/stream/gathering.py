@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import TYPE_CHECKING
+from math import degrees, sqrt
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Components
     from frametool.grammar.pose import Pose
+    from frametool.grammar.result import Result
     from frametool.stream.faults import Outcome
     from frametool.stream.row_layout import Shape
     from frametool.text.spans import Flags, Floats
@@ -93,3 +95,35 @@ class Gathered:
     def weights(self) -> Floats | None:
         """Return the numbers with the poses; None if there are none."""
         return np.concatenate(self._extra) if self._extra else None
+
+
+def mean_of_rows(gathered: Gathered, values: list[float] | None, *, robust: bool) -> tuple[Result, list[str]]:
+    """Return the mean of gathered poses, with its spread, and a message for each outlier."""
+    from frametool.fit.closed_forms import solve_mean
+    from frametool.fit.least_squares import off_text
+    from frametool.grammar.pose import Pose
+    from frametool.grammar.result import Result, uncertain
+
+    weights = gathered.weights if values is None else values
+    found = solve_mean(gathered.transforms, weights=weights, robust=robust)
+    (metres, radians), (farthest, widest), covariance = found.rms, found.most, found.covariance
+    extras: dict[str, Any] = {"count": len(found.used)} | ({"used": int(found.used.sum())} if robust else {})
+    left_out: list[str] = []
+    for row in found.left_out.nonzero()[0].tolist():
+        off = off_text(found.residuals[row], 2)
+        left_out.append(f"{gathered.places[row]}: left out, {off} off (u {found.u[row]:.1f})")
+    pose = Pose.of(found.transform.components)
+    if gathered.placed:
+        extras |= {"distance_rms": metres, "distance_max": farthest}
+    if gathered.turned:
+        extras |= {"angle_rms": radians, "angle_rms_deg": degrees(radians)}
+        extras |= {"angle_max": widest, "angle_max_deg": degrees(widest)}
+    if covariance is not None:
+        if gathered.placed:
+            extras |= {f"std_{axis}": sqrt(covariance[at, at]) for at, axis in enumerate("xyz")}
+        if gathered.turned:
+            angle = sqrt(covariance[3:, 3:].trace())
+            extras |= {"std_angle": angle, "std_angle_deg": degrees(angle)}
+        extras |= uncertain((covariance if gathered.turned else covariance[:3, :3]).ravel().tolist())
+    position, rotation = pose.position if gathered.placed else None, pose.rotation if gathered.turned else None
+    return Result(Pose(position, rotation, None, gathered.frame), extras), left_out

@@ -12,14 +12,16 @@ from __future__ import annotations
 import re
 from collections import Counter
 from math import radians
+from os import PathLike
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import Verbatim
 from frametool.errors import FormatError, ValueInvalid, alternatives, did_you_mean, first_of, shown, warn
-from frametool.formats.load import EdgePlace, FrameFile, close_all, lines_of
+from frametool.fit.measured_tree import Measurement, solve_tree
+from frametool.formats.load import EdgePlace, FrameFile, close_all, lines_of, load
 from frametool.formats.trees.tree_reader import MOST_KEYS, read_edges
-from frametool.geometry.rotation import Rotation
+from frametool.frames.lookups import FrameTree, taken
 from frametool.geometry.transform import Transform
 from frametool.grammar.covariance import AXES, columns, is_sigma
 from frametool.grammar.pose import COVARIANCE_KEYS, Pose, inverted, read_angle_unit
@@ -31,10 +33,13 @@ from frametool.stream.request import COMBINED, Operation, Request, RowOptions
 from frametool.stream.row_layout import POSE, Shape
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
+    from typing import TypeAlias
 
-    from frametool.geometry.types import Rigid
+    from frametool.fit.measured_tree import TreeSolution
     from frametool.text.lines import ByteStream
+
+    Measured: TypeAlias = str | PathLike[str] | Iterable[tuple[str, str, Transform] | tuple[str, str, Transform, Any]]
 
 LISTS = ("measurements", "frames")
 CHILD = "child"
@@ -44,46 +49,6 @@ LIKE = "a measurement is {parent: .., child: .., xyz: [..], rpy_deg: [..]}"
 WRAPPED = rb'"(?:op|msg|message|topic|transforms?)"'  # of JSON that holds messages rather than rows
 TABLES = ("csv", "tsv", "semicolon")
 MOVED = Operation(left=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))  # by nothing: so that covariances count
-
-
-class Measurement(NamedTuple):
-    """The pose of a child in its parent, as somebody measured it.
-
-    components: tx, ty, tz, x, y, z, w; metres
-    covariance: 36 numbers as ROS orders them, in the parent's axes; None where nobody gave it
-    place: where it is, `m.yaml:12`, and its column behind that where several are on a line
-    written: how its rotation was written, "rpy" or "rotvec", with the three numbers as read, in radians
-    """
-
-    parent: str
-    child: str
-    components: Rigid
-    covariance: tuple[float, ...] | None = None
-    place: str = ""
-    id: str | None = None
-    written: tuple[str, tuple[float, float, float]] | None = None
-
-    @property
-    def transform(self) -> Transform:
-        """Return parent_from_child."""
-        return Transform.of(*self.components)
-
-    def turned(self, x: float, y: float, z: float, w: float) -> Transform:
-        """Return it with another quaternion."""
-        return Transform.of(*self.components[:3], x, y, z, w)
-
-    def shifted(self, factor: float) -> Transform:
-        """Return it with its translation times a factor."""
-        x, y, z, *turn = self.components
-        return Transform.of(x * factor, y * factor, z * factor, *turn)
-
-    def reread(self, change: Callable[[float], float]) -> Transform | None:
-        """Return it with the numbers of its rotation changed; None where it was not written in angles."""
-        if self.written is None:
-            return None
-        kind, angles = self.written
-        read = Rotation.from_rpy if kind == "rpy" else Rotation.from_rotvec
-        return self.turned(*read([change(angle) for angle in angles]).components)
 
 
 class MeasuredRow(NamedTuple):
@@ -129,6 +94,50 @@ def read_measurements(
     return found
 
 
+def solve(
+    measurements: Measured, *, root: str | None = None, fix: Iterable[FrameTree | str | PathLike[str]] = (),
+    robust: bool = True,
+) -> TreeSolution:  # fmt: skip
+    """Estimate the tree that fits measurements; outliers are rejected.
+
+    measurements: (parent, child, transform) or (parent, child, transform, covariance), the covariance as 36 numbers or
+        (6, 6); or the path of a file as for `frametool solve`
+    root: the frame in which the others are expressed; fix: trees, or paths of them, that are exact
+    Returns .tree, .covariance(target, source), .residuals (n, 6), .u, .used, .fits, .checked and more.
+    Raises ValueInvalid if frames are not connected or an outlier cannot be identified; FormatError.
+    """
+    trees = [each if isinstance(each, FrameTree) else load(each) for each in fix]
+    if moving := next((each for each in trees if each.moves), None):
+        raise ValueInvalid(f"{moving.name} moves; fixed frames must be static")
+    fixed = FrameTree("the fixed frames")
+    for tree in trees:
+        for track in tree.tracks():
+            own = Transform.of(*track.components), tree.covariances.get(track.child)
+            fixed.add(track.parent, track.child, *own)
+    if isinstance(measurements, str | PathLike):
+        rows = read_measurements([FrameFile(measurements)])
+    else:
+        rows = [_measurement(each, f"measurement {number}") for number, each in enumerate(measurements, 1)]
+    return solve_tree(rows, root=root, fixed=fixed, robust=robust)
+
+
+def _measurement(argument: Any, place: str) -> Measurement:
+    """Check one measurement passed from Python; raises ValueInvalid that names it."""
+    if isinstance(argument, Measurement):
+        return argument
+    if not (isinstance(argument, tuple | list) and len(argument) in (3, 4) and isinstance(argument[2], Transform)):
+        raise ValueInvalid(f"{place}: expected (parent, child, Transform) or with a covariance behind")
+    parent, child, transform = argument[:3]
+    if wrong := [name for name in (parent, child) if not (isinstance(name, str) and name)]:
+        raise ValueInvalid(f"{place}: a frame is named by a text, found {wrong[0]!r}")
+    if transform.shape:
+        raise ValueInvalid(f"{place}: expected one transform, got shape {transform.shape}")
+    try:
+        return Measurement(parent, child, transform.components, taken(argument[3] if len(argument) > 3 else None))
+    except ValueInvalid as error:
+        raise ValueInvalid(f"{place}: {error}") from None
+
+
 def without(measurements: Sequence[Measurement], places: Sequence[str]) -> list[Measurement]:
     """Return the measurements but those that are at some places, FILE:LINE.
 
@@ -140,12 +149,6 @@ def without(measurements: Sequence[Measurement], places: Sequence[str]) -> list[
     if several := next((place for place in places if many[place] > 1), ""):
         raise ValueInvalid(f"{several} holds {many[several]} measurements; write each on a line of its own")
     return [each for each in measurements if each.place not in places]
-
-
-def parted(place: str) -> tuple[str, int, int]:
-    """Take a place apart: file, line, column; 0 where it does not say that."""
-    file, line, column = re.fullmatch(r"(?s)(.*?)(?::(\d+))?(?::(\d+))?", place).groups("0")  # type: ignore[union-attr]
-    return file, int(line), int(column)
 
 
 def _problem(row: MeasuredRow, first: dict[tuple[str, str], MeasuredRow]) -> str:

@@ -17,9 +17,11 @@ import numpy as np
 from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import InputFile
 from frametool.errors import FormatError, ValueInvalid, bare, first_of, shown, warn
+from frametool.fit.alignment import between, nearest
 from frametool.formats.detect import detect
 from frametool.formats.table import FORMATS
 from frametool.formats.trees.tree_reader import MOST_KEYS
+from frametool.frames.trajectory import BODY, WORLD, Trajectory
 from frametool.geometry.transform import Transform
 from frametool.grammar.pose import COVARIANCE_KEYS, Pose, inverted
 from frametool.grammar.readers import Misfit, Path, Reading, as_mapping, kind, tell, within
@@ -39,7 +41,7 @@ from frametool.text.numbers import parse_number
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.geometry.types import Array
+    from frametool.geometry.types import Array, Indices
     from frametool.grammar.edges import Answers
     from frametool.text.lines import ByteStream
 
@@ -48,6 +50,7 @@ PARTNERS = {"gripper": ("target",), "effector_wrt_world": ("object_wrt_sensor",)
 LIKE = "{gripper: POSE, target: POSE}"
 IDS, WEIGHT = ("id", "name"), "weight"
 MOST_NAMED = 5
+NEAR_NS = 50_000_000  # maximum between stamps of a gripper and a target that are paired
 
 
 class HandEyeSamples(NamedTuple):
@@ -142,6 +145,43 @@ def _of_table(file: InputFile, fmt: str, columns: Sequence[str], *, normalize: b
         sides.append(Transform.of(*np.pad(numbers, ((0, 0), (7 - numbers.shape[1], 0))).T.copy()))
         places = [f"{file.name}:{line}" for line in poses.lines.tolist()]
     return HandEyeSamples(sides[0], sides[1], places, (None,) * 4, (file.name,), placed=placed)
+
+
+def paired_samples(
+    gripper: Trajectory, target: Trajectory, files: tuple[str, str], max_gap_ns: int | None
+) -> HandEyeSamples:
+    """Pair poses: the gripper's at the target's stamps, or by row if not both have stamps.
+
+    Within the maximum gap the gripper is interpolated, else the nearest pose within the gap is used.
+    Raises ValueInvalid if nothing pairs.
+    """
+    names = [name if each.world != WORLD or each.body != BODY else None
+             for each in (gripper, target) for name in (each.world, each.body)]  # fmt: skip
+    for each, file in ((gripper, files[0]), (target, files[1])):
+        if each.xyzw is None:
+            raise ValueInvalid(f"{file}: positions alone are not poses: rotations are needed here")
+    if gripper.stamps_ns is None or target.stamps_ns is None:
+        if gripper.size != target.size:
+            counts = f"{files[0]} has {gripper.size} poses, {files[1]} {target.size}"
+            raise ValueInvalid(f"{counts}, and no stamps to pair them")
+        kept: Indices = np.arange(target.size)
+    else:
+        gap_ns, dense = NEAR_NS if max_gap_ns is None else max_gap_ns, gripper.in_order()
+        made, is_between = between(dense, target.stamps_ns, gap_ns)
+        index, off = nearest(dense.stamps_ns, target.stamps_ns)
+        gripper = dense.at(index)
+        gripper.xyz[is_between], gripper.xyzw[is_between] = made.xyz, made.xyzw
+        kept = np.flatnonzero(np.logical_or(is_between, off <= gap_ns))
+        gap = f"{gap_ns / 1e6:g} ms"
+        if not len(kept):
+            apart = f"their stamps are {float(off.min()) / 1e9:.3f} s apart at least; one clock? --max-gap"
+            raise ValueInvalid(f"no pose of {files[0]} is within {gap} of one of {files[1]}: {apart}")
+        if alone := target.size - len(kept):
+            warn(f"{files[1]}: {alone} of {target.size} poses have none of {files[0]} within {gap}: unpaired")
+    places = [f"{files[1]} row {row + 1}" for row in kept.tolist()]
+    if target.lines is not None:
+        places = [f"{files[1]}:{line}" for line in target.lines[kept].tolist()]
+    return HandEyeSamples(gripper.at(kept).poses, target.at(kept).poses, places, tuple(names), files)
 
 
 def _sample(value: Any, path: Path, reading: Reading, *, eye_to_hand: bool) -> tuple[str, Pose, Pose]:

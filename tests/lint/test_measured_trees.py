@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from frametool.fit.measured_tree import BLUNDERS
+from frametool.fit.measured_tree import BLUNDERS, Measurement
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
-from frametool.stream.measurements import Measurement
 
 if TYPE_CHECKING:
     from collections.abc import Callable

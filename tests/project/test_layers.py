@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 ROOT = Path(frametool.__file__).parent
 LAYERS = [
-    "errors", "sizes", "geometry", "frames", "text", "documents", "grammar", "ros", "recordings", "formats", "lint", "explain", "stream",
-    "fit", "calc", "sim", "view", "cli",
+    "errors", "sizes", "geometry", "frames", "text", "documents", "grammar", "ros", "recordings", "formats", "lint", "fit", "explain",
+    "stream", "calc", "sim", "view", "cli",
 ]  # fmt: skip
 HOMES = {"click": "cli", "rich": "view", "yaml": "documents"}
 MODULES = sorted(path for path in ROOT.rglob("*.py") if path.parent != ROOT or path.stem in LAYERS)

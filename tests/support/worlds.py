@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from frametool.fit.measured_tree import Measurement
 from frametool.fit.tree_problem import bridges, spanning_tree
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
-from frametool.stream.measurements import Measurement
 
 if TYPE_CHECKING:
     from collections.abc import Callable

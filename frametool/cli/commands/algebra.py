@@ -197,7 +197,7 @@ def mean_command(inputs: Inputs) -> int:
     numbers are those of the plain mean. Weights are in proportion to 1 / variance.
     """
     task, weights, by, robust = PoseTask(inputs), inputs.weights, inputs.by, inputs.robust
-    from frametool.stream.gathering import Gathered
+    from frametool.stream.gathering import Gathered, mean_of_rows
     from frametool.stream.record_values import read_poses
 
     arguments, status, numbers = inputs.poses, 0, None
@@ -223,8 +223,6 @@ def mean_command(inputs: Inputs) -> int:
         warn("covariances left out: mean's is that of the rows")
     if gathered.stamped:
         warn("stamps left out: a mean is of no one time")
-    from frametool.fit.closed_forms import mean_of_rows
-
     groups = [("", gathered)] if by is None else gathered.groups()
     found = [(label, *mean_of_rows(each, numbers, robust=robust)) for label, each in groups]
     labels: list[dict[str, Any]] = [{} if by is None else {by: label} for label, *_ in found]

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     import click
 
+    from frametool.fit.measured_tree import Measurement
     from frametool.formats.load import FrameFile
-    from frametool.stream.measurements import Measurement
 
 FAILED = 1
 MARKS = (r"(?m)^\S.*?: (?P<red>error): ", r"(?m)^\S.*?: (?P<magenta>warning): ")

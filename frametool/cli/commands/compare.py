@@ -247,8 +247,9 @@ def resample_command(inputs: Inputs) -> int:
     (fmt,) = options.for_each(inputs.input_formats, 1)
     found, name, skipped = trajectory(inputs, path, fmt, inputs.on_error)
     from frametool.fit.alignment import between, stamps_at_rate, stamps_every
+    from frametool.stream.trajectories import in_order
 
-    found = _in_order(found, name)
+    found = in_order(found, name)
     counted = found.stamps_ns is None
     if counted:
         refuse(every is None, f"{name} has no stamps; give them with --stamps FILE")
@@ -266,7 +267,7 @@ def resample_command(inputs: Inputs) -> int:
             stamps = np.array(options.read_times(times or "", stop), np.int64)
         else:
             refuse(other.stamps_ns is None, f"--at {times}: the poses there have no stamps")
-            stamps = _in_order(other, other_name).stamps_ns
+            stamps = in_order(other, other_name).stamps_ns
     if not counted and (window := options.window_of(inputs)):
         inputs.ask("start", "stop")
         stamps = stamps[(window[0] <= stamps) & (stamps <= window[1])]
@@ -279,13 +280,6 @@ def resample_command(inputs: Inputs) -> int:
         say(f"note: {lost} of {len(stamps)} times {lies} outside {span} and {are} left out")
     write_trajectory(output, made._replace(stamps_ns=None) if counted else made)
     return ROWS_SKIPPED if skipped else 0
-
-
-def _in_order(found: Trajectory, name: str) -> Trajectory:
-    """Sort a trajectory; warn of what that changes."""
-    for hint in found.disorder(name):
-        warn(hint)
-    return found.in_order()
 
 
 def trajectory(inputs: Inputs, argument: str, fmt: str = "", on_error: str = STOP) -> tuple[Trajectory, str, bool]:

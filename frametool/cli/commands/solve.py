@@ -35,8 +35,8 @@ UNSURE = 1.2  # times: sigmas of the input that are smaller than that are report
 
 def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
     """Solve the tree of the measurements in files, with its fixed edges."""
-    from frametool.fit.measured_tree import solve_tree
-    from frametool.stream.measurements import parted, read_measurements, without
+    from frametool.fit.measured_tree import parted, solve_tree
+    from frametool.stream.measurements import read_measurements, without
 
     recordings = opened(files)
     rows = read_measurements(recordings, normalize=inputs.normalize)
@@ -118,7 +118,8 @@ def _solution(
 
 def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
     """Solve where a camera is on a hand, or next to a robot: two files of poses, or one of samples."""
-    from frametool.stream.samples import read_samples
+    from frametool.fit.hand_eye import solve_hand_eye
+    from frametool.stream.samples import paired_samples, read_samples
 
     eye_to_hand = inputs.eye_to_hand
     if len(files) == 1:
@@ -126,8 +127,6 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
         columns, normalize = inputs.columns, inputs.normalize
         samples = read_samples(files[0], eye_to_hand=eye_to_hand, normalize=normalize, fmt=fmt, columns=columns)
     else:
-        from frametool.fit.alignment import paired_samples
-
         formats, gap = options.for_each(inputs.input_formats, 2), inputs.max_gap_ns
         read = [trajectory(inputs, file, fmt)[:2] for file, fmt in zip(files, formats, strict=True)]
         for each, name in read:
@@ -142,8 +141,6 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
     second, number = f"; {samples.files[1]}:" if len(files) > 1 else ",", len(samples.places)
     taken = f"{samples.files[0]}: {base}<-{gripper}{second} {camera}<-{target}; {number} sample{'s' * (number != 1)}"
     inputs.note(taken, samples.taken, f"solving for {holder}<-{camera} and {other}<-{target}")
-    from frametool.fit.hand_eye import solve_hand_eye
-
     found = solve_hand_eye(samples.gripper, samples.target, eye_to_hand=eye_to_hand, robust=robust, names=called)
     sigmas: list[Any] = [found.covariance_x, found.covariance_z]
     if not samples.placed:
