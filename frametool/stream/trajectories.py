@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from frametool.stream.record_results import BlockResults
     from frametool.text.lines import ByteStream
 
-    Given: TypeAlias = Trajectory | str | PathLike[str]
+    TrajectoryLike: TypeAlias = Trajectory | str | PathLike[str]
 
 POSITION = 3  # numbers
 RECORDINGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
@@ -334,7 +334,7 @@ class Alignment(NamedTuple):
 
 
 def compare(
-    ref: Given, est: Given, *, offset: float | str | None = None, align: str | None = None,
+    ref: TrajectoryLike, est: TrajectoryLike, *, offset: float | str | None = None, align: str | None = None,
     mount: Transform | str | None = None, deltas: Iterable[str] | None = None, like: str | None = None, **more: Any,
 ) -> Comparison:  # fmt: skip
     """Compare a trajectory with a reference.
@@ -364,14 +364,14 @@ def compare(
     return compared(_taken(ref, "ref"), _taken(est, "est"), base.changed(**chosen), (names[0], names[1]))
 
 
-def align(ref: Given, est: Given, **settings: Any) -> Alignment:
+def align(ref: TrajectoryLike, est: TrajectoryLike, **settings: Any) -> Alignment:
     """Align a trajectory with a reference; settings as for `compare`."""
     found = compare(ref, est, **settings)
     return Alignment(found.fit.transform, found.fit.scale, found.offset_ns / BILLION, found.whole_estimate())
 
 
 def resample(
-    trajectory: Given, *, rate: float | None = None, at: Sequence[int] | None = None, every: str | None = None,
+    trajectory: TrajectoryLike, *, rate: float | None = None, at: Sequence[int] | None = None, every: str | None = None,
     max_gap_ns: float | None = None,
 ) -> Trajectory:  # fmt: skip
     """Interpolate a trajectory: `rate` poses per second, `at` stamps in nanoseconds, or `every` "1m" or "5deg".
@@ -401,7 +401,7 @@ def in_order(found: Trajectory, name: str) -> Trajectory:
     return found.in_order()
 
 
-def _taken(argument: Given, name: str) -> Trajectory:
+def _taken(argument: TrajectoryLike, name: str) -> Trajectory:
     """Read a path; check and convert the arrays of a trajectory."""
     if not isinstance(argument, Trajectory):
         return load_trajectory(argument)
