@@ -230,25 +230,26 @@ def chain(sheet: Sheet, frames: Frames, target: str, source: str, at_ns: int | N
         sheet.play("same frame", {}, **words)
         return IDENTITY
     at_ns = frames.latest(target, source) if at_ns is None else at_ns
-    down, up = frames.between(target, source, at_ns)
-    tracks = {track.child: track for track in frames.way(target, source, at_ns)}
+    path = frames.between(target, source, at_ns)
+    down, up = path.to_target, path.to_source
+    tracks = dict(zip(path.edges, frames.way(target, source, at_ns), strict=True))
     parents = {child: str(frames.parent(child, at_ns)) for child in tracks}
-    left, right = (" @ ".join(_named(parents[child], child) for child in branch) for branch in (down, up[::-1]))
+    left, right = (" @ ".join(_named(parents[child], child) for child in branch) for branch in (down, up))
     words["formula"] = " @ ".join(filter(None, [left and f"({left})^-1", right]))
-    words["top"] = printable(parents[[*down, *reversed(up)][0]])
-    words["path"] = " <- ".join(map(printable, frames.path(target, source, at_ns)))
+    words["top"] = printable(path.frames[path.top])
+    words["path"] = " <- ".join(map(printable, path.frames))
     sheet.play("way", {"down": float(len(down)), "up": float(len(up))}, **words)
-    moving = [track for child in (*down, *up) if not (track := tracks[child]).is_static]
+    moving = [track for child in (*down, *up[::-1]) if not (track := tracks[child]).is_static]
     if moving and at_ns is not None:
         ends = ", ".join(f"{printable(track.child)} {format_stamp(track.last_ns)}" for track in moving)
         values = {"latest": float(at_ns == min(track.last_ns for track in moving)), "count": float(len(moving))}
         sheet.play("way of moving edges", values, at=format_stamp(at_ns), ends=ends)
-    for child in (*down, *reversed(up)):
+    for child in (*down, *up):
         if (track := tracks[child]).is_static:
             sheet.reached(track.components[:3])
             sheet.say(f"{_named(track.parent, child)}: {_line(sheet, track.components)}")
-    edges = {child: _edge(sheet, tracks[child], at_ns or 0) for child in (*down, *up)}
-    return _joined(sheet, [edges[each] for each in down], [edges[each] for each in reversed(up)])
+    edges = {child: _edge(sheet, tracks[child], at_ns or 0) for child in (*down, *up[::-1])}
+    return _joined(sheet, [edges[each] for each in down], [edges[each] for each in up])
 
 
 def _line(sheet: Sheet, pose: Rigid) -> str:

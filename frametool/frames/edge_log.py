@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import UnknownFrame
 from frametool.frames.stamps import BILLION
-from frametool.frames.topology import edges_between, seconds
+from frametool.frames.topology import FramePath, path_between, seconds
 from frametool.geometry import rigid
 
 if TYPE_CHECKING:
@@ -155,8 +155,8 @@ def _median(values: list[float]) -> float:
     return sorted(values)[len(values) // 2] if values else 0.0
 
 
-def chain(logs: dict[str, EdgeLog], target: str, source: str) -> list[str]:
-    """Return the children of the edges between two frames, by their newest parents, from target to source.
+def chain(logs: dict[str, EdgeLog], target: str, source: str) -> FramePath:
+    """Return the path between two frames by their newest parents.
 
     Raises UnknownFrame, NotConnected.
     """
@@ -164,8 +164,7 @@ def chain(logs: dict[str, EdgeLog], target: str, source: str) -> list[str]:
     for frame in (target, source):
         if frame not in known:
             raise UnknownFrame(frame, known=known)
-    down, up = edges_between(target, source, lambda frame: logs[frame].parent if frame in logs else None)
-    return [*reversed(down), *reversed(up)]
+    return path_between(target, source, lambda frame: logs[frame].parent if frame in logs else None)
 
 
 SHORTEST = 0.0001  # seconds: tf2 divides by at least this

@@ -20,13 +20,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from frametool.frames.lookups import Frames
-    from frametool.frames.topology import Query
+    from frametool.frames.topology import FramePath, Query
     from frametool.frames.track import MovingTrack
     from frametool.geometry.types import Rigid
 
     Stamps = NDArray[np.int64]
     Floats = NDArray[np.float64]
-    Way = tuple[tuple[str, ...], tuple[str, ...]]
 
 SHARED = 4  # times per sample
 
@@ -44,17 +43,16 @@ def lookup_many(frames: Frames, target: str, source: str, at_ns: Any, *, missing
     if flat.size:
         frames.way_at(target, source, int(ordered[0]))  # detects a cycle of newest parents
     if changes := frames.changes():  # intervals in which no parent changes, grouped by the path valid in each
-        stretches: dict[Way | None, list[Any]] = {}
+        stretches: dict[FramePath | None, list[Any]] = {}
         for begin, end in itertools.pairwise([0, *np.searchsorted(ordered, changes).tolist(), flat.size]):
             if begin < end:
-                found = frames.way_at(target, source, int(ordered[begin]))
-                way = None if found is None else (tuple(found[0]), tuple(found[1]))
+                way = frames.way_at(target, source, int(ordered[begin]))
                 stretches.setdefault(way, []).append(np.arange(begin, end))
         for way, parts in stretches.items():
             at = np.concatenate(parts)
             piece = np.full((7, at.size), np.nan)
             if way is not None:
-                _fill(piece, frames.query_of(*way), ordered[at])
+                _fill(piece, frames.query_of(way), ordered[at])
             out[:, at] = piece
     else:
         _fill(out, frames.query(target, source, None), ordered)

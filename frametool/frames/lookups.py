@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import BadTopology, NoDataAt, NotConnected, UnknownFrame, ValueInvalid, bare, listing, warn
 from frametool.frames import topology
 from frametool.frames.stamps import BILLION, FURTHEST_NS, whole_stamp
-from frametool.frames.topology import Groups, Query, edges_between, left_out, no_data, to_root
+from frametool.frames.topology import FramePath, Groups, Query, Snapshot, left_out, no_data, path_between, to_root
 from frametool.frames.track import StaticTransform, Track
 from frametool.geometry import rigid
 from frametool.geometry.rigid import IDENTITY
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
     from typing import Any
 
-    from frametool.errors import LookupFailed
     from frametool.geometry.camera import Camera
     from frametool.geometry.types import Components, Rigid
 
@@ -118,23 +117,17 @@ class Frames:
         tree = FrameTree(self.name)
         for frame in self._frames:
             tree.add_root(frame)
-        for track in self._tracks.values():
-            pose, parent = track.at(at_ns), track.parent_at(at_ns)
-            if pose is not None and parent is not None:
-                tree.add_components(parent, track.child, pose)
-            elif not track.is_static:
-                warn(left_out(track, at_ns))
+        now = Snapshot(self, at_ns)
+        for child, (parent, pose) in now.edges.items():
+            tree.add_components(parent, child, pose)
+        for track in now.without_data.values():
+            warn(left_out(track, at_ns))
         tree.covariances = {child: each for child, each in self.covariances.items() if tree.track(child)}
         tree.drawn, tree.at_ns = self.drawn, at_ns
         tree.camera_axes, tree.cameras, tree.read_cameras = self.camera_axes, self.cameras, self.read_cameras
         return tree
 
     # --- cameras ---
-
-    @property
-    def camera_names(self) -> list[str]:
-        """Return the frames whose intrinsics are known."""
-        return [*dict.fromkeys((*self.cameras, *self.read_cameras()))]
 
     def camera(self, frame: str, size: tuple[int, int] | None = None) -> Camera:
         """Return the camera of a frame: intrinsics from the tree's files, points expressed in its own axes.
@@ -148,7 +141,7 @@ class Frames:
             known = self.read_cameras()
             if frame not in known:
                 what = f"{self.name}: {bare(frame)} has no intrinsics; --camera FILE[:NAME]"
-                raise ValueInvalid(f"{what}; cameras: {listing(self.camera_names) or 'none'}")
+                raise ValueInvalid(f"{what}; cameras: {listing({**self.cameras, **known}) or 'none'}")
             found = known[frame](size=size)
         axes = self.camera_axes.get(frame, found.axes)
         return found if axes == found.axes else found.changed(axes=axes)
@@ -176,7 +169,7 @@ class Frames:
             query = self.query(target, source, at_ns)
         found = query.at(at_ns if type(at_ns) is int else whole_stamp(at_ns))
         if found is None:
-            raise no_data(target, source, at_ns, self.way(target, source, at_ns))
+            raise self._no_data(target, source, at_ns, self.between(target, source, at_ns))
         return found
 
     def latest(self, target: str, source: str) -> int | None:
@@ -228,16 +221,17 @@ class Frames:
 
         at_ns: a time at which this path is valid
         """
-        down, up = self.between(target, source, at_ns)
-        if (down or up) and self.covariances.keys().isdisjoint((*down, *up)):
+        path = self.between(target, source, at_ns)
+        if path.edges and self.covariances.keys().isdisjoint(path.edges):
             raise ValueInvalid(f"no edge between {bare(target)} and {bare(source)} has a sigma or a covariance")
         from frametool.geometry import placed, uncertainty
 
         edges: dict[str, Components] = {
             child: (*(sample(self._tracks[child]) or IDENTITY), *self.covariances.get(child, ()))
-            for child in (*down, *up)
+            for child in path.edges
         }
-        steps = [*(placed.inverse(edges[child]) for child in reversed(down)), *(edges[child] for child in reversed(up))]
+        steps = [placed.inverse(edges[child]) for child in path.frames[: path.top]]
+        steps += [edges[child] for child in path.to_source]
         found = placed.covariance_of(reduce(placed.compose, steps, IDENTITY)) or (0.0,) * uncertainty.POSE
         return tuple(entry + 0.0 for entry in uncertainty.symmetric(found))
 
@@ -295,14 +289,11 @@ class Frames:
         """
         if at_ns is None and self._varies:
             at_ns = self.latest(target, source)
-        down, up = self.between(target, source, at_ns)
-        top = self.parent(up[-1] if up else down[0], at_ns) if up or down else self.resolve_name(source)
-        return [*reversed(down), str(top), *reversed(up)]
+        return [*self.between(target, source, at_ns).frames]
 
     def way(self, target: str, source: str, at_ns: int | None = None) -> list[Track]:
         """Return the edges between two frames, from the target to the source, at a time or by the newest parents."""
-        down, up = self.between(target, source, at_ns)
-        return [self._tracks[child] for child in (*reversed(down), *reversed(up))]
+        return [self._tracks[child] for child in self.between(target, source, at_ns).edges]
 
     def span(self, target: str, source: str) -> tuple[int, int] | None:
         """Return the first and last time at which a lookup has a result; None if nothing on the path moves.
@@ -317,7 +308,7 @@ class Frames:
         found = []
         for begin, end in zip([changes[0] - 1, *changes], [*changes, None], strict=True):
             way = self.way_at(target, source, begin)
-            span = None if way is None else self.query_of(*way).span
+            span = None if way is None else self.query_of(way).span
             if span is not None:
                 first = span[0] if begin < changes[0] else max(span[0], begin)
                 last = span[1] if end is None else min(span[1], end - 1)
@@ -337,37 +328,44 @@ class Frames:
         """Return the path between two frames at a time, or by the newest parents; cached if no parent changes."""
         if kept := self._queries.get((target, source)):
             return kept
-        query = self.query_of(*self.between(target, source, at_ns))
+        query = self.query_of(self.between(target, source, at_ns))
         if not self._varies:
             if len(self._queries) >= MOST_KEPT:
                 self._queries.clear()
             self._queries[target, source] = query
         return query
 
-    def query_of(self, down: Sequence[str], up: Sequence[str]) -> Query:
-        """Prepare a path returned by `between`."""
+    def query_of(self, path: FramePath) -> Query:
+        """Prepare a path."""
         track = self._tracks.__getitem__
-        return Query([*map(track, down)], [*map(track, reversed(up))])
+        return Query([*map(track, path.to_target)], [*map(track, path.to_source)])
 
-    def way_at(self, target: str, source: str, at_ns: int) -> tuple[list[str], list[str]] | None:
-        """Return the edges as `between` does; None if a changing parent leaves no path."""
+    def way_at(self, target: str, source: str, at_ns: int) -> FramePath | None:
+        """Return the path as `between` does; None if a changing parent leaves none."""
         try:
             return self.between(target, source, at_ns)
         except (NoDataAt, NotConnected):
             return None
 
-    def between(self, target: str, source: str, at_ns: int | None) -> tuple[list[str], list[str]]:
-        """Return the edges between two existing frames, as `edges_between` does."""
+    def between(self, target: str, source: str, at_ns: int | None) -> FramePath:
+        """Return the path between two existing frames at a time, or by the newest parents."""
         target, source = self.require(target, source)
         try:
-            return edges_between(target, source, partial(self.parent, at_ns=at_ns) if self._varies else self.parent)
-        except NotConnected as error:
-            raise self._unconnected(error, target, source, at_ns) from None
-        except BadTopology as error:
+            return path_between(target, source, partial(self.parent, at_ns=at_ns) if self._varies else self.parent)
+        except NotConnected:
+            if at_ns is None or not self._varies:
+                raise
+            with suppress(NotConnected):  # perhaps a changing parent is not known at that time
+                near = path_between(
+                    target, source, lambda frame: each.parent_near(at_ns) if (each := self._tracks.get(frame)) else None
+                )
+                raise self._no_data(target, source, at_ns, near) from None
+            raise
+        except BadTopology:
             self._loops = self._varies = True
             if at_ns is None:
-                raise error from None
-            return edges_between(  # of the edges that have data then
+                raise
+            return path_between(  # of the edges that have data then
                 target, source,
                 lambda frame: each.parent_at(at_ns) if (each := self.track(frame)) and each.covers(at_ns) else None,
             )  # fmt: skip
@@ -381,16 +379,8 @@ class Frames:
                 raise UnknownFrame(frame, known=self.frames, where=self.name)
         return names
 
-    def _unconnected(self, error: NotConnected, target: str, source: str, at_ns: int | None) -> LookupFailed:
-        """Return the error for two frames without a path: two trees, or a changing parent not known at that time."""
-        if at_ns is None or not self._varies:
-            return error
-        with suppress(NotConnected):
-            down, up = edges_between(
-                target, source, lambda frame: each.parent_near(at_ns) if (each := self._tracks.get(frame)) else None
-            )
-            return no_data(target, source, at_ns, [self._tracks[child] for child in (*reversed(down), *reversed(up))])
-        return error
+    def _no_data(self, target: str, source: str, at_ns: int, path: FramePath) -> NoDataAt:
+        return no_data(target, source, at_ns, path.frames, [self._tracks[child] for child in path.edges])
 
 
 class FrameTree(Frames):
@@ -456,7 +446,10 @@ class FrameTree(Frames):
         """Return target_from_source of two frames of one tree.
 
         Both ways up are climbed in turn until they meet: neighbours deep in a long chain cost no more than others.
+        Raises UnknownFrame, NotConnected.
         """
+        if self.groups.of(target) != self.groups.of(source):
+            self.between(target, source, None)  # raises
         ways = ({target: IDENTITY}, {source: IDENTITY})  # frames above -> the pose in them of what is below
         tops = [target, source]
         at = 0

@@ -11,7 +11,7 @@ from collections.abc import Hashable
 from contextlib import suppress
 from functools import cached_property
 from operator import attrgetter
-from typing import Generic, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 from frametool.errors import BadTopology, LookupFailed, NoDataAt, NotConnected, TooEarly, TooLate, bare, shown
 from frametool.frames.stamps import BILLION, format_stamp
@@ -23,11 +23,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Container, Sequence
 
-    from frametool.frames.edge_log import EdgeLog
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Components, Rigid
-
-    Edge = TypeVar("Edge")
 
 MOST_SHOWN = 16  # frames of a cycle
 OTHER_CLOCK = 10**8 * BILLION  # three years: beyond it, only one of two clocks counts from 1970
@@ -84,15 +81,35 @@ def to_root(frame: str, parent_of: Callable[[str], str | None]) -> list[str]:
     return [*line]
 
 
-def edges_between(target: str, source: str, parent_of: Callable[[str], str | None]) -> tuple[list[str], list[str]]:
-    """Return the edges between two frames, each by its child.
+class FramePath(NamedTuple):
+    """The frames on the path from a target to a source, both included, and the index of their common ancestor.
 
-    Returns (down, up): `down` leads from the common ancestor to the target, `up` from the source to that ancestor;
-    target_from_source = inverse(product of down) @ product of reversed up.
-    Raises NotConnected, naming both roots.
+    Every other frame stands for the edge to its parent; target_from_source is the inverse of the product of the edges
+    from the ancestor down to the target, times the product of those down to the source.
     """
-    target_line = to_root(target, parent_of)
-    source_line = to_root(source, parent_of)
+
+    frames: tuple[str, ...]
+    top: int
+
+    @property
+    def to_target(self) -> tuple[str, ...]:
+        """Return the edges from the common ancestor down to the target, each by its child."""
+        return self.frames[: self.top][::-1]
+
+    @property
+    def to_source(self) -> tuple[str, ...]:
+        """Return the edges from the common ancestor down to the source, each by its child."""
+        return self.frames[self.top + 1 :]
+
+    @property
+    def edges(self) -> tuple[str, ...]:
+        """Return all edges from the target to the source, each by its child."""
+        return self.frames[: self.top] + self.frames[self.top + 1 :]
+
+
+def path_between(target: str, source: str, parent_of: Callable[[str], str | None]) -> FramePath:
+    """Return the path between two frames; raises NotConnected, naming both roots."""
+    target_line, source_line = to_root(target, parent_of), to_root(source, parent_of)
     if target_line[-1] != source_line[-1]:
         raise NotConnected(
             f"{shown(target)} and {shown(source)} are not connected: "
@@ -101,9 +118,9 @@ def edges_between(target: str, source: str, parent_of: Callable[[str], str | Non
             target=target, source=source, target_root=target_line[-1], source_root=source_line[-1],
         )  # fmt: skip
     while target_line and source_line and target_line[-1] == source_line[-1]:
-        target_line.pop()
+        top = target_line.pop()
         source_line.pop()
-    return target_line[::-1], source_line
+    return FramePath((*target_line, top, *reversed(source_line)), len(target_line))
 
 
 def check_same(child: str, known: tuple[str, Rigid], found: tuple[str, Rigid]) -> None:
@@ -153,7 +170,7 @@ class Snapshot:
     """The edges of a tree at one time, or each at its own latest time.
 
     edges: child -> its parent and its pose there, parent_from_child
-    without_data: the moving frames that have no data at that time
+    without_data: the moving frames that have no data at that time, with their samples
     """
 
     def __init__(self, tree: Frames, at_ns: int | None = None) -> None:
@@ -161,14 +178,14 @@ class Snapshot:
         self.tree = tree
         self.at_ns = at_ns
         self.edges: dict[str, tuple[str, Rigid]] = {}
-        self.without_data: set[str] = set()
+        self.without_data: dict[str, MovingTrack] = {}
         for track in tree.tracks():
             pose = track.components if at_ns is None else track.at(at_ns)
             parent = track.parent if at_ns is None else track.parent_at(at_ns)
-            if pose is None or parent is None:
-                self.without_data.add(track.child)
-            else:
+            if pose is not None and parent is not None:
                 self.edges[track.child] = parent, pose
+            elif not track.is_static:
+                self.without_data[track.child] = track
 
     def parent(self, frame: str) -> str | None:
         """Return a frame's parent; None for a root, and if there are no data."""
@@ -219,39 +236,8 @@ class Snapshot:
         return found
 
 
-# --- the path between two frames ---
-
-
-def compose_path(
-    to_target: Sequence[Edge], to_source: Sequence[Edge], sample: Callable[[Edge], Rigid | None], *, far: bool = False
-) -> Rigid | None:
-    """Return target_from_source, floats or columns; None if an edge has no pose.
-
-    to_target, to_source: the edges from the common ancestor down to either end.  An empty branch does not change the
-    bits of the other.
-    sample: returns parent_from_child of an edge, or None.
-    far: the common ancestor is far away: subtracting before rotating halves the rounding of positions.
-    """
-    ends: list[Rigid | None] = []  # the product of each branch, topmost edge first; None if it is empty
-    for edges in (to_target, to_source):
-        product: Rigid | None = None
-        for here in map(sample, edges):
-            if here is None:
-                return None
-            product = here if product is None else rigid.compose(*product, *here)
-        ends.append(product)
-    top_from_target, top_from_source = ends
-    if top_from_target is None:
-        return top_from_source or rigid.IDENTITY
-    if top_from_source is None:
-        return rigid.inverse(*top_from_target)
-    if far:
-        return rigid.relative(*top_from_target, *top_from_source)
-    return rigid.compose(*rigid.inverse(*top_from_target), *top_from_source)
-
-
 class Query:
-    """The path between two frames, from their common ancestor down to the target and down to the source.
+    """The edges of the path between two frames, from their common ancestor down to the target and down to the source.
 
     fixed: the result, if nothing on the path moves; otherwise None
     moving: the edges that move
@@ -261,20 +247,33 @@ class Query:
     __slots__ = ("far", "fixed", "moving", "to_source", "to_target")
 
     def __init__(self, to_target: Sequence[Track], to_source: Sequence[Track]) -> None:
-        """Compose the static edges; both branches begin with the topmost edge."""
+        """Compose adjacent static edges; both branches begin with the topmost edge."""
         self.moving = [track for track in (*to_target, *to_source) if not track.is_static]
         self.far = bool(to_target) and to_target[0].parent in EARTH_FRAMES
-        self.fixed: Rigid | None = None
-        self.to_target: Sequence[Track] = ()
-        self.to_source: Sequence[Track] = ()
-        if self.moving:
-            self.to_target, self.to_source = _folded(to_target), _folded(to_source)
-        else:
-            self.fixed = compose_path(to_target, to_source, attrgetter("components"), far=self.far)
+        self.to_target, self.to_source = _folded(to_target), _folded(to_source)
+        self.fixed = None if self.moving else self.compose(attrgetter("components"))
 
     def compose(self, sample: Callable[[Track], Rigid | None]) -> Rigid | None:
-        """Return target_from_source for the poses that `sample` finds for the edges."""
-        return compose_path(self.to_target, self.to_source, sample, far=self.far)
+        """Return target_from_source for the poses that `sample` finds for the edges, floats or columns; None without.
+
+        An empty branch does not change the bits of the other.
+        """
+        ends: list[Rigid | None] = []  # the product of each branch, topmost edge first; None if it is empty
+        for edges in (self.to_target, self.to_source):
+            product: Rigid | None = None
+            for here in map(sample, edges):
+                if here is None:
+                    return None
+                product = here if product is None else rigid.compose(*product, *here)
+            ends.append(product)
+        top_from_target, top_from_source = ends
+        if top_from_target is None:
+            return top_from_source or rigid.IDENTITY
+        if top_from_source is None:
+            return rigid.inverse(*top_from_target)
+        if self.far:  # subtracting before rotating halves the rounding of positions
+            return rigid.relative(*top_from_target, *top_from_source)
+        return rigid.compose(*rigid.inverse(*top_from_target), *top_from_source)
 
     def at(self, at_ns: int) -> Rigid | None:
         """Return target_from_source at a time; None if an edge has no data then."""
@@ -311,12 +310,12 @@ def _folded(tracks: Sequence[Track]) -> list[Track]:
     return pieces
 
 
-def no_data(target: str, source: str, at_ns: int, path: Sequence[Track]) -> NoDataAt:
+def no_data(target: str, source: str, at_ns: int, path: Sequence[str], edges: Sequence[Track]) -> NoDataAt:
     """Return the error for a lookup at a time; it names the edge whose data are furthest from it.
 
-    path: the edges between the two frames, from the target to the source.
+    path, edges: the frames between the two, from the target to the source, and their poses
     """
-    moving = [track for track in path if not track.is_static]
+    moving = [track for track in edges if not track.is_static]
     worst = max(moving, key=lambda track: gap(track, at_ns))
     first, last = worst.span
     short = gap(worst, at_ns)
@@ -334,7 +333,7 @@ def no_data(target: str, source: str, at_ns: int, path: Sequence[Track]) -> NoDa
         when = f"ends at {format_stamp(end)} before {begun} begins at {format_stamp(begin)}"
         whole = f"; {ended} {when}: they never overlap"
     clocks = "; that is years: one of the clocks counts from 1970, the other does not" if short >= OTHER_CLOCK else ""
-    frames = list(map(bare, frames_on(target, source, path)))
+    frames = list(map(bare, path))
     if len(frames) > 13:
         frames = [*frames[:6], f"({len(frames) - 12} more)", *frames[-6:]]
     message = (
@@ -343,7 +342,7 @@ def no_data(target: str, source: str, at_ns: int, path: Sequence[Track]) -> NoDa
     )
     return (TooEarly if is_early else TooLate)(
         message, parent=parent, child=worst.child, at_ns=at_ns, first_ns=first, last_ns=last, short_ns=short,
-        short_s=short / BILLION, target=target, source=source, path=frames_on(target, source, path),
+        short_s=short / BILLION, target=target, source=source, path=[*path],
         available_from_ns=begin if begin <= end else None, available_until_ns=end if begin <= end else None,
     )  # fmt: skip
 
@@ -367,10 +366,3 @@ def seconds(duration_ns: int) -> str:
     """Format a duration in seconds without trailing zeros: `0.5`, `3`."""
     return format_stamp(duration_ns).rstrip("0").rstrip(".")
 
-
-def frames_on(target: str, source: str, path: Sequence[Track | EdgeLog]) -> list[str]:
-    """Return the frames on a path of edges from target to source, both included."""
-    frames = [target]
-    for track in path:
-        frames.append(track.parent if track.child == frames[-1] else track.child)
-    return frames if frames[-1] == source else [*frames, source]

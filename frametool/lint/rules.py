@@ -20,7 +20,6 @@ from frametool.formats.trees.tree_reader import edges_of, located, read_edges
 from frametool.frames import topology
 from frametool.frames.edge_log import EdgeLog, chain
 from frametool.frames.stamps import BILLION, format_stamp
-from frametool.frames.topology import frames_on
 from frametool.geometry.representations import EARTH_FRAMES
 from frametool.grammar.edges import stop
 from frametool.grammar.readers import may_be_on_earth
@@ -440,9 +439,10 @@ def monitor(
     if not ends:
         return list(map(edge_entry, logs.values()))
     target, source = ends
-    if not (between := [logs[child] for child in chain(logs, target, source)]):
+    path = chain(logs, target, source)
+    if not (between := [logs[child] for child in path.edges]):
         raise Misused(f"no edge is between {shown(target)} and itself; name two frames")
-    return [*map(edge_entry, between), chain_entry(target, source, between)]
+    return [*map(edge_entry, between), chain_entry(path.frames, between)]
 
 
 def edge_entry(log: EdgeLog) -> dict[str, Any]:
@@ -485,8 +485,8 @@ OF_CHAIN: dict[str, Callable[..., Any]] = {
 }  # fmt: skip
 
 
-def chain_entry(target: str, source: str, logs: Sequence[EdgeLog]) -> dict[str, Any]:
-    """Describe the edges between two frames together: their common interval, and their worst values."""
+def chain_entry(path: Sequence[str], logs: Sequence[EdgeLog]) -> dict[str, Any]:
+    """Describe the edges of a path together: their common interval, and their worst values."""
     spans = [log.span for log in logs if log.moves]
     first, last = (max(begin for begin, _ in spans), min(end for _, end in spans)) if spans else (None, None)
     entries = [edge_entry(log) for log in logs]
@@ -494,11 +494,11 @@ def chain_entry(target: str, source: str, logs: Sequence[EdgeLog]) -> dict[str, 
     worst = {key: OF_CHAIN[key](values) for key, values in known.items() if values}
     return dict.fromkeys(entries[0]) | worst | {
         "kind": "chain",
-        "parent": target,
-        "child": source,
+        "parent": path[0],
+        "child": path[-1],
         "first_ns": first,
         "last_ns": last,
-        "parents": " <- ".join(frames_on(target, source, logs)),
+        "parents": " <- ".join(path),
         "topics": "",
         "overlap": None if first is None or last is None else first <= last,
     }

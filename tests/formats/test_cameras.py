@@ -75,7 +75,7 @@ def test_golden_pixels_of_a_camera_in_its_tree(name: str, tmp_path: Path) -> Non
     points = tree.lookup(target, form["tree"]["source"]).apply(form["tree"]["points"])
     expected = [[np.nan] * 2 if each is None else each for each in form["tree"]["pixels"]]
     np.testing.assert_allclose(camera.project(points)[0], expected, rtol=0, atol=PIXEL)
-    assert target in tree.camera_names
+    assert target in {**tree.cameras, **tree.read_cameras()}
 
 
 @pytest.mark.parametrize("name", TREES)

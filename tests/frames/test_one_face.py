@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from frametool import FrameTree, Transform, TransformBuffer
-from frametool.errors import BadTopology, LookupFailed, NoDataAt, TooLate, UnknownFrame, ValueInvalid
-from frametool.frames.topology import compose_path
-from frametool.frames.track import MovingTrack
+from frametool.errors import BadTopology, LookupFailed, NoDataAt, NotConnected, TooLate, UnknownFrame, ValueInvalid
+from frametool.frames.topology import Query
+from frametool.frames.track import MovingTrack, StaticTransform
 
 if TYPE_CHECKING:
 
@@ -68,21 +68,42 @@ def test_a_tree_and_a_buffer_that_stands_still_hold_the_same() -> None:
     assert not buffer.moves
 
 
+def moving_path(down: int, up: int, seed: int = 5) -> Query:
+    """Return a path of edges that move, each with one sample at 0."""
+    poses = [pose.components for pose in Transform.random(down + up, seed=seed)]
+    edges = [MovingTrack(f"f{at}", 0, "", pose) for at, pose in enumerate(poses)]
+    return Query(edges[:down], edges[down:])
+
+
 @pytest.mark.parametrize("count", [0, 1, 4])
 def test_a_path_is_composed_alike_from_floats_and_from_columns(count: int) -> None:
-    poses = Transform.random(2 * count, seed=5)
-    parts: list[Any] = [tuple(map(float, row)) for row in zip(*poses.components, strict=True)]
-    single = compose_path(parts[:count], parts[count:], lambda part: part)
-    as_columns: list[Any] = [tuple(np.array([value]) for value in part) for part in parts]
-    columns: Any = compose_path(as_columns[:count], as_columns[count:], lambda part: part)
+    path = moving_path(count, count)
+    single = path.compose(lambda edge: edge.components)
+    columns: Any = path.compose(lambda edge: tuple(np.array([value]) for value in edge.components))  # type: ignore[arg-type]
     assert single is not None
     assert [float(np.ravel(column)[0]) for column in columns] == list(single)
 
 
-def test_an_edge_without_a_pose_leaves_a_path_without_one() -> None:
-    here = POSES[0].components
-    assert compose_path([here], [None], lambda part: part) is None
-    assert compose_path([None], [here], lambda part: part) is None
+def test_a_path_of_static_edges_is_that_of_the_same_edges_one_by_one() -> None:
+    moving = moving_path(3, 4)
+    static = [[StaticTransform(each.child, "", each.components) for each in part] for part in (moving.to_target, moving.to_source)]
+    assert Query(*static).fixed == moving.compose(lambda edge: edge.components)
+
+
+@pytest.mark.parametrize("without", ["f0", "f1"])
+def test_an_edge_without_a_pose_leaves_a_path_without_one(without: str) -> None:
+    assert moving_path(1, 1).compose(lambda edge: None if edge.child == without else edge.components) is None
+
+
+def test_frames_of_two_trees_have_no_pose_in_each_other_however_they_are_climbed() -> None:
+    tree = FrameTree()
+    tree.add("a", "b", shifted(1))
+    tree.add("c", "d", shifted(1))
+    assert tree.near("a", "b") == shifted(1).components
+    with pytest.raises(NotConnected, match="'b' hangs from root 'a', 'd' from root 'c'"):
+        tree.near("b", "d")
+    with pytest.raises(UnknownFrame):
+        tree.near("b", "e")
 
 
 # --- parents that change -------------------------------------------------------------------------------------------
@@ -111,6 +132,19 @@ def test_the_latest_lookup_takes_the_way_of_its_own_time() -> None:
 
 def test_the_span_of_changing_parents_is_where_there_are_answers() -> None:
     assert reparented().span("f0", "f3") == (825, 1074)
+
+
+def test_an_error_names_the_path_of_its_own_time() -> None:
+    buffer = TransformBuffer()
+    for parent in "mn":
+        buffer.insert("w", parent, shifted(0))
+    for stamp, parent in ((10, "m"), (20, "m"), (30, "n")):
+        buffer.insert(parent, "x", shifted(1), stamp)
+        buffer.insert("x", "y", shifted(1), stamp // 2)
+    for target, source, path in (("y", "w", "y <- x <- m <- w"), ("w", "y", "w <- m <- x <- y")):
+        with pytest.raises(TooLate, match=f"on the path {path};") as caught:
+            buffer.lookup(target, source, 18)
+        assert caught.value.fields["path"] == path.split(" <- ")
 
 
 class Scan:

@@ -23,7 +23,7 @@ from frametool.documents.document import parse_documents
 from frametool.documents.source import InputFile, Source
 from frametool.errors import FormatError, UnknownFrame, ValueInvalid, alternatives, listing, shown
 from frametool.formats.table import FORMATS
-from frametool.frames.topology import edges_between
+from frametool.frames.topology import path_between
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import notation
 from frametool.geometry.transform import Transform
@@ -309,8 +309,9 @@ class Robot:
         for frame in (base, tip):
             if frame not in self.frames:
                 raise UnknownFrame(frame, known=self.frames, where=self.name)
-        down, up = edges_between(base, tip, lambda frame: self.links[frame].parent if frame in self.links else None)
-        return Chain([self.links[child] for child in down], [self.links[child] for child in reversed(up)], self.joints)
+        path = path_between(base, tip, lambda frame: self.links[frame].parent if frame in self.links else None)
+        to_base, to_tip = ([self.links[child] for child in each] for each in (path.to_target, path.to_source))
+        return Chain(to_base, to_tip, self.joints)
 
     def __repr__(self) -> str:
         """Show the number of frames and joints, and the roots."""
