@@ -243,7 +243,7 @@ class Frames:
         at_ns: integer nanoseconds, an array or a sequence.  missing: "raise" an error at the first time without data,
         as `lookup` does, or "nan" for rows of NaN.
         """
-        from frametool.frames.lookup_many import lookup_many
+        from frametool.frames.trajectory import lookup_many
 
         return lookup_many(self, target, source, at_ns, missing=missing)
 

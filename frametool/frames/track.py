@@ -273,7 +273,7 @@ class MovingTrack:
     def at_many(self, times: Any) -> Rigid:
         """Return parent_from_child at sorted times, an int64 array, all of them covered."""
         if self.table is None:
-            from frametool.frames.lookup_many import TrackTable
+            from frametool.frames.trajectory import TrackTable
 
             self.table = TrackTable(self)
         found: Rigid = self.table.at(times)

@@ -178,7 +178,7 @@ class Lookups:
             found = self.tree.lookup_many(target, source, block, missing="nan" if miss else "raise").components
             entries: Iterable[list[float] | None] = repeat(None)
             if self.carried:
-                from frametool.frames.lookup_many import carried_many
+                from frametool.frames.trajectory import carried_many
 
                 entries = carried_many(self.tree, target, source, block, found).tolist()
             for at_ns, *row, each in zip(block, *(column.tolist() for column in found), entries, strict=False):
@@ -200,7 +200,7 @@ class Lookups:
         poses = self.tree.lookup_many(target, source, times_ns, missing="nan").components
         if not self.carried:
             return poses
-        from frametool.frames.lookup_many import carried_many
+        from frametool.frames.trajectory import carried_many
 
         for at_ns in islice((at_ns for at_ns, w in zip(times_ns, poses[6], strict=True) if isfinite(w)), 1):
             self.edges |= {track.child for track in self.tree.way(target, source, int(at_ns))}

@@ -310,8 +310,7 @@ class Robot:
             if frame not in self.frames:
                 raise UnknownFrame(frame, known=self.frames, where=self.name)
         path = path_between(base, tip, lambda frame: self.links[frame].parent if frame in self.links else None)
-        to_base, to_tip = ([self.links[child] for child in each] for each in (path.to_target, path.to_source))
-        return Chain(to_base, to_tip, self.joints)
+        return Chain(*([self.links[child] for child in each] for each in (path.to_target, path.to_source)), self.joints)
 
     def __repr__(self) -> str:
         """Show the number of frames and joints, and the roots."""
