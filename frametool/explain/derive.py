@@ -236,7 +236,7 @@ def chain(sheet: Sheet, frames: Frames, target: str, source: str, at_ns: int | N
     parents = {child: str(frames.parent(child, at_ns)) for child in tracks}
     left, right = (" @ ".join(_named(parents[child], child) for child in branch) for branch in (down, up))
     words["formula"] = " @ ".join(filter(None, [left and f"({left})^-1", right]))
-    words |= {"top": printable(path.frames[path.top]), "path": " <- ".join(map(printable, path.frames))}
+    words |= {"top": printable(path.top), "path": " <- ".join(map(printable, path.frames))}
     sheet.play("way", {"down": float(len(down)), "up": float(len(up))}, **words)
     moving = [track for child in (*down, *up[::-1]) if not (track := tracks[child]).is_static]
     if moving and at_ns is not None:

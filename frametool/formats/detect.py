@@ -62,10 +62,10 @@ class Beginning:
     @cached_property
     def data_line(self) -> str:
         """Return the first line of data."""
-        from frametool.ros.message_stream import NOISE
+        from frametool.ros.messages import is_noise
 
         lines = (line for line in self.text.splitlines() if line.strip() and not line.startswith(("#", "---")))
-        return next((line for line in lines if not NOISE(line)), "")
+        return next((line for line in lines if not is_noise(line)), "")
 
     @cached_property
     def first_line(self) -> str:

@@ -147,7 +147,7 @@ _EUROC = (
 )  # fmt: skip
 
 # formats that differ only in their names and magic
-_ECHO = Format("", writes=("poses", "points", "tree"), writer="frametool.ros.echo_format")
+_ECHO = Format("", writes=("poses", "points", "tree"), writer="frametool.ros.messages")
 _CALLS = Format("", writes=("poses", "tree"), writer="frametool.ros.publisher")
 _RECORDING = _messages(
     "", reader=BAG, reads=_CAMERAS, writes=("poses", "points", "tree", "recording"), writer="frametool.recordings.write"

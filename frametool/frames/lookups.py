@@ -62,12 +62,11 @@ class Frames:
         """Add a frame that has no parent (yet)."""
         self._frames[frame] = None
 
-    def _put(self, track: Track) -> Track:
+    def _put(self, track: Track) -> None:
         """Store a track and replace that of the same frame."""
         self._frames[track.child] = None
         self._tracks[track.child] = track
         self._queries.clear()
-        return track
 
     # --- contents ---
 
@@ -94,8 +93,7 @@ class Frames:
 
     def parent(self, frame: str, at_ns: int | None = None) -> str | None:
         """Return a frame's parent at a time, or the newest; None for a root or if it is not known."""
-        track = self.track(frame)
-        if track is None:
+        if (track := self.track(frame)) is None:
             return None
         return track.parent if at_ns is None else track.parent_at(at_ns)
 
@@ -230,7 +228,7 @@ class Frames:
             child: (*(sample(self._tracks[child]) or IDENTITY), *self.covariances.get(child, ()))
             for child in path.edges
         }
-        steps = [placed.inverse(edges[child]) for child in path.frames[: path.top]]
+        steps = [placed.inverse(edges[child]) for child in path.to_target[::-1]]
         steps += [edges[child] for child in path.to_source]
         found = placed.covariance_of(reduce(placed.compose, steps, IDENTITY)) or (0.0,) * uncertainty.POSE
         return tuple(entry + 0.0 for entry in uncertainty.symmetric(found))
@@ -307,9 +305,8 @@ class Frames:
             return newest
         found = []
         for begin, end in zip([changes[0] - 1, *changes], [*changes, None], strict=True):
-            way = self.way_at(target, source, begin)
-            span = None if way is None else self.query_of(way).span
-            if span is not None:
+            path = self.path_at(target, source, begin)
+            if path is not None and (span := Query(path, self._tracks).span) is not None:
                 first = span[0] if begin < changes[0] else max(span[0], begin)
                 last = span[1] if end is None else min(span[1], end - 1)
                 found += [(first, last)] if first <= last else []
@@ -328,19 +325,14 @@ class Frames:
         """Return the path between two frames at a time, or by the newest parents; cached if no parent changes."""
         if kept := self._queries.get((target, source)):
             return kept
-        query = self.query_of(self.between(target, source, at_ns))
+        query = Query(self.between(target, source, at_ns), self._tracks)
         if not self._varies:
             if len(self._queries) >= MOST_KEPT:
                 self._queries.clear()
             self._queries[target, source] = query
         return query
 
-    def query_of(self, path: FramePath) -> Query:
-        """Prepare a path."""
-        track = self._tracks.__getitem__
-        return Query([*map(track, path.to_target)], [*map(track, path.to_source)])
-
-    def way_at(self, target: str, source: str, at_ns: int) -> FramePath | None:
+    def path_at(self, target: str, source: str, at_ns: int) -> FramePath | None:
         """Return the path as `between` does; None if a changing parent leaves none."""
         try:
             return self.between(target, source, at_ns)
@@ -353,22 +345,18 @@ class Frames:
         try:
             return path_between(target, source, partial(self.parent, at_ns=at_ns) if self._varies else self.parent)
         except NotConnected:
-            if at_ns is None or not self._varies:
-                raise
-            with suppress(NotConnected):  # perhaps a changing parent is not known at that time
-                near = path_between(
-                    target, source, lambda frame: each.parent_near(at_ns) if (each := self._tracks.get(frame)) else None
-                )
-                raise self._no_data(target, source, at_ns, near) from None
+            if at_ns is not None and self._varies:
+                with suppress(NotConnected):  # perhaps a changing parent is not known at that time
+                    parents = {child: track.parent_near(at_ns) for child, track in self._tracks.items()}
+                    near = path_between(target, source, parents.get)
+                    raise self._no_data(target, source, at_ns, near) from None
             raise
         except BadTopology:
             self._loops = self._varies = True
             if at_ns is None:
                 raise
-            return path_between(  # of the edges that have data then
-                target, source,
-                lambda frame: each.parent_at(at_ns) if (each := self.track(frame)) and each.covers(at_ns) else None,
-            )  # fmt: skip
+            there = {child: track.parent_at(at_ns) for child, track in self._tracks.items() if track.covers(at_ns)}
+            return path_between(target, source, there.get)  # of the edges that have data then
 
     def require(self, *frames: str) -> list[str]:
         """Return the names of frames in this tree; raise UnknownFrame unless all exist."""

@@ -21,7 +21,7 @@ from frametool.geometry.representations import EARTH_FRAMES
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Container, Sequence
+    from collections.abc import Callable, Container, Mapping, Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Components, Rigid
@@ -82,29 +82,24 @@ def to_root(frame: str, parent_of: Callable[[str], str | None]) -> list[str]:
 
 
 class FramePath(NamedTuple):
-    """The frames on the path from a target to a source, both included, and the index of their common ancestor.
+    """The path between two frames: its edges from their common ancestor `top` down to either, each by its child.
 
-    Every other frame stands for the edge to its parent; target_from_source is the inverse of the product of the edges
-    from the ancestor down to the target, times the product of those down to the source.
+    target_from_source is the inverse of the product of the edges to the target, times that of the edges to the source.
     """
 
-    frames: tuple[str, ...]
-    top: int
+    to_target: tuple[str, ...]
+    top: str
+    to_source: tuple[str, ...]
 
     @property
-    def to_target(self) -> tuple[str, ...]:
-        """Return the edges from the common ancestor down to the target, each by its child."""
-        return self.frames[: self.top][::-1]
-
-    @property
-    def to_source(self) -> tuple[str, ...]:
-        """Return the edges from the common ancestor down to the source, each by its child."""
-        return self.frames[self.top + 1 :]
+    def frames(self) -> tuple[str, ...]:
+        """Return the frames from the target to the source, both included."""
+        return (*self.to_target[::-1], self.top, *self.to_source)
 
     @property
     def edges(self) -> tuple[str, ...]:
-        """Return all edges from the target to the source, each by its child."""
-        return self.frames[: self.top] + self.frames[self.top + 1 :]
+        """Return the edges from the target to the source."""
+        return (*self.to_target[::-1], *self.to_source)
 
 
 def path_between(target: str, source: str, parent_of: Callable[[str], str | None]) -> FramePath:
@@ -120,7 +115,7 @@ def path_between(target: str, source: str, parent_of: Callable[[str], str | None
     while target_line and source_line and target_line[-1] == source_line[-1]:
         top = target_line.pop()
         source_line.pop()
-    return FramePath((*target_line, top, *reversed(source_line)), len(target_line))
+    return FramePath(tuple(target_line[::-1]), top, tuple(source_line[::-1]))
 
 
 def check_same(child: str, known: tuple[str, Rigid], found: tuple[str, Rigid]) -> None:
@@ -246,11 +241,18 @@ class Query:
 
     __slots__ = ("far", "fixed", "moving", "to_source", "to_target")
 
-    def __init__(self, to_target: Sequence[Track], to_source: Sequence[Track]) -> None:
-        """Compose adjacent static edges; both branches begin with the topmost edge."""
-        self.moving = [track for track in (*to_target, *to_source) if not track.is_static]
-        self.far = bool(to_target) and to_target[0].parent in EARTH_FRAMES
-        self.to_target, self.to_source = _folded(to_target), _folded(to_source)
+    def __init__(self, path: FramePath, tracks: Mapping[str, Track]) -> None:
+        """Look up the edges of a path, and compose static ones that follow each other."""
+        self.far = bool(path.to_target) and path.top in EARTH_FRAMES
+        self.to_target, self.to_source = list[Track](), list[Track]()
+        for edges, pieces in ((path.to_target, self.to_target), (path.to_source, self.to_source)):
+            for track in map(tracks.__getitem__, edges):
+                if track.is_static and pieces and pieces[-1].is_static:
+                    pose = rigid.compose(*pieces.pop().components, *track.components)
+                    pieces.append(StaticTransform(track.child, "", pose))
+                else:
+                    pieces.append(track)
+        self.moving = [track for track in (*self.to_target, *self.to_source) if not track.is_static]
         self.fixed = None if self.moving else self.compose(attrgetter("components"))
 
     def compose(self, sample: Callable[[Track], Rigid | None]) -> Rigid | None:
@@ -296,18 +298,6 @@ class Query:
         if not self.moving:
             return None
         return max(track.first_ns for track in self.moving), min(track.last_ns for track in self.moving)
-
-
-def _folded(tracks: Sequence[Track]) -> list[Track]:
-    """Compose adjacent static edges."""
-    pieces: list[Track] = []
-    for track in tracks:
-        if pieces and track.is_static and pieces[-1].is_static:
-            pose = rigid.compose(*pieces[-1].components, *track.components)
-            pieces[-1] = StaticTransform(track.child, pieces[-1].parent, pose)
-        else:
-            pieces.append(track)
-    return pieces
 
 
 def no_data(target: str, source: str, at_ns: int, path: Sequence[str], edges: Sequence[Track]) -> NoDataAt:

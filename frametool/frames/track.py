@@ -89,7 +89,7 @@ class StaticTransform:
 class MovingTrack:
     """Samples in order of time, as three parallel lists, and the prepared interpolation after some of them.
 
-    `late` holds samples that arrived out of order, by their stamps, until the next query, so that one sort inserts many.
+    `late` holds samples that arrived out of order, by their stamps, until the next query: one sort inserts many.
     """
 
     __slots__ = (

@@ -127,18 +127,18 @@ def lookup_many(frames: Frames, target: str, source: str, at_ns: Any, *, missing
     ordered = flat if order is None else flat[order]
     frames.require(target, source)
     if flat.size:
-        frames.way_at(target, source, int(ordered[0]))  # detects a cycle of newest parents
+        frames.path_at(target, source, int(ordered[0]))  # detects a cycle of newest parents
     if changes := frames.changes():  # intervals in which no parent changes, grouped by the path valid in each
         stretches: dict[FramePath | None, list[Any]] = {}
         for begin, end in itertools.pairwise([0, *np.searchsorted(ordered, changes).tolist(), flat.size]):
             if begin < end:
-                way = frames.way_at(target, source, int(ordered[begin]))
-                stretches.setdefault(way, []).append(np.arange(begin, end))
-        for way, parts in stretches.items():
+                path = frames.path_at(target, source, int(ordered[begin]))
+                stretches.setdefault(path, []).append(np.arange(begin, end))
+        for path, parts in stretches.items():
             at = np.concatenate(parts)
             piece = np.full((7, at.size), np.nan)
-            if way is not None:
-                _fill(piece, frames.query_of(way), ordered[at])
+            if path is not None:
+                _fill(piece, frames.query(target, source, int(ordered[at[0]])), ordered[at])
             out[:, at] = piece
     else:
         _fill(out, frames.query(target, source, None), ordered)

@@ -88,20 +88,6 @@ def _nested(names: Sequence[str], cells: Sequence[str]) -> dict[str, Any]:
     return message
 
 
-# what the tools or the shell print between messages; only the warning about lost messages ends a document
-NOISE = re.compile(
-    r"""(?x) \ufeff? (?:
-      A\ message\ was\ lost!!! | \ttotal\ count\ change:\ ?\d+ | \ttotal\ count:\ ?\d+(?:---)?
-    | WARNING:\ .* | Is\ /clock\ being\ published\?
-    | \[\ ?(?:DEBUG|INFO|WARN|ERROR|FATAL)\ ?\].*
-    | \d{4}-\d\d-\d\d\ [\d:.]+\ \[[A-Z_]+\ \w+\].* | selected\ interface\ .*\ multicast.*
-    | \$\ .* | \[exit\ \d+\] | \^C.* )""",
-).fullmatch
-
-
-_ODD_START = re.compile(r"^(?=[A-Z\t\[\d$^\ufeff])", re.MULTILINE)  # no key that ROS prints begins like this
-
-
 class TextMessage(NamedTuple):
     """The plain values of one message, with its text and the number of its first line; document: None for a row."""
 
@@ -131,7 +117,7 @@ def piece_messages(piece: Piece, name: str, fmt: str, tally: Diagnostics) -> Ite
     """Yield the messages of documents that end in `---`, or of lines."""
     texts: Iterable[tuple[int, str]] = _data_lines(piece, tally)
     if fmt != "jsonl":
-        texts = ((line, without_noise(text, line, tally)) for text, line in _cut(piece, "---\n", 1))
+        texts = ((line, messages.without_noise(text, line, tally)) for text, line in _cut(piece, "---\n", 1))
     for line, text in texts:
         try:
             with counted_from(line):
@@ -142,18 +128,6 @@ def piece_messages(piece: Piece, name: str, fmt: str, tally: Diagnostics) -> Ite
         yield from (TextMessage(each.value, each.source, line, each.index) for each in found)
 
 
-def without_noise(text: str, line: int, tally: Diagnostics) -> str:
-    """Blank the lines that are known not to be data; the others keep their numbers."""
-    if _ODD_START.search(text) is None:
-        return text
-    kept = text.split("\n")
-    for index, each in enumerate(kept):
-        if NOISE(each.rstrip("\r")):
-            tally.noise.append((line + index, each.strip()))
-            kept[index] = "---" if each.endswith("---") else ""
-    return "\n".join(kept)
-
-
 def line_texts(stream: BinaryIO, name: str, tally: Diagnostics) -> Iterator[tuple[int, str]]:
     """Yield the lines that are neither blank nor noise, with their numbers."""
     for piece in lines(stream, name):
@@ -161,7 +135,7 @@ def line_texts(stream: BinaryIO, name: str, tally: Diagnostics) -> Iterator[tupl
 
 
 def _data_lines(piece: Piece, tally: Diagnostics) -> Iterator[tuple[int, str]]:
-    for number, line in enumerate(without_noise(piece.text, piece.line, tally).split("\n"), piece.line):
+    for number, line in enumerate(messages.without_noise(piece.text, piece.line, tally).split("\n"), piece.line):
         if line.strip():
             yield number, line
 

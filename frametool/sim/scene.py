@@ -32,7 +32,7 @@ from frametool.formats.detect import detect
 from frametool.formats.rows.csv import split_line
 from frametool.frames.stamps import BILLION, FURTHEST_NS, format_stamp, parse_time
 from frametool.grammar.readers import Misfit, Path, as_mapping, kind, read_numbers, within
-from frametool.ros.message_stream import NOISE
+from frametool.ros.messages import is_noise
 from frametool.sim.turtle import (
     CENTRE,
     KEYS,
@@ -306,7 +306,7 @@ def _pieces(lines: Iterable[str]) -> Iterator[tuple[Piece, bool]]:
     number = 0
     for number, line in enumerate(lines, 1):
         text = line.rstrip("\r\n")
-        if NOISE(text) is not None:
+        if is_noise(text):
             text = "---" if text.endswith("---") else ""
         if not held and (not text.strip() or text.startswith(("#", "..."))):
             continue

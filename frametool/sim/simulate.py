@@ -30,7 +30,7 @@ from frametool.frames.topology import seconds
 from frametool.geometry.transform import Transform
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
-from frametool.ros.echo_format import message_text, transform_stamped
+from frametool.ros.messages import message_text, transform_stamped
 from frametool.sim.scene import Follow, Scene
 from frametool.sim.turtle import TICK_NS, EndOfRun, Heading, ServiceRefused, TurtlePose, TurtleState, Twist, World
 

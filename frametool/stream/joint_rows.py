@@ -21,7 +21,6 @@ from frametool.formats.robots.joints import SLACK, JointColumn, JointState, find
 from frametool.formats.robots.model import TURNING, JointValue, Robot
 from frametool.formats.table import FORMATS
 from frametool.ros import messages
-from frametool.stream.record_values import without_noise
 from frametool.stream.request import Formula
 from frametool.stream.row_layout import POSE
 from frametool.stream.splitter import Splitter
@@ -118,7 +117,7 @@ def names_in(begin: bytes, fmt: str, source: str, wanted: str, *, header: bool =
         return table.called
     part = next(iter(Splitter(fmt).parts(begin)[0]), None)
     text = "" if part is None else begin[part.start : part.end].decode("utf-8", "replace")
-    documents = parse_documents(without_noise(text) if fmt == "yaml" else text, source)
+    documents = parse_documents(messages.without_noise(text) if fmt == "yaml" else text, source)
     value: Any = documents[0].value if documents else {}
     value = value[0] if type(value) is list and value else value
     if type(value) is not dict:

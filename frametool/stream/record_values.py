@@ -306,13 +306,6 @@ def json_documents(source: Source) -> list[Document]:
     return [Document(value, index, source) for index, value in enumerate(values) if value is not None]
 
 
-def without_noise(text: str) -> str:
-    """Blank the lines that the echo tools print between messages."""
-    from frametool.ros.message_stream import NOISE
-
-    return "\n".join("" if NOISE(line.rstrip("\r")) else line for line in text.split("\n"))
-
-
 # --- results as values ---
 
 

@@ -6,7 +6,6 @@ stands between them, and how one is written.
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import Aliased, Node, parse_documents, parse_nodes
@@ -19,7 +18,7 @@ from frametool.grammar.readers import AXES_KEY, EARTH_FRAMES, PLACE_KEYS
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream.faults import Fault
 from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ, Name, outermost
-from frametool.stream.record_values import Answer, Entry, RecordText, json_documents, without_noise, written
+from frametool.stream.record_values import Answer, Entry, RecordText, json_documents, written
 from frametool.stream.row_layout import (
     POINT,
     POSE,
@@ -46,7 +45,6 @@ if TYPE_CHECKING:
     from frametool.stream.splitter import Part
 
 MARK = "\0"
-_OTHER_START = re.compile(r"^(?=[A-Z\t\[\d$^])", re.MULTILINE)  # no key that ROS prints begins so
 SAMPLE = (0.5, 0.5, 0.5, 0.5)
 OURS = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *XYZ, "linear", "angular", "force", "torque")).union(
     *({column, f"{column}_deg", f"{column}_rad"} for row in ROTATIONS.values() for column in row.columns)
@@ -423,7 +421,9 @@ def attempt(text: bytes, part: Part, line: int = 0, *, fmt: str, request: Reques
     source = Source(name, "", line + 1, column_in(text, part.start))
     try:
         decoded = decode(text[part.start : part.end], name)
-        if fmt == "yaml" and _OTHER_START.search(decoded):
+        if fmt == "yaml":
+            from frametool.ros.messages import without_noise
+
             decoded = without_noise(decoded)
         source = source._replace(text=decoded)
         found = RecordText(source, request, json=fmt == "json")

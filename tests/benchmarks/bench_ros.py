@@ -70,7 +70,7 @@ def ratios(ros: str, count: int, messages: int = 4000, rounds: int = 7) -> list[
     import yaml
 
     from frametool.grammar.result import Style
-    from frametool.ros.echo_format import message_text
+    from frametool.ros.messages import message_text
 
     made = [message(ros, number, count) for number in range(messages)]
     lines = [json.dumps(each) + "\n" for each in made]

@@ -12,7 +12,7 @@ import yaml
 
 from frametool.grammar.result import Style
 from frametool.lint.rules import RULES
-from frametool.ros.echo_format import message_text
+from frametool.ros.messages import message_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable

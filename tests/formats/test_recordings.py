@@ -12,7 +12,7 @@ import pytest
 from frametool.errors import FileProblem, FormatError, FrametoolError, FrametoolWarning, ValueInvalid
 from frametool.formats.load import FrameFile
 from frametool.grammar.result import Style
-from frametool.ros.echo_format import message_text, stamp
+from frametool.ros.messages import message_text, new_stamp
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -333,10 +333,10 @@ def test_seconds_of_ros1_are_not_negative(tmp_path: Path) -> None:
 
 
 def test_no_message_is_written_whose_stamp_no_message_can_hold() -> None:
-    assert stamp(-1, "ros2") == {"sec": -1, "nanosec": 999_999_999}
+    assert new_stamp(-1, "ros2") == {"sec": -1, "nanosec": 999_999_999}
     for form, stamp_ns in (("ros1", -1), ("ros1", 2**32 * 10**9), ("ros2", 2**63)):
         with pytest.raises(ValueInvalid, match="does not fit in ros"):
-            stamp(stamp_ns, form)
+            new_stamp(stamp_ns, form)
 
 
 DATES = {

@@ -13,7 +13,7 @@ import pytest
 
 from frametool import FrameTree, Transform, TransformBuffer
 from frametool.errors import BadTopology, LookupFailed, NoDataAt, NotConnected, TooLate, UnknownFrame, ValueInvalid
-from frametool.frames.topology import Query
+from frametool.frames.topology import FramePath, Query
 from frametool.frames.track import MovingTrack, StaticTransform
 
 if TYPE_CHECKING:
@@ -68,31 +68,34 @@ def test_a_tree_and_a_buffer_that_stands_still_hold_the_same() -> None:
     assert not buffer.moves
 
 
-def moving_path(down: int, up: int, seed: int = 5) -> Query:
-    """Return a path of edges that move, each with one sample at 0."""
-    poses = [pose.components for pose in Transform.random(down + up, seed=seed)]
-    edges = [MovingTrack(f"f{at}", 0, "", pose) for at, pose in enumerate(poses)]
-    return Query(edges[:down], edges[down:])
+def path_of(down: int, up: int, *, moves: bool = True) -> Query:
+    """Return a path of edges with one pose each, that move or not."""
+    poses = {f"f{at}": pose.components for at, pose in enumerate(Transform.random(down + up, seed=5))}
+    tracks = {
+        name: MovingTrack(name, 0, "", pose) if moves else StaticTransform(name, "", pose) for name, pose in poses.items()
+    }
+    return Query(FramePath(tuple(poses)[:down], "", tuple(poses)[down:]), tracks)
 
 
 @pytest.mark.parametrize("count", [0, 1, 4])
 def test_a_path_is_composed_alike_from_floats_and_from_columns(count: int) -> None:
-    path = moving_path(count, count)
+    path = path_of(count, count)
     single = path.compose(lambda edge: edge.components)
-    columns: Any = path.compose(lambda edge: tuple(np.array([value]) for value in edge.components))  # type: ignore[arg-type]
+    columns: Any = path.compose(lambda edge: tuple(np.array([value]) for value in edge.components))  # type: ignore[arg-type,return-value]
     assert single is not None
     assert [float(np.ravel(column)[0]) for column in columns] == list(single)
 
 
-def test_a_path_of_static_edges_is_that_of_the_same_edges_one_by_one() -> None:
-    moving = moving_path(3, 4)
-    static = [[StaticTransform(each.child, "", each.components) for each in part] for part in (moving.to_target, moving.to_source)]
-    assert Query(*static).fixed == moving.compose(lambda edge: edge.components)
+@pytest.mark.parametrize(("down", "up"), [(0, 0), (0, 3), (1, 1), (3, 4)])
+def test_a_path_of_static_edges_is_that_of_the_same_edges_one_by_one(down: int, up: int) -> None:
+    single = path_of(down, up).compose(lambda edge: edge.components)
+    assert path_of(down, up, moves=False).fixed == single
 
 
 @pytest.mark.parametrize("without", ["f0", "f1"])
 def test_an_edge_without_a_pose_leaves_a_path_without_one(without: str) -> None:
-    assert moving_path(1, 1).compose(lambda edge: None if edge.child == without else edge.components) is None
+    path = path_of(1, 1)
+    assert path.compose(lambda edge: None if edge.child == without else edge.components) is None
 
 
 def test_frames_of_two_trees_have_no_pose_in_each_other_however_they_are_climbed() -> None:

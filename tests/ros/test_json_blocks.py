@@ -13,8 +13,8 @@ from frametool.errors import FormatError
 from frametool.formats.load import FrameFile, load
 from frametool.grammar.edges import Diagnostics
 from frametool.grammar.result import Style
-from frametool.ros.echo_format import message_text
 from frametool.ros.message_stream import plain_columns
+from frametool.ros.messages import message_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -23,7 +23,7 @@ from frametool.documents.document import parse_documents
 from frametool.documents.source import InputFile, Source
 from frametool.errors import FormatError, UnknownFrame, ValueInvalid, alternatives, listing, shown
 from frametool.formats.table import FORMATS
-from frametool.frames.topology import path_between
+from frametool.frames.topology import FramePath, path_between
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import notation
 from frametool.geometry.transform import Transform
@@ -310,7 +310,7 @@ class Robot:
             if frame not in self.frames:
                 raise UnknownFrame(frame, known=self.frames, where=self.name)
         path = path_between(base, tip, lambda frame: self.links[frame].parent if frame in self.links else None)
-        return Chain(*([self.links[child] for child in each] for each in (path.to_target, path.to_source)), self.joints)
+        return Chain(path, self.links, self.joints)
 
     def __repr__(self) -> str:
         """Show the number of frames and joints, and the roots."""
@@ -357,11 +357,11 @@ class Chain:
     needs: the joints whose values are needed, without those that mimic others
     """
 
-    def __init__(self, down: Sequence[Link], up: Sequence[Link], joints: Mapping[str, Joint]) -> None:
-        """Store the links from the common ancestor down to either end, topmost first."""
+    def __init__(self, path: FramePath, links: Mapping[str, Link], joints: Mapping[str, Joint]) -> None:
+        """Find the links from the common ancestor down to either end, topmost first."""
         self._joints = joints
-        self._down, self._up = down, up
-        self._between = [joint.name for link in (*down, *up) for joint in link.joints]
+        self._down, self._up = ([links[child] for child in edges] for edges in (path.to_target, path.to_source))
+        self._between = [joint.name for link in (*self._down, *self._up) for joint in link.joints]
         self.needs = self._deciding(())
 
     def uses(self, joint: str) -> bool:
