@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import placed, uncertainty, validation
+from frametool.geometry import rigid, uncertainty, validation
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,12 +34,12 @@ def compose(a: Transform, cov_a: Covariance, b: Transform, cov_b: Covariance) ->
     """Return the covariance of a @ b; b is the lever arm of a's rotation uncertainty."""
     first, second = _placed(a, cov_a), _placed(b, cov_b)
     size, parts = len(first), (*first, *second)
-    return _found(lambda *p: placed.covariance_of(placed.compose(p[:size], p[size:])), uncertainty.POSE, parts)
+    return _found(lambda *p: rigid.covariance_of(rigid.compose_full(p[:size], p[size:])), uncertainty.POSE, parts)
 
 
 def invert(a: Transform, cov_a: Covariance) -> Any:
     """Return the covariance of a.inverse(), along the axes of the former child."""
-    return _found(lambda *parts: placed.covariance_of(placed.inverse(parts)), uncertainty.POSE, _placed(a, cov_a))
+    return _found(lambda *parts: rigid.covariance_of(rigid.inverse_full(parts)), uncertainty.POSE, _placed(a, cov_a))
 
 
 def point(a: Transform, cov_a: Covariance, p: Numbers, cov_p: Covariance = None) -> Any:
@@ -49,8 +49,8 @@ def point(a: Transform, cov_a: Covariance, p: Numbers, cov_p: Covariance = None)
 
     def kernel(*parts: Any) -> Components | None:
         moved, numbers = parts[:end], parts[end : end + 3]
-        of_pose = placed.covariance_of(moved)
-        return uncertainty.of_three(placed.pose_of(moved), of_pose, numbers, parts[end + 3 :] or None)
+        of_pose = rigid.covariance_of(moved)
+        return uncertainty.of_three(rigid.pose_of(moved), of_pose, numbers, parts[end + 3 :] or None)
 
     return _found(kernel, uncertainty.POINT, (*pose, *at, *own))
 

@@ -222,15 +222,15 @@ class Frames:
         path = self.between(target, source, at_ns)
         if path.edges and self.covariances.keys().isdisjoint(path.edges):
             raise ValueInvalid(f"no edge between {bare(target)} and {bare(source)} has a sigma or a covariance")
-        from frametool.geometry import placed, uncertainty
+        from frametool.geometry import uncertainty
 
         edges: dict[str, Components] = {
             child: (*(sample(self._tracks[child]) or IDENTITY), *self.covariances.get(child, ()))
             for child in path.edges
         }
-        steps = [placed.inverse(edges[child]) for child in path.to_target[::-1]]
+        steps = [rigid.inverse_full(edges[child]) for child in path.to_target[::-1]]
         steps += [edges[child] for child in path.to_source]
-        found = placed.covariance_of(reduce(placed.compose, steps, IDENTITY)) or (0.0,) * uncertainty.POSE
+        found = rigid.covariance_of(reduce(rigid.compose_full, steps, IDENTITY)) or (0.0,) * uncertainty.POSE
         return tuple(entry + 0.0 for entry in uncertainty.symmetric(found))
 
     # --- many lookups ---

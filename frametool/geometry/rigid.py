@@ -3,6 +3,9 @@
 Products and inverses; interpolation of two poses, prepared once for many fractions, with exactly the rotation of
 `quaternion.slerp`; motions of joints; and twists and wrenches in another frame
 (linear part first), by the adjoint.
+A full pose has seven components alone, eight with a scale, 43 with a covariance: the eighth is s of the similarity
+p' = s R p + t, the 36 are the entries that `uncertainty` describes.  A pose alone is exact and has scale 1; none has
+both.
 Knows numbers only; components are floats or arrays of one shape, and both take the same steps.
 """
 
@@ -22,7 +25,9 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from frametool.geometry.types import Components, Functions, N, Number, Rigid, Seven, Six, Three, Two
 
-EXACT, SCALED, UNCERTAIN = 7, 8, 43  # components of a pose: alone, with a scale, with a covariance
+EXACT, SCALED, UNCERTAIN = 7, 8, 43  # components of a full pose: alone, with a scale, with a covariance
+NOT_BOTH = "the covariance cannot be carried through a scale; leave one of them out"
+SIMILARITY = "scale: a similarity, not a pose; apply --transform, compose and invert take it"
 IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 SERIES_EXP = 1.5  # rad: above, a - sin(a) loses less than a digit; below, ten terms of its series are exact
 SERIES_LOG = 0.6  # rad: the same for 1 - (a/2) cot(a/2) and six terms
@@ -264,3 +269,61 @@ def move_twist(
     bx, by, bz = quaternion.rotate(x, y, z, w, wx, wy, wz)
     cx, cy, cz = quaternion.cross(tx, ty, tz, bx, by, bz)
     return ax + cx, ay + cy, az + cz, bx, by, bz
+
+
+# --- full poses: with a scale or a covariance, or neither ---
+
+
+def compose_full(a: Components, b: Components) -> Components:
+    """Return a_from_c of a_from_b and b_from_c: s = s1 s2, R = R1 R2, t = t1 + s1 R1 t2."""
+    if len(a) == len(b) == EXACT:
+        return compose(*a, *b)
+    first, second = pose_of(a), pose_of(b)
+    if SCALED in (len(a), len(b)):
+        if UNCERTAIN in (len(a), len(b)):
+            raise ValueInvalid(NOT_BOTH)
+        s1, s2 = scale_of(a), scale_of(b)
+        x, y, z = second[:3]
+        return (*compose(*first, s1 * x, s1 * y, s1 * z, *second[3:]), s1 * s2)
+    from frametool.geometry import uncertainty
+
+    entries = uncertainty.propagate_compose(first, covariance_of(a), second, covariance_of(b))
+    return (*compose(*first, *second), *(entries or ()))
+
+
+def inverse_full(a: Components) -> Components:
+    """Return b_from_a of a_from_b: 1/s, R', -R' t / s."""
+    pose = pose_of(a)
+    x, y, z, *rotation = inverse(*pose)
+    if len(a) == SCALED:
+        s = a[EXACT]
+        return (x / s, y / s, z / s, *rotation, 1.0 / s)
+    if len(a) == EXACT:
+        return (x, y, z, *rotation)
+    from frametool.geometry import uncertainty
+
+    return (x, y, z, *rotation, *uncertainty.propagate_inverse(pose, a[EXACT:]))
+
+
+def relative_full(a: Components, b: Components) -> Components:
+    """Return the pose of b in a: inverse(a) b."""
+    pose = relative(*pose_of(a), *pose_of(b))
+    if SCALED in (len(a), len(b)):
+        raise ValueInvalid(SIMILARITY)
+    return pose if len(a) == len(b) == EXACT else (*pose, *compose_full(inverse_full(a), b)[EXACT:])
+
+
+def pose_of(a: Components) -> Rigid:
+    """Return the seven components of a pose."""
+    tx, ty, tz, x, y, z, w = a[:EXACT]
+    return tx, ty, tz, x, y, z, w
+
+
+def covariance_of(a: Components) -> Components | None:
+    """Return the covariance of a pose; None if it is exact."""
+    return a[EXACT:] if len(a) == UNCERTAIN else None
+
+
+def scale_of(a: Components) -> Number:
+    """Return the scale of a similarity; 1 for a pose."""
+    return a[EXACT] if len(a) == SCALED else 1.0

@@ -200,9 +200,7 @@ class Rotation(Batched):
         rep = _notation(spec)
         if validation.single(inputs):
             return cls.of(*rep.checked_quaternion(inputs, floats, normalize=normalize))
-        from frametool.geometry.batch_validation import require_rotations
-
-        return cls.of(*require_rotations(rep, inputs, name, normalize=normalize))
+        return cls.of(*validation.require_rotations(rep, inputs, name, normalize=normalize))
 
     def _as(self, spec: str, out: Array | None, inner: tuple[int, ...] = ()) -> Array:
         """Return rows of the columns of a notation, in shape `inner` if set, in `out` if passed."""

@@ -1,23 +1,25 @@
 """The entry points of the public API: lists and arrays in, checked components out, kernels applied, rows out.
 
 One item becomes Python floats without numpy; more become columns, views of the caller's array that are never
-written to. Errors name the argument, the shapes and the first bad row.
+written to. Errors name the argument, the shapes and the first bad row.  Many rotations are checked at once: the rules
+are those for a single one (`Representation.checked`), which also words the error of a row.
 """
 
 from __future__ import annotations
 
 from math import isfinite
+from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, warn
 from frametool.geometry import floats
-
-TYPE_CHECKING = False
+from frametool.geometry.quaternion import SILENT, TOLERATED
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from typing import Any
 
-    from frametool.geometry.types import Array, Components, Kernel, Numbers
+    from frametool.geometry.representations import BatchRule, Notation
+    from frametool.geometry.types import Array, Components, Indices, Kernel, Numbers
 
 
 def single(components: Components) -> bool:
@@ -253,3 +255,102 @@ def masses(value: Numbers | None, shape: tuple[int, ...]) -> Array:
     if (array < 0.0).any() or not array.any():
         raise ValueInvalid("weights: expected none negative and not all 0")
     return array
+
+
+# --- many rotations: which rows are invalid and why, and which were normalised ---
+
+
+class Rotations(NamedTuple):
+    """Unit quaternions of n rows, the reasons why rows are invalid, and the rows that were normalised.
+
+    off: the largest deviation from a rotation among the accepted rows
+    """
+
+    quaternions: Components
+    reasons: dict[int, str]
+    mended: Indices
+    off: float
+
+
+def read_rotations(
+    notation: Notation, numbers: Sequence[Array], *, degrees: bool = False, normalize: bool = False
+) -> Rotations:
+    """Return the quaternions of rows of numbers in column order; invalid rows get the identity."""
+    import numpy as np
+
+    from frametool.geometry import arrays
+
+    inputs, row = tuple(numbers), notation.representation
+    shape = arrays.batch_shape(inputs)
+    quaternions = np.empty((4, int(np.prod(shape))))
+    off: Array = np.empty(0)  # the deviation of each row, inf if it is refused; empty: nothing to report
+    worst = 0.0
+    with np.errstate(all="ignore"):
+        for place, block in arrays.cut(inputs):
+            grades, right, furthest = _repaired(row.batch, block, normalize=normalize)
+            worst = max(worst, furthest)
+            results = notation.to_quaternion(right, arrays, degrees=degrees)
+            if row.batch is None and not arrays.all_finite(results):
+                grades = np.where(np.isfinite(sum(results)), 0.0, np.inf)
+            for target, result in zip(quaternions, results, strict=True):
+                target[place] = result
+            if grades is not None:
+                off = off if off.size else np.zeros(quaternions.shape[1])
+                off[place] = grades
+    refused = np.flatnonzero(off == np.inf)
+    flat = [np.broadcast_to(column, shape).reshape(-1) for column in inputs] if refused.size else []
+    reasons = dict.fromkeys(refused.tolist(), "the numbers are not a rotation")
+    for index in reasons:
+        try:
+            row.checked([float(column[index]) for column in flat], normalize=normalize)
+        except ValueInvalid as error:
+            reasons[index] = str(error)
+    quaternions[:, refused] = [[0.0], [0.0], [0.0], [1.0]]
+    return Rotations(tuple(quaternions), reasons, np.flatnonzero((off > SILENT) & (off < np.inf)), worst)
+
+
+def _repaired(
+    rule: BatchRule | None, block: Components, *, normalize: bool
+) -> tuple[Array | None, Components, float]:
+    """Return the deviations of a block's rows (None: nothing to report), the block made rotations, and the worst."""
+    if rule is None:
+        return None, block, 0.0
+    import numpy as np
+
+    from frametool.geometry import arrays
+
+    off = rule.deviation(*block, arrays)
+    worst = arrays.furthest(off)
+    if worst <= min(rule.exact, SILENT):
+        return None, block, worst
+    refused = ~(off < np.inf) if normalize else ~(off <= TOLERATED)
+    rough = np.flatnonzero((off > rule.exact) & ~refused)
+    if rough.size == len(off):
+        block = rule.repair(*block, arrays)
+    elif rough.size:
+        mended = rule.repair(*(column[rough] for column in block), arrays)
+        block = tuple(column.copy() for column in block)
+        for column, values in zip(block, mended, strict=True):
+            column[rough] = values
+    grades = None if worst <= SILENT else np.where(refused, np.inf, 0.0 if normalize else off)
+    return grades, block, float(off[~refused].max(initial=0.0))
+
+
+def require_rotations(notation: Notation, inputs: Components, name: str, *, normalize: bool = False) -> Components:
+    """Return the quaternions of columns of any shape; warn once about all rows that were normalised.
+
+    Raises:
+        ValueInvalid: rows are not rotations; names the first one and how many there are.
+    """
+    from frametool.geometry import arrays
+
+    shape = arrays.batch_shape(inputs)
+    found = read_rotations(notation, inputs, normalize=normalize)
+    for row, reason in found.reasons.items():
+        more = f" ({len(found.reasons)} such rows)" if len(found.reasons) > 1 else ""
+        raise ValueInvalid(f"{at_row(name, row, shape)}: {reason}{more}")
+    if found.mended.size and (rule := notation.representation.batch):
+        share = f"{found.mended.size} of {found.quaternions[0].size} {rule.what}"
+        first = at_row(name, found.mended[0], shape)
+        warn(f"{name}: {share} are off by up to {found.off:.2g} (first: {first}) and were normalised")
+    return tuple(part.reshape(shape) for part in found.quaternions)

@@ -13,7 +13,7 @@ from math import radians
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid, did_you_mean, shown
-from frametool.geometry import placed, uncertainty
+from frametool.geometry import rigid, uncertainty
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, places_in, read_number, read_texts, within
 from frametool.text.numbers import ANGLES as UNITS_OF_ANGLE
 from frametool.text.numbers import BRACKETS, parse_number, read_number_or_angle
@@ -178,7 +178,7 @@ def refuse_scale(value: Any) -> None:
     except (ValueInvalid, TypeError):
         is_one = False
     if not is_one:
-        raise NotARotation(placed.SIMILARITY, ("scale",))
+        raise NotARotation(rigid.SIMILARITY, ("scale",))
 
 
 def of_sigmas(sigmas: Sequence[Any]) -> Components:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid, shown
 from frametool.geometry import earth as wgs84
-from frametool.geometry import floats, placed, quaternion
+from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.earth import NORTH, SOUTH, ZONES, standard_zone, utm, zone_number
 from frametool.geometry.place import ECEF, ENU, GRID, GRIDDED, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place, Spot
 from frametool.geometry.representations import HEADING, POSITIONS
@@ -102,7 +102,7 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
         return inner._replace(position=position, parent=inner.parent or ECEF, read=spots[0])
     place, numbers = spots[0].place._replace(axes=axes), spots[0].numbers
     within((next(iter(own)),), place.check, numbers)
-    made = placed.compose(place.base(numbers), inner._replace(rotation=rotation, scale=1.0).placed)
+    made = rigid.compose_full(place.base(numbers), inner._replace(rotation=rotation, scale=1.0).placed)
     found = inner.of(made, inner.name, inner.parent or ECEF)
     found = found if inner.position else found._replace(read=spots[0])
     return found if rotation is not None or is_frame else found._replace(rotation=None)
@@ -393,7 +393,7 @@ def frame_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
     local = local._replace(parent=pose.parent)
     if pose.covariance is not None and local.rotation is not None:
         back = quaternion.compose(*local.rotation, *quaternion.conjugate(*turned))
-        made = placed.compose((0.0, 0.0, 0.0, *back), (0.0, 0.0, 0.0, *turned, *pose.covariance))
+        made = rigid.compose_full((0.0, 0.0, 0.0, *back), (0.0, 0.0, 0.0, *turned, *pose.covariance))
         local = local._replace(covariance=pose.of(made).covariance)
     axes = at.pop(AXES_KEY)
     return {AT: at, AXES_KEY: axes}, local

@@ -13,7 +13,7 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, bare, did_you_mean, overheard, shown
-from frametool.geometry import floats, placed, quaternion
+from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import LIST, NAMED, NAMED_AXES, REPRESENTATIONS, ROTATIONS, ROWS, axes_name
 from frametool.geometry.representations import notation as parse_notation
 from frametool.grammar import readers
@@ -88,7 +88,7 @@ class Pose(NamedTuple):
 
     @classmethod
     def of(cls, components: Sequence[float], name: str | None = None, parent: str | None = None) -> Pose:
-        """Return a pose of tx, ty, tz, x, y, z, w, and of its covariance or scale as in `placed`."""
+        """Return a pose of tx, ty, tz, x, y, z, w, and of its covariance or scale as in `rigid`."""
         tx, ty, tz, x, y, z, w, *extras = components
         covariance = tuple(extras) if len(extras) > 1 else None
         return cls((tx, ty, tz), (x, y, z, w), name, parent, None, covariance, extras[0] if len(extras) == 1 else 1.0)
@@ -100,12 +100,12 @@ class Pose(NamedTuple):
 
     @property
     def placed(self) -> Components:
-        """Return the components, followed by the covariance or the scale: as in `geometry.placed`.
+        """Return the components, followed by the covariance or the scale: as in `geometry.rigid`.
 
         Raises ValueInvalid if it has both.
         """
         if self.covariance is not None and self.scale != 1.0:
-            raise ValueInvalid(placed.NOT_BOTH)
+            raise ValueInvalid(rigid.NOT_BOTH)
         return (*self.components, *(self.covariance or ()), *([self.scale] * (self.scale != 1.0)))
 
     @property
@@ -176,7 +176,7 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
 
 def inverted(pose: Pose) -> Pose:
     """Return the inverse numbers under the same names: the meaning of `inverse: true`."""
-    back = Pose.of(placed.inverse(pose.placed))
+    back = Pose.of(rigid.inverse_full(pose.placed))
     return pose._replace(
         position=None if pose.position is None else back.position,
         rotation=None if pose.rotation is None else back.rotation,

@@ -13,7 +13,7 @@ from math import isfinite
 
 from frametool.errors import LookupFailed, ValueInvalid, shown, warn
 from frametool.frames.stamps import format_stamp
-from frametool.geometry import floats, placed, quaternion, rigid
+from frametool.geometry import floats, quaternion, rigid
 from frametool.grammar.pose import Pose, inverted
 from frametool.grammar.result import Result, uncertain
 
@@ -40,7 +40,7 @@ def product(left: Pose, right: Pose) -> Pose:
             f"frames do not touch: {left.parent or '?'} <- {left.name} is followed by "
             f"{right.parent} <- {right.name or '?'}; change the order, or invert one",
         )
-    return Pose.of(placed.compose(left.placed, right.placed), right.name, left.parent)
+    return Pose.of(rigid.compose_full(left.placed, right.placed), right.name, left.parent)
 
 
 def shared_stamp(poses: Iterable[Pose]) -> dict[str, Any]:

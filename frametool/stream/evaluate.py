@@ -14,8 +14,8 @@ import numpy as np
 from frametool.errors import FrametoolError
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import arrays, floats, quaternion, uncertainty
-from frametool.geometry.batch_validation import read_rotations
 from frametool.geometry.representations import UPPER_ROWS, BatchRule
+from frametool.geometry.validation import read_rotations
 from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
 from frametool.grammar.pose import FEW_DIGITS
 from frametool.stream.faults import DEGREES, NULL, Fault, RowNote

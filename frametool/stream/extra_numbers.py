@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FormatError, ValueInvalid, listing, warn
 from frametool.geometry import rigid, uncertainty
-from frametool.geometry.placed import NOT_BOTH, inverse, pose_of, scale_of
 from frametool.geometry.quaternion import TOLERATED
-from frametool.geometry.rigid import EXACT, SCALED
+from frametool.geometry.rigid import EXACT, NOT_BOTH, SCALED, inverse_full, pose_of, scale_of
 from frametool.geometry.uncertainty import UNKNOWN
 from frametool.grammar import covariance
 from frametool.grammar.pose import LEFT_OUT, SCALE, read_angle_unit
@@ -233,7 +232,7 @@ def with_own(
         turned = [part if mover is None else uncertainty.rotate_covariance(part, *mover[3:]) for part in parts]
         return pose, (*chain.from_iterable(turned), *extra[count:])
     if shape.inverse:
-        back = inverse((*rigid.inverse(*pose), *entries))
+        back = inverse_full((*rigid.inverse(*pose), *entries))
         return (back if size == 1 else (*pose, *back[EXACT:])), rest
     return (*pose, *entries), rest
 
@@ -249,7 +248,7 @@ def of_multiple(
     s = xp.where(abs(size - 1.0) <= TOLERATED, size - size + 1.0, size)
     bare = tuple(number / s if at in shape.rotation_at else number for at, number in enumerate(own))
     pose = pose_of((*shape.position(own), *rotation(bare)))
-    return inverse((*pose, s)) if shape.inverse else (*pose, s)
+    return inverse_full((*pose, s)) if shape.inverse else (*pose, s)
 
 
 def in_full(shape: Shape, own: Components, extra: Components) -> tuple[Shape, Components]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import placed, quaternion, rigid
+from frametool.geometry import quaternion, rigid
 from frametool.geometry.floats import RADIAN
 from frametool.geometry.representations import HEADING, Notation, notation
 from frametool.geometry.rigid import EXACT, SCALED, UNCERTAIN
@@ -118,7 +118,7 @@ class Operation(NamedTuple):
     formula: an expression, instead of all this; it is given points that are moved by their edge, or that edge alone
     uncertain: what moves rows, each by its frame or its time, has a covariance that counts
     similar: a scale with a pose counts, and is that of the result; multiples: so is that of a matrix s R
-    Poses are seven components, and may have a covariance or a scale behind them, as `geometry.placed` has it.
+    Poses are seven components, and may have a covariance or a scale behind them, as `geometry.rigid` has it.
     """
 
     left: Components | None = None
@@ -284,14 +284,14 @@ class Operation(NamedTuple):
         """Return the resulting pose, how far it goes if poses are compared, and its covariance or scale, if any."""
         result = poses[0]
         if self.inverse:
-            result = placed.inverse(result)
+            result = rigid.inverse_full(result)
         if self.mirrors:
             result = rigid.mirrored(*result)
         left = edge or self.left
         if left is not None:
-            result = placed.compose(left, result)
+            result = rigid.compose_full(left, result)
         for right in self.right:
-            result = placed.compose(result, right)
+            result = rigid.compose_full(result, right)
         if self.moves and len(result) == SCALED:
             return result[:EXACT]  # a pose that is scaled is one
         if not self.of:
@@ -300,7 +300,7 @@ class Operation(NamedTuple):
         if not others:
             raise ValueInvalid("cannot be compared with the one before: only whole messages can, without other lines")
         first, second = (*others, result) if self.of == "first" else (result, *others)
-        result = placed.relative(first, second)
+        result = rigid.relative_full(first, second)
         tx, ty, tz, x, y, z, w = result[:EXACT]
         metres, angle = rigid.extent(tx, ty, tz, x, y, z, w, xp)
         return (*result[:EXACT], metres, angle, angle * RADIAN, *result[EXACT:])

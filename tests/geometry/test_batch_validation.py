@@ -12,8 +12,8 @@ import samples
 
 from frametool.errors import FrametoolWarning, ValueInvalid
 from frametool.geometry import floats
-from frametool.geometry.batch_validation import IDENTITY, read_rotations, require_rotations
 from frametool.geometry.representations import ROTATIONS, Notation, notation
+from frametool.geometry.validation import read_rotations, require_rotations
 
 if TYPE_CHECKING:
     from frametool.geometry.types import Array, Quaternion
@@ -42,7 +42,7 @@ def alone(form: Notation, row: list[float], *, normalize: bool) -> tuple[Quatern
         try:
             return form.checked_quaternion(row, floats, normalize=normalize), "", bool(caught)
         except ValueInvalid as error:
-            return IDENTITY, str(error), False
+            return (0.0, 0.0, 0.0, 1.0), str(error), False
 
 
 @pytest.mark.parametrize("spec", SPECS)

@@ -10,7 +10,7 @@ import pytest
 
 from frametool.errors import FormatError, FrametoolError, FrametoolWarning, ValueInvalid
 from frametool.formats.load import FrameFile
-from frametool.geometry import placed
+from frametool.geometry import rigid
 from frametool.geometry.transform import Transform
 from frametool.stream.measurements import read_measurements, without
 
@@ -103,7 +103,7 @@ def test_every_spelling_is_the_same_measurement(read: Read, name: str) -> None:
 )
 def test_an_inverse_row_has_its_pose_and_its_covariance_inverted(read: Read, text: str, name: str) -> None:
     (found,) = read(text, name)
-    whole = placed.inverse((1.0, 2.0, 3.0, x, y, z, w, *DIAGONAL))
+    whole = rigid.inverse_full((1.0, 2.0, 3.0, x, y, z, w, *DIAGONAL))
     assert (*found.components, *(found.covariance or ())) == pytest.approx(whole, rel=1e-12, abs=1e-18)
     assert found.written is None
 

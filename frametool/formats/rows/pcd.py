@@ -31,7 +31,7 @@ import numpy as np
 from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.formats.rows import column_file
 from frametool.formats.rows.clouds import CloudFile, count_in, head_lines, misfit_of, same_columns, type_in
-from frametool.geometry import floats, placed, quaternion
+from frametool.geometry import floats, quaternion, rigid
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
@@ -255,8 +255,8 @@ class PcdFile(CloudFile):
         if quaternion.complaint(x, y, z, w):
             warn(f"{name}: VIEWPOINT is left as it is: {w:g} {x:g} {y:g} {z:g} is not a rotation")
             return
-        moved = placed.compose(pose, (tx, ty, tz, *quaternion.repaired(x, y, z, w, floats)))
-        self.viewpoint = viewpoint_words(placed.pose_of(moved))
+        moved = rigid.compose_full(pose, (tx, ty, tz, *quaternion.repaired(x, y, z, w, floats)))
+        self.viewpoint = viewpoint_words(rigid.pose_of(moved))
 
     def batches(self) -> Iterator[Batch]:
         """Yield the points; raises FormatError if the file ends too early, or has more.

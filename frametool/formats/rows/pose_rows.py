@@ -242,7 +242,7 @@ def blocks(file: InputFile, options: Options, *, named: bool = True) -> Iterator
     """
     import numpy as np
 
-    from frametool.geometry.batch_validation import read_rotations
+    from frametool.geometry.validation import read_rotations
 
     spec, rows = form_of(file, options), READERS[file.format](file, options)
     stamps = StampFile(options.answers.stamps) if options.answers.stamps else None
