@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from frametool.errors import ValueInvalid, alternatives, shown, warn
 from frametool.geometry import floats, quaternion, rigid, validation
-from frametool.geometry.floats import bearing, half_sincos
+from frametool.geometry.floats import bearing, half_sincos, polynomial
 from frametool.geometry.quaternion import TINY
 
 TYPE_CHECKING = False
@@ -61,14 +61,6 @@ class Lens(NamedTuple):
 # ---------------------------------------------------------------- where a distortion stops growing
 
 
-def _horner(coefficients: Sequence[float], x: N) -> N:
-    """Evaluate a polynomial, lowest coefficient first."""
-    value = 0.0 * x
-    for coefficient in reversed(coefficients):
-        value = value * x + coefficient
-    return value
-
-
 def _slope(coefficients: Sequence[float]) -> list[float]:
     return [power * each for power, each in enumerate(coefficients)][1:]
 
@@ -79,10 +71,10 @@ def _roots(coefficients: Sequence[float], top: float) -> list[float]:
         return []
     found = []
     for turn, high in pairwise([0.0, *_roots(_slope(coefficients), top), top]):
-        low, sign = turn, _horner(coefficients, turn)
-        if sign and sign * _horner(coefficients, high) <= 0.0:
+        low, sign = turn, polynomial(turn, coefficients)
+        if sign and sign * polynomial(high, coefficients) <= 0.0:
             while low < (middle := 0.5 * (low + high)) < high:
-                low, high = (middle, high) if sign * _horner(coefficients, middle) > 0.0 else (low, middle)  # noqa: PLW2901
+                low, high = (middle, high) if sign * polynomial(middle, coefficients) > 0.0 else (low, middle)  # noqa: PLW2901
             found.append(high)
     return found
 
@@ -140,7 +132,7 @@ def _angle_slope(d: Sequence[float]) -> tuple[float, ...]:
 
 def _angular(t: N, d: Sequence[float], _xp: Functions[N]) -> Two[N]:
     """Return the polynomial of equidistant at an angle, and its derivative."""
-    return t * _horner((1.0, *d[:4]), t * t), _horner(_angle_slope(d), t * t)
+    return t * polynomial(t * t, (1.0, *d[:4])), polynomial(t * t, _angle_slope(d))
 
 
 def _inverse(grown: Callable[..., Any], y: N, d: Sequence[float], top: float, tolerance: float, xp: Functions[N]) -> N:

@@ -18,6 +18,8 @@ __all__ = [
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from frametool.geometry.types import Condition, Functions, N, Two
 
 DEGREE, RADIAN = pi / 180.0, 180.0 / pi  # a degree in radians and a radian in degrees
@@ -118,7 +120,7 @@ def bearing(y: N, x: N, radius: N, xp: Functions[N]) -> N:
     return angle
 
 
-def polynomial(x: N, coefficients: tuple[float, ...]) -> N:
+def polynomial(x: N, coefficients: Sequence[float]) -> N:
     """Evaluate a polynomial by Horner's rule, arrays in a new array; lowest coefficient first."""
     return horner(x * coefficients[-1], x, coefficients[:-1])
 
@@ -130,7 +132,7 @@ def monic_polynomial(x: N, coefficients: tuple[float, ...]) -> N:
     return horner(value, x, coefficients[:-1])
 
 
-def horner(value: N, x: N, coefficients: tuple[float, ...]) -> N:
+def horner(value: N, x: N, coefficients: Sequence[float]) -> N:
     """Add the lower coefficients to the highest term, one power of x after another, in place."""
     for coefficient in coefficients[:0:-1]:
         value += coefficient

@@ -97,17 +97,6 @@ def angle(x: N, y: N, z: N, w: N, xp: Functions[N]) -> N:
     return 2.0 * incline(length(x, y, z, xp), abs(w), xp)
 
 
-def arc(
-    ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N, xp: Functions[N],
-) -> N:  # fmt: skip
-    """Return the angle in [0, pi/2] between two quaternions as vectors, q and -q being equal: half the rotation angle.
-
-    Source: Kahan, 2 atan2(|b - a|, |b + a|); it keeps its relative accuracy for the smallest arcs.
-    """
-    apart, along = halves(ax, ay, az, aw, bx, by, bz, bw, xp)
-    return 2.0 * incline(apart, along, xp)
-
-
 def halves(
     ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N, xp: Functions[N],
 ) -> Two[N]:  # fmt: skip
@@ -120,8 +109,12 @@ def halves(
 def distance(
     ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N, xp: Functions[N],
 ) -> N:  # fmt: skip
-    """Return the angle in [0, pi] of the rotation between two orientations."""
-    return 2.0 * arc(ax, ay, az, aw, bx, by, bz, bw, xp)
+    """Return the angle in [0, pi] of the rotation between two orientations, q and -q being equal.
+
+    It is twice the arc between the quaternions as vectors.
+    Source: Kahan, 2 atan2(|b - a|, |b + a|); it keeps its relative accuracy for the smallest arcs.
+    """
+    return 4.0 * incline(*halves(ax, ay, az, aw, bx, by, bz, bw, xp), xp)
 
 
 def toward(

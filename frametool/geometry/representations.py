@@ -71,7 +71,6 @@ class Representation(NamedTuple):
     forward, backward: kernels (components, xp, degrees, axes) to and from a quaternion
     complaint: takes the components of one rotation, and `normalize`, and returns the error if they are refused; None if
         any finite numbers are a rotation
-    kept: takes a unit quaternion and preserves its sign; None if the notation has no such sign
     short: short names of its numbers, for people and as keys of a map; () for x y z, if there are three
     shape: how documents hold the numbers: LIST, MAP (a list is accepted too), NAMED (a map only), ROWS, or the
         keys of a map, each with the number of its values
@@ -80,17 +79,15 @@ class Representation(NamedTuple):
     alone: columns that suffice for the last number if the others are missing and 0
     batch: how many rows are checked at once; without it rows are refused whose quaternion is not finite
     in_degrees: whether its angles are degrees if their name states no unit
-    overview: the units in which an overview shows it ("" for no unit)
     kernels: for a position the `module:name` of its arithmetic, a `place.Kernels`
     """
 
     columns: tuple[str, ...]
     angles: tuple[int, ...]
     summary: str
-    forward: Callable[..., Any] = _no_rotation
-    backward: Callable[..., Any] = _no_rotation
+    forward: Callable[..., Quaternion] = _no_rotation
+    backward: Callable[..., Components] = _no_rotation
     complaint: Callable[..., ValueInvalid | None] | None = None
-    kept: Callable[..., Components] | None = None
     shape: str | tuple[tuple[str, int], ...] = LIST
     short: tuple[str, ...] = ()
     label: str = ""
@@ -98,7 +95,6 @@ class Representation(NamedTuple):
     whole: Whole | None = None
     searched: bool = True
     alone: tuple[str, ...] = ()
-    overview: tuple[str, ...] = ()
     in_degrees: bool = False
     batch: BatchRule | None = None
     kernels: str = ""
@@ -166,10 +162,6 @@ def _xyzw(x: Any, y: Any, z: Any, w: Any) -> Quaternion:
     return x, y, z, w
 
 
-def _wxyz(x: Any, y: Any, z: Any, w: Any) -> Components:
-    return w, x, y, z
-
-
 def _of_wxyz(kernel: Callable[..., Any]) -> Callable[..., Any]:
     """Return a kernel of w, x, y, z made from one of x, y, z, w."""
     return lambda w, x, y, z, *xp, **options: kernel(x, y, z, w, *xp, **options)
@@ -177,7 +169,11 @@ def _of_wxyz(kernel: Callable[..., Any]) -> Callable[..., Any]:
 
 def _as_wxyz(kernel: Kernel) -> Kernel:
     """Return a kernel with results w, x, y, z made from one with results x, y, z, w."""
-    return lambda *components, **options: _wxyz(*kernel(*components, **options))
+    def reordered(*components: Any, **options: Any) -> Components:
+        x, y, z, w = kernel(*components, **options)
+        return w, x, y, z
+
+    return reordered
 
 
 def _of_heading(components: Components, xp: Namespace, degrees: bool, axes: str) -> Quaternion:  # noqa: FBT001 - all do
@@ -218,20 +214,20 @@ MATRICES = BatchRule(
 RPY, EULER_COLUMNS = ("roll", "pitch", "yaw"), ("euler_1", "euler_2", "euler_3")
 XYZW = Representation(
     ("qx", "qy", "qz", "qw"), (), "unit quaternion, scalar last", short=("x", "y", "z", "w"), label="quaternion",
-    forward=_kernel(_xyzw), backward=_kernel(quaternion.from_quaternion, "xp"), kept=_xyzw,
+    forward=_kernel(_xyzw), backward=_kernel(quaternion.from_quaternion, "xp"),
     complaint=quaternion.complaint, batch=QUATERNIONS,
 )  # fmt: skip
 
 
 ROTATIONS = {
     "quaternion": XYZW._replace(
-        summary="unit quaternion, named x y z w", label="", shape=NAMED, overview=("",)
+        summary="unit quaternion, named x y z w", label="", shape=NAMED
     ),
     "xyzw": XYZW,
     "wxyz": Representation(
         ("qw", "qx", "qy", "qz"), (), "unit quaternion, scalar first", short=("w", "x", "y", "z"), label="quaternion",
         forward=_kernel(_of_wxyz(_xyzw)), backward=_kernel(_as_wxyz(quaternion.from_quaternion), "xp"),
-        complaint=_of_wxyz(quaternion.complaint), kept=_wxyz,
+        complaint=_of_wxyz(quaternion.complaint),
         batch=QUATERNIONS._replace(
             deviation=_of_wxyz(quaternion.deviation), repair=_as_wxyz(_of_wxyz(quaternion.repaired)),
             remark=_of_wxyz(quaternion.remark),
@@ -239,7 +235,7 @@ ROTATIONS = {
     ),
     "rpy": Representation(
         RPY, (0, 1, 2), "roll, pitch, yaw about the fixed axes x, y, z (URDF, tf2 setRPY)",
-        short=RPY, shape=MAP, axes="sxyz", alone=("yaw", "theta"), overview=("_rad", "_deg"),
+        short=RPY, shape=MAP, axes="sxyz", alone=("yaw", "theta"),
         forward=_kernel(euler.to_quaternion, "axes"), backward=_kernel(euler.from_quaternion, "axes"),
     ),
     "euler": Representation(
@@ -249,7 +245,7 @@ ROTATIONS = {
     ),
     "axis_angle": Representation(
         ("axis_x", "axis_y", "axis_z", "angle"), (3,), "axis of any length, then the angle about it",
-        short=("x", "y", "z", "angle"), label="axis-angle", shape=(("axis", 3), ("angle", 1)), overview=("_rad",),
+        short=("x", "y", "z", "angle"), label="axis-angle", shape=(("axis", 3), ("angle", 1)),
         forward=_kernel(quaternion.from_axis_angle, "degrees"), backward=_kernel(quaternion.as_axis_angle, "degrees"),
         complaint=quaternion.axis_angle_complaint,
     ),
@@ -260,7 +256,7 @@ ROTATIONS = {
     ),
     "matrix": Representation(
         ("r11", "r12", "r13", "r21", "r22", "r23", "r31", "r32", "r33"), (), "rotation matrix, row by row",
-        shape=ROWS, whole=HOMOGENEOUS, overview=("",),
+        shape=ROWS, whole=HOMOGENEOUS,
         forward=_kernel(matrix.to_quaternion, "xp"), backward=_kernel(quaternion.to_matrix),
         complaint=matrix.complaint, batch=MATRICES,
     ),
@@ -371,9 +367,7 @@ class Notation:
 
     def to_quaternion(self, components: Components, xp: Namespace, *, degrees: bool = False) -> Quaternion:
         """Return x, y, z, w; `degrees` applies if the notation itself states no unit."""
-        unit = degrees if self.degrees is None else self.degrees
-        result: Quaternion = self.representation.forward(components, xp, unit, self.bound_axes())
-        return result
+        return self.representation.forward(components, xp, self.in_degrees(degrees), self.bound_axes())
 
     def from_quaternion(
         self, x: Any, y: Any, z: Any, w: Any, xp: Namespace, *, degrees: bool = False, keep_sign: bool = False
@@ -382,11 +376,11 @@ class Notation:
 
         keep_sign: preserve the sign of a quaternion
         """
-        if keep_sign and self.representation.kept is not None:
-            return self.representation.kept(x, y, z, w)
-        unit = degrees if self.degrees is None else self.degrees
-        result: Components = self.representation.backward((x, y, z, w), xp, unit, self.bound_axes())
-        return result
+        row = self.representation
+        if keep_sign and {*row.columns} == {*XYZW.columns}:
+            named = {"qx": x, "qy": y, "qz": z, "qw": w}
+            return tuple(named[column] for column in row.columns)
+        return row.backward((x, y, z, w), xp, self.in_degrees(degrees), self.bound_axes())
 
     def checked_quaternion(
         self, components: Sequence[float], xp: Namespace, *, degrees: bool = False, normalize: bool = False
@@ -449,8 +443,12 @@ def notation(spec: str) -> Notation:
     if name not in REPRESENTATIONS and name[-4:] in ("_deg", "_rad"):
         bare, degrees = name[:-4], name.endswith("_deg")
     row = REPRESENTATIONS.get(bare)
-    if row is None:
-        known = f"{_near_names(bare, spec)} representations: {listing(REPRESENTATIONS, near=bare)}"
+    if row is None:  # suggested are the nearest, and those nearly as near that have the same numbers in another order
+        near = nearest(bare, REPRESENTATIONS)
+        rivals = [each for each in near if {*REPRESENTATIONS[each].columns} == {*REPRESENTATIONS[near[0]].columns}]
+        meant = [OTHER_NAMES[spec]] if spec in OTHER_NAMES else rivals
+        hint = f"; did you mean {' or '.join(map(shown, meant))}?" if meant else ";"
+        known = f"{hint} representations: {listing(REPRESENTATIONS, near=bare)}"
         raise ValueInvalid(f"unknown representation {shown(bare)}{known}")
     if degrees is not None and not row.angles:
         raise ValueInvalid(f"{bare} has no angle: write it without {name[-4:]}")
@@ -459,15 +457,6 @@ def notation(spec: str) -> Notation:
     if colon and row.axes not in CHECKED:
         raise ValueInvalid(f"{bare} has no axes to name; only euler has: euler:{axes or 'rzyx'}")
     return Notation(spec, row, CHECKED[row.axes](axes) if colon else None, degrees=degrees)
-
-
-def _near_names(name: str, spec: str) -> str:
-    """Return the nearest representation, and those nearly as near that have the same numbers in another order."""
-    if spec in OTHER_NAMES:
-        return f"; did you mean {shown(OTHER_NAMES[spec])}?"
-    near = nearest(name, REPRESENTATIONS)
-    rivals = [each for each in near if {*REPRESENTATIONS[each].columns} == {*REPRESENTATIONS[near[0]].columns}]
-    return f"; did you mean {' or '.join(map(shown, rivals))}?" if near else ";"
 
 
 def notations(spec: str) -> tuple[Notation, ...]:
@@ -480,8 +469,12 @@ def checked_axes(axes: str) -> str:
     """Return the name of an Euler convention; raise ValueInvalid, naming the nearest, if it is not one."""
     if axes in euler.AXES:
         return axes
-    alike = [each for each in euler.AXES if each[0] == axes[:1].lower()]  # static axes are never suggested for rotating
-    near = _both_readings(axes.lower()) or did_you_mean(axes.lower(), alike) or ";"
+    folded = axes.lower()
+    letters = folded[1:] if folded[:1] not in ("s", "r") and f"r{folded[1:]}" in euler.AXES else folded
+    if f"r{letters}" in euler.AXES:  # of three letters, bare or with another prefix, both readings are suggested
+        near = f"; did you mean r{letters} (rotating axes, intrinsic) or s{letters} (static axes, extrinsic)?"
+    else:  # static axes are never suggested for rotating
+        near = did_you_mean(folded, [each for each in euler.AXES if each[0] == folded[:1]]) or ";"
     raise ValueInvalid(
         f"unknown Euler axes {shown(axes)}{near} s (static axes) or r (rotating axes) and three letters, such as rzyx"
     )
@@ -497,14 +490,6 @@ def checked_world(axes: str | None) -> str:
 
 
 CHECKED = {NAMED_AXES: checked_axes, OF_WORLD: checked_world}
-
-
-def _both_readings(letters: str) -> str:
-    """Return a suggestion of the two conventions that three letters may mean, bare or with another prefix; else ""."""
-    letters = letters[1:] if letters[:1] not in ("s", "r") and f"r{letters[1:]}" in euler.AXES else letters
-    if f"r{letters}" not in euler.AXES:
-        return ""
-    return f"; did you mean r{letters} (rotating axes, intrinsic) or s{letters} (static axes, extrinsic)?"
 
 
 def axes_name(order: str, frame: str) -> str:

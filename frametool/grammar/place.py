@@ -281,7 +281,7 @@ def _heading(own: dict[str, Any], axes: str) -> Quaternion | None:
     degrees = HEADINGS[key] if unit is None else unit == "deg"
     if not axes:
         raise Misfit(UNSAID)
-    return HEADING.forward((angle,), floats, degrees, NED if axes == NED else ENU)  # type: ignore[no-any-return]
+    return HEADING.forward((angle,), floats, degrees, NED if axes == NED else ENU)
 
 
 def refuse_not_read(own: dict[str, Any]) -> None:
