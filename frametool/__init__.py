@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from frametool.geometry.earth import lla_from_ecef as lla_from_ecef
     from frametool.geometry.earth import lla_from_utm as lla_from_utm
     from frametool.geometry.earth import utm_from_lla as utm_from_lla
-    from frametool.geometry.rotation import Rotation as Rotation
+    from frametool.geometry.transform import Rotation as Rotation
     from frametool.geometry.transform import Transform as Transform
     from frametool.lint.tree_diff import diff as diff
     from frametool.sim.followed import explain as explain
@@ -73,8 +73,7 @@ _HOMES = {
         "frametool.frames.trajectory": "Trajectory",
         "frametool.geometry.camera": "Camera",
         "frametool.geometry.earth": "earth_pose ecef_from_lla lla_from_ecef lla_from_utm utm_from_lla",
-        "frametool.geometry.rotation": "Rotation",
-        "frametool.geometry.transform": "Transform",
+        "frametool.geometry.transform": "Rotation Transform",
         "frametool.lint.tree_diff": "diff",
         "frametool.sim.followed": "explain follow_steps",
         "frametool.sim.scene": "tutorial",

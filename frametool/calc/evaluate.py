@@ -27,8 +27,7 @@ from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_
 from frametool.frames.lookups import Frames
 from frametool.geometry import floats
 from frametool.geometry.representations import EARTH_FRAMES
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose, read_pose
 from frametool.grammar.readers import Misfit, Reading, kind, may_be_on_earth, read_numbers, slash_note, within
 from frametool.text.numbers import parse_number

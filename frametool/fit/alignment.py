@@ -14,8 +14,7 @@ import numpy as np
 from frametool.errors import ValueInvalid
 from frametool.fit.least_squares import align_vectors, length, require_near, solve_normal
 from frametool.frames.stamps import BILLION
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -18,8 +18,7 @@ from frametool.frames.trajectory import Trajectory, way
 from frametool.geometry import earth
 from frametool.geometry.place import ENU, Origin
 from frametool.geometry.representations import EARTH_FRAMES
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

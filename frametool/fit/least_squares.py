@@ -16,8 +16,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import arrays, floats
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator

@@ -20,8 +20,7 @@ from frametool.fit.tree_problem import Fitted, Noise, TreeProblem, bodies_of, br
 from frametool.frames.lookups import Frames, FrameTree
 from frametool.frames.topology import Groups
 from frametool.geometry.conventions import axes_change
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 from frametool.lint.tree_diff import Tolerance
 
 if TYPE_CHECKING:

@@ -20,8 +20,7 @@ from frametool.frames.topology import FramePath, Groups, Query, Snapshot, left_o
 from frametool.frames.track import StaticTransform, Track
 from frametool.geometry import rigid
 from frametool.geometry.rigid import IDENTITY
-from frametool.geometry.rotation import in_notebook
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Transform, in_notebook
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -13,8 +13,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid, shown
 from frametool.geometry import arrays, quaternion, rigid
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

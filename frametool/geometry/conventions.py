@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import ValueInvalid, nearest, shown
 from frametool.geometry import euler, floats, matrix, quaternion
 from frametool.geometry.representations import WORLDS
-from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Rotation
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

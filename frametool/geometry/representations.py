@@ -79,6 +79,7 @@ class Representation(NamedTuple):
     alone: columns that suffice for the last number if the others are missing and 0
     batch: how many rows are checked at once; without it rows are refused whose quaternion is not finite
     in_degrees: whether its angles are degrees if their name states no unit
+    overview: the units in which an overview shows it ("" for no unit)
     kernels: for a position the `module:name` of its arithmetic, a `place.Kernels`
     """
 
@@ -95,6 +96,7 @@ class Representation(NamedTuple):
     whole: Whole | None = None
     searched: bool = True
     alone: tuple[str, ...] = ()
+    overview: tuple[str, ...] = ()
     in_degrees: bool = False
     batch: BatchRule | None = None
     kernels: str = ""
@@ -221,7 +223,7 @@ XYZW = Representation(
 
 ROTATIONS = {
     "quaternion": XYZW._replace(
-        summary="unit quaternion, named x y z w", label="", shape=NAMED
+        summary="unit quaternion, named x y z w", label="", shape=NAMED, overview=("",)
     ),
     "xyzw": XYZW,
     "wxyz": Representation(
@@ -235,7 +237,7 @@ ROTATIONS = {
     ),
     "rpy": Representation(
         RPY, (0, 1, 2), "roll, pitch, yaw about the fixed axes x, y, z (URDF, tf2 setRPY)",
-        short=RPY, shape=MAP, axes="sxyz", alone=("yaw", "theta"),
+        short=RPY, shape=MAP, axes="sxyz", alone=("yaw", "theta"), overview=("_rad", "_deg"),
         forward=_kernel(euler.to_quaternion, "axes"), backward=_kernel(euler.from_quaternion, "axes"),
     ),
     "euler": Representation(
@@ -245,7 +247,7 @@ ROTATIONS = {
     ),
     "axis_angle": Representation(
         ("axis_x", "axis_y", "axis_z", "angle"), (3,), "axis of any length, then the angle about it",
-        short=("x", "y", "z", "angle"), label="axis-angle", shape=(("axis", 3), ("angle", 1)),
+        short=("x", "y", "z", "angle"), label="axis-angle", shape=(("axis", 3), ("angle", 1)), overview=("_rad",),
         forward=_kernel(quaternion.from_axis_angle, "degrees"), backward=_kernel(quaternion.as_axis_angle, "degrees"),
         complaint=quaternion.axis_angle_complaint,
     ),
@@ -256,7 +258,7 @@ ROTATIONS = {
     ),
     "matrix": Representation(
         ("r11", "r12", "r13", "r21", "r22", "r23", "r31", "r32", "r33"), (), "rotation matrix, row by row",
-        shape=ROWS, whole=HOMOGENEOUS,
+        shape=ROWS, whole=HOMOGENEOUS, overview=("",),
         forward=_kernel(matrix.to_quaternion, "xp"), backward=_kernel(quaternion.to_matrix),
         complaint=matrix.complaint, batch=MATRICES,
     ),

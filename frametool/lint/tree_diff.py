@@ -13,8 +13,7 @@ from frametool.errors import FrametoolError, ValueInvalid, listing, shown
 from frametool.frames.stamps import format_stamp
 from frametool.frames.topology import Snapshot
 from frametool.geometry import floats, rigid
-from frametool.geometry.rotation import NEAR
-from frametool.geometry.transform import NEAR_BY
+from frametool.geometry.transform import NEAR, NEAR_BY
 from frametool.text.numbers import parse_length, read_number_or_angle
 
 if TYPE_CHECKING:

@@ -30,8 +30,7 @@ from frametool.explain.run import DIGITS
 from frametool.frames.lookups import Frames
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry.representations import notation, notations
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Style
 from frametool.sim.simulate import IssuedCommand, frame_of, simulate

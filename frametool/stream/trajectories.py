@@ -24,7 +24,7 @@ from frametool.formats.load import FrameFile, Rules, load_sources, opened_togeth
 from frametool.formats.table import BAG, FORMATS, by_suffix
 from frametool.frames.stamps import BILLION, FURTHEST_NS
 from frametool.frames.trajectory import BODY, WORLD, Trajectory
-from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Rotation
 from frametool.grammar.edges import Answers, Diagnostics, Names
 from frametool.grammar.pose_algebra import sample_stamps
 from frametool.grammar.readers import in_nanoseconds, stamp_column, stamp_places

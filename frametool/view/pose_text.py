@@ -12,7 +12,7 @@ from frametool.documents.writers import dump_json
 from frametool.errors import printable
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
-from frametool.geometry.representations import ROWS, notation
+from frametool.geometry.representations import ROTATIONS, ROWS, notation
 from frametool.grammar.pose import TIMES, Pose
 from frametool.grammar.readers import EARTH_FRAMES
 from frametool.grammar.result import ROUNDED_TO_ZERO, Result, Style, is_locked, placed, rotation_entry, rotation_numbers
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
 
-OVERVIEW = ("quaternion", "rpy_rad", "rpy_deg", "axis_angle_rad", "matrix")
+OVERVIEW = [name + unit for name, row in ROTATIONS.items() for unit in row.overview]
 
 
 WIDTH = 80

@@ -24,8 +24,7 @@ from scipy.spatial.transform import Rotation as Peer
 
 from frametool.geometry import floats
 from frametool.geometry.representations import ROTATIONS, notation
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
     from collections.abc import Callable

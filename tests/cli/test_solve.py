@@ -18,8 +18,7 @@ import yaml
 from console import ROOT
 
 from frametool.formats.table import writers
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

@@ -16,8 +16,7 @@ from frametool.fit.comparison import compared as compare
 from frametool.fit.hand_eye import solve_hand_eye
 from frametool.fit.measured_tree import solve_tree
 from frametool.frames.trajectory import Trajectory
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 pytestmark = pytest.mark.filterwarnings("ignore::frametool.errors.FrametoolWarning")  # what looks odd is in the result too
 

@@ -21,8 +21,7 @@ from frametool.fit.alignment import (
 from frametool.fit.comparison import Delta, parse_delta
 from frametool.fit.numbers import absolute_errors, all_pairs, chained, relative_errors, segment_errors, statistics
 from frametool.frames.trajectory import Trajectory, way
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 CASES = {case["name"]: case for case in json.loads((GOLDEN / "compare.json").read_text())["cases"]}

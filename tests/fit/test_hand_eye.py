@@ -14,8 +14,7 @@ from rigs import Rig, replaced, rig, small
 from frametool.errors import ValueInvalid
 from frametool.fit.hand_eye import HandEye, solve_hand_eye
 from frametool.fit.least_squares import draws
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 pytestmark = pytest.mark.filterwarnings("ignore::frametool.errors.FrametoolWarning")  # what looks odd is in the result too
 

@@ -9,7 +9,7 @@ import pytest
 import samples
 
 from frametool.fit.least_squares import NotSettled, align_vectors, inverse, solve_normal
-from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Rotation
 
 if TYPE_CHECKING:
     from frametool.geometry.types import Array

@@ -17,8 +17,7 @@ from frametool.errors import ValueInvalid
 from frametool.fit.measured_tree import BLUNDERS, Measurement, TreeSolution, solve_tree
 from frametool.frames.lookups import FrameTree
 from frametool.geometry.conventions import axes_change
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 GOLDEN = json.loads((Path(__file__).parents[1] / "golden" / "solve_tree.json").read_text())["tree"]
 LEAST_SQUARES = 3e-8

@@ -7,7 +7,7 @@ import pytest
 
 from frametool.fit.alignment import lever_arm
 from frametool.frames.trajectory import Trajectory
-from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Rotation
 
 UP = np.array([0.0, 0.0, 1.0])
 ARM = np.array([0.3, -0.2, 0.5])

@@ -11,8 +11,7 @@ from rigs import replaced, small
 
 from frametool.errors import ValueInvalid
 from frametool.fit.closed_forms import solve_mean
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 CASES = {each["name"]: each for each in json.loads((Path(__file__).parents[1] / "golden" / "hand_eye.json").read_text())["mean"]}
 TRUTH = Transform.random(seed=5)

@@ -14,8 +14,7 @@ from mpmath import mpf
 
 from frametool.geometry import euler, floats
 from frametool.geometry.representations import notation
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -10,8 +10,7 @@ import samples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
     from frametool.geometry.types import Array

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from frametool.geometry.representations import axes_name
-from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Rotation
 
 GOLDEN: dict[str, Any] = json.loads((Path(__file__).parents[1] / "golden" / "euler.json").read_text())
 CLOSE = 1e-12

@@ -12,8 +12,7 @@ import pytest
 
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.geometry.arrays import BLOCK
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -13,7 +13,7 @@ import samples
 from frametool.errors import ValueInvalid
 from frametool.geometry import arrays, euler, floats, quaternion
 from frametool.geometry.representations import ROTATIONS, Notation, axes_name, notation
-from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Rotation
 
 if TYPE_CHECKING:
     from frametool.geometry.types import Quaternion

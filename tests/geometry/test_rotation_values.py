@@ -16,8 +16,7 @@ from frametool.errors import FrametoolWarning, ValueInvalid
 from frametool.geometry import arrays, euler, floats
 from frametool.geometry.conventions import AXES, axes_change
 from frametool.geometry.representations import ROTATIONS, notation
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -402,8 +401,7 @@ def test_conversions_of_long_arrays_need_little_beyond_the_result() -> None:
 
 def test_one_item_loads_no_numpy() -> None:
     program = (
-        "import sys; from frametool.geometry.transform import Transform\n"
-        "from frametool.geometry.rotation import Rotation\n"
+        "import sys; from frametool.geometry.transform import Rotation, Transform\n"
         "from frametool.geometry.conventions import axes_change\n"
         "a = Transform(Rotation.from_rpy([0.1, 0.2, 0.3]), [1, 2, 3]); b = a @ a.inverse(); a.interpolate(b, 0.5)\n"
         "a.distance(b), a.is_close(b), a.relative(b), repr(a), a.rotation.slerp(b.rotation, 0.5), a.rotation.angle()\n"

@@ -13,8 +13,7 @@ import samples
 from frametool.geometry import arrays, earth, euler, floats, matrix, quaternion, rigid
 from frametool.geometry import earth as mercator
 from frametool.geometry.representations import ROTATIONS, notation
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from frametool.fit.measured_tree import BLUNDERS, Measurement
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
     from collections.abc import Callable

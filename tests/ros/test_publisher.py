@@ -10,7 +10,7 @@ from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid
 from frametool.formats.load import load
 from frametool.geometry.representations import notation
-from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Rotation
 from frametool.grammar.pose import Pose
 from frametool.grammar.readers import Reading
 from frametool.grammar.result import Result, Style

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from flow import Moving
 
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

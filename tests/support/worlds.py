@@ -8,8 +8,7 @@ import numpy as np
 
 from frametool.fit.measured_tree import Measurement
 from frametool.fit.tree_problem import bridges, spanning_tree
-from frametool.geometry.rotation import Rotation
-from frametool.geometry.transform import Transform
+from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -18,7 +18,7 @@ from frametool.errors import ValueInvalid
 from frametool.geometry import euler, floats
 from frametool.geometry.conventions import find_euler
 from frametool.geometry.representations import ROTATIONS
-from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Rotation
 
 if TYPE_CHECKING:
     from conftest import Outcome

@@ -126,7 +126,7 @@ def _are_numbers(values: Sequence[str], *, has_from: bool) -> bool:
 def _found(poses: Sequence[Pose], find: str, tolerance: float, style: Style) -> Style:
     """Return a style that writes the Euler conventions in which three angles are a rotation."""
     from frametool.geometry.conventions import find_euler
-    from frametool.geometry.rotation import Rotation
+    from frametool.geometry.transform import Rotation
 
     if len(poses) != 1 or poses[0].rotation is None:
         raise click.UsageError("--find is about one rotation")
