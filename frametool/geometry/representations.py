@@ -369,7 +369,8 @@ class Notation:
 
     def to_quaternion(self, components: Components, xp: Namespace, *, degrees: bool = False) -> Quaternion:
         """Return x, y, z, w; `degrees` applies if the notation itself states no unit."""
-        return self.representation.forward(components, xp, self.in_degrees(degrees), self.bound_axes())
+        unit = degrees if self.degrees is None else self.degrees
+        return self.representation.forward(components, xp, unit, self.bound_axes())
 
     def from_quaternion(
         self, x: Any, y: Any, z: Any, w: Any, xp: Namespace, *, degrees: bool = False, keep_sign: bool = False
@@ -382,7 +383,8 @@ class Notation:
         if keep_sign and {*row.columns} == {*XYZW.columns}:
             named = {"qx": x, "qy": y, "qz": z, "qw": w}
             return tuple(named[column] for column in row.columns)
-        return row.backward((x, y, z, w), xp, self.in_degrees(degrees), self.bound_axes())
+        unit = degrees if self.degrees is None else self.degrees
+        return row.backward((x, y, z, w), xp, unit, self.bound_axes())
 
     def checked_quaternion(
         self, components: Sequence[float], xp: Namespace, *, degrees: bool = False, normalize: bool = False
@@ -445,12 +447,8 @@ def notation(spec: str) -> Notation:
     if name not in REPRESENTATIONS and name[-4:] in ("_deg", "_rad"):
         bare, degrees = name[:-4], name.endswith("_deg")
     row = REPRESENTATIONS.get(bare)
-    if row is None:  # suggested are the nearest, and those nearly as near that have the same numbers in another order
-        near = nearest(bare, REPRESENTATIONS)
-        rivals = [each for each in near if {*REPRESENTATIONS[each].columns} == {*REPRESENTATIONS[near[0]].columns}]
-        meant = [OTHER_NAMES[spec]] if spec in OTHER_NAMES else rivals
-        hint = f"; did you mean {' or '.join(map(shown, meant))}?" if meant else ";"
-        known = f"{hint} representations: {listing(REPRESENTATIONS, near=bare)}"
+    if row is None:
+        known = f"{_near_names(bare, spec)} representations: {listing(REPRESENTATIONS, near=bare)}"
         raise ValueInvalid(f"unknown representation {shown(bare)}{known}")
     if degrees is not None and not row.angles:
         raise ValueInvalid(f"{bare} has no angle: write it without {name[-4:]}")
@@ -459,6 +457,15 @@ def notation(spec: str) -> Notation:
     if colon and row.axes not in CHECKED:
         raise ValueInvalid(f"{bare} has no axes to name; only euler has: euler:{axes or 'rzyx'}")
     return Notation(spec, row, CHECKED[row.axes](axes) if colon else None, degrees=degrees)
+
+
+def _near_names(name: str, spec: str) -> str:
+    """Return the nearest representation, and those nearly as near that have the same numbers in another order."""
+    if spec in OTHER_NAMES:
+        return f"; did you mean {shown(OTHER_NAMES[spec])}?"
+    near = nearest(name, REPRESENTATIONS)
+    rivals = [each for each in near if {*REPRESENTATIONS[each].columns} == {*REPRESENTATIONS[near[0]].columns}]
+    return f"; did you mean {' or '.join(map(shown, rivals))}?" if near else ";"
 
 
 def notations(spec: str) -> tuple[Notation, ...]:

@@ -7,7 +7,7 @@ are those for a single one (`Representation.checked`), which also words the erro
 
 from __future__ import annotations
 
-from math import isfinite
+from math import inf, isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, warn
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from frametool.geometry.representations import BatchRule, Notation
-    from frametool.geometry.types import Array, Components, Indices, Kernel, Numbers
+    from frametool.geometry.types import Array, Components, Indices, Kernel, Namespace, Numbers
 
 
 def single(components: Components) -> bool:
@@ -281,16 +281,17 @@ def read_rotations(
     from frametool.geometry import arrays
 
     inputs, row = tuple(numbers), notation.representation
+    rule = row.batch
     shape = arrays.batch_shape(inputs)
     quaternions = np.empty((4, int(np.prod(shape))))
     off: Array = np.empty(0)  # the deviation of each row, inf if it is refused; empty: nothing to report
     worst = 0.0
     with np.errstate(all="ignore"):
         for place, block in arrays.cut(inputs):
-            grades, right, furthest = _repaired(row.batch, block, normalize=normalize)
+            grades, right, furthest = _repaired(rule, block, arrays, normalize) if rule else (None, block, 0.0)
             worst = max(worst, furthest)
             results = notation.to_quaternion(right, arrays, degrees=degrees)
-            if row.batch is None and not arrays.all_finite(results):
+            if rule is None and not arrays.all_finite(results):
                 grades = np.where(np.isfinite(sum(results)), 0.0, np.inf)
             for target, result in zip(quaternions, results, strict=True):
                 target[place] = result
@@ -310,29 +311,22 @@ def read_rotations(
 
 
 def _repaired(
-    rule: BatchRule | None, block: Components, *, normalize: bool
+    rule: BatchRule, block: Components, xp: Namespace, normalize: bool  # noqa: FBT001 - as of the caller
 ) -> tuple[Array | None, Components, float]:
     """Return the deviations of a block's rows (None: nothing to report), the block made rotations, and the worst."""
-    if rule is None:
-        return None, block, 0.0
-    import numpy as np
-
-    from frametool.geometry import arrays
-
-    off = rule.deviation(*block, arrays)
-    worst = arrays.furthest(off)
+    off = rule.deviation(*block, xp)
+    worst = xp.furthest(off)
     if worst <= min(rule.exact, SILENT):
         return None, block, worst
-    refused = ~(off < np.inf) if normalize else ~(off <= TOLERATED)
-    rough = np.flatnonzero((off > rule.exact) & ~refused)
-    if rough.size == len(off):
-        block = rule.repair(*block, arrays)
-    elif rough.size:
-        mended = rule.repair(*(column[rough] for column in block), arrays)
+    refused = ~(off < inf) if normalize else ~(off <= TOLERATED)
+    (rough,) = ((off > rule.exact) & ~refused).nonzero()
+    if rough.size:
+        some = rough if rough.size < len(off) else slice(None)
+        mended = rule.repair(*(column[some] for column in block), xp)
         block = tuple(column.copy() for column in block)
         for column, values in zip(block, mended, strict=True):
-            column[rough] = values
-    grades = None if worst <= SILENT else np.where(refused, np.inf, 0.0 if normalize else off)
+            column[some] = values
+    grades = None if worst <= SILENT else xp.where(refused, inf, 0.0 if normalize else off)
     return grades, block, float(off[~refused].max(initial=0.0))
 
 
