@@ -312,16 +312,16 @@ def _nerf(value: dict[str, Any]) -> dict[str, Any]:
 
 def _kitti(file: InputFile) -> Found:
     """Yield the cameras of a KITTI calibration."""
-    from frametool.formats.trees.text_calibrations import CAMERAS, RECTIFICATIONS, Calibration
+    from frametool.formats.trees.calibrations import CAMERAS, RECTIFICATIONS, kitti_lines, kitti_name
 
-    read = Calibration(file, _options(file))
-    numbers = {name: field.numbers for name, field in read.fields.items()}
+    options = _options(file)
+    numbers = {name: line.numbers for name, line in kitti_lines(file, options).items()}
     rect = "_rect" if any(name in numbers for name in RECTIFICATIONS) else ""
     for at, camera in enumerate(CAMERAS):
         raw = ("K", "K"), ("D", "D"), ("size", "S"), ("R", "R_rect"), ("P", "P_rect")
         said = {key: each for key, line in raw if (each := numbers.get(f"{line}_0{at}"))}
         if "K" in said:
-            yield read.named(camera), {"model": "plumb_bob", **said}
+            yield kitti_name(camera, options), {"model": "plumb_bob", **said}
         more = {"size": each} if (each := numbers.get(f"S_rect_0{at}")) else {}
         for name, p in ((f"{camera}{rect}", numbers.get(f"P{at}")), (f"{camera}_rect", said.get("P"))):
             fields: dict[str, Any] = {"model": "pinhole", "K": p and [p[0:3], p[4:7], p[8:11]], "P": p, **more}
@@ -329,7 +329,7 @@ def _kitti(file: InputFile) -> Found:
                 turn, centre = said["R"], Camera(**fields).rectified(from_first=True).fields["shift"]
                 fields["shift"] = [c - sum(turn[3 * i + k] * t[k] for k in range(3)) for i, c in enumerate(centre)]
             if p:
-                yield read.named(name), fields
+                yield kitti_name(name, options), fields
 
 
 def _options(file: InputFile) -> Options:

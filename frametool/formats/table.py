@@ -305,7 +305,7 @@ FORMATS = {
         required_options=("direction", "frames"), reads=_CAMERAS,
     ),
     "kalibr": _read_tree(
-        "results of Kalibr as text", "frametool.formats.trees.text_calibrations",
+        "results of Kalibr as text", "frametool.formats.trees.calibrations",
         magic=(
             ("text", r"(?im)^[ \t]*(?:baseline T_\d+_\d+:|Camera-system parameters:)"),
             ("text", r"(?im)^[ \t]*(?:Transformation[ \t]+)?T_(?:ci|ic|\w{1,40}_\w{1,40}):?[ \t]*\(\w{1,40} to \w"),
@@ -335,7 +335,7 @@ FORMATS = {
         conventions="parent<-child, metres, quaternion by name; its euler_angles_degree are not used",
     ),
     "kitti-calib": _read_tree(
-        "KITTI calibration", "frametool.formats.trees.text_calibrations", magic=(("text", _KITTI),),
+        "KITTI calibration", "frametool.formats.trees.calibrations", magic=(("text", _KITTI),),
         conventions="parent<-child, metres, optical axes of cameras by default",
         required_options=("frames", "camera_axes"), reads=_CAMERAS,
     ),
