@@ -155,7 +155,7 @@ _RECORDING = _messages(
 _DRAWN = _tree("", _DRAWINGS, reads=("drawing",), conventions="parent -> child, no poses")
 _LAS = _arrays("", "frametool.formats.rows.las", writes=("points", "arrays"), conventions="metres")
 _BIN = _arrays(
-    "", "frametool.formats.rows.clouds", writes=("points", "arrays"),
+    "", "frametool.formats.rows.column_file", writes=("points", "arrays"),
     conventions="float32, metres, frame of the lidar; only --in tells it from other .bin",
 )  # fmt: skip
 _XYZI = ("x", "y", "z", "intensity")
@@ -383,7 +383,7 @@ FORMATS = {
         magic=(("magic", _PCD),), conventions="metres; VIEWPOINT: pose of the sensor among the points, w first",
     ),
     "ply": _arrays(
-        "PLY point cloud or mesh", "frametool.formats.rows.ply", suffixes=(".ply",), writes=("points", "arrays"),
+        "PLY point cloud or mesh", "frametool.formats.rows.clouds", suffixes=(".ply",), writes=("points", "arrays"),
         magic=(("magic", rb"ply\r?\n"),), conventions="metres",
     ),
     "kitti-bin": _BIN._replace(summary="point cloud of KITTI, .bin", rows=Rows(columns=_XYZI)),

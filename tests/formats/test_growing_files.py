@@ -10,7 +10,7 @@ import pytest
 
 from frametool.documents.source import InputFile
 from frametool.formats.load import FrameFile
-from frametool.formats.rows.ply import read_head
+from frametool.formats.rows.clouds import read_head
 from frametool.grammar.edges import Answers
 
 if TYPE_CHECKING:

@@ -1,26 +1,37 @@
-"""Point clouds: what those with a header share, PCD and PLY; and those without, of KITTI and nuScenes.
+"""Point clouds with a header: what PCD and PLY share, and PLY, of polygons too.
 
 Records are binary, or lines of numbers between blanks.  Unchanged data are preserved byte for byte: in text, blanks,
-line ends and the digits of other columns too.  Headers are parsed and written by their formats.
+line ends and the digits of other columns too.  Of PLY, vertices and their normals are transformed:
 
-A cloud without a header is consecutive points, four or five float32 (little-endian) each:
+    ply
+    format binary_little_endian 1.0
+    comment made by hand
+    element vertex 3
+    property float x
+    property float y
+    property float z
+    element face 1
+    property list uchar int vertex_indices
+    end_header
 
-    x y z intensity            KITTI, velodyne/000000.bin
-    x y z intensity ring       nuScenes, LIDAR_TOP/*.pcd.bin
-
-Metres, in the frame of the lidar.  The file does not state which of the two it is: `--in` does.
+Reads `ascii`, `binary_little_endian`, `binary_big_endian`; the unit is that of the author, metres for point clouds.
+Rotations of Gaussian splats, rot_0 .. rot_3 (w x y z, of any norm), are rotated too; their spherical harmonics are
+not, with a warning.
 """
 
 from __future__ import annotations
 
+import re
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from itertools import chain, takewhile
+from math import log
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.formats.rows import column_file
-from frametool.formats.table import FORMATS
+from frametool.geometry.rigid import EXACT, SCALED
 from frametool.grammar.readers import NORMALS
 from frametool.text.lines import read_blocks
 from frametool.text.numbers import explain_number
@@ -33,7 +44,8 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.errors import FormatError
-    from frametool.formats.rows.column_file import Kind, Made, OutColumn
+    from frametool.formats.rows.column_file import Batch, Kind, Made, OutColumn
+    from frametool.geometry.types import Components
     from frametool.grammar.result import Style
     from frametool.text.spans import Floats, Ints
 
@@ -42,7 +54,6 @@ Code = TypeVar("Code")
 LONGEST_HEAD = 1 << 20  # bytes of a header: a hundred times the longest known
 _MOST_POINTS = 1 << 62
 _NOT_FINITE = {"nan": np.nan, "inf": np.inf, "infinity": np.inf}
-_SINGLE = np.dtype("<f4")
 
 
 class CloudFile(column_file.RecordFile):
@@ -65,7 +76,7 @@ class CloudFile(column_file.RecordFile):
     header: Callable[[Sequence[OutColumn], int], bytes]
     record_with: Callable[[Sequence[OutColumn]], Kind]
 
-    def batches(self) -> Iterator[column_file.Batch]:
+    def batches(self) -> Iterator[Batch]:
         """Yield the points; raises FormatError if the file ends too early, or has more."""
         yield from super().batches() if self.at is None else self._rows_of_text(self.at)
         if not self.is_last:
@@ -239,7 +250,7 @@ def encode_text(
         if style.precision is not None:
             spans = fixed_spans(values, style.precision, b" ")
         else:
-            spans = shortest_spans(rounded_to_single(values) if column.kind == _SINGLE else values, b" ")
+            spans = shortest_spans(rounded_to_single(values) if column.kind == column_file.SINGLE else values, b" ")
         written = Spans(spans.data, spans.starts[:, 0], spans.ends[:, 0] - 1)
         if place < len(batch.at):
             end = cells.ends[chosen, batch.at[place]]
@@ -251,82 +262,211 @@ def encode_text(
     return join([*parts, Spans(cells.data, at, ends)])
 
 
-# --- points without a header ---
+# --- PLY ---
+
+FORMS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
+    "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
+    "float32": "f4", "float64": "f8", "int64": "i8", "uint64": "u8",
+}  # fmt: skip
+NAMES = {code: name for name, code in reversed(TYPES.items())}
+NEW_NAMES = {code: name for code, name in NAMES.items() if code not in ("i8", "u8")}  # not every tool reads these
+NEW_NAMES |= {"b1": "uchar", "f2": "float"}
+PROPERTY = rf"(?:list (?:{'|'.join(name for name, code in TYPES.items() if code[0] != 'f')}) )?(?:{'|'.join(TYPES)})"
+LINES = {
+    "format": f"one format: {', '.join(FORMS)}, and 1.0",
+    "element": "element NAME COUNT, each name once",
+    "property": "property TYPE NAME below an element, or property list INTEGER TYPE NAME, each name once; "
+    f"types: {', '.join(TYPES)}",
+}
+VERTEX = "vertex"
+OWN_LINES: tuple[list[bytes], ...] = ([b"property"], [b"comment"], [b"obj_info"], [])  # of an element
+SPLAT = ("rot_1", "rot_2", "rot_3", "rot_0")  # x y z w
 
 
-class BinCloud(column_file.RecordFile):
-    """The points of a file without a header."""
+class PlyElement(NamedTuple):
+    """One element of a file.
+
+    instances: their number; line: in the header
+    properties: by name the type of a value, and for a list the type of its count, else ""
+    """
+
+    name: str
+    instances: int
+    line: int
+    properties: dict[str, tuple[str, str]]
+
+    @property
+    def lists(self) -> list[str]:
+        """Return the properties that are lists, whose size is not known beforehand."""
+        return [name for name, (_, counted) in self.properties.items() if counted]
+
+
+def read_head(file: InputFile) -> tuple[bytes, str, list[PlyElement]]:
+    """Read a header, up to the data; raises FormatError with line, value and remedy."""
+    if (first := file.stream.readline(64)).strip() != b"ply" or not first.endswith(b"\n"):
+        raise file.error("the first line of a PLY file is `ply`, and it ends in a line feed", 1)
+    fmt, elements, text = "", dict[str, PlyElement](), [first]
+    for words in head_lines(file, text, "`end_header`"):
+        match words:
+            case ["comment" | "obj_info", *_]:
+                continue
+            case ["end_header", *_]:
+                break
+            case ["format", name, "1.0"] if name in FORMS and not fmt:
+                fmt = name
+            case ["element", name, number] if name not in elements:
+                count = count_in(number, f"{shown(number)} of element {shown(name)}", file, len(text))
+                element = elements[name] = PlyElement(name, count, len(text), {})
+            case ["property", *types, name] if (
+                elements and name not in element.properties and re.fullmatch(PROPERTY, " ".join(types))
+            ):
+                *counted, code = (TYPES[each] for each in types if each != "list")
+                element.properties[name] = code, "".join(counted)
+            case [word, *_]:
+                expected = LINES.get(word, f"{', '.join(LINES)}, comment, obj_info or end_header at its beginning")
+                raise file.error(f"{shown(' '.join(words))}: expected {expected}", len(text))
+    if not fmt:
+        raise file.error(f"the header has no format; formats: {', '.join(FORMS)}", len(text))
+    return b"".join(text), FORMS[fmt], list(elements.values())
+
+
+class PlyFile(CloudFile):
+    """A cloud, or the vertices of a mesh, read in batches."""
+
+    vectors = NORMALS[::-1]
+    what = "vertices"
 
     def __init__(self, file: InputFile) -> None:
-        """Count the points; raises FormatError if the last one is incomplete."""
-        names = FORMATS[file.format].rows.columns
-        record = column_file.record_of([_SINGLE] * len(names))
-        file.stream = column_file.seekable(file, self)
-        size = column_file.bytes_left(file.stream) or 0
-        if size % record.itemsize:
-            others = [name for name, row in FORMATS.items() if row.reader == __name__ and name != file.format]
-            fits = [name for name in others if size % (_SINGLE.itemsize * len(FORMATS[name].rows.columns)) == 0]
-            hint = f"; --in {fits[0]} fits" if fits else "; is it whole?"
-            points = f"points of {record.itemsize} bytes (float32 {' '.join(names)})"
-            raise file.error(f"{size} bytes are no whole number of {points}{hint}")
-        super().__init__(file, names, record, size // record.itemsize)
+        """Read the header and everything before the vertices; raises FormatError, also for lists on the way to them."""
+        self.head, self.order, elements = read_head(file)
+        at = next((at for at, each in enumerate(elements) if each.name == VERTEX), None)
+        if at is None:
+            names = listing(each.name for each in elements) or "none"
+            raise file.error(f"no element {VERTEX!r}; elements: {names}")
+        before, vertex, self.after = elements[:at], elements[at], elements[at + 1 :]
+        self.others = before + self.after
+        if vertex.lists:
+            message = f"the list {shown(vertex.lists[0])} within {VERTEX!r} is not read"
+            raise file.error(f"{message}; write it as an element of its own, or leave it out", vertex.line)
+        for each in before:
+            if self.order and each.lists and each.instances:
+                message = f"element {shown(each.name)} with the list {shown(each.lists[0])} is before {VERTEX!r}"
+                raise file.error(f"{message}; write {VERTEX!r} first, or the file as ascii", each.line)
+        self.codes = {name: code for name, (code, _) in vertex.properties.items()}
+        record = column_file.record_of((self.order or "<") + code for code in self.codes.values())
+        super().__init__(file, self.codes, record, vertex.instances)
+        self.own_line = vertex.line
+        self.is_last = not self.after
+        self.turn: tuple[float, ...] | None = None
+        if self.order:
+            sizes = (each.instances * sum(int(code[1:]) for code, _ in each.properties.values()) for each in before)
+            self.before = column_file.read_exactly(file, sum(sizes), "the elements before the vertices")
+            column_file.check_declared(file, self.count, record.itemsize, self.what, last=self.is_last)
+            return
+        lines, count = list[bytes](), sum(each.instances for each in before)
+        while count and (line := file.stream.readline()):
+            lines.append(line)
+            count -= bool(line.strip())
+        if count:
+            raise file.error(f"the file ends before its vertices, {count} lines early")
+        if not self.width:
+            raise file.error(f"the {self.count} vertices have no properties")
+        self.before = b"".join(lines)
+        self.at, self.cells, self.line = range(self.width), self.width, (self.head + self.before).count(b"\n") + 1
 
-    def batches(self) -> Iterator[column_file.Batch]:
-        """Yield the points; raises FormatError for invalid rings."""
-        done = 0
+    def moved_by(self, pose: Components | None) -> None:
+        """Rotate splats by the pose that transforms all points; None: there is no such pose."""
+        name = self.file.name
+        if pose is not None and len(pose) == SCALED and "scale_0" in self.names:
+            warn(f"{name}: scale_0 .. scale_2, the sizes of splats, are left as they are: add {log(pose[EXACT]):.9g}")
+        turns = pose is None or pose[6] * pose[6] < 1.0
+        if not turns or not set(SPLAT) <= set(self.names):
+            return
+        if pose is None or self.at is not None or any(self.codes[each][0] != "f" for each in SPLAT):
+            why = "not all points are moved by the same pose" if pose is None else "only binary files are turned"
+            warn(f"{name}: rot_0 .. rot_3, the rotations of splats, are left as they are: {why}")
+            return
+        self.turn = pose[3:EXACT]
+        if "f_rest_0" in self.names:
+            warn(f"{name}: f_rest_*, spherical harmonics, are left as they are: colours keep to the old axes")
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield the vertices; raises FormatError if the file ends too early, or has more.
+
+        Rotations of splats are multiplied from the left: the Hamilton product, which preserves their norms.
+        """
         for batch in super().batches():
-            rings = batch.column(self.width - 1) if "ring" in FORMATS[self.file.format].rows.columns else np.zeros(0)
-            bad = np.flatnonzero((rings != np.rint(rings)) | (rings < 0))
-            if len(bad):
-                found = f"ring: {rings[bad[0]]:g} is not a ring number; is it --in kitti-bin?"
-                raise self.file.error(found, done + int(bad[0]) + 1)
-            done += batch.size
+            if self.turn is not None:
+                columns = [batch.column(self.names.index(name)) for name in SPLAT]
+                bx, by, bz, bw = (column.astype(np.float64) for column in columns)
+                ax, ay, az, aw = self.turn
+                turned = (
+                    aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
+                    aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz,
+                )  # fmt: skip
+                for column, values in zip(columns, turned, strict=True):
+                    column[:] = values
             yield batch
 
-    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> PointsWriter:
-        """Return a writer for a cloud of either format."""
-        del drops
-        return PointsWriter(columns, None, style)
+    def rest(self) -> Iterator[bytes]:
+        """Yield everything after the vertices; binary data are copied unchecked.
+
+        Raises FormatError if there are more or fewer lines than the header says.
+        """
+        lines, begun = 0, b""
+        for piece in chain((self.behind,), () if self.is_last else column_file.pieces(self.file.stream)):
+            yield piece
+            if self.at is not None:
+                *whole, begun = (begun + piece).split(b"\n")
+                lines += sum(map(bool, map(bytes.strip, whole)))
+        lines += bool(begun.strip())
+        expected = sum(each.instances for each in self.after)
+        if self.at is not None and lines != expected:
+            said = f"after the vertices there are {lines} lines, the header says {expected}; correct the header"
+            raise self.file.error(said)
+
+    def record_with(self, columns: Sequence[OutColumn]) -> Kind:
+        """Return the type of a vertex with other columns."""
+        return column_file.record_of(self.order + TYPES[_type_of(column)] for column in columns)
+
+    def header(self, columns: Sequence[OutColumn], count: int) -> bytes:
+        """Return the header with the number of vertices and their properties, and everything before them."""
+        text = self.head
+        if count != self.count:
+            if not self.is_last:
+                names = ", ".join(shown(each.name) for each in self.others)
+                raise ValueInvalid(f"vertices cannot be left out: other elements count them ({names})")
+            text = re.sub(rb"(?m)^(\s*element\s+vertex\s+)\d+", rb"\g<1>%d" % count, text, count=1)
+        if not same_columns(columns, self.width):
+            lines = text.splitlines(keepends=True)
+            end = b"\r\n" if lines[0].endswith(b"\r\n") else b"\n"
+            own = list(takewhile(lambda line: line.split()[:1] in OWN_LINES, lines[self.own_line :]))
+            others = [line for line in own if line.split()[:1] != [b"property"]]
+            made = [_property_line(column) + end for column in columns]
+            text = b"".join([*lines[: self.own_line], *made, *others, *lines[self.own_line + len(own) :]])
+        return text + self.before
 
 
-class PointsWriter:
-    """Writes points without a header; `off` is the largest rounding error of float32."""
-
-    def __init__(self, columns: Sequence[OutColumn], _count: int | None, style: Style) -> None:
-        """Find the columns; raises ValueInvalid if one is missing, and warns about those that are omitted."""
-        self.columns, self.format = columns, (fmt := style.format)
-        self.names = FORMATS[fmt].rows.columns
-        self.off = 0.0
-        at_input = [column.name for column in columns if column.kind is not None]
-        if missing := [name for name in self.names if name not in at_input]:
-            raise ValueInvalid(f"{fmt} holds {' '.join(self.names)}; there is no {listing(missing)}")
-        if others := [column.name for column in columns if column.name not in self.names]:
-            warn(f"{fmt}: {listing(others)} left out: it holds {' '.join(self.names)} alone")
-
-    def of_rows(self, batch: column_file.Batch | None, rows: Ints | None, made: Sequence[Made]) -> bytes:
-        """Return the bytes of some points."""
-        new, found = iter(made), {}
-        for column in self.columns:
-            if column.passed is None or batch is None:
-                found[column.name] = next(new).values
-            else:
-                passed = batch.column(column.passed)
-                found[column.name] = passed if rows is None else passed[rows]
-        points = np.empty((len(found[self.names[0]]), len(self.names)), _SINGLE)
-        for at, name in enumerate(self.names):
-            with np.errstate(over="ignore", invalid="ignore"):
-                points[:, at] = found[name]
-                far = abs(points[:, at] - found[name])
-            if np.isinf(far).any():
-                raise ValueInvalid(f"column {name}: {found[name][np.isinf(far)][0]:g} is too large for float32")
-            self.off = max(self.off, float(np.nanmax(far, initial=0.0)))
-        return points.tobytes()
-
-    def end(self) -> Iterator[bytes]:
-        """Warn about rounding."""
-        if self.off:
-            warn(f"{self.format}: numbers are float32; they were rounded by up to {self.off:.1g}")
-        return iter(())
+def _type_of(column: OutColumn) -> str:
+    """Return PLY's name for the type of a column; raises ValueInvalid for what PLY cannot hold."""
+    return type_in("ply", NEW_NAMES if column.passed is None else NAMES, column)
 
 
-open_columns, create = BinCloud, PointsWriter
+def _property_line(column: OutColumn) -> bytes:
+    return f"property {_type_of(column)} {column.name}".encode()
+
+
+def create(columns: Sequence[OutColumn], count: int | None, _style: Style) -> column_file.CountedWriter:
+    """Return a writer for new points, with numbers of their own types."""
+    record = column_file.record_of(f"<{TYPES[_type_of(column)]}" for column in columns)
+    lines = b"".join(_property_line(column) + b"\n" for column in columns)
+
+    def head(vertices: int) -> bytes:
+        return b"ply\nformat binary_little_endian 1.0\nelement vertex %d\n%send_header\n" % (vertices, lines)
+
+    return column_file.CountedWriter(partial(column_file.encode_records, columns, record), head, count)
+
+
+open_columns, misfit = PlyFile, partial(misfit_of, NEW_NAMES)

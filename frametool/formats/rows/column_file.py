@@ -4,7 +4,15 @@ The module of a format that is read as `arrays` has `open_columns(file) -> Colum
 `create(columns, count, style) -> ColumnWriter`.  Rows are counted from 1, batches follow one another.
 
 Records in a file have numpy's layout, one field after another.  Headers are checked against the file before data are
-read, memory is allocated or output is written.  Knows no format.
+read, memory is allocated or output is written.
+
+One format is nothing but records, and is read and written here, kitti-bin and nuscenes-bin: consecutive points, four or
+five float32 (little-endian) each:
+
+    x y z intensity            KITTI, velodyne/000000.bin
+    x y z intensity ring       nuScenes, LIDAR_TOP/*.pcd.bin
+
+Metres, in the frame of the lidar.  The file does not state which of the two it is: `--in` does.
 """
 
 from __future__ import annotations
@@ -22,7 +30,8 @@ from weakref import finalize
 import numpy as np
 
 from frametool.documents.source import InputFile, Verbatim
-from frametool.errors import FormatError, FrametoolError, ValueInvalid, printable, shown
+from frametool.errors import FormatError, FrametoolError, ValueInvalid, listing, printable, shown, warn
+from frametool.formats.table import FORMATS
 from frametool.frames.stamps import SUFFIXES, nanoseconds_each, tell_size
 from frametool.text.parse import nanoseconds_of
 
@@ -42,6 +51,7 @@ if TYPE_CHECKING:
 FLOATS, WHOLE = "f", "iu"  # kinds of numpy's types
 STAMP_NS = np.dtype(np.int64)
 XYZ = ("x", "y", "z")
+SINGLE = np.dtype("<f4")
 PIECE = 1 << 20  # bytes that are copied at once
 BATCH_BYTES = 1 << 21
 MOST_ROWS = 1 << 15  # of a batch; it and its results stay in cache
@@ -389,3 +399,88 @@ def encode_records(
         elif of_input is not None and records is not of_input.rows:
             records[name] = of_input.column(column.passed)
     return memoryview(records.view(np.uint8)) if records.size else b""  # type: ignore[arg-type]
+
+
+# --- points without a header ---
+
+
+class BinCloud(RecordFile):
+    """The points of a file without a header."""
+
+    def __init__(self, file: InputFile) -> None:
+        """Count the points; raises FormatError if the last one is incomplete."""
+        names = FORMATS[file.format].rows.columns
+        record = record_of([SINGLE] * len(names))
+        file.stream = seekable(file, self)
+        size = bytes_left(file.stream) or 0
+        if size % record.itemsize:
+            others = {name: row.rows.columns for name, row in FORMATS.items() if row.reader == __name__}
+            fits = [name for name, of in others.items() if of and size % (SINGLE.itemsize * len(of)) == 0]
+            hint = f"; --in {fits[0]} fits" if fits else "; is it whole?"
+            points = f"points of {record.itemsize} bytes (float32 {' '.join(names)})"
+            raise file.error(f"{size} bytes are no whole number of {points}{hint}")
+        super().__init__(file, names, record, size // record.itemsize)
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield the points; raises FormatError for invalid rings."""
+        done = 0
+        for batch in super().batches():
+            rings = batch.column(self.width - 1) if "ring" in FORMATS[self.file.format].rows.columns else np.zeros(0)
+            bad = np.flatnonzero((rings != np.rint(rings)) | (rings < 0))
+            if len(bad):
+                found = f"ring: {rings[bad[0]]:g} is not a ring number; is it --in kitti-bin?"
+                raise self.file.error(found, done + int(bad[0]) + 1)
+            done += batch.size
+            yield batch
+
+    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
+        """Return a writer for a cloud of either format."""
+        del drops
+        return _bin_writer(columns, style.format)
+
+
+def _bin_writer(columns: Sequence[OutColumn], fmt: str) -> CountedWriter:
+    """Return a writer for points without a header, which warns about columns left out and about rounding to float32.
+
+    Raises ValueInvalid if a column is missing, or a number too large.
+    """
+    names, off = FORMATS[fmt].rows.columns, 0.0
+    at_input = [column.name for column in columns if column.kind is not None]
+    if missing := [name for name in names if name not in at_input]:
+        raise ValueInvalid(f"{fmt} holds {' '.join(names)}; there is no {listing(missing)}")
+    if others := [column.name for column in columns if column.name not in names]:
+        warn(f"{fmt}: {listing(others)} left out: it holds {' '.join(names)} alone")
+
+    def encode(batch: Batch | None, rows: Ints | None, made: Sequence[Made]) -> bytes:
+        nonlocal off
+        new, found = iter(made), {}
+        for column in columns:
+            if column.passed is None or batch is None:
+                found[column.name] = next(new).values
+            else:
+                passed = batch.column(column.passed)
+                found[column.name] = passed if rows is None else passed[rows]
+        points = np.empty((len(found[names[0]]), len(names)), SINGLE)
+        for at, name in enumerate(names):
+            with np.errstate(over="ignore", invalid="ignore"):
+                points[:, at] = found[name]
+                far = abs(points[:, at] - found[name])
+            if np.isinf(far).any():
+                raise ValueInvalid(f"column {name}: {found[name][np.isinf(far)][0]:g} is too large for float32")
+            off = max(off, float(np.nanmax(far, initial=0.0)))
+        return points.tobytes()
+
+    def behind() -> tuple[bytes, ...]:
+        if off:
+            warn(f"{fmt}: numbers are float32; they were rounded by up to {off:.1g}")
+        return ()
+
+    return CountedWriter(encode, lambda _: b"", 0, behind)
+
+
+def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> CountedWriter:
+    """Return a writer for new points."""
+    return _bin_writer(columns, style.format)
+
+
+open_columns = BinCloud

@@ -24,7 +24,7 @@ import struct
 from collections import Counter
 from functools import partial
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -83,89 +83,6 @@ def layout_of(fields: Sequence[PcdField]) -> tuple[list[str], list[int], Kind]:
     })  # fmt: skip
     names = [field.name if field.values == 1 else f"{field.name}_{place}" for _, field, place in used]
     return names, [at for at, _, _ in used], record
-
-
-class PcdHead:
-    """The contents of a header.
-
-    text: the header byte for byte, including its last line end
-    words: the values of each key; lines: the number of its line
-    viewpoint: seven numbers; None if there are none
-    """
-
-    def __init__(self, file: InputFile) -> None:
-        """Read a header, up to the data; raises FormatError with line, value and remedy."""
-        self.file, text = file, list[bytes]()
-        self.words: dict[str, list[str]] = {}
-        self.lines: dict[str, int] = {}
-        for words in head_lines(file, text, "DATA"):
-            if words[0].startswith("#"):
-                continue
-            if (key := words[0].upper()) not in _KEYS:
-                raise file.error(f"{shown(words[0])} is not a key of a PCD header; keys: {listing(_KEYS)}", len(text))
-            if (key := "FIELDS" if key == "COLUMNS" else key) in self.lines:
-                raise file.error(f"{key} appears twice, first on line {self.lines[key]}", len(text))
-            self.lines[key], self.words[key] = len(text), words[1:]
-            if key == "DATA":
-                break
-        self.text = b"".join(text)
-        missing = [key for key in ("FIELDS", "SIZE", "TYPE") if key not in self.lines]
-        if "POINTS" not in self.lines and not {"WIDTH", "HEIGHT"} <= set(self.lines):
-            missing.append("POINTS")
-        if missing:
-            raise self.problem("DATA", f"the header has no {', '.join(missing)}")
-        self.fields = self._fields()
-        counts = {}
-        for key in [key for key in ("WIDTH", "HEIGHT", "POINTS") if key in self.words]:
-            if len(words := self.words[key]) != 1:
-                raise self.problem(key, f"{key} has {len(words)} values, expected 1")
-            counts[key] = count_in(words[0], f"{key} {shown(words[0])}", file, self.lines[key])
-        if {"WIDTH", "HEIGHT"} <= counts.keys():
-            points = counts["WIDTH"] * counts["HEIGHT"]
-            if counts.setdefault("POINTS", points) != points:
-                both = f"WIDTH {counts['WIDTH']} times HEIGHT {counts['HEIGHT']} is {points}"
-                raise self.problem("POINTS", f"POINTS is {counts['POINTS']}, {both}; correct the one that is wrong")
-        self.points = counts["POINTS"]
-        self.data = " ".join(self.words["DATA"]).lower()
-        if self.data not in DATA:
-            raise self.problem("DATA", f"DATA {shown(self.data)} is not known; known: {', '.join(DATA)}")
-        self.viewpoint: tuple[float, ...] | None = None
-        if (sensor := self.words.get("VIEWPOINT")) is not None:
-            if len(sensor) != 7:
-                found = f"VIEWPOINT has {len(sensor)} numbers, expected 7 (tx ty tz qw qx qy qz)"
-                raise self.problem("VIEWPOINT", found)
-            try:
-                self.viewpoint = tuple(map(parse_number, sensor))
-            except ValueInvalid as error:
-                raise self.problem("VIEWPOINT", f"VIEWPOINT: {error}") from None
-
-    def problem(self, key: str, message: str) -> FormatError:
-        """Return the error for a line."""
-        return self.file.error(message, self.lines.get(key, 0))
-
-    def _fields(self) -> tuple[PcdField, ...]:
-        """Return the fields of a point."""
-        names, fields = self.words["FIELDS"], list[PcdField]()
-        others = {key: self.words.get(key, ["1"] * len(names)) for key in _EACH[1:]}
-        for key, words in others.items():
-            if len(words) != len(names):
-                raise self.problem(key, f"{key} has {len(words)} values for {len(names)} fields")
-        if not names:
-            raise self.problem("FIELDS", "FIELDS names no field")
-        for name, times in Counter(names).items():
-            if name != PADDING and times > 1:
-                raise self.problem("FIELDS", f"field {shown(name)} appears twice")
-        for name, size, letter, values in zip(names, *others.values(), strict=True):
-            of, kind = f" of field {shown(name)}", letter.upper()
-            if kind not in TYPES:
-                raise self.problem("TYPE", f"TYPE {shown(kind)}{of} is not known; known: F, I, U")
-            if size not in (known := [*map(str, TYPES[kind])]):
-                raise self.problem("SIZE", f"SIZE {shown(size)}{of}: TYPE {kind} has {', '.join(known)}")
-            count = count_in(values, f"COUNT {shown(values)}{of}", self.file, self.lines.get("COUNT", 0))
-            fields.append(PcdField(name, int(size), kind, count))
-        if sum(field.values for field in fields) > _WIDEST:
-            raise self.problem("COUNT", f"more than {_WIDEST} values a point")
-        return tuple(fields)
 
 
 def _words_of(fields: Sequence[PcdField]) -> dict[str, str]:
@@ -229,29 +146,104 @@ def unpack(packed: bytes, size: int) -> bytearray:
 
 
 class PcdFile(CloudFile):
-    """A cloud whose points are read in batches."""
+    """A cloud whose points are read in batches.
+
+    text: the header byte for byte, including its last line end
+    words: the values of each key; lines: the number of its line
+    sensor: the seven numbers of VIEWPOINT; None if there are none.  viewpoint: their words, once they are transformed
+    """
+
+    viewpoint = ""
+    sensor: tuple[float, ...] | None = None
 
     def __init__(self, file: InputFile) -> None:
-        """Read the header and check it against the file; raises FormatError."""
-        head = self.head = PcdHead(file)
-        names, cells, record = layout_of(head.fields)
-        super().__init__(file, names, record, head.points)
-        self.viewpoint = ""
-        if head.data == "binary":
+        """Read the header and check it against the file; raises FormatError with line, value and remedy."""
+        self.file, text = file, list[bytes]()
+        self.words: dict[str, list[str]] = {}
+        self.lines: dict[str, int] = {}
+        for words in head_lines(file, text, "DATA"):
+            if words[0].startswith("#"):
+                continue
+            if (key := words[0].upper()) not in _KEYS:
+                raise file.error(f"{shown(words[0])} is not a key of a PCD header; keys: {listing(_KEYS)}", len(text))
+            if (key := "FIELDS" if key == "COLUMNS" else key) in self.lines:
+                raise file.error(f"{key} appears twice, first on line {self.lines[key]}", len(text))
+            self.lines[key], self.words[key] = len(text), words[1:]
+            if key == "DATA":
+                break
+        self.text = b"".join(text)
+        missing = [key for key in ("FIELDS", "SIZE", "TYPE") if key not in self.lines]
+        if "POINTS" not in self.lines and not {"WIDTH", "HEIGHT"} <= set(self.lines):
+            missing.append("POINTS")
+        if missing:
+            raise self._problem("DATA", f"the header has no {', '.join(missing)}")
+        self.fields = self._read_fields()
+        counts = {}
+        for key in [key for key in ("WIDTH", "HEIGHT", "POINTS") if key in self.words]:
+            if len(words := self.words[key]) != 1:
+                raise self._problem(key, f"{key} has {len(words)} values, expected 1")
+            counts[key] = count_in(words[0], f"{key} {shown(words[0])}", file, self.lines[key])
+        if {"WIDTH", "HEIGHT"} <= counts.keys():
+            points = counts["WIDTH"] * counts["HEIGHT"]
+            if counts.setdefault("POINTS", points) != points:
+                both = f"WIDTH {counts['WIDTH']} times HEIGHT {counts['HEIGHT']} is {points}"
+                raise self._problem("POINTS", f"POINTS is {counts['POINTS']}, {both}; correct the one that is wrong")
+        self.data = " ".join(self.words["DATA"]).lower()
+        if self.data not in DATA:
+            raise self._problem("DATA", f"DATA {shown(self.data)} is not known; known: {', '.join(DATA)}")
+        if (sensor := self.words.get("VIEWPOINT")) is not None:
+            if len(sensor) != 7:
+                found = f"VIEWPOINT has {len(sensor)} numbers, expected 7 (tx ty tz qw qx qy qz)"
+                raise self._problem("VIEWPOINT", found)
+            try:
+                self.sensor = tuple(map(parse_number, sensor))
+            except ValueInvalid as error:
+                raise self._problem("VIEWPOINT", f"VIEWPOINT: {error}") from None
+        names, cells, record = layout_of(self.fields)
+        super().__init__(file, names, record, counts["POINTS"])
+        if self.data == "binary":
             column_file.check_declared(file, self.count, self.record.itemsize, self.what, last=True)
-        elif head.data == "ascii":
-            self.at, self.cells = cells, sum(field.values for field in head.fields)
-            self.line = head.text.count(b"\n") + 1
+        elif self.data == "ascii":
+            self.at, self.cells = cells, sum(field.values for field in self.fields)
+            self.line = self.text.count(b"\n") + 1
+
+    def _problem(self, key: str, message: str) -> FormatError:
+        """Return the error for a line."""
+        return self.file.error(message, self.lines.get(key, 0))
+
+    def _read_fields(self) -> tuple[PcdField, ...]:
+        """Return the fields of a point."""
+        names, fields = self.words["FIELDS"], list[PcdField]()
+        others = {key: self.words.get(key, ["1"] * len(names)) for key in _EACH[1:]}
+        for key, words in others.items():
+            if len(words) != len(names):
+                raise self._problem(key, f"{key} has {len(words)} values for {len(names)} fields")
+        if not names:
+            raise self._problem("FIELDS", "FIELDS names no field")
+        for name, times in Counter(names).items():
+            if name != PADDING and times > 1:
+                raise self._problem("FIELDS", f"field {shown(name)} appears twice")
+        for name, size, letter, values in zip(names, *others.values(), strict=True):
+            of, kind = f" of field {shown(name)}", letter.upper()
+            if kind not in TYPES:
+                raise self._problem("TYPE", f"TYPE {shown(kind)}{of} is not known; known: F, I, U")
+            if size not in (known := [*map(str, TYPES[kind])]):
+                raise self._problem("SIZE", f"SIZE {shown(size)}{of}: TYPE {kind} has {', '.join(known)}")
+            count = count_in(values, f"COUNT {shown(values)}{of}", self.file, self.lines.get("COUNT", 0))
+            fields.append(PcdField(name, int(size), kind, count))
+        if sum(field.values for field in fields) > _WIDEST:
+            raise self._problem("COUNT", f"more than {_WIDEST} values a point")
+        return tuple(fields)
 
     def moved_by(self, pose: Components | None) -> None:
         """Transform VIEWPOINT by the pose that transforms all points; None: there is no such pose."""
-        if self.head.viewpoint is None:
+        if self.sensor is None:
             return
         name = self.file.name
         if pose is None:
             warn(f"{name}: VIEWPOINT is left as it is: not all points are moved by the same pose")
             return
-        tx, ty, tz, w, x, y, z = self.head.viewpoint
+        tx, ty, tz, w, x, y, z = self.sensor
         if quaternion.complaint(x, y, z, w):
             warn(f"{name}: VIEWPOINT is left as it is: {w:g} {x:g} {y:g} {z:g} is not a rotation")
             return
@@ -263,12 +255,12 @@ class PcdFile(CloudFile):
 
         Packed columns are stored field by field, possibly with padding.
         """
-        if self.head.data != "binary_compressed":
+        if self.data != "binary_compressed":
             yield from super().batches()
             return
         if not self.count:
             return
-        file, points, fields = self.file, self.count, self.head.fields
+        file, points, fields = self.file, self.count, self.fields
         packed_size, size = struct.unpack("<II", column_file.read_exactly(file, 8, "the sizes behind DATA"))
         if size != points * self.record.itemsize:
             fields = tuple(field for field in fields if field.name != PADDING)
@@ -282,43 +274,40 @@ class PcdFile(CloudFile):
             data = np.frombuffer(unpack(packed, size), np.uint8)
         except ValueInvalid as error:
             raise file.error(f"the packed points cannot be unpacked: {error}") from None
-        columns: list[Any] = []
-        at = 0
+        rows, columns, at = np.zeros(points, self.record), iter(self.record.names or ()), 0
         for field in fields:
             end = at + points * field.values * field.size
             if field.name != PADDING:
-                columns.extend(data[at:end].view(field.code).reshape(points, field.values).T)
+                for values in data[at:end].view(field.code).reshape(points, field.values).T:
+                    rows[next(columns)] = values
             at = end
         step = column_file.rows_of_batch(self.record.itemsize)
         for first in range(0, points, step):
-            rows = np.zeros(min(step, points - first), self.record)
-            for name, values in zip(self.record.names or (), columns, strict=True):
-                rows[name] = values[first : first + step]
-            yield column_file.StructuredBatch(rows)
+            yield column_file.StructuredBatch(rows[first : first + step])
 
-    def _fields(self, columns: Sequence[OutColumn]) -> tuple[PcdField, ...]:
+    def _fields_of(self, columns: Sequence[OutColumn]) -> tuple[PcdField, ...]:
         """Return the fields of an output: those of the input with new ones after them, or one for each column."""
-        known = self.head.fields if same_columns(columns[: self.width], self.width) else ()
+        known = self.fields if same_columns(columns[: self.width], self.width) else ()
         return (*known, *map(_new_field, columns[self.width * bool(known) :]))
 
     def record_with(self, columns: Sequence[OutColumn]) -> Kind:
         """Return the type of a point with other columns."""
-        return layout_of(self._fields(columns))[2]
+        return layout_of(self._fields_of(columns))[2]
 
     def header(self, columns: Sequence[OutColumn], count: int) -> bytes:
         """Return the header with changes."""
-        fields = self._fields(columns)
+        fields = self._fields_of(columns)
         words = {"VIEWPOINT": self.viewpoint} if self.viewpoint else {}
-        if self.head.data == "binary_compressed":
+        if self.data == "binary_compressed":
             warn(f"{self.file.name}: binary_compressed is written as binary")
             words["DATA"] = "binary"
-        if fields != self.head.fields:
+        if fields != self.fields:
             words |= _words_of(fields)
         if count != self.count:
             words |= {"WIDTH": str(count), "HEIGHT": "1", "POINTS": str(count)}
-        lines = self.head.text.split(b"\n")
-        for key in words.keys() & self.head.lines.keys():
-            at = self.head.lines[key] - 1
+        lines = self.text.split(b"\n")
+        for key in words.keys() & self.lines.keys():
+            at = self.lines[key] - 1
             first, last = re.match(rb"\s*\S+\s+", lines[at]), len(lines[at].rstrip())
             lines[at] = lines[at][: first.end() if first else last] + words[key].encode() + lines[at][last:]
         return b"\n".join(lines)
