@@ -184,9 +184,9 @@ def _read(file: InputFile) -> Found:
                 yield from ((channel.topic, fields), (message["header"].frame_id, fields))
     elif is_open and file.head().lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
         from frametool.documents.xml import read_xml
-        from frametool.formats.trees.matrix_files import StoredXml
+        from frametool.formats.trees.matrix_files import stored
 
-        yield from _in_document(StoredXml(read_xml(file)).value, file)
+        yield from _in_document(stored(read_xml(file), (), {}), file)
     elif re.search(r"(?m)^(?:P[0-3]|P_rect_0\d|K_0\d):", file.text):
         yield from _kitti(file)
     elif re.match(r"(?:\s*#.*\n)*\s*\d+\s+[A-Z_]+\s+\d+\s+\d+\s", file.text):  # cameras.txt of COLMAP

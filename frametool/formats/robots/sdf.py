@@ -18,7 +18,6 @@ a frame is attached to is independent of that, and determines its motion.
 from __future__ import annotations
 
 from collections import Counter
-from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.xml import Element, read_xml
@@ -35,7 +34,6 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.readers import Vector
 
 
 def read_pose(holder: Element, options: Options) -> tuple[Rigid, str]:
@@ -168,14 +166,23 @@ class SdfTree:
         }
         self.joints = [self._joint(frame) for frame in of_joints]
         self.hung: dict[str, SdfJoint] = {}
-        self._hang_links()
+        connected = Groups[str]()
+        for joint in self.joints:
+            link, outer = (end.name for end in joint.ends)
+            if link in self.hung:
+                where = f"{shown(link)} hangs on joint {shown(self.hung[link].frame.local)} already"
+            elif not connected.join(link, outer):
+                where = f"{shown(outer)} hangs on {shown(link)} already"
+            else:
+                self.hung[link] = joint
+                continue
+            self.note(joint.frame.holder, f"joint {shown(joint.frame.local)} closes a loop and is left out: {where}")
         ends = [end for joint in self.joints for end in (joint.parent, joint.child)]
         self.in_world = self.top.holder.tag == "world" or self.top in ends
         self.carried: dict[str, SdfFrame] = {}
-        for model in frames:
-            link = self.body(model) if model.kind == "model" else None
-            if link is not None and link.name in self.hung:
-                self.carried[model.name] = link
+        for model in [frame for frame in frames if frame.kind == "model"]:
+            if (body := self.body(model)) and body.name in self.hung:
+                self.carried[model.name] = body
 
     def _take(self) -> None:
         """Register the contents of the world or file, and of all models in it."""
@@ -321,69 +328,46 @@ class SdfTree:
             self.note(holder, f"{named}: it is fixed as in the file and takes no value")
         name, line = self.names[frame.name], holder.line
         motions = [Joint(name, "ball", line=line)] if kind == "ball" else []
-        plain = {"continuous": "continuous", "prismatic": "prismatic"}.get(kind, "revolute")
+        plain = kind if kind in ("continuous", "prismatic") else "revolute"
         for tag, called in (("axis", name), ("axis2", f"{name}:2"))[: KINDS[kind]]:
             if axis := holder.first(tag):
-                lower, upper = (self._limit(axis.first("limit"), which) for which in ("lower", "upper"))
-                if lower is None or upper is None or lower > upper:
-                    lower = upper = None
-                direction, mimic = self._direction(frame, axis), self._mimic(frame, axis)
-                motions.append(Joint(called, plain, direction, lower, upper, mimic, line=line))
+                motions.append(self._motion(frame, axis, Joint(called, plain, line=line)))
             else:
                 self.note(holder, f"joint {shown(frame.local)} has no <{tag}>: it takes no value there")
         return SdfJoint(frame, parent, child, tuple(motions))
 
-    def _direction(self, frame: SdfFrame, axis: Element) -> Vector:
-        """Return an axis in the joint's frame."""
-        xyz = axis.first("xyz")
-        if xyz is None:
-            return 0.0, 0.0, 1.0
-        x, y, z = xyz.numbers(3)
-        if not (x or y or z):
-            raise xyz.error(f"joint {shown(frame.local)} has the axis 0 0 0, which is not a direction")
-        outer = frame
-        if name := xyz.attribute("expressed_in"):
-            outer = self.find(name, frame.scope, xyz, "expressed_in")
-        elif axis.text_of("use_parent_model_frame").lower() in TRUE * (self.version < (1, 7)) or self.version < (1, 5):
-            outer = frame.scope  # before 1.5 an axis is relative to the model, until 1.6 if it says so
-        if outer is not frame:
-            x, y, z = quaternion.rotate(*self.relative(frame, outer)[3:], x, y, z)
-        return quaternion.unit_vector(x, y, z, floats)
-
-    def _limit(self, limit: Element | None, which: str) -> float | None:
-        """Read one limit; None for no limit, which SDF writes as 1e16 or inf."""
-        held = limit.first(which) if limit is not None else None
-        if held is None or held.text.lstrip("+-").lower() in ("inf", "infinity"):
-            return None
-        (value,) = held.numbers(1)
-        return value if isfinite(value) and abs(value) < UNLIMITED else None
-
-    def _mimic(self, frame: SdfFrame, axis: Element) -> Mimic | None:
-        """Read a mimic: multiplier * (leader - reference) + offset, of either axis of the leader."""
-        mimic = axis.first("mimic")
-        if mimic is None:
-            return None
-        leader = self.find(mimic.attribute("joint"), frame.scope, mimic, "joint")
-        if leader.kind != "joint":
-            raise mimic.error(f"{shown(leader.name)} is a {leader.kind}, no joint", "joint")
-        name = self.names[leader.name] + (":2" if mimic.attribute("axis") == "axis2" else "")
-        held = ((mimic.first(tag), usual) for tag, usual in (("multiplier", 1.0), ("offset", 0.0), ("reference", 0.0)))
-        multiplier, offset, reference = (usual if part is None else part.numbers(1)[0] for part, usual in held)
-        return Mimic(name, multiplier, offset - multiplier * reference)
-
-    def _hang_links(self) -> None:
-        """Make joints the parents of links; one that would close a loop is omitted, with a note."""
-        connected = Groups[str]()
-        for joint in self.joints:
-            link, outer = (end.name for end in joint.ends)
-            if link in self.hung:
-                where = f"{shown(link)} hangs on joint {shown(self.hung[link].frame.local)} already"
-            elif not connected.join(link, outer):
-                where = f"{shown(outer)} hangs on {shown(link)} already"
-            else:
-                self.hung[link] = joint
-                continue
-            self.note(joint.frame.holder, f"joint {shown(joint.frame.local)} closes a loop and is left out: {where}")
+    def _motion(self, frame: SdfFrame, axis: Element, joint: Joint) -> Joint:
+        """Read an axis, in the joint's frame, its limits and its mimic of either axis of a leader."""
+        x, y, z = 0.0, 0.0, 1.0
+        if xyz := axis.first("xyz"):
+            x, y, z = xyz.numbers(3)
+            if not (x or y or z):
+                raise xyz.error(f"joint {shown(frame.local)} has the axis 0 0 0, which is not a direction")
+            outer, in_model = frame, axis.text_of("use_parent_model_frame").lower() in TRUE
+            if name := xyz.attribute("expressed_in"):
+                outer = self.find(name, frame.scope, xyz, "expressed_in")
+            elif self.version < (1, 5) or (self.version < (1, 7) and in_model):
+                outer = frame.scope  # before 1.5 an axis is relative to the model, until 1.6 if it says so
+            if outer is not frame:
+                x, y, z = quaternion.rotate(*self.relative(frame, outer)[3:], x, y, z)
+            x, y, z = quaternion.unit_vector(x, y, z, floats)
+        joint = joint._replace(axis=(x, y, z))
+        limit, limits = axis.first("limit"), []
+        for held in (limit.first("lower"), limit.first("upper")) if limit else ():
+            if held and held.text.lstrip("+-").lower() not in ("inf", "infinity"):
+                limits += [value for value in held.numbers(1) if abs(value) < UNLIMITED]
+        if len(limits) == 2 and limits[0] <= limits[1]:
+            joint = joint._replace(lower=limits[0], upper=limits[1])
+        if mimic := axis.first("mimic"):  # multiplier * (leader - reference) + offset
+            leader = self.find(mimic.attribute("joint"), frame.scope, mimic, "joint")
+            if leader.kind != "joint":
+                raise mimic.error(f"{shown(leader.name)} is a {leader.kind}, no joint", "joint")
+            name = self.names[leader.name] + (":2" if mimic.attribute("axis") == "axis2" else "")
+            usual = {"multiplier": 1.0, "offset": 0.0, "reference": 0.0}
+            said = {part.tag: part.numbers(1)[0] for part in reversed([*mimic.all(*usual)])}  # the first of each
+            multiplier, offset, reference = (usual | said).values()
+            joint = joint._replace(mimic=Mimic(name, multiplier, offset - multiplier * reference))
+        return joint
 
     def edges(self) -> Iterator[Edge]:
         """Yield every edge, and the root if there is no world."""

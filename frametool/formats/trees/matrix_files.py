@@ -208,21 +208,6 @@ def grid_of(value: Any) -> Grid | None:
     return Grid(len(rows), widths.pop() if len(widths) == 1 else 0, [text for row in rows for text in row], places)
 
 
-def whole_pose(grid: Grid | None, *, twelve: bool) -> Grid | None:
-    """Return a matrix that has the size of a whole pose with its four rows; None for any other.
-
-    twelve: twelve numbers in a row are a pose too
-    """
-    if grid is not None and grid.holds(16):
-        grid = grid._replace(rows=4, columns=4)
-    elif grid is not None and grid.holds(12) and twelve:
-        grid = grid._replace(rows=3, columns=4)
-    if grid is None or (grid.rows, grid.columns) not in ((4, 4), (3, 4)):
-        return None
-    last = ["0", "0", "0", "1"] if len(grid.texts) == 12 else []
-    return Grid(4, 4, [*grid.texts, *last], [*grid.places, *[()] * len(last)])
-
-
 TAGS = frozenset(("!!opencv-matrix", "!!opencv-nd-matrix", "!!opencv-sparse-matrix"))
 _HEAD = r"\s*%(?=YAML:1\.[0-9])"
 _TIGHT_KEY = r"(?m)^( *(?:- +)*[\w.-]+):(?=[^\s:/])"
@@ -337,15 +322,21 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
     if not file.head().lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
         yield from document_edges(made_ordinary(file), options, take, TAGS)
         return
+    elements: dict[Path, Element] = {}
+
+    def at(path: Path) -> Element:
+        return next(elements[path[:end]] for end in range(len(path), -1, -1) if path[:end] in elements)
+
     try:
-        stored = StoredXml(read_xml(file))
-        reading = Reading(stored.root.file.source, normalize=options.normalize)
+        root = read_xml(file)
+        value = stored(root, (), elements)
+        reading = Reading(root.file.source, normalize=options.normalize)
         reading.bare_numbers = True
-        for edge in take(stored.value, reading):
-            yield edge._replace(path=(), line=stored.element(edge.path).line)
-        remember(reading.notes, [stored.element(note.path).line for note in reading.notes], options.tally)
+        for edge in take(value if type(value) is dict else {}, reading):
+            yield edge._replace(path=(), line=at(edge.path).line)
+        remember(reading.notes, [at(note.path).line for note in reading.notes], options.tally)
     except Misfit as misfit:
-        error = stored.element(misfit.path).error(str(misfit), rule=misfit.rule)
+        error = at(misfit.path).error(str(misfit), rule=misfit.rule)
         if isinstance(misfit, Unclear):
             raise answerable(error) from None
         options.report(error)
@@ -418,7 +409,11 @@ class Matrices:
         value, path = block.entries[key], (*block.path, key)
         meaning = meaning_of(key, known, self.frames)
         says = isinstance(meaning, Meaning) and meaning.said
-        whole = whole_pose(grid, twelve=says)
+        whole = grid
+        if grid is not None and (grid.holds(16) or (grid.holds(12) and says)):  # in a row
+            whole = grid._replace(rows=len(grid.texts) // 4, columns=4)
+        if whole is not None and (whole.rows, whole.columns) not in ((4, 4), (3, 4)):
+            whole = None
         if says and whole is None and (grid is not None or type(value) is not str):
             found = grid.size if grid else kind(value)
             raise Misfit(f"{bare(key)}: expected a 4 x 4 or 3 x 4 matrix, found {found}", path)
@@ -440,7 +435,9 @@ class Matrices:
             meaning = directed(dotted(path), path, meaning.target, meaning.source, self.answers)
         if "" in (meaning.target, meaning.source):
             raise Misfit(f"{bare(key)}: there is no camera before {bare(block.name)}", path, key=True)
-        position, rotation = within(path, read_spelled, MATRIX, whole.texts, whole.places, self.reading)
+        last = ["0", "0", "0", "1"][len(whole.texts) - 12 :]
+        texts, places = [*whole.texts, *last], [*whole.places, *[()] * len(last)]
+        position, rotation = within(path, read_spelled, MATRIX, texts, places, self.reading)
         return Stated(*meaning[:3], (*(position or IDENTITY[:3]), *rotation), path, chained=key == "T_cn_cnm1")
 
     def _named(self, block: MatrixBlock, path: Path) -> Meaning | None:
@@ -498,33 +495,22 @@ def _blocks(entries: dict[str, Any], name: str, path: Path) -> Iterator[MatrixBl
                 yield from _blocks(each, f"{inner}{index}", (*path, key, index))
 
 
-class StoredXml:
-    """The `<opencv_storage>` as one document: its value, and the element at which each path begins."""
+def stored(outer: Element, path: Path, elements: dict[Path, Element]) -> Any:
+    """Return the contents of an element of `<opencv_storage>`: a map, a list of `_`, the words of a matrix, or a text.
 
-    def __init__(self, root: Element) -> None:
-        """Convert all elements; raises FormatError."""
-        self.root = root
-        self._elements: dict[Path, Element] = {}
-        found = self._inside(root, ())
-        self.value: dict[str, Any] = found if type(found) is dict else {}
-
-    def element(self, path: Path) -> Element:
-        """Return the element of a path, or the nearest enclosing one."""
-        return next(self._elements[path[:end]] for end in range(len(path), -1, -1) if path[:end] in self._elements)
-
-    def _inside(self, outer: Element, path: Path) -> Any:
-        """Return the contents of an element: a map, a list of `_`, the words of a matrix, or a text."""
-        if len(path) >= DEEPEST:
-            raise outer.error(f"more than {DEEPEST} elements inside one another")
-        self._elements[path] = outer
-        found: dict[str | int, Any] = {}
-        for element in outer.children:
-            key = len(found) if element.tag == "_" else element.tag
-            if key in found:
-                raise element.error(f"key {element.tag!r} appears twice")
-            found[key] = self._inside(element, (*path, key))
-        plain = outer.text.split() if outer.tag == "data" else outer.text.strip('"')
-        return ([*found.values()] if 0 in found else found) or plain
+    elements: receives the element at which each path begins
+    """
+    if len(path) >= DEEPEST:
+        raise outer.error(f"more than {DEEPEST} elements inside one another")
+    elements[path] = outer
+    found: dict[str | int, Any] = {}
+    for element in outer.children:
+        key = len(found) if element.tag == "_" else element.tag
+        if key in found:
+            raise element.error(f"key {element.tag!r} appears twice")
+        found[key] = stored(element, (*path, key), elements)
+    plain = outer.text.split() if outer.tag == "data" else outer.text.strip('"')
+    return ([*found.values()] if 0 in found else found) or plain
 
 
 def write_tree(tree: Frames, style: Style) -> str:
