@@ -52,12 +52,11 @@ if TYPE_CHECKING:
     from frametool.geometry.place import Place
     from frametool.geometry.types import Components
     from frametool.stream.array_writer import ArrayWriter
-    from frametool.stream.recording_writer import RecordingWriter
     from frametool.text.lines import ByteStream
     from frametool.text.spans import Ints
 
     Step: TypeAlias = tuple[RowPoses, Outcome]  # what a block became, and what is reported about it
-    BlockWriter: TypeAlias = "SingleWriter | RowsWriter | ArrayWriter | RecordingWriter"
+    BlockWriter: TypeAlias = "SingleWriter | RowsWriter | ArrayWriter"
 
 QUATERNION = notation("quaternion")
 NO_ROTATION = "no rotation among the columns {}: poses are wanted"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from frametool.grammar.readers import EARTH_FRAMES
 from frametool.recordings.write import KINDS, RecordingFile, check_stamps, filled, serialised
 from frametool.stream.row_layout import POINT, POSE
 from frametool.stream.rows import RowPoses, plain_cells
-from frametool.stream.writers import refuse_scale_in
+from frametool.stream.writers import SingleWriter, refuse_infinite, refuse_scale_in
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -29,7 +29,7 @@ LLA = "lla"
 NO_STAMPS = "{}: the rows have no stamps, and messages need them; `convert --stamps FILE` says them, one a line"
 
 
-class RecordingWriter:
+class RecordingWriter(SingleWriter):
     """Write blocks of poses or points as messages of one topic, or of several that go side by side."""
 
     def __init__(self, style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> None:
@@ -37,9 +37,7 @@ class RecordingWriter:
 
         Raises ValueInvalid for rows and notations that no message holds, FileProblem without the extra.
         """
-        self.style = style
-        self.kind = kind
-        self.placed = placed
+        super().__init__(style, kind, extras, placed=placed)
         asked = style.recording
         if kind not in KINDS_OF:
             raise ValueInvalid(f"{style.format} is not written of rows of a {kind}; write csv, json or yaml")
@@ -59,32 +57,38 @@ class RecordingWriter:
         if asked.topic and len(self.kinds) > 1:
             raise ValueInvalid(f"there are {len(self.kinds)} topics ({', '.join(self.kinds)}); {asked.topic} names one")
         self.file = RecordingFile(style.format, asked.folder)
-        self.dropped = dict.fromkeys(extras)
+        self.dropped |= dict.fromkeys(extras)
         self.path: list[tuple[str, Ints, Floats]] = []
         self.lost: dict[str, None] = {}  # names of frames that poses are of
         self.is_named = True  # whether all rows say what they are seen from
 
     def of_block(self, block: RowPoses) -> bytes:
         """Write the messages of a block; their bytes come at the end."""
-        if not len(block.numbers):
+        if not (size := len(block.numbers)):
             return b""
-        stamps = block.stamps_ns
+        stamps, fmt = block.stamps_ns, self.style.format
         if stamps is None:
-            raise ValueInvalid(NO_STAMPS.format(self.style.format))
-        check_stamps(stamps, self.style.format)
+            raise ValueInvalid(NO_STAMPS.format(fmt))
+        check_stamps(stamps, fmt)
         if not self.kinds:
             self.kinds = ("fix" if {*block.parents} <= {*EARTH_FRAMES} else "point",)
         used = (NAME,) if "fix" in self.kinds else ()
         self.dropped |= dict.fromkeys(name for name in block.extras if name not in used)
-        refuse_scale_in(self.style.format, self.dropped)
+        refuse_scale_in(fmt, self.dropped)
         frames = self._frames(block)
         numbers = self._numbers(block)
         channels = {name: self.file.channel(name, self.style.recording.topic) for name in self.kinds}
         if channels.pop("path", None):
             self.path += [(frames[0][0], stamps, numbers)]
-        messages = [self._messages(name, frames, stamps, numbers) for name in channels]
-        rows = zip(stamps.tolist(), *messages, strict=True)
-        topics = channels.values()
+        rows_of: dict[tuple[str, str], Any] = {frames[0]: np.arange(size)} if len(frames) == 1 else {}
+        for row, each in enumerate(frames if len(frames) > 1 else ()):
+            rows_of.setdefault(each, []).append(row)
+        messages = {name: [b""] * size for name in channels}
+        for each, at in rows_of.items():
+            for name, made in messages.items():
+                for row, data in zip(at, filled(KINDS[name], fmt, each, stamps[at], numbers[at]), strict=True):
+                    made[row] = data
+        rows, topics = zip(stamps.tolist(), *messages.values(), strict=True), channels.values()
         self.file.write((topic, stamp, each) for stamp, *row in rows for topic, each in zip(topics, row, strict=True))
         return b""
 
@@ -104,8 +108,7 @@ class RecordingWriter:
         if self.lost:
             kinds = f"; --messages {self.kinds[0]},tf keeps them" if self.kind == POSE else ""
             warn(f"{fmt}: names of frames left out: {first_of([*self.lost], MOST_NAMED)}{kinds}")
-        if self.dropped:
-            warn(f"{fmt}: {listing(self.dropped, MOST_NAMED)} left out")
+        yield from super().end()
         yield from self.file.pieces()
 
     def _frames(self, block: RowPoses) -> list[tuple[str, str]]:
@@ -142,28 +145,9 @@ class RecordingWriter:
                 return block.read + 0.0
             x, y, z = (np.ascontiguousarray(column) for column in block.numbers.T[:3])
             return np.column_stack(earth.lla(x, y, z, arrays)) + 0.0
-        numbers = block.numbers[:, : 7 if self.kind == POSE else 3]
-        if self.kind == POSE and not self.placed:
-            numbers = np.column_stack([np.zeros((len(numbers), 3)), numbers[:, :4]])
-        if not np.isfinite(numbers).all():
-            raise ValueInvalid("a result is too large for a double")
+        numbers = np.column_stack(self.columns(block)[: 7 if self.kind == POSE else 3])
+        refuse_infinite(numbers)
         if self.kind == POSE and not self.style.keep_sign:
-            x, y, z, w = numbers[:, 3:].T
-            x, y, z, w = quaternion.unit(x, y, z, w, arrays)
-            numbers = np.column_stack([numbers[:, :3], *quaternion.from_quaternion(x, y, z, w, arrays)])
+            x, y, z, w = quaternion.unit(*numbers[:, 3:].T, arrays)  # type: ignore[call-arg]
+            numbers[:, 3:] = np.column_stack(quaternion.from_quaternion(x, y, z, w, arrays))
         return numbers + 0.0  # none is -0.0
-
-    def _messages(
-        self, name: str, frames: Sequence[tuple[str, str]], stamps: Ints, numbers: Floats
-    ) -> Sequence[bytes]:
-        """Return the message of each row."""
-        if len(frames) == 1:
-            return filled(KINDS[name], self.style.format, frames[0], stamps, numbers)
-        made: dict[int, bytes] = {}
-        rows_of: dict[tuple[str, str], list[int]] = {}
-        for row, each in enumerate(frames):
-            rows_of.setdefault(each, []).append(row)
-        for each, rows in rows_of.items():
-            made |= zip(rows, filled(KINDS[name], self.style.format, each, stamps[rows], numbers[rows]), strict=True)
-        return [made[row] for row in range(len(frames))]
-
