@@ -48,6 +48,7 @@ class FrameFile(InputFile):
     """A file of frames and its format."""
 
     cameras: Mapping[str, Camera] = MappingProxyType({})  # in a frametool tree, by their frames
+    reader: Any = None  # takes the file and Options and yields edges; None is that of the format
 
     def __init__(
         self,
@@ -117,7 +118,7 @@ class FrameFile(InputFile):
         """
         try:
             options = Options(self.tally, self.topics, report, normalize, self.answers)
-            found = import_module(FORMATS[self.format].reader).read(self, options)
+            found = (self.reader or import_module(FORMATS[self.format].reader).read)(self, options)
             if offset_ns := self.answers.time_offset:
                 from frametool.grammar.edges import at_other_times
 

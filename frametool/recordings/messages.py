@@ -187,11 +187,11 @@ def open_trajectory(path: str, chosen: Collection[str], tally: Diagnostics) -> t
 
 def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[bytes]:
     """Yield the messages, or the poses of lists, as lines, many together; an error follows the lines before it."""
-    layouts, number = Layouts(reader.types), 1
+    number = 1
     try:
         for stretch in reader.blocks(channels):
             known: dict[int, bytes] = {}
-            for at, layout, values in layouts.groups(stretch):
+            for at, layout, values in alike(reader.types, stretch):
                 known |= zip(at, layout.lines(values).splitlines(keepends=True), strict=True)
             lines: list[bytes] = []
             try:
@@ -354,32 +354,26 @@ def layout_of(types: MessageTypes, channel: Channel, data: bytes) -> BinaryLayou
     return made if alike.all() and made.lines(values) == line else None
 
 
-class Layouts:
-    """The layouts that were learned of the messages of a recording, by channel and length."""
-
-    def __init__(self, types: MessageTypes) -> None:
-        """Create an empty set."""
-        self.types = types
-        self._known: dict[Any, list[BinaryLayout | None]] = {}
-
-    def groups(self, messages: Sequence[Recorded]) -> Iterator[tuple[list[int], BinaryLayout, NDArray[np.float64]]]:
-        """Yield the places of messages of one layout, and their numbers, (n, k); those whose layout varies are left."""
-        groups: dict[Any, list[int]] = {}
-        for at, each in enumerate(messages):
-            groups.setdefault((each.channel, len(each.data)), []).append(at)
-        for key, group in groups.items():
-            left, known = np.array(group), self._known.setdefault(key, [])
-            for tried in range(MOST_LAYOUTS):
-                if tried == len(known):
-                    known.append(layout_of(self.types, key[0], messages[left[0]].data))
-                if (layout := known[tried]) is None:
-                    break
-                values, alike = layout.values([messages[at].data for at in left.tolist()])
-                if alike.any():
-                    yield left[alike].tolist(), layout, values[alike]
-                left = left[~alike]
-                if not left.size:
-                    break
+def alike(
+    types: MessageTypes, messages: Sequence[Recorded]
+) -> Iterator[tuple[list[int], BinaryLayout, NDArray[np.float64]]]:
+    """Yield the places of messages of one layout, and their numbers, (n, k); those whose layout varies are left."""
+    groups: dict[Any, list[int]] = {}
+    for at, each in enumerate(messages):
+        groups.setdefault((each.channel, len(each.data)), []).append(at)
+    for key, group in groups.items():
+        left, known = np.array(group), types.layouts.setdefault(key, [])
+        for tried in range(MOST_LAYOUTS):
+            if tried == len(known):
+                known.append(layout_of(types, key[0], messages[left[0]].data))
+            if (layout := known[tried]) is None:
+                break
+            values, fit = layout.values([messages[at].data for at in left.tolist()])
+            if fit.any():
+                yield left[fit].tolist(), layout, values[fit]
+            left = left[~fit]
+            if not left.size:
+                break
 
 
 TYPES = frozenset(("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"))
@@ -443,11 +437,11 @@ def recorded_edges(
     reader: RecordingReader, channels: Sequence[Channel], options: Options
 ) -> Iterator[Edge | EdgeColumns]:
     """Yield the edges of the messages on some channels; raises FormatError if there are none, or one is broken."""
-    layouts, number = Layouts(reader.types), 0
+    number = 0
     for stretch in reader.blocks(channels):
         for is_static, part in groupby(stretch, lambda each: each.channel.is_static):
             messages = [*part]
-            found = zip(_contents(reader, layouts, messages, number, options), messages, strict=True)
+            found = zip(_contents(reader, messages, number, options), messages, strict=True)
             rows = [(each, at, sent) for at, (some, sent) in enumerate(found, number + 1) for each in some]
             columns = None if is_static or not rows else _columns(rows, options)
             yield from [columns] if columns else (_edge(*row, reader.path, options) for row in rows)
@@ -457,11 +451,11 @@ def recorded_edges(
 
 
 def _contents(
-    reader: RecordingReader, layouts: Layouts, messages: Sequence[Recorded], number: int, options: Options
+    reader: RecordingReader, messages: Sequence[Recorded], number: int, options: Options
 ) -> list[list[RawTransform]]:
     """Return the transforms or the pose in each message, of equal layout at once; `number` of them before."""
     found: dict[int, list[RawTransform]] = {}
-    for at, layout, values in layouts.groups(messages):
+    for at, layout, values in alike(reader.types, messages):
         known = _transforms(reader, messages[at[0]]._replace(data=layout.sample), 0, options)
         if known and values.shape[1] in (9 * len(known), 10 * len(known)):  # ROS 1 counts its headers
             numbers = np.vstack([layout.values([layout.sample])[0], values])

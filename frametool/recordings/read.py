@@ -320,6 +320,7 @@ class MessageTypes:
         from rosbags.typesys import Stores, get_typestore
 
         self.channels, self.ros1 = channels, ros1
+        self.layouts: dict[tuple[Channel, int], list[Any]] = {}  # that were learned, by channel and length of messages
         self.store: Any = get_typestore(Stores.EMPTY)
         if ros1:  # whose seconds have no sign (wiki.ros.org/msg); the library has int32
             parts: Any = [(name, (Nodetype.BASE, ("uint32", 0))) for name in ("sec", "nanosec")]

@@ -33,7 +33,7 @@ from frametool.formats.load import FrameFile, Rules, load_sources
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.frames.topology import resolve_name, static_and_moving, to_root, two_parents
 from frametool.geometry import floats, quaternion, rigid, uncertainty
-from frametool.grammar.edges import Diagnostics, Edge, Names, Options, Topics, stop
+from frametool.grammar.edges import Diagnostics, Edge, Names, Topics
 from frametool.recordings.messages import POSE_ARRAY, TYPES, RawTransform, numbers_of, posed_messages, recorded_edges
 from frametool.recordings.read import ITSELF, SERIALIZED, Recorded, broken, read_metadata, typestore
 from frametool.recordings.write import KINDS, SECONDS_ROS2, RecordingFile, new_channel, serialised
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import EdgeColumns, Report, Samples
+    from frametool.grammar.edges import Options
     from frametool.recordings.read import Channel, MessageTypes, RecordingReader
 
     Advance = Callable[[int, int], None]  # takes the number of messages and bytes that were read
@@ -66,28 +66,16 @@ class RecordedEdge:
     varies: bool = False
 
 
-class AddedEdge(NamedTuple):
-    """A static edge: parent_from_child."""
-
-    parent: str
-    child: str
-    numbers: Rigid
-
-    def __str__(self) -> str:
-        """Return `parent -> child`."""
-        return f"{bare(self.parent)} -> {bare(self.child)}"
-
-
 class EdgePlan(NamedTuple):
     """The edges of a tree: those that a recording lacks, by topic, and those with the same or other values there.
 
     apart: the roots of added edges that are not connected to the recording
     """
 
-    added: dict[str, list[AddedEdge]]
+    added: dict[str, list[Edge]]
     apart: list[str]
-    same: list[AddedEdge]
-    replaced: list[AddedEdge]
+    same: list[Edge]
+    replaced: list[Edge]
 
 
 class RecordedEdges:
@@ -116,12 +104,12 @@ class RecordedEdges:
         Raises BadTopology for a frame that moves here or there, has another parent or would be below itself, and for
         other values without `replace`.
         """
-        added, same, others, name = list[AddedEdge](), list[AddedEdge](), list[AddedEdge](), bare(tree.name)
+        added, same, others, name = list[Edge](), list[Edge](), list[Edge](), bare(tree.name)
         for track in tree.tracks():
             child, parent = (resolve_name(frame, self.frames) for frame in (track.child, track.parent))
             if not track.is_static:
                 raise static_and_moving(child, f" moves in {name}; --with adds static frames")
-            edge, known = AddedEdge(parent, child, track.components), self.known.get(child)
+            edge, known = Edge(parent, child, track.components), self.known.get(child)
             if known is None:
                 added.append(edge)
                 continue
@@ -132,26 +120,27 @@ class RecordedEdges:
                 raise two_parents(child, wrong[0], parent, (here, name))
             if known.varies and not any(topic.endswith(STATIC) for topic in known.topics):
                 raise static_and_moving(child, f": it moves in {shown(parent)} ({here}) and is static in it ({name})")
-            is_there = not known.varies and is_same(known.numbers, edge.numbers)
+            is_there = not known.varies and is_same(known.numbers, edge.components)
             (same if is_there else others).append(edge)
         if others and not replace:
             differing = []
             for edge in others:
                 numbers, on = self.known[edge.child].numbers, first_of([*self.known[edge.child].topics], MOST_NAMED)
-                metres, radians = rigid.distance(*numbers, *edge.numbers, xp=floats)
-                differing.append(f"{edge} on {on} ({metres:.3g} m and {radians * floats.RADIAN:.3g} deg off)")
+                metres, radians = rigid.distance(*numbers, *edge.components, xp=floats)
+                off = f"{metres:.3g} m and {radians * floats.RADIAN:.3g} deg off"
+                differing.append(f"{_listed([edge])} on {on} ({off})")
             what = f"other values than in {name}: {first_of(differing, MOST_NAMED)}; --replace uses those of {name}"
             raise BadTopology(f"{self.name}: {what}", rule="two-poses")
         return EdgePlan(*self._by_topic(added), same, others)
 
-    def _by_topic(self, added: Iterable[AddedEdge]) -> tuple[dict[str, list[AddedEdge]], list[str]]:
+    def _by_topic(self, added: Iterable[Edge]) -> tuple[dict[str, list[Edge]], list[str]]:
         """Return added edges by topic, `tf_static` in the namespace of the frames above them, and the roots apart."""
-        above = {each.child: each.parent for each in added}
-        topics, is_held = dict[str, list[AddedEdge]](), dict[str, bool]()
+        above = {each.child: str(each.parent) for each in added}
+        topics, is_held = dict[str, list[Edge]](), dict[str, bool]()
         everywhere = {child: [*edge.parents][-1] for child, edge in self.known.items()} | above
         for edge in added:
             to_root(edge.child, everywhere.get)  # raises for a frame below itself
-            line = [*to_root(edge.parent, above.get), edge.child]
+            line = [*to_root(above[edge.child], above.get), edge.child]
             near = next((self.frames[frame] for frame in line if frame in self.frames), "/tf")
             topics.setdefault(f"{near.rpartition('/')[0]}/{STATIC}", []).append(edge)
             is_held[line[-2]] = is_held.get(line[-2], False) or not self.frames.keys().isdisjoint(line[:1] + line[-1:])
@@ -328,7 +317,8 @@ class RecordRun:
             used = [each for each in self.used if self.counts[each]]
             if not more and not used:
                 raise FormatError("no transforms in it; --with FILE brings some", source=self.path)
-            source = TransformsOfCopy(reader, used, self.transform_topics, more)
+            source = FrameFile(self.path, topics=self.transform_topics)
+            source.reader = lambda _, options: edges_of_copy(reader, used, more, options)
             frames = load_sources([source], Rules(normalize=request.normalize))
             self.mover = MessageMover(frames, request.into, reader.types, normalize=request.normalize)
 
@@ -414,8 +404,8 @@ class RecordRun:
             same = [each for each in reader.channels if (each.topic, each.type) == (topic, TF_STATIC.type)]
             channel = same[0] if same and not ros1 else new_channel(TF_STATIC, topic, ros1=ros1, like=channels)
             file.begin([channel])
-            data = serialised(TF_STATIC, fmt, [(stamp_ns, (edge.parent, edge.child), edge.numbers) for edge in edges])
-            file.add([Recorded(channel, first_ns, data, first_ns)])
+            samples = [(stamp_ns, (str(edge.parent), edge.child), edge.components) for edge in edges]
+            file.add([Recorded(channel, first_ns, serialised(TF_STATIC, fmt, samples), first_ns)])
         file.begin(channels)
         file.add(self._copied(advance))
         said: dict[str, Any] | None = None  # the metadata of rosbag2 about an MCAP file
@@ -439,8 +429,8 @@ class RecordRun:
                 named = [(edges.get(names.bare(each.child_frame_id)), each.transform) for each in found.transforms]
                 for edge, part in named:
                     if edge is not None:
-                        put(part.translation, edge.numbers[:3])
-                        put(part.rotation, edge.numbers[3:])
+                        put(part.translation, edge.components[:3])
+                        put(part.rotation, edge.components[3:])
                 if any(edge for edge, _ in named):
                     self.rewritten += 1
                     data = types.write(channel, found)
@@ -469,32 +459,19 @@ class RecordRun:
             yield f"nothing is changed: {_count(self.counts.total())} copied"
 
 
-class TransformsOfCopy(FrameFile):
-    """The transforms of a recording as its copy has them: some of its edges are replaced, and others are added."""
-
-    def __init__(
-        self, recording: RecordingReader, channels: Sequence[Channel], topics: set[str], more: Sequence[AddedEdge]
-    ) -> None:
-        """Take the recording, the channels and topics that are read, and the edges that are added or replaced."""
-        super().__init__(recording.path, topics=topics)
-        self.recording, self.channels, self.more = recording, channels, more
-
-    def pieces(
-        self, report: Report = stop, *, tell: bool = True, normalize: bool = False  # noqa: ARG002
-    ) -> Iterator[Edge | Samples | EdgeColumns]:  # fmt: skip
-        """Yield its edges, but for those that are replaced, and then the others."""
-        self.close()
-        options = Options(self.tally, self.topics, report, normalize, self.answers)
-        children = {edge.child for edge in self.more}
-        found = recorded_edges(self.recording, self.channels, options) if self.channels else ()
-        edges = (edge for piece in found for edge in ((piece,) if isinstance(piece, Edge) else piece.edges()))
-        yield from (edge for edge in edges if edge.child not in children)
-        yield from (Edge(edge.parent, edge.child, edge.numbers) for edge in self.more)
-        self.tell()
+def edges_of_copy(
+    reader: RecordingReader, channels: Sequence[Channel], more: Sequence[Edge], options: Options
+) -> Iterator[Edge]:
+    """Yield the edges of a recording as its copy has them: some are replaced, and others are added."""
+    children = {edge.child for edge in more}
+    found = recorded_edges(reader, channels, options) if channels else ()
+    edges = (edge for piece in found for edge in ((piece,) if isinstance(piece, Edge) else piece.edges()))
+    yield from (edge for edge in edges if edge.child not in children)
+    yield from more
 
 
-def _listed(edges: Sequence[AddedEdge]) -> str:
-    return first_of([*map(str, edges)], MOST_NAMED)
+def _listed(edges: Sequence[Edge]) -> str:
+    return first_of([f"{bare(str(edge.parent))} -> {bare(edge.child)}" for edge in edges], MOST_NAMED)
 
 
 def _count(messages: int) -> str:
