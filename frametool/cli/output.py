@@ -169,7 +169,7 @@ class Output:
             self._warn_dropped(key for each in placed for key in each)
             # for a person one a line, but what has more than three numbers as a mapping
             is_plain = all(any(isinstance(each.get(kind), list) for kind in ("point", "vector")) for each in mappings)
-            text_module = "frametool.view.pose_text" if is_plain else table.FORMATS["yaml"].writer
+            text_module = "frametool.view.text" if is_plain else table.FORMATS["yaml"].writer
             self.text(self._module(text_module).write_points(mappings, self.style))
             return
         keys = {key for each in poses for key in each.said(self.style)}
@@ -179,7 +179,7 @@ class Output:
             from frametool.stream.writers import refuse_scale_in
 
             refuse_scale_in(self.style.format, keys)
-        self.text(self._module("frametool.view.pose_text").write_poses(found, self.style))
+        self.text(self._module("frametool.view.text").write_poses(found, self.style))
         self._warn_dropped(key for each in poses for key in each.extras)
 
     def _shorten(self) -> None:
@@ -204,7 +204,7 @@ class Output:
 
         In every format the text of several results begins with that of the first: what follows it is the batch's.
         """
-        write_poses = self._module("frametool.view.pose_text").write_poses
+        write_poses = self._module("frametool.view.text").write_poses
         size = 2
         begin = list(islice(results, size))
         yield write_poses(begin, self.style)

@@ -26,7 +26,8 @@ from frametool.grammar.result import Style
 from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRow, BadRows, Outcome, run
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator, Sequence
+    from collections.abc import Callable, Generator, Iterator, Sequence
+    from contextlib import AbstractContextManager
 
     from frametool.explain.derive import DerivationStyle, WrittenPose
     from frametool.explain.render import Explanation
@@ -256,18 +257,18 @@ class Stream:
 
     def _write(self, outcomes: Generator[Outcome], bad: BadRows, *, gathers: bool = False) -> int:
         """Write what becomes of each block as it comes, or nothing of it, and report its bad rows."""
-        progress = None
+        progress: AbstractContextManager[Callable[[int, int], None] | None] = nullcontext()
         if not self.inputs.quiet and sys.stderr is not None and sys.stderr.isatty():
-            from frametool.view.progress import ProgressBar
+            from frametool.view.text import progress_bar
 
-            progress = ProgressBar(os.path.getsize(self.path) if self.path else None)
+            progress = progress_bar(os.path.getsize(self.path) if self.path else None)
         with (
             nullcontext(lambda _: None) if gathers else self.output.opened() as write,
-            progress or nullcontext(),
+            progress as advance,
             self.opened(),  # closed before a file takes its place, which Windows asks for
             closing(outcomes),
         ):
-            return run(outcomes, write, bad, None if progress is None else progress.advance)
+            return run(outcomes, write, bad, advance)
 
     def detected(self, begin: bytes, *, is_table: bool = False) -> str:
         """Find the format of the stream by what it begins with, and by its name."""

@@ -18,18 +18,21 @@ import numpy as np
 from frametool import __version__
 from frametool.documents.writers import dump_json
 from frametool.errors import printable
+from frametool.explain.render import Explanation
+from frametool.explain.run import Sheet
 from frametool.fit.numbers import SHORT, number_at
 from frametool.formats.rows.csv import write_points
 from frametool.grammar.result import Style
 from frametool.view import pictures
-from frametool.view.pictures import Chart, ChartLine, Picture, SvgElement, stacked
-from frametool.view.pose_text import WIDTH
+from frametool.view.pictures import ChartLine, Picture, SvgElement, chart, stacked
 from frametool.view.reports import columns, fixed
+from frametool.view.text import WIDTH
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from frametool.fit.comparison import Comparison
+    from frametool.view.pictures import Place, Point
 
 NAME, LONGEST_NAME = 18, 24  # characters; a longer one does not push the rest aside
 STATISTICS = ("rmse", "mean", "median", "p95", "max")
@@ -94,34 +97,24 @@ def _statistics(label: str, summed: dict[str, float] | None) -> str:
 
 def write_explanation(found: dict[str, Any]) -> str:
     """Write the formulas of a comparison with the numbers of this run."""
-    poses, fit, ate, settings = found["poses"], found["transform"], found["ate"], found["settings"]
-    c, q = fit.get("scale", 1.0), fit["quaternion"]
-    squares = " + ".join(f"{ate[key]['rmse']:.6g}^2" for key in ("along_m", "across_m", "up_m"))
-    turn, shift = ", ".join(f"{q[axis]:.9g}" for axis in "xyzw"), ", ".join(f"{part:.9g}" for part in fit["xyz"])
-    lines = [
-        f"pairs      n = {poses['paired']} of {poses['possible']}, t_ref = t_est + {found['offset_s']:.9g} s",
-        f"fit        p' = c R p + t, R' = R R_i   ({settings['align']})",
-        f"           c = {c:.9g}",
-        f"           R = quaternion x y z w ({turn})",
-        f"           t = ({shift}) m",
-        "ate        d_i = p'_i - p_ref,i;  rmse = sqrt(sum |d_i|^2 / n)",
-        f"           = sqrt({ate['m']['sse']:.9g} / {poses['paired']}) = {ate['m']['rmse']:.9g} m",
-        "           along, across, up: d_i in the axes of REF's path",
-        f"           {squares} = {ate['m']['rmse']:.6g}^2",
-    ]
-    if ate["deg"]:
-        lines.append(f"           E_i = inv(ref_i) est'_i;  its angle: rmse {ate['deg']['rmse']:.9g} deg")
-    if found["rpe"]:
-        lines.append("rpe        E_ij = inv(inv(ref_i) ref_j) inv(est'_i) est'_j")
+    sheet, fit, ate = Sheet(9, clean=False), found["transform"], found["ate"]
+    errors = {name: ate[f"{name}_m"]["rmse"] for name in ("along", "across", "up")}
+    turned = {"turned": float(bool(ate["deg"])), "deg": ate["deg"]["rmse"] if ate["deg"] else 0.0}
+    values = {"sse": ate["m"]["sse"], "paired": float(found["poses"]["paired"]), "c": fit.get("scale", 1.0)}
+    sheet.play(
+        "comparison", values | errors | turned | {"offset": found["offset_s"]}, est=printable(found["est"]),
+        ref=printable(found["ref"]), possible=found["poses"]["possible"], align=found["settings"]["align"],
+        turn=sheet.numbers([*fit["quaternion"].values()]), shift=sheet.numbers(fit["xyz"]),
+    )  # fmt: skip
     for row in found["rpe"]:
         if row["m"]:
-            share = "" if row["percent"] is None else f" = {row['percent']:.6g} % of the delta"
-            root = f"sqrt({row['m']['sse']:.9g} / {row['pairs']}) = {row['m']['rmse']:.9g} m"
-            lines.append(f"           {row['delta']}: |t(E)|, rmse = {root}{share}")
+            size = 0.0 if row["percent"] is None else float(row["delta"][:-1])
+            summed = {"sse": row["m"]["sse"], "pairs": float(row["pairs"]), "size": size}
+            sheet.play("relative error", summed, delta=row["delta"])
     if kitti := found["kitti"]:
-        lines.append(f"kitti      mean of |t(E)| / L over {kitti['segments']} stretches = {kitti['percent']:.9g} %")
-        lines.append(f"           mean of angle(E) / L = {kitti['deg_per_m']:.9g} deg/m")
-    return "\n".join([*lines, ""])
+        means = {key: kitti[key] for key in ("percent", "deg_per_m")}
+        sheet.play("kitti", means, segments=kitti["segments"])
+    return str(Explanation("comparison", sheet.items))
 
 
 def write_table(found: Sequence[dict[str, Any]], fmt: str = "text") -> str:
@@ -150,7 +143,7 @@ def write_table(found: Sequence[dict[str, Any]], fmt: str = "text") -> str:
 
 
 WIDE, HIGH = 412.0, 112.0  # pixels of a chart
-LEFT, TOP, RIGHT, BOTTOM = 54.0, 40.0, 14.0, 42.0  # around it
+LEFT, TOP, RIGHT, BOTTOM, GAP = 54.0, 40.0, 14.0, 42.0, 68.0  # around it, and between two of a column
 ROW = 38.0  # pixels of an estimate's box and its name
 STRETCHES, FEWEST = 200, 20  # of all paths together, and of one at least, each drawn by its extremes
 LEVELS, BINS = 12, 30  # of error: colours along a path, columns of a histogram
@@ -180,10 +173,9 @@ def write_report(found: Sequence[Comparison], fmt: str, command: str) -> str:
     curves = [_curve(each, at, len(found)) for at, each in enumerate(found)]
     numbers = [each.as_dict() for each in found]
     unit = "pair" if found[0].pairs.ref.stamps_ns is None else "s"
-    paths, seen = _map(curves)
-    charts = _over_time(curves, "pair" if unit == "pair" else "time (s)")
-    left = {"path": _path(curves, paths, seen)}
-    right = {"errors": _figure(charts[-1].area[1] + HIGH - TOP, [shape for each in charts for shape in each.drawn()])}
+    path, on_path = _path(curves)
+    errors, on_errors = _over_time(curves, "pair" if unit == "pair" else "time (s)")
+    left, right = {"path": path}, {"errors": errors}
     is_one = len(curves) == 1
     (left if is_one else right)["distribution"] = _distribution(curves)
     if lengths := _by_length(curves, numbers):
@@ -211,7 +203,7 @@ def write_report(found: Sequence[Comparison], fmt: str, command: str) -> str:
         command=escape(printable(command)), hints="".join(f"<p class=hint>{escape(hint)}</p>" for hint in hints),
         text=escape(text), figures=drawn,
     )  # fmt: skip
-    samples = {"unit": unit, "curves": [_samples(each, paths, seen, charts[0]) for each in curves]}
+    samples = {"unit": unit, "curves": [_samples(each, on_path, on_errors) for each in curves]}
     held = {"numbers": f"[{', '.join(map(dump_json, numbers))}]", "samples": json.dumps(samples)}
     return pictures.write_html(title, body, script="tables.js report.js", data=held)
 
@@ -236,8 +228,12 @@ def _figure(high: float, shapes: Sequence[SvgElement]) -> Picture:
     return Picture(LEFT + WIDE + RIGHT, TOP + high + BOTTOM, shapes)
 
 
-def _map(curves: Sequence[Curve]) -> tuple[Chart, Any]:
-    """Return the chart of all paths, seen along the axis of least extent, and the projection of positions onto it."""
+def _path(curves: Sequence[Curve]) -> tuple[Picture, Callable[[Any], list[Point]]]:
+    """Draw the paths, seen along the axis of least extent; a single estimate is coloured by its error.
+
+    Returns also what maps positions to pixels.
+    """
+    first, ref = curves[0].found, curves[0].found.pairs.ref
     every = np.concatenate([xyz for each in curves for xyz in (each.found.pairs.ref.xyz, each.found.moved.xyz)])
     axes = np.sort(np.argsort(np.ptp(every, axis=0), kind="stable")[1:])
     low, high = every[:, axes].min(0), every[:, axes].max(0)
@@ -245,38 +241,40 @@ def _map(curves: Sequence[Curve]) -> tuple[Chart, Any]:
     base = np.where(np.abs(low) > FAR * span, np.round(low), 0.0)
     names = [f"{'xyz'[axis]}{f' - {at:.0f}' if at else ''} (m)" for axis, at in zip(axes, base, strict=True)]
     wide, tall = np.maximum(high - low, 1e-9)
-    pixels = np.array([WIDE, WIDE * min(max(tall / wide, 0.5), 1.0)])
+    area = LEFT, TOP, WIDE, WIDE * min(max(float(tall / wide), 0.5), 1.0)
+    pixels = np.array(area[2:])
     reach = ((high - low + 0.06 * span) / pixels).max() * pixels / 2.0  # metres, at one scale
     middle = (low + high) / 2.0 - base
     ends = [*zip((middle - reach).tolist(), (middle + reach).tolist(), strict=True)]
-    chart = Chart((LEFT, TOP, *pixels.tolist()), (names[0], names[1]), ends=ends)
-    return chart, lambda xyz: (xyz[:, axes] - base).tolist()
 
+    def seen(xyz: Any) -> list[Point]:
+        return (xyz[:, axes] - base).tolist()  # type: ignore[no-any-return]
 
-def _path(curves: Sequence[Curve], chart: Chart, seen: Any) -> Picture:
-    """Draw the paths; a single estimate is coloured by its error."""
-    first = curves[0]
-    lines = [ChartLine("reference", "soft", seen(first.found.pairs.ref.xyz[first.chosen]), 2.0, (5.0, 4.0))]
-    shapes = [pictures.dot(*chart.place(*seen(first.found.moved.xyz[:1])[0]), 4.0, "ink", "start")]
+    lines = [ChartLine("reference", "soft", seen(ref.xyz[curves[0].chosen]), 2.0, (5.0, 4.0))]
+    legend: list[SvgElement] = []
     if len(curves) == 1:
         lines.append(ChartLine("estimate, by error", SHADES[LEVELS // 2], []))
-        points, errors, begin = seen(first.found.moved.xyz[first.chosen]), first.found.ate.m, 0
-        levels = (errors[first.chosen] / (errors.max() or 1.0) * LEVELS).astype(int)
+        points, errors, begin = seen(first.moved.xyz[curves[0].chosen]), first.ate.m, 0
+        levels = (errors[curves[0].chosen] / (errors.max() or 1.0) * LEVELS).astype(int)
         for level, run in groupby(np.minimum(levels, LEVELS - 1).tolist()[:-1]):
             end = begin + len([*run])
             lines.append(ChartLine("", SHADES[level], points[begin : end + 1], 2.0))
             begin = end
-        low, text = chart.area[1] + chart.area[3] + 25.0, f"error 0 .. {first.found.ate.m.max():.3g} m"
-        shapes += (pictures.box(LEFT + at * 7.0, low, 7.5, 9.0, shade) for at, shade in enumerate(SHADES))
-        shapes.append(pictures.words(LEFT + LEVELS * 7.0 + 8.0, low + 4.5, text, "soft", size=11.0))
+        below, text = TOP + area[3] + 25.0, f"error 0 .. {errors.max():.3g} m"
+        legend += (pictures.box(LEFT + at * 7.0, below, 7.5, 9.0, shade) for at, shade in enumerate(SHADES))
+        legend.append(pictures.words(LEFT + LEVELS * 7.0 + 8.0, below + 4.5, text, "soft", size=11.0))
     else:
         lines += [ChartLine(each.name, each.colour, seen(each.found.moved.xyz[each.chosen])) for each in curves]
-    chart.lines = lines
-    return _figure(chart.area[3], [*chart.drawn(), *shapes])
+    shapes, place = chart(area, (names[0], names[1]), lines, ends)
+    start = pictures.dot(*place(*seen(first.moved.xyz[:1])[0]), 4.0, "ink", "start")
+    return _figure(area[3], [*shapes, start, *legend]), lambda xyz: [place(*point) for point in seen(xyz)]
 
 
-def _over_time(curves: Sequence[Curve], along: str) -> list[Chart]:
-    """Return the charts over time: errors in position, in rotation, and for one estimate along and across its path."""
+def _over_time(curves: Sequence[Curve], along: str) -> tuple[Picture, Place]:
+    """Draw the errors over time: in position, in rotation, and for one estimate along and across its path.
+
+    Returns also what maps a time and an error in position to pixels.
+    """
     ate, one = curves[0].found.ate, len(curves) == 1
     position = [each.line(each.name * (not one), each.colour, each.found.ate.m) for each in curves]
     turned = [(each, each.found.ate.rad) for each in curves]
@@ -287,7 +285,8 @@ def _over_time(curves: Sequence[Curve], along: str) -> list[Chart]:
         position.append(ChartLine(f"rmse {rmse:.3g} m", "soft", [(0.0, rmse), (end, rmse)], 1.0, (4.0, 3.0)))
         parts = (("along", "x", ate.along), ("across", "y", ate.across), ("up", "z", ate.up))
         kinds["error in the path's axes (m)"] = [curves[0].line(*part) for part in parts]
-    return stacked((LEFT, TOP, WIDE, HIGH), TOP + BOTTOM - 14.0, along, kinds)
+    shapes, place = stacked((LEFT, TOP, WIDE, HIGH), GAP, along, kinds)
+    return _figure(len(kinds) * (HIGH + GAP) - GAP, shapes), place
 
 
 def _distribution(curves: Sequence[Curve]) -> Picture:
@@ -297,22 +296,21 @@ def _distribution(curves: Sequence[Curve]) -> Picture:
         counts, edges = np.histogram(errors, BINS, (0.0, errors.max() or 1.0))
         steps = [*zip(np.repeat(edges, 2)[1:-1].tolist(), np.repeat(counts, 2).tolist(), strict=True)]
         lines, names = [ChartLine("", curves[0].colour, steps)], ("error in position (m)", "poses")
-        return _figure(HIGH, [*Chart((LEFT, TOP, WIDE, HIGH), names, lines).drawn()])
+        return _figure(HIGH, chart((LEFT, TOP, WIDE, HIGH), names, lines)[0])
     worst = max(float(each.found.ate.m.max()) for each in curves)
     names = ("error in position (m)", "boxes: half of the poses; lines: 5 to 95 %; dots: median, maximum")
-    chart = Chart((LEFT, TOP, WIDE, ROW * len(curves)), names, ends=((0.0, worst or 1.0), (0.0, 1.0)))
-    chart.ticks[1] = []
-    shapes = [*chart.drawn()]
+    area, ends = (LEFT, TOP, WIDE, ROW * len(curves)), ((0.0, worst or 1.0), (0.0, 1.0))
+    shapes, place = chart(area, names, ends=ends, is_scaled=False)
     for at, each in enumerate(curves):
         y, colour = TOP + (at + 0.66) * ROW, each.colour
         marks = np.percentile(each.found.ate.m, (5, 25, 50, 75, 95, 100)).tolist()
-        least, first, middle, third, most, last = (chart.place(mark, 0.0)[0] for mark in marks)
+        least, first, middle, third, most, last = (place(mark, 0.0)[0] for mark in marks)
         shapes += [
             pictures.line([(least, y), (most, y)], colour, 1.5, title=each.name),
             pictures.box(first, y - 7.0, third - first, 14.0, colour), pictures.dot(middle, y, 4.0, "paper"),
             pictures.dot(last, y, 3.0, colour), pictures.words(LEFT + 4.0, y - 17.0, each.name[:60], size=11.0),
         ]  # fmt: skip
-    return _figure(chart.area[3], shapes)
+    return _figure(ROW * len(curves), shapes)
 
 
 def _by_length(curves: Sequence[Curve], numbers: Sequence[dict[str, Any]]) -> Picture | None:
@@ -323,15 +321,15 @@ def _by_length(curves: Sequence[Curve], numbers: Sequence[dict[str, Any]]) -> Pi
         deltas = [(float(row["delta"][:-1]), row["percent"]) for row in each["rpe"] if row["percent"] is not None]
         if len(points or deltas) >= LEAST_LENGTHS:
             lines.append(ChartLine("", curve.colour, sorted(points or deltas), dots=True))
-    chart = Chart((LEFT, TOP, WIDE, HIGH), ("length (m)", "relative error (%)"), lines)
-    return _figure(HIGH, [*chart.drawn()]) if lines else None
+    shapes, _ = chart((LEFT, TOP, WIDE, HIGH), ("length (m)", "relative error (%)"), lines)
+    return _figure(HIGH, shapes) if lines else None
 
 
-def _samples(curve: Curve, paths: Chart, seen: Any, errors: Chart) -> dict[str, Any]:
+def _samples(curve: Curve, on_path: Callable[[Any], list[Point]], on_errors: Place) -> dict[str, Any]:
     """Return the pixels of the drawn pairs in both charts and the values shown on hover."""
     ate, chosen = curve.found.ate, curve.chosen
-    points = ("path", paths, seen(curve.found.moved.xyz[chosen])), ("errors", errors, curve.line("", "", ate.m).points)
-    pixels = {key: [chart.place(*each) for each in places] for key, chart, places in points}
+    errors = [on_errors(*point) for point in zip(curve.times, ate.m[chosen].tolist(), strict=True)]
+    pixels = {"path": on_path(curve.found.moved.xyz[chosen]), "errors": errors}
     numbers = {"m": ate.m[chosen], **({} if ate.rad is None else {"deg": np.degrees(ate.rad[chosen])})}
     return {
         "name": curve.name, "colour": curve.colour, "t": [round(each, 3) for each in curve.times],

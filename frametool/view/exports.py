@@ -31,7 +31,7 @@ from frametool.sim.turtle import SIZE as WORLD
 from frametool.sim.turtle import single
 from frametool.view import pictures
 from frametool.view.pictures import PALETTE, ChartLine, Picture, box, dot, line, shade_of, stacked, words
-from frametool.view.scene import EYES, SLANTED, FrameScene, Labels, Projection, Size, can_be_drawn, nice, text_width
+from frametool.view.scene import EYES, FrameScene, Projection, Size, can_be_drawn, nice, placed_names, text_width
 from frametool.view.terminal import BACKGROUND, ON_WHITE, colours_of
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from frametool.sim.simulate import SimulationStep
     from frametool.sim.turtle import Pen, TurtleState
     from frametool.view.pictures import Point, SvgElement
+    from frametool.view.scene import Eye
 
     Stroke = tuple[str, Pen, list[Point]]  # of a turtle, a line drawn with one pen; metres, y up
 
@@ -52,7 +53,7 @@ CORNER = 46.0  # pixels from the corner to the little axes
 
 
 def still_picture(
-    scene: FrameScene, eye: tuple[float, float] = SLANTED, title: str = "", other: FrameScene | None = None,
+    scene: FrameScene, eye: Eye = EYES["slanted"], title: str = "", other: FrameScene | None = None,
 ) -> Picture:  # fmt: skip
     """Draw a scene from a direction, azimuth and elevation in radians; its notes say what it does not show.
 
@@ -60,8 +61,7 @@ def still_picture(
     """
     flat = Projection(scene, SIZE, eye)
     blocked = [(0.0, HEIGHT - 92.0, 100.0, HEIGHT), (WIDTH - 330.0, HEIGHT - 58.0, WIDTH, HEIGHT)]
-    labels = Labels(flat, blocked)
-    labels.place_all()
+    labels, hidden = placed_names(flat, blocked)
     step, ground = flat.ground()
     shapes = [line([flat.at(a)[:2], flat.at(b)[:2]], "zero" if zero else "faint") for a, b, zero in ground]
     for link in flat.links:
@@ -83,13 +83,13 @@ def still_picture(
         x, y, _ = flat.origins[name]
         shapes += (line([(x, y), tip[:2]], "xyz"[axis], 2.0, title=name) for axis, tip in flat.axes(name))
         shapes.append(dot(x, y, 2.2, "ink", name))
-    for text, point, (left, top, right, bottom), away in labels.placed:
+    for text, point, (left, top, right, bottom), away in labels:
         if away > 1.1:  # with a leader line
             end = min(max(point.x, left), right), top if top > point.y else bottom
             shapes.append(line([point[:2], end], "soft", 0.7))
         shapes.append(words(left + 2.0, (top + bottom) / 2.0, text))
     shapes += _legend(flat, step)
-    near, hidden = len(flat.cluster()), labels.hidden
+    near = len(flat.cluster())
     crowded = f"{near} of {len(scene.names)} frames lie in a small spot; --below FRAME shows a part"
     notes = [crowded] * (near < len(flat.poses)) + [f"{hidden} names found no place"] * bool(hidden)
     return Picture(WIDTH, HEIGHT, shapes, title, notes=notes)
@@ -113,41 +113,6 @@ def _legend(flat: Projection, step: float) -> Iterator[SvgElement]:
 SHORT = 0.05  # metres: two pixels
 
 
-class Drawing:
-    """Collect what a plot shows of a run; turtles that do not move take no memory."""
-
-    def __init__(self, scene: Scene) -> None:
-        """Create an empty drawing."""
-        self.strokes: list[Stroke] = []
-        self.turtles: dict[str, TurtleState] = {}
-        # of each follower, for each control step: seconds, metres, m/s, rad/s
-        self.curves: dict[str, list[tuple[float, ...]]] = {name: [] for name in scene.followers}
-        self._current: dict[str, Stroke] = {}
-        self._clears = 0
-
-    def watch(self, step: SimulationStep) -> None:
-        """Add a step to the drawing: extend the strokes of the turtles, or begin one with a new pen."""
-        if step.is_tick:
-            if step.clears != self._clears:
-                self._clears = step.clears
-                self.strokes.clear()
-                self._current.clear()
-            self.turtles = step.states
-            for name, (x, y, _) in step.states.items():
-                pen = step.pens[name]
-                _, before, points = self._current.get(name, (name, None, []))
-                if before != pen:
-                    points = points[-1:]
-                    self._current[name] = name, pen, points
-                    if not pen.off:
-                        self.strokes.append(self._current[name])
-                if not points or math.dist(points[-1], (x, y)) > SHORT:
-                    points.append((x, y))
-        for command in step.commands:
-            ahead, turning, _ = command.twist
-            self.curves[command.turtle].append((step.t_ns / BILLION, command.distance or 0.0, ahead, turning))
-
-
 WINDOW, METRE = 500.0, 45.0  # pixels, as turtlesim's
 MARGIN = 30.0
 LEFT = WINDOW + 110.0  # where the curves begin
@@ -158,33 +123,67 @@ PANELS = ("distance (m)", "linear.x (m/s)", "angular.z (rad/s)")  # as the numbe
 BODY = (*((x, y, 4.0) for x in (-9.0, 9.0) for y in (-11.0, 11.0)), (17.0, 0.0, 5.0), (0.0, 0.0, 13.0))
 
 
-def run_picture(drawing: Drawing) -> Picture:
-    """Draw the run: the world with trails and the turtles at the end; charts if there are followers."""
+def run_picture(scene: Scene) -> tuple[Callable[[SimulationStep], None], Callable[[], Picture]]:
+    """Return what collects a run by steps, and what then draws it; turtles that do not move take no memory.
+
+    It draws the world with trails and the turtles at the end, and charts if there are followers.
+    """
+    strokes: list[Stroke] = []
+    current: dict[str, Stroke] = {}
+    turtles: dict[str, TurtleState] = {}
+    # of each follower, for each control step: seconds, metres, m/s, rad/s
+    curves: dict[str, list[tuple[float, ...]]] = {name: [] for name in scene.followers}
+    clears = 0
+
+    def watch(step: SimulationStep) -> None:
+        """Extend the strokes of the turtles, or begin one with a new pen."""
+        nonlocal clears, turtles
+        if step.is_tick:
+            if step.clears != clears:
+                clears = step.clears
+                strokes.clear()
+                current.clear()
+            turtles = step.states
+            for name, (x, y, _) in turtles.items():
+                pen = step.pens[name]
+                _, before, points = current.get(name, (name, None, []))
+                if before != pen:
+                    points = points[-1:]
+                    current[name] = name, pen, points
+                    if not pen.off:
+                        strokes.append(current[name])
+                if not points or math.dist(points[-1], (x, y)) > SHORT:
+                    points.append((x, y))
+        for command in step.commands:
+            ahead, turning, _ = command.twist
+            curves[command.turtle].append((step.t_ns / BILLION, command.distance or 0.0, ahead, turning))
 
     def place(x: float, y: float) -> Point:
         return MARGIN + x * METRE, MARGIN + (WORLD - y) * METRE
 
-    colours = colours_of({*drawing.turtles, *drawing.curves})
-    shapes = [box(MARGIN, MARGIN, WINDOW, WINDOW, f"#{bytes(BACKGROUND).hex()}")]
-    for turtle, (*colour, width, _), way in drawing.strokes:
-        points = [place(*point) for point in way]
-        shapes.append(line(points, f"#{bytes(colour).hex()}", width, title=turtle))
-    for name, (*position, theta) in drawing.turtles.items():
-        x, y = place(*position)
-        cosine, sine = math.cos(theta), math.sin(theta)
-        for ahead, left, radius in BODY:
-            across, down = x + cosine * ahead - sine * left, y - sine * ahead - cosine * left
-            shapes += dot(across, down, radius + 1.0, "#333333"), dot(across, down, radius, colours[name])
-        shapes.append(words(x, y - 24.0, name, "#ffffff", "middle"))
-    followed = {name: rows for name, rows in drawing.curves.items() if rows}
-    panels = {
-        title: [ChartLine(name, ON_WHITE[colours[name]], [(row[0], row[at]) for row in rows])
-                for name, rows in followed.items()]
-        for at, title in enumerate(PANELS if followed else (), 1)
-    }  # fmt: skip
-    area = LEFT, MARGIN, PANEL_WIDTH, (WINDOW - 2.0 * PANEL_GAP) / len(PANELS)
-    shapes += (shape for chart in stacked(area, PANEL_GAP, "time (s)", panels) for shape in chart.drawn())
-    return Picture(LEFT + PANEL_WIDTH + MARGIN if followed else SIDE, SIDE, shapes, "turtles")
+    def picture() -> Picture:
+        colours = colours_of({*turtles, *curves})
+        shapes = [box(MARGIN, MARGIN, WINDOW, WINDOW, f"#{bytes(BACKGROUND).hex()}")]
+        for turtle, (*colour, width, _), way in strokes:
+            shapes.append(line([place(*point) for point in way], f"#{bytes(colour).hex()}", width, title=turtle))
+        for name, (*position, theta) in turtles.items():
+            x, y = place(*position)
+            cosine, sine = math.cos(theta), math.sin(theta)
+            for ahead, left, radius in BODY:
+                across, down = x + cosine * ahead - sine * left, y - sine * ahead - cosine * left
+                shapes += dot(across, down, radius + 1.0, "#333333"), dot(across, down, radius, colours[name])
+            shapes.append(words(x, y - 24.0, name, "#ffffff", "middle"))
+        followed = {name: rows for name, rows in curves.items() if rows}
+        panels = {
+            title: [ChartLine(name, ON_WHITE[colours[name]], [(row[0], row[at]) for row in rows])
+                    for name, rows in followed.items()]
+            for at, title in enumerate(PANELS, 1)
+        }  # fmt: skip
+        area = LEFT, MARGIN, PANEL_WIDTH, (WINDOW - 2.0 * PANEL_GAP) / len(PANELS)
+        shapes += stacked(area, PANEL_GAP, "time (s)", panels)[0] if followed else ()
+        return Picture(LEFT + PANEL_WIDTH + MARGIN if followed else SIDE, SIDE, shapes, "turtles")
+
+    return watch, picture
 
 
 def html_of(value: Any) -> str | None:
@@ -206,7 +205,7 @@ def html_of(value: Any) -> str | None:
         return None
     from frametool.grammar.pose import Pose
     from frametool.grammar.result import Result, Style
-    from frametool.view.pose_text import write_poses
+    from frametool.view.text import write_poses
 
     parts = value.components
     pose = Pose.of(parts) if len(parts) > len("xyzw") else Pose(rotation=parts)
@@ -223,36 +222,28 @@ MESH = {"primitives": [{"attributes": {"POSITION": 0, "COLOR_0": 1}, "indices": 
 MATERIAL = {"extensions": {"KHR_materials_unlit": {}}, "pbrMetallicRoughness": {"metallicFactor": 0}}
 
 
-class BinaryPart:
-    """The binary part of a .glb: one buffer, its views and accessors."""
-
-    def __init__(self) -> None:
-        """Create an empty one."""
-        self.data = bytearray()
-        self.views: list[dict[str, int]] = []
-        self.accessors: list[dict[str, Any]] = []
-
-    def add(self, letter: str, rows: Sequence[Sequence[float]], *, target: int | None = None, **more: Any) -> int:
-        """Append rows of numbers, each of a type of the module struct; return the index of their accessor."""
-        data = _packed(letter, chain.from_iterable(rows))
-        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data)}
-        self.views.append(view if target is None else view | {"target": target})
-        kind = {"count": len(rows), "type": ("SCALAR", "", "VEC3", "VEC4")[len(rows[0]) - 1]}
-        self.accessors.append({"bufferView": len(self.views) - 1, "componentType": COMPONENTS[letter], **kind, **more})
-        self.data += data + bytes(-len(data) % 4)
-        return len(self.accessors) - 1
-
-
 def write_glb(scene: FrameScene) -> bytes:
     """Return the scene as the bytes of a .glb."""
-    flat, part = Projection(scene, SIZE), BinaryPart()
+    data, views, accessors = bytearray(), list[dict[str, int]](), list[dict[str, Any]]()  # the binary part
+
+    def add(letter: str, rows: Sequence[Sequence[float]], *, target: int | None = None, **more: Any) -> int:
+        """Append rows of numbers, each of a type of the module struct; return the index of their accessor."""
+        packed = _packed(letter, chain.from_iterable(rows))
+        view = {"buffer": 0, "byteOffset": len(data), "byteLength": len(packed)}
+        views.append(view if target is None else view | {"target": target})
+        kind = {"count": len(rows), "type": ("SCALAR", "", "VEC3", "VEC4")[len(rows[0]) - 1]}
+        accessors.append({"bufferView": len(views) - 1, "componentType": COMPONENTS[letter], **kind, **more})
+        data.extend(packed + bytes(-len(packed) % 4))
+        return len(accessors) - 1
+
     # three bars of length 1 along x, y, z: positions, colours, triangles
     bars = [[(-THICK, 1.0 if side == axis else THICK) for side in range(3)] for axis in range(3)]
     corners = [(8 * bar + corner,) for bar in range(3) for a, b, c, d in SIDES for corner in (a, b, c, a, c, d)]
     places = [place for bar in bars for place in product(*bar)]
-    part.add("f", places, target=VERTICES, min=[single(-THICK)] * 3, max=[1.0] * 3)
-    part.add("B", [colour for colour in COLOURS for _ in range(8)], target=VERTICES, normalized=True)
-    part.add("H", corners, target=INDICES)
+    add("f", places, target=VERTICES, min=[single(-THICK)] * 3, max=[1.0] * 3)
+    add("B", [colour for colour in COLOURS for _ in range(8)], target=VERTICES, normalized=True)
+    add("H", corners, target=INDICES)
+    flat = Projection(scene, SIZE)
     # a node of each frame and one of its axes; a frame without a drawn parent is placed in `fixed`
     index = {name: 1 + 2 * number for number, name in enumerate(flat.poses)}
     nodes: list[dict[str, Any]] = [{"name": "z up", "rotation": Z_UP, "children": []}]
@@ -265,21 +256,21 @@ def write_glb(scene: FrameScene) -> bytes:
         above, place = (index[parent], edge) if parent in index and edge is not None else (0, pose)
         nodes[above]["children"].append(index[name])
         nodes[index[name]] |= {"translation": place[:3], "rotation": place[3:]}
-    animation = _animation(scene, index, part)
+    animation = _animation(scene, index, add)
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": f"frametool {__version__}"}, "extensionsUsed": ["KHR_materials_unlit"],
         "scene": 0, "scenes": [{"nodes": [0]}], "nodes": nodes, "meshes": [MESH], "materials": [MATERIAL],
-        **({"animations": [animation]} if animation else {}), "accessors": part.accessors, "bufferViews": part.views,
-        "buffers": [{"byteLength": len(part.data)}],
+        **({"animations": [animation]} if animation else {}), "accessors": accessors, "bufferViews": views,
+        "buffers": [{"byteLength": len(data)}],
     }  # fmt: skip
     text = dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
-    head = struct.pack("<4sIII4s", b"glTF", 2, 28 + len(text) + len(part.data), len(text), b"JSON")
-    return head + text + struct.pack("<I4s", len(part.data), b"BIN\0") + part.data
+    head = struct.pack("<4sIII4s", b"glTF", 2, 28 + len(text) + len(data), len(text), b"JSON")
+    return head + text + struct.pack("<I4s", len(data), b"BIN\0") + data
 
 
-def _animation(scene: FrameScene, index: dict[str, int], part: BinaryPart) -> dict[str, Any] | None:
-    """Return the animation of the frames that move below one drawn parent."""
+def _animation(scene: FrameScene, index: dict[str, int], add: Callable[..., int]) -> dict[str, Any] | None:
+    """Return the animation of the frames that move below one drawn parent; `add` appends numbers."""
     channels: list[dict[str, Any]] = []
     samplers: list[dict[str, Any]] = []
     for name, track in scene.tracks.items():
@@ -293,10 +284,10 @@ def _animation(scene: FrameScene, index: dict[str, int], part: BinaryPart) -> di
         for *_, x, y, z, w in keys.values():
             sign = -1.0 if rotations and sum(map(mul, (x, y, z, w), rotations[-1])) < 0.0 else 1.0
             rotations.append((sign * x, sign * y, sign * z, sign * w))
-        times = part.add("f", [(second,) for second in keys], min=[min(keys)], max=[max(keys)])
+        times = add("f", [(second,) for second in keys], min=[min(keys)], max=[max(keys)])
         for path, rows in (("translation", [sample[:3] for sample in keys.values()]), ("rotation", rotations)):
             channels.append({"sampler": len(samplers), "target": {"node": index[name], "path": path}})
-            samplers.append({"input": times, "output": part.add("f", rows), "interpolation": "LINEAR"})
+            samplers.append({"input": times, "output": add("f", rows), "interpolation": "LINEAR"})
     return {"name": "samples", "channels": channels, "samplers": samplers} if channels else None
 
 
@@ -306,7 +297,7 @@ PACKED = 48_000  # bytes of numbers, from where on they are compressed
 
 
 def write_page(
-    scene: FrameScene, *, title: str, file: str = "", eye: tuple[float, float] | None = None,
+    scene: FrameScene, *, title: str, file: str = "", eye: Eye | None = None,
     other: FrameScene | None = None, other_title: str = "", sliders: bool = False, solids: Sequence[Solid] = (),
 ) -> str:  # fmt: skip
     """Return the page.

@@ -24,12 +24,13 @@ from frametool.errors import FileProblem, FormatError, ValueInvalid, printable
 from frametool.view.scene import text_width
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from frametool.geometry.types import Number
     from frametool.view.scene import Box
 
     Point = tuple[float, float]
+    Place = Callable[[float, float], Point]  # maps data to pixels
 
 # name -> light, dark
 PALETTE = {
@@ -238,74 +239,72 @@ class ChartLine(NamedTuple):
     dots: bool = False
 
 
-class Chart:
-    """Two axes in a plot area, and the mapping from data to pixels."""
+def chart(
+    area: Box, names: tuple[str, str], lines: Sequence[ChartLine] = (), ends: Sequence[Point] = (), *,
+    is_scaled: bool = True,
+) -> tuple[list[SvgElement], Place]:  # fmt: skip
+    """Draw two axes, lines and a legend: each name after its line; a long one has only the dashed lines.
 
-    def __init__(
-        self, area: Box, names: tuple[str, str], lines: Sequence[ChartLine] = (), ends: Sequence[Point] = ()
-    ) -> None:
-        """Choose the limits of both axes.
-
-        area: left, top, width and height without the labels.  names: titles of the x and the y axis, with units.
-        ends: least and greatest x and y; by default 0 and those of the lines, in y rounded to ticks.
-        """
-        self.area, self.names, self.lines = area, names, lines
-        columns = zip(*(point for line in lines for point in line.points), strict=True)
-        found = ends or [(min(0.0, *column), max(0.0, *column)) for column in columns] or [(0.0, 0.0)] * 2
-        x, y = ((max(begin, -FURTHEST), min(end, FURTHEST)) for begin, end in found)
-        rounded = ticks(*x), ticks(*y)
-        self.x = x if x[1] - x[0] > LEAST_SPAN else (rounded[0][0], rounded[0][-1])
-        self.y = y if ends else (rounded[1][0], rounded[1][-1])
-        self.ticks = [[at for at in each if begin <= at <= end]
-                      for each, (begin, end) in zip(rounded, (self.x, self.y), strict=True)]  # fmt: skip
-
-    def place(self, x: float, y: float) -> Point:
-        """Return the pixels of a point; values beyond the y axis are clamped to its ends."""
-        left, top, width, height = self.area
-        inside = min(max(y, self.y[0]), self.y[1])
-        across = left + width * (x - self.x[0]) / (self.x[1] - self.x[0])
-        return across, top + height * (self.y[1] - inside) / (self.y[1] - self.y[0])
-
-    def drawn(self) -> Iterator[SvgElement]:
-        """Draw axes, lines and the legend: each name after its line; a long one has only the dashed lines."""
-        left, top, width, height = self.area
-        right, bottom, above = left + width, top + height, top - 14.0
-        yield words(left, above, self.names[1], "soft")
-        if self.names[0]:
-            yield words(right, bottom + 30.0, self.names[0], "soft", "end")
-        for tick in self.ticks[0]:
-            across, _ = self.place(tick, 0.0)
-            yield line([(across, top), (across, bottom)], "faint")
-            yield words(across, bottom + 13.0, f"{tick:g}", "soft", "middle", 11.0)
-        for tick in self.ticks[1]:
-            _, down = self.place(0.0, tick)
-            yield line([(left, down), (right, down)], "faint" if tick else "zero")
-            yield words(left - 7.0, down, f"{tick:g}", "soft", "end", 11.0)
-        for each in self.lines:
-            points = [self.place(*point) for point in each.points]
-            if points:
-                yield line(points, each.colour, each.width, dashes=each.dashes, title=each.name)
-            yield from (dot(x, y, 3.0, each.colour) for x, y in points if each.dots)
-        named = [each for each in self.lines if each.name]
-        if sum(text_width(each.name) + 33.0 for each in named) > width - text_width(self.names[1]):
-            named = [each for each in named if each.dashes]
-        for each in reversed(named):
-            yield words(right, above, each.name, "ink", "end", 11.0)
-            right -= text_width(each.name) + 5.0
-            yield line([(right - 16.0, above), (right, above)], each.colour, max(each.width, 2.0), dashes=each.dashes)
-            right -= 28.0
-
-
-def stacked(area: Box, gap: float, along: str, kinds: Mapping[str, Sequence[ChartLine]]) -> list[Chart]:
-    """Return charts one below the other over the same x axis, which the last one names.
-
-    area: of the first.  along: title of the x axis.  kinds: the lines of each by the title of its y axis
+    area: left, top, width and height without the labels.  names: titles of the x and the y axis, with units.
+    ends: least and greatest x and y; by default 0 and those of the lines, in y rounded to ticks.
+    is_scaled: whether the y axis has ticks.
+    Returns the shapes, and what maps data to pixels; values beyond the y axis are clamped to its ends.
     """
     left, top, width, height = area
-    return [
-        Chart((left, top + at * (height + gap), width, height), (along * (at == len(kinds) - 1), name), lines)
+    right, bottom, above = left + width, top + height, top - 14.0
+    columns = zip(*(point for each in lines for point in each.points), strict=True)
+    found = ends or [(min(0.0, *column), max(0.0, *column)) for column in columns] or [(0.0, 0.0)] * 2
+    x, y = ((max(begin, -FURTHEST), min(end, FURTHEST)) for begin, end in found)
+    x_ticks, y_ticks = ticks(*x), ticks(*y)
+    x = x if x[1] - x[0] > LEAST_SPAN else (x_ticks[0], x_ticks[-1])
+    y = y if ends else (y_ticks[0], y_ticks[-1])
+
+    def place(across: float, up: float) -> Point:
+        inside = min(max(up, y[0]), y[1])
+        return left + width * (across - x[0]) / (x[1] - x[0]), top + height * (y[1] - inside) / (y[1] - y[0])
+
+    shapes = [words(left, above, names[1], "soft")]
+    if names[0]:
+        shapes.append(words(right, bottom + 30.0, names[0], "soft", "end"))
+    for tick in (tick for tick in x_ticks if x[0] <= tick <= x[1]):
+        across, _ = place(tick, 0.0)
+        shapes.append(line([(across, top), (across, bottom)], "faint"))
+        shapes.append(words(across, bottom + 13.0, f"{tick:g}", "soft", "middle", 11.0))
+    for tick in (tick for tick in y_ticks if is_scaled and y[0] <= tick <= y[1]):
+        _, down = place(0.0, tick)
+        shapes.append(line([(left, down), (right, down)], "faint" if tick else "zero"))
+        shapes.append(words(left - 7.0, down, f"{tick:g}", "soft", "end", 11.0))
+    for each in lines:
+        points = [place(*point) for point in each.points]
+        if points:
+            shapes.append(line(points, each.colour, each.width, dashes=each.dashes, title=each.name))
+        shapes += (dot(*point, 3.0, each.colour) for point in points if each.dots)
+    named = [each for each in lines if each.name]
+    if sum(text_width(each.name) + 33.0 for each in named) > width - text_width(names[1]):
+        named = [each for each in named if each.dashes]
+    for each in reversed(named):
+        shapes.append(words(right, above, each.name, "ink", "end", 11.0))
+        right -= text_width(each.name) + 5.0
+        ends_of_line = [(right - 16.0, above), (right, above)]
+        shapes.append(line(ends_of_line, each.colour, max(each.width, 2.0), dashes=each.dashes))
+        right -= 28.0
+    return shapes, place
+
+
+def stacked(
+    area: Box, gap: float, along: str, kinds: Mapping[str, Sequence[ChartLine]]
+) -> tuple[list[SvgElement], Place]:
+    """Draw charts one below the other over the same x axis, which the last one names, as `chart` does.
+
+    area: of the first, whose mapping is returned.  along: title of the x axis.
+    kinds: the lines of each by the title of its y axis
+    """
+    left, top, width, height = area
+    charts = [
+        chart((left, top + at * (height + gap), width, height), (along * (at == len(kinds) - 1), name), lines)
         for at, (name, lines) in enumerate(kinds.items())
     ]
+    return [shape for shapes, _ in charts for shape in shapes], charts[0][1]
 
 
 def ticks(low: float, high: float) -> list[float]:
@@ -340,6 +339,8 @@ def write_png(picture: Picture) -> bytes:
     require_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.image import imread
+    from matplotlib.patches import Rectangle
 
     figure = Figure(figsize=(picture.width / 100.0, picture.height / 100.0), dpi=100)
     FigureCanvasAgg(figure)
@@ -351,9 +352,28 @@ def write_png(picture: Picture) -> bytes:
             xs, ys, radii, colours = zip(*found, strict=True)
             sizes = [(2.0 * radius * POINTS) ** 2 for radius in radii]
             axes.scatter(xs, ys, s=sizes, c=colours, linewidths=0.0, zorder=order)
-        else:
-            for shape in run:
-                _paint(axes, shape, order)
+            continue
+        for shape in run:
+            look = shape.look
+            style = {"color": NAMED.get(shape.colour, (shape.colour,))[0], "zorder": order}
+            if kind == "path":
+                dashes = [each * POINTS for each in look["stroke-dasharray"]]
+                style |= {"alpha": look["opacity"], "linestyle": (0, dashes) if dashes else "solid"}
+                axes.plot(*zip(*shape.points, strict=True), linewidth=look["stroke-width"] * POINTS, **style)
+            elif kind == "text":
+                style |= {"ha": ANCHORS[look["text-anchor"]], "va": "center", "weight": look["font-weight"]}
+                if look["stroke"]:
+                    style["bbox"] = {"color": look["stroke"], "alpha": 0.5, "pad": 1.0}
+                text = printable(shape.text).replace("$", r"\$")
+                axes.text(look["x"], look["y"], text, fontsize=look["font-size"] * POINTS, **style)
+            elif kind == "rect":
+                axes.add_patch(Rectangle((look["x"], look["y"]), look["width"], look["height"], linewidth=0.0, **style))
+            else:  # a gray image stays gray
+                suffix, _, data = look["href"].removeprefix("data:image/").partition(";base64,")
+                pixels = imread(io.BytesIO(b64decode(data)), format=suffix)
+                gray = {"cmap": "gray", "vmin": 0.0, "vmax": 1.0 if pixels.dtype.kind == "f" else 255.0}
+                extent = look["x"], look["x"] + look["width"], look["y"] + look["height"], look["y"]
+                axes.imshow(pixels, extent=extent, interpolation="none", zorder=order, **gray)
     left, top = picture.corner
     axes.set(xlim=(left, left + picture.width), ylim=(top + picture.height, top), aspect="auto")
     stream = io.BytesIO()
@@ -361,34 +381,6 @@ def write_png(picture: Picture) -> bytes:
         warnings.simplefilter("ignore", UserWarning)  # of letters that matplotlib's font lacks: it draws boxes
         figure.savefig(stream, format="png", metadata={"Software": None})
     return stream.getvalue()
-
-
-def _paint(axes: Any, shape: SvgElement, order: int) -> None:
-    """Paint any other shape; gray images stay gray."""
-    look, style = shape.look, {"color": NAMED.get(shape.colour, (shape.colour,))[0], "zorder": order}
-    match shape.kind:
-        case "path":
-            dashes = [each * POINTS for each in look["stroke-dasharray"]]
-            style |= {"alpha": look["opacity"], "linestyle": (0, dashes) if dashes else "solid"}
-            axes.plot(*zip(*shape.points, strict=True), linewidth=look["stroke-width"] * POINTS, **style)
-        case "text":
-            style |= {"ha": ANCHORS[look["text-anchor"]], "va": "center", "weight": look["font-weight"]}
-            if look["stroke"]:
-                style["bbox"] = {"color": look["stroke"], "alpha": 0.5, "pad": 1.0}
-            text = printable(shape.text).replace("$", r"\$")
-            axes.text(look["x"], look["y"], text, fontsize=look["font-size"] * POINTS, **style)
-        case "rect":
-            from matplotlib.patches import Rectangle
-
-            axes.add_patch(Rectangle((look["x"], look["y"]), look["width"], look["height"], linewidth=0.0, **style))
-        case "image":
-            from matplotlib.image import imread
-
-            kind, _, data = look["href"].removeprefix("data:image/").partition(";base64,")
-            pixels = imread(io.BytesIO(b64decode(data)), format=kind)
-            gray = {"cmap": "gray", "vmin": 0.0, "vmax": 1.0 if pixels.dtype.kind == "f" else 255.0}
-            extent = look["x"], look["x"] + look["width"], look["y"] + look["height"], look["y"]
-            axes.imshow(pixels, extent=extent, interpolation="none", zorder=order, **gray)
 
 
 # --- overlays: projected points on the camera's image, coloured by depth; pixels, the centre of the first one at 0, 0

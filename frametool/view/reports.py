@@ -16,7 +16,7 @@ from frametool.frames.stamps import format_stamp
 from frametool.geometry.transform import Transform
 from frametool.grammar.result import Style, edge_label
 from frametool.lint.tree_diff import SAME, Apart, Difference
-from frametool.view.pose_text import WIDTH, in_width, largest_sigmas, sigmas_of
+from frametool.view.text import WIDTH, in_width, largest_sigmas, sigmas_of
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Sequence

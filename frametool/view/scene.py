@@ -11,7 +11,7 @@ import re
 import warnings
 from collections import Counter
 from functools import cached_property
-from itertools import pairwise, product
+from itertools import chain, pairwise, product
 from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Rigid
 
     Point = tuple[float, float, float]
+    Eye = tuple[float, float]  # azimuth and elevation, radians
     Ground = tuple[str, Rigid]  # the replacement of the Earth's frame: level axes, x east and y north, at a frame
     Box = tuple[float, float, float, float]  # left, top, right, bottom
     Label = tuple[str, "Flat", Box, float]  # a name, the point it labels, its box in whole cells, its distance in lines
@@ -139,28 +140,26 @@ class FrameScene:
 
         It is cut into stretches where its parent changes or data are missing.
         """
-        drawn = (name for name in self.tracks if name in self.chosen)
-        return {name: stretches for name in drawn if (stretches := self._stretches(name))}
-
-    def _stretches(self, name: str) -> list[list[Point]]:
-        """Look a frame up at, and between, the stamps of all moving frames on its path."""
         import numpy as np
 
-        movers = self._movers_above(name) | self._movers_above(self.fixed)
-        stamps = sorted({stamp for mover in movers for stamp, _, _ in self.tracks[mover].walk()})
-        stamps = stamps[:: -(-len(stamps) // MOST_STAMPS) or 1]
-        parts = 1 if len(stamps) > FEW_STAMPS else PARTS
-        times = [a + (b - a) * part // parts for a, b in pairwise(stamps) for part in range(parts)] + stamps[-1:]
-        with np.errstate(over="ignore", invalid="ignore"):  # what is too far is not drawn
-            points = self.tree.lookup_many(self.fixed, name, times, missing="nan").xyz
-        known = np.abs(points).max(axis=1) < FURTHEST
-        changes = sorted(stamp for mover in movers for stamp in self.tracks[mover].changes())
-        epoch = np.searchsorted(changes, times, side="right")
-        cuts = np.flatnonzero((known[1:] != known[:-1]) | (epoch[1:] != epoch[:-1])) + 1
-        pieces = [piece for piece, here in zip(np.split(points, cuts), known[[0, *cuts]], strict=True) if here]
-        if not pieces or np.ptp(np.concatenate(pieces), axis=0).max() < STILL:
-            return []
-        return [[(x, y, z) for x, y, z in piece.tolist()] for piece in pieces]
+        found = {}
+        for name in (name for name in self.tracks if name in self.chosen):
+            # looked up at, and between, the stamps of all moving frames on its path
+            movers = self._movers_above(name) | self._movers_above(self.fixed)
+            stamps = sorted({stamp for mover in movers for stamp, _, _ in self.tracks[mover].walk()})
+            stamps = stamps[:: -(-len(stamps) // MOST_STAMPS) or 1]
+            parts = 1 if len(stamps) > FEW_STAMPS else PARTS
+            times = [a + (b - a) * part // parts for a, b in pairwise(stamps) for part in range(parts)] + stamps[-1:]
+            with np.errstate(over="ignore", invalid="ignore"):  # what is too far is not drawn
+                points = self.tree.lookup_many(self.fixed, name, times, missing="nan").xyz
+            known = np.abs(points).max(axis=1) < FURTHEST
+            changes = sorted(stamp for mover in movers for stamp in self.tracks[mover].changes())
+            epoch = np.searchsorted(changes, times, side="right")
+            cuts = np.flatnonzero((known[1:] != known[:-1]) | (epoch[1:] != epoch[:-1])) + 1
+            pieces = [piece for piece, here in zip(np.split(points, cuts), known[[0, *cuts]], strict=True) if here]
+            if pieces and np.ptp(np.concatenate(pieces), axis=0).max() >= STILL:
+                found[name] = [[(x, y, z) for x, y, z in piece.tolist()] for piece in pieces]
+        return found
 
     def _movers_above(self, name: str) -> set[str]:
         """Return the moving frames on any path from a frame to a root."""
@@ -190,17 +189,16 @@ def _in_order(tree: Frames) -> list[str]:
     return [*dict.fromkeys([*order, *tree.frames])]  # those in a cycle of first parents last
 
 
-SLANTED = (-0.9, 0.5)
 # name -> azimuth and elevation of the eye, radians: from where one looks along -x, along +y, and down
 EYES = {
-    "slanted": SLANTED,
+    "slanted": (-0.9, 0.5),
     "front": (0.0, 0.0),
     "side": (-math.pi / 2.0, 0.0),
     "top": (-math.pi / 2.0, math.pi / 2.0),
 }
 
 
-def parse_eye(text: str) -> tuple[float, float]:
+def parse_eye(text: str) -> Eye:
     """Read a name of EYES, or AZ,EL in degrees, and return azimuth and elevation in radians.
 
     Raises ValueInvalid.
@@ -263,7 +261,7 @@ class Projection:
     """
 
     def __init__(
-        self, scene: FrameScene, size: Size, eye: tuple[float, float] = SLANTED, *, most: bool = False
+        self, scene: FrameScene, size: Size, eye: Eye = EYES["slanted"], *, most: bool = False
     ) -> None:
         """Fit the scene into the picture; most: leave out a few frames that are far from the others."""
         self.scene, self.size = scene, size
@@ -331,6 +329,16 @@ class Projection:
         """Return the axes 0, 1, 2 of a frame with their tips, from the farthest to the nearest."""
         return sorted(enumerate(self.tips(self.poses[name])), key=lambda each: each[1].depth)
 
+    def label(
+        self, words: str, length: float, point: Flat, left: float, middle: float, away: float = 0.0
+    ) -> Iterator[Label]:
+        """Yield the label of some length at a place, moved to the nearest cells, if it is inside the picture."""
+        (wide, high), line = self.size.cell, self.size.line
+        left, top = wide * round(left / wide), high * round((middle - line / 2.0) / high)
+        right, bottom = left + wide * math.ceil(length / wide), top + line
+        if left >= 0.0 and right <= self.size.width and top >= 0.0 and bottom <= self.size.height:
+            yield words, point, (left - MARGIN, top, right + MARGIN, bottom), away
+
     def ground(self) -> tuple[float, list[tuple[Point, Point, bool]]]:
         """Return the grid on z = 0: its spacing in metres, and its lines with whether they pass the origin."""
         wide = max(self.high[0] - self.low[0], self.high[1] - self.low[1], 4.0 * self.axis)
@@ -365,67 +373,55 @@ LONGEST = 60  # characters of a name
 WIDE, THIN = "mwMW_@", "il.·tfjrI "
 
 
-class Labels:
-    """Names next to frames that cover neither one another nor, if possible, an axis."""
+def placed_names(
+    flat: Projection, blocked: Iterable[Box] = (), outside: Iterable[Iterator[Label]] = ()
+) -> tuple[list[Label], int]:
+    """Place a name next to each group of frames on one point inside the picture, nearest first.
 
-    def __init__(self, flat: Projection, blocked: Iterable[Box] = ()) -> None:
-        """Reserve the cells of frames and of some boxes."""
-        self._flat, self._size = flat, flat.size
-        self.placed: list[Label] = []
-        self.hidden = 0  # names without room
-        self._taken: set[tuple[float, float]] = {cell for box in blocked for cell in self._cells(box)}
-        wide, high = self._size.cell
-        self._taken |= {(x // wide, y // high) for x, y, _ in flat.origins.values()}
-        axes = ((flat.origins[name], tip) for name in flat.poses for tip in flat.tips(flat.poses[name]))
-        self._axes = {
-            ((begin.x + part * (end.x - begin.x)) // wide, (begin.y + part * (end.y - begin.y)) // high)
-            for begin, end in axes for part in (0.4, 0.7, 1.0)
-        }  # fmt: skip
+    Names cover neither one another nor, if possible, an axis: each is at its first free spot, or else at the first
+    that covers axes only.
+    blocked: boxes that stay free.  outside: spots for further names, best first, which are placed before the others
+    Returns the labels, and the number of names without room.
+    """
+    (wide, high), line, measure = flat.size.cell, flat.size.line, flat.size.measure
 
-    def place_all(self) -> None:
-        """Place a name next to each group of frames on one point inside the picture, nearest first."""
-        groups: dict[tuple[int, int], tuple[Flat, list[str]]] = {}
-        for name in reversed(self._flat.nearest_last):
-            point = self._flat.origins[name]
-            if self._flat.holds(point):
-                groups.setdefault((round(point.x / SAME), round(point.y / SAME)), (point, []))[1].append(name)
-        for point, names in groups.values():
-            words, line = words_of(names), self._size.line
-            wide, (x, y, _) = self._size.measure(words), point
-            spots = (
-                label for away in DISTANCES for dx, dy in SIDES  # best first; at a side the name begins or ends there
-                for label in self.at(words, wide, point, x + dx * away * line - (1.0 - dx) / 2.0 * wide,
-                                     y + dy * away * line, away)
-            )  # fmt: skip
-            if not self.place(spots):
-                self.hidden += len(names)
-
-    def place(self, spots: Iterable[Label]) -> bool:
-        """Place a name at the first free spot, or else at the first that covers axes only; return False for none."""
-        free = [spot for spot in spots if self._taken.isdisjoint(self._cells(spot[2]))]
-        if not free:
-            return False
-        found = next((spot for spot in free if self._axes.isdisjoint(self._cells(spot[2]))), free[0])
-        self._taken.update(self._cells(found[2]))
-        self.placed.append(found)
-        return True
-
-    def at(
-        self, words: str, length: float, point: Flat, left: float, middle: float, away: float = 0.0
-    ) -> Iterator[Label]:
-        """Yield the label of some length at a place, moved to the nearest cells, if it is inside the picture."""
-        wide, high = self._size.cell
-        left, top = wide * round(left / wide), high * round((middle - self._size.line / 2.0) / high)
-        right, bottom = left + wide * math.ceil(length / wide), top + self._size.line
-        if left >= 0.0 and right <= self._size.width and top >= 0.0 and bottom <= self._size.height:
-            yield words, point, (left - MARGIN, top, right + MARGIN, bottom), away
-
-    def _cells(self, box: Box) -> Iterator[tuple[int, int]]:
+    def cells_of(box: Box) -> Iterator[tuple[int, int]]:
         """Return the cells that a box covers; a point covers one."""
-        (wide, high), (left, top, right, bottom) = self._size.cell, box
+        left, top, right, bottom = box
         spans = ((int(left // wide), math.ceil(right / wide)), (int(top // high), math.ceil(bottom / high)))
         across, down = (range(begin, max(end, begin + 1)) for begin, end in spans)
         return product(across, down)
+
+    def spots(point: Flat, names: list[str]) -> Iterator[Label]:
+        """Yield the labels around a point, best first; at a side the name begins or ends there."""
+        words = words_of(names)
+        length = measure(words)
+        for away, (dx, dy) in product(DISTANCES, SIDES):
+            left = point.x + dx * away * line - (1.0 - dx) / 2.0 * length
+            yield from flat.label(words, length, point, left, point.y + dy * away * line, away)
+
+    groups: dict[tuple[int, int], tuple[Flat, list[str]]] = {}
+    for name in reversed(flat.nearest_last):
+        if flat.holds(point := flat.origins[name]):
+            groups.setdefault((round(point.x / SAME), round(point.y / SAME)), (point, []))[1].append(name)
+    taken: set[tuple[float, float]] = {cell for box in blocked for cell in cells_of(box)}
+    taken |= {(x // wide, y // high) for x, y, _ in flat.origins.values()}
+    axes = {
+        ((begin.x + part * (end.x - begin.x)) // wide, (begin.y + part * (end.y - begin.y)) // high)
+        for name, begin in flat.origins.items() for end in flat.tips(flat.poses[name]) for part in (0.4, 0.7, 1.0)
+    }  # fmt: skip
+    placed: list[Label] = []
+    hidden = 0
+    inside = ((spots(point, names), len(names)) for point, names in groups.values())
+    for found, count in chain(((each, 1) for each in outside), inside):
+        free = [spot for spot in found if taken.isdisjoint(cells_of(spot[2]))]
+        if free:
+            best = next((spot for spot in free if axes.isdisjoint(cells_of(spot[2]))), free[0])
+            taken.update(cells_of(best[2]))
+            placed.append(best)
+        else:
+            hidden += count
+    return placed, hidden
 
 
 def text_width(words: str, size: float = 12.0) -> float:

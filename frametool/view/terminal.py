@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from frametool.errors import cells, printable
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.sim.turtle import SIZE, TurtleState
-from frametool.view.progress import coloured_console
-from frametool.view.scene import SLANTED, Flat, FrameScene, Labels, Projection, Size, nice, words_of
+from frametool.view.scene import EYES, Flat, FrameScene, Projection, Size, nice, placed_names, words_of
+from frametool.view.text import coloured_console
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import IssuedCommand, SimulationStep
-    from frametool.view.scene import Label
+    from frametool.view.scene import Eye, Label
 
     Run = tuple[str, str]  # text and its style
     Spot = tuple[int, int]  # line and column
@@ -60,7 +60,7 @@ COLOURS = ("red", "green", "blue")  # of axes
 ARROWS = "→↗↑↖←↙↓↘"
 
 
-def terminal_lines(scene: FrameScene, columns: int, lines: int, eye: tuple[float, float] = SLANTED) -> list[list[Run]]:
+def terminal_lines(scene: FrameScene, columns: int, lines: int, eye: Eye = EYES["slanted"]) -> list[list[Run]]:
     """Draw a scene in some columns and lines, each as runs of one style; the last line is the scale."""
     canvas = Canvas(max(lines, 4) - 1, max(columns, 20))
     wide, high = 2.0 * canvas.columns, 4.0 * canvas.lines
@@ -75,19 +75,16 @@ def terminal_lines(scene: FrameScene, columns: int, lines: int, eye: tuple[float
     for name in flat.nearest_last:
         for axis, tip in flat.axes(name):
             _mark_line(canvas, flat, flat.origins[name], tip, COLOURS[axis])
-    labels = Labels(flat)
     outside = [name for name, point in flat.origins.items() if not flat.holds(point)]
-    pointed = sum(labels.place(_at_edge(labels, flat, name)) for name in outside[:12])
-    arrows = len(labels.placed)
-    labels.place_all()
+    labels, hidden = placed_names(flat, outside=(_at_edge(flat, name) for name in outside[:12]))
     letters: dict[Spot, Run] = {}
-    for number, (words, _, (left, top, *_), _) in enumerate(labels.placed):
+    for words, _, (left, top, *_), away in labels:
         row, column = int(top) // 4, int(left) // 2 + 1
-        style = "dim" if number < arrows else "bold"
+        style = "bold" if away else "dim"
         drawn = (each for letter in words for each in (letter, *[""] * (cells(letter) - 1)))  # wide ones take two
         letters |= {(row, column + at): (letter, style) for at, letter in enumerate(drawn)}
     # the scale, the direction of view, and the number of names without room
-    metres, stamp_ns, hidden = nice(24.0 / flat.scale), scene.at_ns, len(outside) - pointed + labels.hidden
+    metres, stamp_ns, hidden = nice(24.0 / flat.scale), scene.at_ns, hidden + len(outside[12:])
     bar = "─" * max(round(metres * flat.scale / 2.0) - 2, 0)
     azimuth, elevation = (round(math.degrees(angle)) + 0 for angle in eye)
     more = f", {hidden} name{'s' * (hidden > 1)} hidden" if hidden else ""
@@ -98,13 +95,13 @@ def terminal_lines(scene: FrameScene, columns: int, lines: int, eye: tuple[float
     return [*(canvas.runs(row, letters) for row in range(canvas.lines)), scale]
 
 
-def terminal_text(scene: FrameScene, columns: int, lines: int, eye: tuple[float, float] = SLANTED) -> str:
+def terminal_text(scene: FrameScene, columns: int, lines: int, eye: Eye = EYES["slanted"]) -> str:
     """Return the picture without colours."""
     drawn = terminal_lines(scene, columns, lines, eye)
     return "".join("".join(text for text, _ in runs).rstrip() + "\n" for runs in drawn)
 
 
-def print_terminal(scene: FrameScene, eye: tuple[float, float] = SLANTED, color: str = "auto") -> None:
+def print_terminal(scene: FrameScene, eye: Eye = EYES["slanted"], color: str = "auto") -> None:
     """Print a picture of the terminal's size, in colour where it has any, or as `color` says: always or never."""
     from rich.text import Text
 
@@ -128,7 +125,7 @@ def _mark_line(canvas: Canvas, flat: Projection, begin: Flat, end: Flat, colour:
         canvas.mark(math.floor(across), math.floor(down), colour)
 
 
-def _at_edge(labels: Labels, flat: Projection, name: str) -> Iterator[Label]:
+def _at_edge(flat: Projection, name: str) -> Iterator[Label]:
     """Yield the places at an edge for a frame beyond it: its name and distance with an arrow, the nearest first."""
     x, y, _ = flat.origins[name]
     half_wide, half_high = flat.size.width / 2.0, flat.size.height / 2.0
@@ -143,7 +140,7 @@ def _at_edge(labels: Labels, flat: Projection, name: str) -> Iterator[Label]:
     left = min(max(left, 0.0), flat.size.width - length)
     middles = (at + 2 for at in range(0, int(flat.size.height), 4))
     for middle in sorted(middles, key=lambda at: abs(at - half_high - down * part)):
-        yield from labels.at(text, length, flat.origins[name], left, middle)
+        yield from flat.label(text, length, flat.origins[name], left, middle)
 
 
 # where pens have all one colour, curves and turtles still differ: one colour a turtle, in the order of their names;

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 PACKAGE = Path(frametool.__file__).parent
 TALKING = {"echo", "secho", "warn", "catch_warnings", "print"}  # as names of functions
 ALLOWED = {
-    ("errors.py", "warn"), ("cli/sink.py", "print"), ("view/pose_text.py", "print"),
+    ("errors.py", "warn"), ("cli/sink.py", "print"), ("view/text.py", "print"),
     ("cli/__init__.py", "sys.stderr.write"),  # where no module can be opened, the voice cannot either
     ("view/pictures.py", "catch_warnings"),  # what a drawing library says of fonts
     ("cli/commands/batch.py", "catch_warnings"),  # filters of the program that runs a command are put back

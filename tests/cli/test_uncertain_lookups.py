@@ -19,7 +19,7 @@ from frametool.formats.rows import csv as csv_form
 from frametool.formats.table import holds_arrays, writers
 from frametool.grammar.covariance import columns
 from frametool.grammar.result import Style
-from frametool.view import pose_text
+from frametool.view import text as text_for_people
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -275,12 +275,12 @@ def test_a_lookup_without_covariances_loads_nothing_of_them(tmp_path: Path) -> N
 
 def test_the_covariance_of_a_point_is_three_sigmas_and_nine_columns() -> None:
     record = {"frame": "map", "point": [1.0, 2.0, 3.0], "covariance": [4.41e-6, 0.0, 0.0, 0.0, 9e-6, 0.0, 0.0, 0.0, 1.21e-6]}
-    text = pose_text.write_points([record], Style("text"))
+    text = text_for_people.write_points([record], Style("text"))
     assert text == "1.0  2.0  3.0  m in map  sigma 2.1 mm 3.0 mm 1.1 mm\n"
     head, row = csv_form.write_points([record], Style("csv")).splitlines()
     assert head.split(",") == ["frame", *"xyz", *columns(9)]
     assert row.startswith("map,1.0,2.0,3.0,4.41e-06,0.0,")
-    unknown = pose_text.write_points([record | {"covariance": [-1.0] + [0.0] * 8}], Style("text"))
+    unknown = text_for_people.write_points([record | {"covariance": [-1.0] + [0.0] * 8}], Style("text"))
     assert unknown == "1.0  2.0  3.0  m in map  sigma unknown\n"
 
 

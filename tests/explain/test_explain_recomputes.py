@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from console import ROOT
 from recheck import recheck
 from written import ALL, HOSTILE, ROTATIONS, SPECS, pose, record, rotation, seeded
 
@@ -90,3 +91,10 @@ def test_the_checker_finds_a_wrong_digit() -> None:
         recheck(sheet.replace("= 0.0381346", "= 0.0381356"), 6)
     with pytest.raises(AssertionError):
         recheck(sheet.replace("0.984808·0.965926", "0.984818·0.965926"), 6)
+
+
+@pytest.mark.parametrize("line", ["truth.tum odometry.tum", "truth.tum mono.tum --align sim3 --delta 10m,5deg,1s", "antenna.csv truth.tum"])
+def test_each_line_of_a_comparison_recomputes(line: str) -> None:
+    files = {name: (ROOT / "examples" / name).read_bytes() for name in ("truth.tum", "odometry.tum", "mono.tum", "antenna.csv")}
+    found = frametool.run(f"compare {line} --explain", files=files)
+    assert (found.status, recheck(found.out.decode(), 9) > 1) == (0, True)

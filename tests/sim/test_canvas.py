@@ -9,7 +9,7 @@ from rich.console import Console
 
 from frametool.sim.scene import tutorial
 from frametool.sim.simulate import simulate
-from frametool.view.exports import Drawing, run_picture
+from frametool.view.exports import run_picture
 from frametool.view.pictures import ticks, write_svg
 from frametool.view.terminal import Canvas, Screen
 
@@ -45,7 +45,7 @@ def test_ticks_enclose_the_values_and_are_few(low: float, high: float) -> None:
 
 def test_a_drawing_of_nobody_is_a_picture() -> None:
     scene = tutorial(followers=0, duration=0.0)
-    drawing = Drawing(scene)
+    watch, picture = run_picture(scene)
     for step in simulate(scene):
-        drawing.watch(step)
-    assert write_svg(run_picture(drawing)).count("<svg") == 1
+        watch(step)
+    assert write_svg(picture()).count("<svg") == 1

@@ -19,7 +19,7 @@ from frametool.frames.lookups import FrameTree
 from frametool.geometry.transform import Transform
 from frametool.view.exports import HEIGHT, SIZE, WIDTH, still_picture
 from frametool.view.pictures import write_png, write_svg
-from frametool.view.scene import EYES, FrameScene, Labels, Projection, nice
+from frametool.view.scene import EYES, FrameScene, Projection, nice, placed_names
 from frametool.view.terminal import Canvas, terminal_lines, terminal_text
 
 if TYPE_CHECKING:
@@ -53,13 +53,12 @@ ODD = {
 @pytest.mark.parametrize("name", ["robot.yaml", "drive.yaml"])
 def test_everything_lies_inside_the_picture_and_no_name_over_another(name: str, eye: str) -> None:
     flat = Projection(FrameScene(frametool.load(ROOT / "examples" / name)), SIZE, EYES[eye])
-    labels = Labels(flat)
-    labels.place_all()
+    labels, _ = placed_names(flat)
     for frame in flat.poses:
         x, y, _ = flat.origins[frame]
         assert SIZE.margin - 1e-6 <= x <= WIDTH - SIZE.margin + 1e-6
         assert SIZE.margin - 1e-6 <= y <= HEIGHT - SIZE.margin + 1e-6
-    for a, b in itertools.combinations([box for _, _, box, _ in labels.placed], 2):
+    for a, b in itertools.combinations([box for _, _, box, _ in labels], 2):
         assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
 
 
@@ -118,14 +117,14 @@ def test_a_picture_says_when_most_frames_lie_in_a_small_spot() -> None:
 
 
 def test_placing_names_looks_at_twice_as_much_for_twice_as_many(monkeypatch: pytest.MonkeyPatch) -> None:
-    counts, at = [], Labels.at
+    counts, label = [], Projection.label
     looked = [0]
 
     def counted(*arguments: Any) -> Any:
         looked[0] += 1
-        return at(*arguments)
+        return label(*arguments)
 
-    monkeypatch.setattr(Labels, "at", counted)
+    monkeypatch.setattr(Projection, "label", counted)
     for frames in (500, 1000):
         looked[0] = 0
         tree = star(*((math.cos(k * k), math.sin(k * k), k % 7 / 7) for k in range(frames)))

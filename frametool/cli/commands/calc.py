@@ -128,7 +128,7 @@ def value_texts(terms: Iterable[Term], style: Style) -> Iterator[str]:
 
 def _for_people(term: Term, style: Style) -> str:
     """Describe one value."""
-    from frametool.view.pose_text import write_points, write_poses
+    from frametool.view.text import write_points, write_poses
 
     def text(values: Sequence[float]) -> str:
         return "  ".join(style.number(value + 0.0) for value in values)

@@ -253,7 +253,7 @@ def echo_command(inputs: Inputs) -> int:
     results = skipped.counted(_results(replayed, target, source, skipped))
     shown = islice(results, None if limit is None else min(limit, sys.maxsize))
     if out.style.format == "text":
-        from frametool.view.pose_text import write_blocks
+        from frametool.view.text import write_blocks
 
         out.pieces(write_blocks(shown, target, source, out.style))
     else:

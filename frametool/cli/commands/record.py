@@ -16,7 +16,7 @@ from frametool.formats.table import FORMATS, is_folder, is_recording, writers
 from frametool.frames.stamps import parse_time
 from frametool.grammar.edges import Diagnostics
 from frametool.stream.faults import ON_ERROR, STOP, BadRows
-from frametool.view.progress import ProgressBar
+from frametool.view.text import progress_bar
 
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 messages skipped, 4 lookup, 5 file."
 TRANSFORMS = ("tf", "tf_static")  # how topics of transforms are called, in any namespace
@@ -98,9 +98,9 @@ def record_command(inputs: Inputs) -> int:
     inputs.refuse_idle()
     with writing(place, force=force, folder=is_folder(copy)) as write, opened_recording(path, tally) as opened:
         run = RecordRun(opened, request)
-        with ProgressBar(None, quiet=quiet, counted="messages") as progress:
-            run.look(progress.advance)
-            for piece in run.pieces(copy, folder_of(place), progress.advance):
+        with progress_bar(None, quiet=quiet, counted="messages") as advance:
+            run.look(advance)
+            for piece in run.pieces(copy, folder_of(place), advance):
                 write(piece)
     moved = run.mover.tally.findings() if run.mover else ()
     for remark in (*tally.findings(), *moved):

@@ -117,11 +117,11 @@ class SimOutput:
         # what is written after the run, by file: what watches the steps, and what then makes the content
         pictures: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
         if self.plot:
-            from frametool.view.exports import Drawing, run_picture
+            from frametool.view.exports import run_picture
             from frametool.view.pictures import write_picture
 
-            run, suffix = Drawing(scene), suffix_of(self.plot)
-            pictures[self.plot] = run.watch, lambda: write_picture(run_picture(run), suffix)
+            (watch_run, drawn), suffix = run_picture(scene), suffix_of(self.plot)
+            pictures[self.plot] = watch_run, lambda: write_picture(drawn(), suffix)
         if self.view:
             from frametool.view.exports import run_page
 

@@ -1,12 +1,19 @@
-"""Poses and points for a person: every notation aligned on the decimal point, and blocks as tf2_echo prints them."""
+"""Text for people: poses and points with every notation aligned on the decimal point, and blocks as tf2_echo has them.
+
+Also the terminal through rich: in which colours, and progress bars on stderr for jobs longer than two seconds.
+"""
 
 from __future__ import annotations
 
 import math
+import os
+import sys
+import time
+from contextlib import contextmanager, suppress
 from itertools import pairwise, zip_longest
 from shutil import get_terminal_size
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from frametool.documents.writers import dump_json
 from frametool.errors import printable
@@ -18,7 +25,12 @@ from frametool.grammar.readers import EARTH_FRAMES
 from frametool.grammar.result import ROUNDED_TO_ZERO, Result, Style, is_locked, placed, rotation_entry, rotation_numbers
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+
+    from rich.console import Console
+
+    Cells = Sequence[tuple[str, float]]  # names and numbers
+    Line = tuple[str, Cells, str]  # of a description: what it is, its numbers, their unit
 
 
 OVERVIEW = [name + unit for name, row in ROTATIONS.items() for unit in row.overview]
@@ -28,14 +40,6 @@ WIDTH = 80
 DECIMALS = 6  # of an overview
 GLUE = "\0"
 ENDLESS = 1e9  # where that many decimals say nothing
-
-
-class NumberLine(NamedTuple):
-    """One line of a description: what it is, its numbers with their names, their unit."""
-
-    label: str
-    cells: Sequence[tuple[str, float]]
-    unit: str
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
@@ -66,7 +70,7 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
 def _describe(result: Result, style: Style) -> str:
     """Return the heading and the aligned lines of one pose."""
     pose = result.pose
-    lines: list[NumberLine] = []
+    lines: list[Line] = []
     if style.place is not None:
         from frametool.grammar.place import placed_entry
 
@@ -74,46 +78,46 @@ def _describe(result: Result, style: Style) -> str:
         lines += _place_lines(entry)
     elif pose.position is not None:
         (position,), unit = placed(pose.position, style).values(), "cm" if style.in_cm else "m"
-        lines.append(NumberLine("translation", list(zip("xyz", position, strict=True)), unit))
+        lines.append(("translation", list(zip("xyz", position, strict=True)), unit))
     for each in style.notations or map(notation, OVERVIEW) if pose.rotation is not None else ():
         numbers = rotation_numbers(pose, each, style)
         if each.representation.shape == ROWS:
             for at, row in enumerate(rotation_entry(pose, each, style)[1][: math.isqrt(len(numbers))]):
                 cells = list(zip(["[" * style.screen, *[""] * len(row)], row, strict=False))
-                lines.append(NumberLine("" if at else each.label, cells, "]" * style.screen))
+                lines.append(("" if at else each.label, cells, "]" * style.screen))
             continue
         unit = ("deg" if each.in_degrees(style.degrees) else "rad") if each.representation.angles else ""
-        lines.append(NumberLine(each.label, list(zip(each.names, numbers, strict=True)), unit))
+        lines.append((each.label, list(zip(each.names, numbers, strict=True)), unit))
         if is_locked(pose, each):
-            lines.append(NumberLine("", [], "gimbal lock: not unique, third angle set to 0"))
+            lines.append(("", [], "gimbal lock: not unique, third angle set to 0"))
     if pose.parent in EARTH_FRAMES and not style.notations and style.place is None:
         lines += _earth_lines(pose)
     units = {"distance": "m", "angle": "rad", "linear": "m/s", "angular": "rad/s", "std": "m", "std_angle": "rad"}
     for key, value in result.said(style).items():
         if isinstance(value, float):
             unit = "deg" if key.endswith("_deg") else units.get(key) or units.get(key.partition("_")[0], "")
-            lines.append(NumberLine(key.removesuffix("_deg"), [("", value)], unit))
+            lines.append((key.removesuffix("_deg"), [("", value)], unit))
         elif sigmas := _sigmas(key, value):
-            lines.append(NumberLine("sigma", [], " ".join(each.replace(" ", GLUE) for each in sigmas)))
+            lines.append(("sigma", [], " ".join(each.replace(" ", GLUE) for each in sigmas)))
         elif key not in TIMES and value is not None:
-            lines.append(NumberLine(key, [], _said(value)))
+            lines.append((key, [], _said(value)))
     if style.place is not None and style.place.origin is not None:  # of its axes, not of the Earth's
         result = Result(result.pose._replace(parent=f"{style.place.name} at the origin"), result.extras)
     return _heading(result) + (_layout(lines, style) if lines else "  identity\n")
 
 
-def _place_lines(entry: dict[str, Any]) -> Iterator[NumberLine]:
+def _place_lines(entry: dict[str, Any]) -> Iterator[Line]:
     """Yield the lines of a position on the Earth as a mapping has it, a number each."""
     for key, value in (entry | entry.get("utm", {})).items():
         if isinstance(value, float):
             unit = "deg" if key in ("lat", "lon", "convergence_deg") else "m"
-            yield NumberLine(key.removesuffix("_deg").replace("_", " "), [("", value)], unit * (key != "grid_scale"))
+            yield key.removesuffix("_deg").replace("_", " "), [("", value)], unit * (key != "grid_scale")
         elif key == "zone":
-            yield NumberLine("utm zone", [], value)
+            yield "utm zone", [], value
         elif key in ("xyz", "ecef"):
-            yield NumberLine("ecef", list(zip("xyz", value, strict=True)), "m")
+            yield "ecef", list(zip("xyz", value, strict=True)), "m"
     if "axes" in entry:
-        yield NumberLine("axes", [], f"{entry['axes']}: of what follows")
+        yield "axes", [], f"{entry['axes']}: of what follows"
 
 
 def _heading(result: Result) -> str:
@@ -137,11 +141,11 @@ def in_width(text: str, more: str, *, gap: str = " ") -> str:
     return f"{text}{gap}{more}\n" if len(text) + len(gap) + len(more) <= width else f"{text}\n  {more}\n"
 
 
-def _earth_lines(pose: Pose) -> Iterator[NumberLine]:
+def _earth_lines(pose: Pose) -> Iterator[Line]:
     """Yield the lines of where a pose or point in ecef is on the Earth, and where its x points; nothing of no place."""
     from frametool.grammar.place import overview
 
-    yield from (NumberLine(label, [], said) for label, said in overview(pose))
+    yield from ((label, [], said) for label, said in overview(pose))
 
 
 def _sigmas(key: str, value: Any) -> list[str]:
@@ -187,24 +191,24 @@ def _said(value: Any) -> str:
     return printable(dump_json(value) if isinstance(value, (dict, list)) else "" if value is None else str(value))
 
 
-def _layout(lines: Sequence[NumberLine], style: Style, label: int = 0) -> str:
+def _layout(lines: Sequence[Line], style: Style, label: int = 0) -> str:
     """Align names and numbers in columns; where that is too wide each part by itself, and what is still too wide wraps.
 
     label: width of the labels, at least
     """
-    label, width = max([label, *(len(line.label) for line in lines)]), get_terminal_size((WIDTH, 0)).columns
-    numbers = _aligned([[_number(value, style) for _, value in line.cells] for line in lines])
-    columns = zip_longest(*(line.cells for line in lines), fillvalue=("", 0.0))
+    label, width = max([label, *(len(each) for each, _, _ in lines)]), get_terminal_size((WIDTH, 0)).columns
+    numbers = _aligned([[_number(value, style) for _, value in cells] for _, cells, _ in lines])
+    columns = zip_longest(*(cells for _, cells, _ in lines), fillvalue=("", 0.0))
     sizes = [max(len(name) for name, _ in column) for column in columns]
     texts = []
-    for line, row in zip(lines, numbers, strict=True):
+    for (own, cells, unit), row in zip(lines, numbers, strict=True):
         named = [  # GLUE for blanks at which they must not be wrapped
             f"{name:>{size}} {text}".replace(" ", GLUE) if size else text
-            for (name, _), text, size in zip(line.cells, row, sizes, strict=False)
+            for (name, _), text, size in zip(cells, row, sizes, strict=False)
         ]
-        text = f"  {line.label:<{label}}  ".replace(" ", GLUE) + " ".join(named)
-        texts.append(f"{text}  {line.unit}".rstrip(f" {GLUE}").replace("  ]", " ]"))
-    begins = [at for at, line in enumerate(lines) if at and line.label]
+        text = f"  {own:<{label}}  ".replace(" ", GLUE) + " ".join(named)
+        texts.append(f"{text}  {unit}".rstrip(f" {GLUE}").replace("  ]", " ]"))
+    begins = [at for at, (own, _, _) in enumerate(lines) if at and own]
     if begins and max(map(len, texts)) > width:
         parts = pairwise([0, *begins, len(lines)])
         return "".join(_layout(lines[begin:end], style, label) for begin, end in parts)
@@ -257,3 +261,59 @@ def write_blocks(results: Iterable[Result], target: str, source: str, style: Sty
         lines += ["".join(entries[at : at + 4]) for at in range(0, 16, 4)]
         yield "\n".join(lines) + "\n"
         heading = ""
+
+
+PATIENCE = 2.0  # seconds before anything is shown
+
+
+@contextmanager
+def progress_bar(
+    total: int | None, *, quiet: bool = False, counted: str = "rows"
+) -> Iterator[Callable[[int, int], None]]:
+    """Yield what counts rows and bytes, and shows them if stderr is a terminal and the job takes longer than PATIENCE.
+
+    total: bytes, if known; counted: the unit of the count
+    """
+    is_hidden, begin = quiet or sys.stderr is None or not sys.stderr.isatty(), time.monotonic()
+    rows = size = 0
+    bar: Any = None
+
+    def advance(more_rows: int, more_size: int) -> None:
+        nonlocal rows, size, bar
+        rows, size, seconds = rows + more_rows, size + more_size, time.monotonic() - begin
+        if is_hidden or seconds < PATIENCE:
+            return
+        with suppress(OSError):
+            if bar is None:
+                from rich import progress
+
+                text = f"{{task.fields[rows]}} {counted}  {{task.fields[rate]}} {counted}/s"
+                columns: list[Any] = [progress.TextColumn(text)]
+                if total:
+                    columns += [progress.BarColumn(), progress.TaskProgressColumn(), progress.TimeRemainingColumn()]
+                bar = progress.Progress(*columns, console=coloured_console(stderr=True), transient=True)
+                bar.start()
+                bar.add_task("", total=total, rows="0", rate="")
+            bar.update(bar.task_ids[0], completed=size, rows=f"{rows:,}", rate=f"{rows / seconds:,.0f}")
+
+    try:
+        yield advance
+    finally:
+        with suppress(OSError):  # a terminal that has gone does not change what the data is worth
+            if bar is not None:
+                bar.stop()
+
+
+def coloured_console(color: str = "auto", *, stderr: bool = False) -> Console:
+    """Return an output, in colour where the terminal has any, or as `color` says: always or never.
+
+    Where there is no colour, also by NO_COLOR, nothing is bold or dim either.
+    """
+    from rich.console import Console
+
+    plain = color == "never" or (color == "auto" and bool(os.environ.get("NO_COLOR")))
+    return Console(
+        file=sys.stderr if stderr else sys.stdout, highlight=False, soft_wrap=True, no_color=plain,
+        force_terminal=True if color == "always" else None,
+        color_system=None if plain else "auto" if color == "auto" else "standard",
+    )  # fmt: skip
