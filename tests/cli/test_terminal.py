@@ -179,9 +179,9 @@ def test_help_has_styles_on_a_terminal_and_its_width(folder: Path) -> None:
 
 @pytest.mark.parametrize("words", [("help", "pose"), ("formats",), ("help", "cookbook"), ("help", "lookup"), ("lookup", "--help-all")], ids=" ".join)
 def test_what_is_longer_than_the_screen_goes_through_the_pager(folder: Path, words: tuple[str, ...]) -> None:
-    paged = seen(folder, *words, PAGER="sed s/^/|/")
+    paged = seen(folder, *words, PAGER="sed 's/^/|/'")
     assert all(line.startswith("|") for line in paged.splitlines())
-    whole = seen(folder, *words, LINES="999", NO_COLOR="1", PAGER="sed s/^/|/")
+    whole = seen(folder, *words, LINES="999", NO_COLOR="1", PAGER="sed 's/^/|/'")
     assert paged.replace("|", "", 1).replace("\n|", "\n") == whole
-    piped = subprocess.run([sys.executable, "-m", "frametool", *words], cwd=folder, capture_output=True, text=True, check=True, env=os.environ | {"PYTHONPATH": str(ROOT), "PAGER": "sed s/^/|/"})
+    piped = subprocess.run([sys.executable, "-m", "frametool", *words], cwd=folder, capture_output=True, text=True, check=True, env=os.environ | {"PYTHONPATH": str(ROOT), "PAGER": "sed 's/^/|/'"})
     assert "\n|" not in piped.stdout

@@ -18,6 +18,7 @@ def refused(cells: list[str], *, in_ns: bool) -> list[str]:
     return [cell for cell, found in zip(cells, stamps_of(cells, in_ns=in_ns), strict=True) if isinstance(found, str)]
 
 
+@pytest.mark.filterwarnings("ignore:stamps such as")  # a whole number may look like milliseconds
 @pytest.mark.parametrize("in_ns", [True, False])
 @given(cells=st.lists(CELLS, min_size=1, max_size=40))
 def test_a_column_is_read_as_its_cells_are(cells: list[str], *, in_ns: bool) -> None:
