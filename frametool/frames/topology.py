@@ -346,6 +346,18 @@ def left_out(track: MovingTrack, at_ns: int) -> str:
     )
 
 
+def motion(track: MovingTrack) -> str:
+    """Return a short description of a frame's motion: `41 at 10 Hz, 0 .. 4 s`."""
+    first, last = track.span
+    if first == last:
+        return f"one at {seconds(first)} s" if track.count == 1 else f"{track.count} at once"
+    rate = (track.count - 1) * BILLION / (last - first)
+    changes = sum(1 for _ in track.changes())
+    times = f" {changes} times" if changes > 1 else ""
+    other = f", reparented{times}" if changes else ""
+    return f"{track.count} at {rate:.4g} Hz, {seconds(first)} .. {seconds(last)} s{other}"
+
+
 def gap(track: MovingTrack, at_ns: int) -> int:
     """Return the distance of a time from a track's samples, in nanoseconds."""
     first, last = track.span

@@ -2,8 +2,6 @@
 
 Findings are written as compilers do:
     robot.yaml:9:17: error: quaternion 0 0 0 0.9 has norm 0.9; .. [denormalized]
-
-Also the report of `monitor`, as plain mappings with units in their keys: one per edge, and one for a chain of edges.
 """
 
 from __future__ import annotations
@@ -13,16 +11,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.writers import dump_json
-from frametool.errors import BadTopology, Finding, FormatError, Misused, Unanswered, first_of, shown
+from frametool.errors import BadTopology, Finding, FormatError, Unanswered, first_of, shown
 from frametool.formats.detect import by_sign
 from frametool.formats.load import FrameFile, refuse_unknown_joints
 from frametool.formats.trees.tree_reader import edges_of, located, read_edges
 from frametool.frames import topology
-from frametool.frames.edge_log import EdgeLog, chain
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry.representations import EARTH_FRAMES
-from frametool.grammar.edges import stop
 from frametool.grammar.readers import may_be_on_earth
+from frametool.lint.monitor import EdgeLog
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -30,7 +27,6 @@ if TYPE_CHECKING:
     from frametool.documents.source import Source
     from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Report
     from frametool.grammar.readers import Misfit
 
     Find = Callable[[Finding], None]
@@ -265,24 +261,21 @@ def _statements(
     refuse_unknown_joints(files)
 
 
-class Child:
-    """All data of one child frame."""
+class Child(EdgeLog[Statement]):
+    """All data of one child frame, and the first samples that violate a rule."""
 
     def __init__(self, first: Statement, number: int) -> None:
-        """Start from the first edge or sample; `number` counts all that were read."""
+        """Start before the first edge or sample; `number` counts all that were read."""
+        super().__init__(first)
         self.first = first
-        self.newest = first
         self.since = (number, first)  # the first with the newest parent
-        self.log = EdgeLog(first.child)
         self.static: Statement | None = None
-        self.changes: list[Statement] = []
         self.stamps: dict[int, tuple[int, int]] = {}  # stamp -> hash of the sample, its line
         self.other_pose: Statement | None = None
         self.again: list[Statement] = []
         self.clashes: list[Statement] = []
-        self.backward: list[Statement] = []
 
-    def add(self, seen: Statement, number: int) -> None:
+    def take(self, seen: Statement, number: int) -> None:
         """Add one more."""
         if seen.stamp_ns is None:
             self.static = self.static or seen
@@ -291,15 +284,11 @@ class Child:
             known = self.stamps.setdefault(seen.stamp_ns, fresh)
             if known is not fresh:
                 (self.again if known[0] == fresh[0] else self.clashes).append(seen)
-            if self.log.is_late(seen.stamp_ns):
-                self.backward.append(seen)
         if seen.parent != self.newest.parent:
-            self.changes.append(seen)
             self.since = (number, seen)
         elif seen.components != self.newest.components:
             self.other_pose = self.other_pose or seen
-        self.newest = seen
-        self.log.add(seen.parent, seen.components, seen.stamp_ns, seen.line)
+        self.add(seen)
 
 
 def lint(everything: Iterable[Statement], tree: FrameTree | None = None) -> Iterator[Finding]:
@@ -315,7 +304,7 @@ def lint(everything: Iterable[Statement], tree: FrameTree | None = None) -> Iter
         if seen.looks_w_first and (child.first is seen or not child.first.looks_w_first):
             message = f"frame {shown(seen.child)} is turned by exactly 180 degrees about x; did you mean w first?"
             yield seen.finding("w-first", message)
-        child.add(seen, number)
+        child.take(seen, number)
     for child in children.values():
         stamps = len(child.stamps) + (child.static is not None)
         if tree is not None and (stamps < 2 or not (child.changes or child.other_pose)):  # it has one pose
@@ -373,8 +362,7 @@ def _moving(child: Child, frame: str) -> Iterator[Finding]:
 
 def _steps(child: Child) -> Iterator[Finding]:
     """Apply the rules about pauses and distances between samples."""
-    log = child.log
-    for rule, steps in (("gap", log.gaps()), ("disagreement", log.returns()), ("jump", log.jumps())):
+    for rule, steps in (("gap", child.gaps()), ("disagreement", child.returns()), ("jump", child.jumps())):
         if not steps:
             continue
         step = steps[0]
@@ -411,94 +399,3 @@ def _at(seen: Statement) -> str:
 
 def _more(found: Sequence[object]) -> str:
     return f" (and {len(found) - 1} more of these)" if len(found) > 1 else ""
-
-
-def monitor(
-    files: Sequence[FrameFile], *ends: str, normalize: bool = False, clashing: Report = stop
-) -> list[dict[str, Any]]:
-    """Describe every edge of some files; or, for `ends` (target, source), those between the two and their chain.
-
-    clashing: receives the errors about frames on the topics of two robots, whose samples then count as one
-    Raises FormatError for files without transforms, UnknownFrame, NotConnected.
-    """
-
-    def report(error: FormatError) -> None:
-        (clashing if error.rule == "two-topics" else stop)(error)
-
-    logs: dict[str, EdgeLog] = {}
-    for file in files:
-        for edge in file.edges(report, normalize=normalize):
-            if edge.parent is not None:
-                log = logs.get(edge.child) or logs.setdefault(edge.child, EdgeLog(edge.child))
-                log.add(edge.parent, edge.components, edge.stamp_ns, edge.line, edge.received_ns)
-                if edge.topic:
-                    log.topics[edge.topic] = log.topics.get(edge.topic, 0) + 1
-    refuse_unknown_joints(files)
-    if not logs:
-        raise FormatError("no transforms in it", source=", ".join(file.name for file in files))
-    if not ends:
-        return list(map(edge_entry, logs.values()))
-    target, source = ends
-    path = chain(logs, target, source)
-    if not (between := [logs[child] for child in path.edges]):
-        raise Misused(f"no edge is between {shown(target)} and itself; name two frames")
-    return [*map(edge_entry, between), chain_entry(path.frames, between)]
-
-
-def edge_entry(log: EdgeLog) -> dict[str, Any]:
-    """Describe an edge; unknown or inapplicable values are None."""
-    longest = max(log.steps, key=lambda step: step.pause_ns, default=None)
-    delays = log.delays_ns
-    metres = sum(step.metres for step in log.steps)
-    seconds = sum(step.pause_ns for step in log.steps) / BILLION
-    speeds = [step.metres / step.pause_ns * BILLION for step in log.steps]
-    return {
-        "kind": "moving" if log.moves else "static",
-        "parent": log.parent,
-        "child": log.child,
-        "count": log.count,
-        "rate_hz": log.rate,
-        "first_ns": log.first_ns,
-        "last_ns": log.last_ns,
-        "gap_s": longest.pause_ns / BILLION if longest else None,
-        "gap_until_ns": longest.stamp_ns if longest else None,
-        "delay_mean_s": sum(delays) / len(delays) / BILLION if delays else None,
-        "delay_max_s": max(delays) / BILLION if delays else None,
-        "length_m": metres if log.steps else None,
-        "duration_s": seconds if log.steps else None,
-        "speed_mean": metres / seconds if log.steps else None,
-        "speed_max": max(speeds, default=None),
-        "gaps": len(log.gaps()) if log.steps else None,
-        "jumps": len(log.jumps()),
-        "backward": log.backward,
-        "parents": ", ".join(log.parents),
-        "parent_changes": log.changes,
-        "topics": ", ".join(f"{topic} ({count})" for topic, count in log.topics.items()),
-        "overlap": None,
-    }
-
-
-# of the values of its edges, that of a chain
-OF_CHAIN: dict[str, Callable[..., Any]] = {
-    "count": sum, "rate_hz": min, "gap_s": max, "delay_max_s": max, "jumps": sum, "backward": sum,
-    "parent_changes": sum,
-}  # fmt: skip
-
-
-def chain_entry(path: Sequence[str], logs: Sequence[EdgeLog]) -> dict[str, Any]:
-    """Describe the edges of a path together: their common interval, and their worst values."""
-    spans = [log.span for log in logs if log.moves]
-    first, last = (max(begin for begin, _ in spans), min(end for _, end in spans)) if spans else (None, None)
-    entries = [edge_entry(log) for log in logs]
-    known = {key: [entry[key] for entry in entries if entry[key] is not None] for key in OF_CHAIN}
-    worst = {key: OF_CHAIN[key](values) for key, values in known.items() if values}
-    return dict.fromkeys(entries[0]) | worst | {
-        "kind": "chain",
-        "parent": path[0],
-        "child": path[-1],
-        "first_ns": first,
-        "last_ns": last,
-        "parents": " <- ".join(path),
-        "topics": "",
-        "overlap": None if first is None or last is None else first <= last,
-    }

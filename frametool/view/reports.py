@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, cells, printable
 from frametool.formats.table import CHOICES, FORMATS
-from frametool.frames.edge_log import motion
 from frametool.frames.stamps import format_stamp
+from frametool.frames.topology import motion
 from frametool.geometry.transform import Transform
 from frametool.grammar.result import Style, edge_label
 from frametool.lint.tree_diff import SAME, Apart, Difference

@@ -14,7 +14,8 @@ from frametool.cli.sink import folded, in_colour, say, say_error, say_first, sho
 from frametool.cli.trees import FRAME, frame_name, load_sides, opened, state
 from frametool.errors import Finding, FormatError, listing, warn
 from frametool.formats.table import FORMATS
-from frametool.lint.rules import RULES, WRITERS, check, github_command, level, monitor
+from frametool.lint.monitor import monitor
+from frametool.lint.rules import RULES, WRITERS, check, github_command, level
 from frametool.lint.tree_diff import Tolerance, diff, entry, parse_tolerance
 
 if TYPE_CHECKING:

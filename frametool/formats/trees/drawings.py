@@ -18,7 +18,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from frametool.frames.edge_log import cache_entries, listed_motion
+from frametool.frames.stamps import BILLION
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.result import Style, edge_label, graphviz
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 _WORD = r"""("(?:[^"\\]|\\.)*+"|[A-Za-z_\d./]++)"""
 _ARROW = rf"""{_WORD}\s*->\s*(?={_WORD}\s*(\[(?:[^\]"]|"(?:[^"\\]|\\.)*+")*+\])?)"""
 _LISTED_FACTS = ("rate", "buffer_length", "most_recent_transform")
+SHORTEST = 0.0001  # seconds: tf2 divides by at least this
 _FACTS = (r"Average rate:\s*([\d.]+)", r"Buffer length:\s*([\d.]+)", r"Most recent transform:\s*([\d.]+)")
 
 
@@ -45,7 +46,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
             if parent:
                 numbers = (listed.get(name, "") for name in _LISTED_FACTS)
                 numbers = (float(each) if re.fullmatch(r"\d+(?:\.\d*)?", each) else 0.0 for each in numbers)
-                options.tally.drawn[child] = listed_motion(*numbers)
+                options.tally.drawn[child] = _motion(*numbers)
                 yield Edge(parent, child, IDENTITY, line=line)
         return
     text = re.sub(r"(?m)^[^\S\n]*//.*$", "", file.text)
@@ -59,8 +60,15 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         facts = [float(found[1]) for pattern in _FACTS if (found := re.search(pattern, arrow[3] or ""))]
         label = re.search(r"""label\s*=\s*("(?:[^"\\]|\\.)*+")""", arrow[3] or "")
         about = " ".join(re.sub(r"\\[nlr]", " ", label[1][1:-1]).split()) if label else ""
-        options.tally.drawn[child] = listed_motion(*facts) if len(facts) == len(_FACTS) else about
+        options.tally.drawn[child] = _motion(*facts) if len(facts) == len(_FACTS) else about
         yield Edge(parent, child, IDENTITY, line=line)
+
+
+def _motion(rate: float, length: float, newest: float) -> str:
+    """Return a short description of an edge's motion from tf2's listing: hertz, and seconds."""
+    if length > 0.0:
+        return f"{rate:.4g} Hz over {length:.4g} s"
+    return f"one at {newest:.9g} s" if newest else "static"
 
 
 def _with_lines(pattern: str, text: str) -> Iterator[tuple[re.Match[str], int]]:
@@ -76,18 +84,29 @@ def _unquoted(word: str) -> str:
     return re.sub(r"\\(.)", r"\1", word[1:-1]) if word[0] == '"' else word
 
 
+def _cache_entries(tree: Frames) -> Iterator[tuple[str, str, float, float, float, float]]:
+    """Yield child, parent, rate, newest and oldest stamp and their distance, as tf2 lists its cache; static: no stamps.
+
+    The order is that of first mention.
+    """
+    for track in (each for frame in tree.frames if (each := tree.track(frame))):
+        oldest, newest = (0, 0) if track.is_static else track.span
+        length = (newest - oldest) / BILLION
+        yield track.child, track.parent, track.count / max(length, SHORTEST), newest / BILLION, oldest / BILLION, length
+
+
 def write_tree(tree: Frames, style: Style) -> str:
     """Return a flowchart of mermaid, a digraph of graphviz, or tf2's listing, `{}` for no frames."""
     if style.format == "tf2":
         return "".join(
-            f"{each.child}: \n"
-            f"  parent: '{each.parent}'\n"
+            f"{child}: \n"
+            f"  parent: '{parent}'\n"
             "  broadcaster: 'default_authority'\n"
-            f"  rate: {each.rate:.3f}\n"
-            f"  most_recent_transform: {each.newest:.3f}\n"
-            f"  oldest_transform: {each.oldest:.3f}\n"
-            f"  buffer_length: {each.length:.3f}\n"
-            for each in cache_entries(tree)
+            f"  rate: {rate:.3f}\n"
+            f"  most_recent_transform: {newest:.3f}\n"
+            f"  oldest_transform: {oldest:.3f}\n"
+            f"  buffer_length: {length:.3f}\n"
+            for child, parent, rate, newest, oldest, length in _cache_entries(tree)
         ) or "{}\n"
     if style.format == "mermaid":  # nodes are numbered, because its ids allow few characters
         ids = {frame: f"n{index}" for index, frame in enumerate(tree.frames)}
@@ -116,18 +135,17 @@ def _escaped(text: str) -> str:
 
 def _view_frames(tree: Frames) -> str:
     """Return the digraph; the legend, which graphviz must attach to something, is above the first root."""
-    edges = cache_entries(tree)
-    lines = ["digraph G {"]
-    for each in edges:
+    lines, last = ["digraph G {"], 0.0
+    for number, (child, parent, rate, newest, oldest, length) in enumerate(_cache_entries(tree)):
         label = (
-            f"Broadcaster: default_authority\\nAverage rate: {round(each.rate, 3)}\\n"
-            f"Buffer length: {round(each.length, 3)}\\nMost recent transform: {round(each.newest, 3)}\\n"
-            f"Oldest transform: {round(each.oldest, 3)}\\n"
+            f"Broadcaster: default_authority\\nAverage rate: {round(rate, 3)}\\n"
+            f"Buffer length: {round(length, 3)}\\nMost recent transform: {round(newest, 3)}\\n"
+            f"Oldest transform: {round(oldest, 3)}\\n"
         )
-        lines.append(f'"{graphviz(each.parent)}" -> "{graphviz(each.child)}"[label=" {label}"];')
-    newest = max((each.newest for each in edges), default=0.0)
+        lines.append(f'"{graphviz(parent)}" -> "{graphviz(child)}"[label=" {label}"];')
+        last = max(last, newest) if number else newest
     lines += ["edge [style=invis];"]
     lines += [' subgraph cluster_legend { style=bold; color=black; label ="view_frames Result";']
-    lines += [f'"Recorded at time: {newest:.6f}"[ shape=plaintext ] ;']
+    lines += [f'"Recorded at time: {last:.6f}"[ shape=plaintext ] ;']
     lines += [f'}}->"{graphviz(root)}";' for root in tree.roots[:1]] or ["}"]
     return "\n".join([*lines, "}", ""])
