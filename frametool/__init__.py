@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from frametool.formats.cameras import load_camera as load_camera
     from frametool.formats.load import load as load
     from frametool.formats.robots.urdf import load_robot as load_robot
+    from frametool.formats.rows.arrow import apply_arrow as apply_arrow
     from frametool.formats.table import FORMATS as FORMATS
     from frametool.frames.buffer import TransformBuffer as TransformBuffer
     from frametool.frames.lookups import FrameTree as FrameTree
@@ -47,7 +48,6 @@ if TYPE_CHECKING:
     from frametool.sim.turtle import FollowController as FollowController
     from frametool.sim.turtle import Turtle as Turtle
     from frametool.sim.turtle import Twist as Twist
-    from frametool.stream.engines import apply_arrow as apply_arrow
     from frametool.stream.measurements import solve as solve
     from frametool.stream.trajectories import align as align
     from frametool.stream.trajectories import compare as compare
@@ -67,6 +67,7 @@ _HOMES = {
         "frametool.formats.cameras": "load_camera",
         "frametool.formats.load": "load",
         "frametool.formats.robots.urdf": "load_robot",
+        "frametool.formats.rows.arrow": "apply_arrow",
         "frametool.formats.table": "FORMATS",
         "frametool.frames.buffer": "TransformBuffer",
         "frametool.frames.lookups": "FrameTree",
@@ -79,7 +80,6 @@ _HOMES = {
         "frametool.sim.scene": "tutorial",
         "frametool.sim.simulate": "simulate",
         "frametool.sim.turtle": "FollowController Turtle Twist",
-        "frametool.stream.engines": "apply_arrow",
         "frametool.stream.measurements": "solve",
         "frametool.stream.trajectories": "align compare load_trajectory resample",
     }.items() for name in names.split()

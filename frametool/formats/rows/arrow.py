@@ -2,7 +2,8 @@
 
 Parquet begins with PAR1, an Arrow file with ARROW1.  Rows are read and written in groups, those of the input or of a
 million: types, metadata and compression are preserved.  Unchanged columns are not inspected; a new one has the type
-and metadata of the one it replaces.  Columns are arrays of numbers and texts with null masks.
+and metadata of the one it replaces.  Columns are arrays of numbers and texts with null masks.  `apply_arrow` moves the
+points of batches inside of engines, without a file.
 """
 
 from __future__ import annotations
@@ -20,15 +21,19 @@ import numpy as np
 from frametool import sizes
 from frametool.documents.source import InputFile, Verbatim
 from frametool.documents.writers import dump_json
-from frametool.errors import FileProblem, ValueInvalid, shown, warn
+from frametool.errors import FileProblem, ValueInvalid, alternatives, shown, warn
 from frametool.formats.rows import column_file
 from frametool.frames.stamps import SUFFIXES
+from frametool.geometry import arrays, quaternion, rigid
+from frametool.geometry.transform import Transform
 from frametool.text.parse import nanoseconds_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.formats.rows.column_file import Kind, Made, OutColumn
+    from frametool.frames.lookups import Frames
+    from frametool.geometry.types import Components
     from frametool.grammar.result import Style
     from frametool.text.spans import Flags, Floats, Ints
 
@@ -391,3 +396,116 @@ def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> Gr
 
 
 open_columns = ArrowFile
+
+# --- points moved inside of engines ---
+
+XYZ = ("x", "y", "z")
+COLUMNS = {"point": XYZ, "vector": XYZ, "pose": (*XYZ, "qx", "qy", "qz", "qw")}  # as_ -> where none are named
+
+
+def apply_arrow(
+    data: Any,
+    transform: Transform | None = None,
+    columns: Sequence[str] | None = None,
+    as_: str = "point",
+    *,
+    tree: Frames | None = None,
+    target: str = "",
+    source: str = "",
+    time_column: str | None = None,
+) -> Any:
+    """Move the points of a pyarrow RecordBatch or Table; return the same type, all other columns as they are.
+
+    transform: one, or one a row; or `tree`, `target`, `source`: looked up at the latest time, with `time_column` at
+    each row's (timestamps, integer nanoseconds, float seconds).
+    as_: "point" or "vector", columns x, y, z unless named, or "pose", columns x, y, z, qx, qy, qz, qw.
+    A row with a null among its columns is null in all.  float32 is computed in float64 and rounded once.
+    Raises ValueInvalid for columns that are no floating point and for the first row, from 0, that is not finite.
+    """
+    pa = require_pyarrow("apply_arrow")
+    if not isinstance(data, (pa.RecordBatch, pa.Table)):
+        kind = f"{type(data).__module__}.{type(data).__name__}"
+        raise ValueInvalid(f"expected a pyarrow RecordBatch or Table, got {kind}")
+    if as_ not in COLUMNS:
+        raise ValueInvalid(f"as_ is one of {', '.join(COLUMNS)}; found {shown(as_)}")
+    names, usual = COLUMNS[as_] if columns is None else tuple(columns), COLUMNS[as_]
+    if len(names) != len(usual) or len(set(names)) != len(names):
+        raise ValueInvalid(f"columns: a {as_} has {len(usual)}, like {', '.join(usual)}; found {', '.join(names)}")
+    places = [_place_of(name, data.schema.names) for name in names]
+    fields, inputs = [data.schema.field(place) for place in places], [in_one(data.column(place)) for place in places]
+    if wrong := next((field for field in fields if not is_floating(field.type)), None):
+        raise ValueInvalid(f"column {shown(wrong.name)} is {wrong.type}, not floating point; cast it to float64 first")
+    numbers = [column.to_numpy(zero_copy_only=False) for column in inputs]
+    masks = [mask for mask in map(nulls_of, inputs) if mask is not None]
+    nulls = np.logical_or.reduce(masks) if masks else None
+    mover = _mover(data, transform, tree, target, source, time_column, nulls)
+    moved: Components
+    if as_ == "pose":
+        rows = np.stack(numbers, axis=-1, dtype=np.float64)
+        if nulls is not None:  # what null rows hold has no meaning
+            rows[nulls] = rigid.IDENTITY
+        poses = mover @ Transform.from_arrays(rows[:, :3], rows[:, 3:])
+        moved = (*poses.components[:3], *poses.xyzw.T)
+    elif as_ == "vector":
+        moved = arrays.run(quaternion.rotate, 3, (*mover.components[3:], *numbers))
+    else:
+        moved = arrays.run(rigid.apply, 3, (*mover.components, *numbers))
+    new = list(data.columns)
+    for place, each, field in zip(places, moved, fields, strict=True):
+        with np.errstate(over="ignore"):  # what is too large becomes infinite
+            values = np.asarray(each, kind_of(field.type))
+        if nulls is not None and not field.nullable:
+            row = int(np.argmax(nulls))
+            raise ValueInvalid(f"{field.name}[{row}] becomes null, and the schema allows none there; make it nullable")
+        finite = np.isfinite(values) if nulls is None else np.isfinite(values) | nulls
+        if not finite.all():
+            row = int(np.argmin(finite))
+            for column, its in zip(numbers, fields, strict=True):
+                if not np.isfinite(column[row]):
+                    what = f"{its.name}[{row}]: {column[row]} is not finite"
+                    raise ValueInvalid(f"{what}; make it null, or leave the row out")
+            raise ValueInvalid(f"{field.name}[{row}]: the result is too large for {field.type}")
+        new[place] = pa.array(values, type=field.type, mask=nulls)
+    return type(data).from_arrays(new, schema=data.schema)
+
+
+def _place_of(name: str, names: Sequence[str]) -> int:
+    """Return the place of a column; raises ValueInvalid for one that is not there, or twice."""
+    if name not in names:
+        raise ValueInvalid(f"no column {shown(name)}{alternatives(name, names, 'columns')}")
+    if names.count(name) > 1:
+        raise ValueInvalid(f"column {shown(name)} appears twice")
+    return names.index(name)
+
+
+def _mover(
+    data: Any, transform: Transform | None, tree: Frames | None, target: str, source: str, time_column: str | None,
+    nulls: Flags | None,
+) -> Transform:  # fmt: skip
+    """Return what moves the rows: one transform, or one a row; those of null rows are not looked up."""
+    if tree is None:
+        lacks_tree, rows = target or source or time_column, data.num_rows
+        if lacks_tree or not isinstance(transform, Transform):
+            found = "no tree" if lacks_tree else type(transform).__name__
+            raise ValueInvalid(f"expected a Transform, or tree, target and source; got {found}")
+        if transform.shape not in ((), (rows,)):
+            raise ValueInvalid(f"transforms of shape {transform.shape} for {rows} rows; expected one, or one a row")
+        return transform
+    if transform is not None or not (target and source):
+        raise ValueInvalid("give a transform, or tree, target and source")
+    if time_column is None:
+        return tree.lookup(target, source)
+    column = data.column(_place_of(time_column, data.schema.names))
+    stamps, missing, bad = stamps_of(column, time_column)
+    if len(bad):
+        seconds = column[int(bad[0])].as_py()
+        raise ValueInvalid(f"{time_column}[{bad[0]}]: {seconds} is not a time in seconds; integers are nanoseconds")
+    needed = np.True_ if nulls is None else ~nulls
+    if missing is not None and (lost := missing & needed).any():
+        row = int(np.argmax(lost))
+        raise ValueInvalid(f"{time_column}[{row}] is null: no time; leave the row out, or make it null in whole")
+    if nulls is None:
+        return tree.lookup_many(target, source, stamps)
+    poses = np.tile(np.reshape(rigid.IDENTITY, (7, 1)), len(stamps))
+    poses[:, needed] = tree.lookup_many(target, source, stamps[needed]).components
+    return Transform.of(*poses)
