@@ -11,7 +11,7 @@ import pytest
 from flow import Asked, asked, flow
 
 from frametool.geometry.camera import Camera
-from frametool.stream.pixels import PixelsOfPoints, PointsOfPixels
+from frametool.stream.formulas import PixelsOfPoints, PointsOfPixels
 
 GOLDEN = json.loads((Path(__file__).parent.parent / "golden" / "camera.json").read_text())
 CASES = {each["name"]: each for each in GOLDEN["cameras"]}

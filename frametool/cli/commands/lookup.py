@@ -297,7 +297,7 @@ def fk_command(inputs: Inputs) -> int:
         words = " ".join((inputs.tree, inputs.base, inputs.tip, *(f"-j {each}" for each in joints)))
         raise click.UsageError(f"no rows of joint values: give -i FILE; for one posture, frametool lookup {words}")
     from frametool.formats.robots.urdf import robot_of
-    from frametool.stream.joint_rows import JointRows, names_in
+    from frametool.stream.formulas import JointRows, names_in
     from frametool.stream.request import Operation, Request, RowOptions
 
     (file,) = opened((inputs.tree,), streams=True)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from frametool.geometry.camera import Camera
     from frametool.geometry.types import Components
-    from frametool.stream.pixels import Seen
+    from frametool.stream.formulas import Seen
 
 AXES = ("optical", "opengl", "flu")
 
@@ -83,7 +83,7 @@ def project_command(inputs: Inputs) -> int:
     SOURCE each row names its frame; without TREE points are in the camera's frame. With --image FILE -o FILE.svg they
     are drawn over the image. `frametool help cameras` says more.
     """
-    from frametool.stream.pixels import PixelsOfPoints
+    from frametool.stream.formulas import PixelsOfPoints
 
     overlay, image, path = None, inputs.image, inputs.output
     own = inputs if image is None else inputs.but(output=os.devnull)  # the rows of an overlay are not written
@@ -203,7 +203,7 @@ def unproject_command(inputs: Inputs) -> int:
     Rows with columns u, v, or a key pixel, get origin_x .. ray_z in TARGET; with a depth or range, in a column or an
     option, x, y, z. They are empty outside the model and above the horizon (help cameras).
     """
-    from frametool.stream.pixels import PointsOfPixels
+    from frametool.stream.formulas import PointsOfPixels
 
     task = CameraTask(inputs, Output(inputs, "points", otherwise="yaml"), "TREE TARGET CAMERA")
     raw, rectified = task.camera, task.rectified()
@@ -265,7 +265,7 @@ def _columns(task: CameraTask, records: Sequence[Source]) -> Sequence[str]:
 
     They are those of the first record, where there are some, and else of the stream.
     """
-    from frametool.stream.joint_rows import names_in
+    from frametool.stream.formulas import names_in
 
     inputs = task.inputs
     if records:
