@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
     from frametool.geometry.types import Components, Namespace
-    from frametool.stream.record import Record, RecordPlace
+    from frametool.stream.record import Record
     from frametool.stream.request import Operation, Request
     from frametool.stream.table import Table
 
@@ -34,15 +34,15 @@ POINT_ENTRIES = 9
 
 
 def with_covariances(
-    record: Record, holder: Any, around: Path, place: RecordPlace, above: Path, request: Request, reading: Reading
+    record: Record, holder: Any, around: Path, keys: Sequence[str], request: Request, reading: Reading
 ) -> Record:
     """Add the numbers of the covariances of a record, or the one that its sigmas say.
 
-    holder: the mapping that says them, at the path `around`
+    holder: the mapping that says them, at the path `around`, under some of the keys
     Where records move, one that begins with -1 is unknown and stays.
     """
-    operation, shape, path = request.operation, record.shape, place.path
-    there = [key for key in place.covariances if key in holder]
+    operation, shape, path = request.operation, record.shape, record.path
+    there = [key for key in keys if key in holder]
     is_own = shape.kind in PLACED and around == path
     flat = [*holder] if is_own and covariance.SIGMA not in holder and not there else []
     flat = [flat[at] for at in covariance.find_columns(flat, 36 if shape.kind == POSE else POINT_ENTRIES)[0]]
@@ -50,7 +50,7 @@ def with_covariances(
     said = (*there, *(flat or [covariance.SIGMA] * has_sigma))
     is_left_out = operation.formula is not None and around == path and not operation.only_adds
     if is_left_out:
-        reading.here = (*above, *path)
+        reading.here = path
         reading.note(LEFT_OUT.format("calc"), rule="left-out")
     if request.gathered is not None:
         request.gathered.uncertain = True
@@ -69,7 +69,7 @@ def with_covariances(
     for key in there:
         below = (*around, key)
         found = within(below, _entries, holder[key], sizes)
-        paths, numbers = tuple((*above, *below, *at) for at, _ in found), [number for _, number in found]
+        paths, numbers = tuple((*below, *at) for at, _ in found), [number for _, number in found]
         if numbers[0] == UNKNOWN and operation.moves:
             record = record._replace(begins=(*record.begins, paths[0]))
             continue
@@ -134,9 +134,9 @@ def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Readi
     )  # fmt: skip
 
 
-def with_scale(record: Record, value: Any, around: Path, above: Path, request: Request) -> Record:
+def with_scale(record: Record, value: Any, around: Path, request: Request) -> Record:
     """Add the scale of a pose, where the operation takes one; else it can only be 1."""
-    if not request.operation.similar or around != record.path[len(above) :] or type(value) in (dict, list):
+    if not request.operation.similar or around != record.path or type(value) in (dict, list):
         within(around, covariance.refuse_scale, value)
         return record
     scale = within(around, covariance.read_scale, value)
@@ -144,7 +144,7 @@ def with_scale(record: Record, value: Any, around: Path, above: Path, request: R
         raise NotARotation(NOT_BOTH, (*around, SCALE), key=True)
     return record._replace(
         shape=record.shape._replace(covariance=(*record.shape.covariance, 1)),
-        numbers=(*record.numbers, (*above, *around, SCALE)),
+        numbers=(*record.numbers, (*around, SCALE)),
         values=(*record.values, scale), keys=record.keys._replace(covariances=(*record.keys.covariances, SCALE)),
     )  # fmt: skip
 

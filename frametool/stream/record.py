@@ -12,6 +12,7 @@ from __future__ import annotations
 from functools import partial
 from itertools import chain, islice
 from math import nan
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import MOST_COMPARED, ValueInvalid, alternatives, did_you_mean, first_of, shown
@@ -64,6 +65,8 @@ if TYPE_CHECKING:
     from frametool.grammar.readers import Path
     from frametool.stream.header import Columns, PoseColumns
     from frametool.stream.request import Request
+
+    Holder = tuple[Path, str, str]  # of the numbers of a record; of a message its field, and the kind of that
 
 POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # with metres a unit
 INNER = ("transforms", "static_transforms", "poses", "pose", "transform", "twist", "wrench", "accel", "msg", "message",
@@ -131,54 +134,41 @@ class Record(NamedTuple):
     stamp_ns: int | None = None
 
 
-class RecordPlace(NamedTuple):
-    """What holds the numbers of a record, and the mappings around it; of a message its field, and the kind of that.
-
-    covariances: the keys under which one may be
-    """
-
-    path: Path
-    outer: tuple[Path, ...]
-    field: str = ""
-    kind: str = ""
-    covariances: tuple[str, ...] = COVARIANCES
-
-
 def find_records(document: Any, request: Request, reading: Reading, path: Path = ()) -> Iterator[Record]:
     """Yield the records of a document in order; `path` leads to it and begins all paths.
 
     Raises Misfit, with the path, for a document without records and for a record that cannot be read.
     """
     formula = request.operation.formula
-    try:
-        search = _search_under if request.rows.columns else _search
-        found = list(search(document, (), (), request)) if request.rows.poses else []
-        is_bare = request.rows.poses and not request.operation.takes_points
-        if not found and is_bare and type(document) is dict and NOTHING_BUT.issuperset(document):
-            reading.here = path
-            reading.note("neither position nor rotation: taken as the identity", rule="identity")
-            found = [RecordPlace((), ())]
-        if not found and formula is not None and not formula.reads_row:
-            found = [RecordPlace(path, ()) for path in _mappings(document)]
-        if not found:
-            raise _nothing_in(document)
-    except Misfit as misfit:
-        raise misfit.below(*path) from None
+    root: Any = document  # all paths begin there; what holds the document is no mapping of it
+    for step in reversed(path):
+        root = MappingProxyType({step: root})
+    search = _search_under if request.rows.columns else _search
+    found = list(search(document, path, request)) if request.rows.poses else []
+    is_bare = request.rows.poses and not request.operation.takes_points
+    if not found and is_bare and type(document) is dict and NOTHING_BUT.issuperset(document):
+        reading.here = path
+        reading.note("neither position nor rotation: taken as the identity", rule="identity")
+        found = [(path, "", "")]
+    if not found and formula is not None and not formula.reads_row:
+        found = [((*path, *each), "", "") for each in _mappings(document)]
+    if not found:
+        raise _nothing_in(document).below(*path)
     if request.operation.of == "pair":
         raise Misfit("a record holds one pose; name A or B, or compare it with the one before by --consecutive", path)
-    for place in found:
-        yield _record(document, place, request, reading, path)
+    for each in found:
+        yield _record(root, *each, request, reading)
 
 
-def _search_under(document: Any, path: Path, outer: tuple[Path, ...], request: Request) -> Iterator[RecordPlace]:
+def _search_under(document: Any, path: Path, request: Request) -> Iterator[Holder]:
     """Search what is under the key `detections.pose`, which --columns names; a list stands for its items."""
-    found = [(document, path, outer)]
+    found = [(document, path)]
     for key in request.rows.columns[0].split("."):
-        items = [(value_at(each, at), (*above, *at), around) for each, above, around in found for at in _mappings(each)]
-        found = [(each[key], (*above, key), (*around, above)) for each, above, around in items if key in each]
+        items = [(value_at(each, at), (*above, *at)) for each, above in found for at in _mappings(each)]
+        found = [(each[key], (*above, key)) for each, above in items if key in each]
         if not found:
-            keys = dict.fromkeys(each for item, *_ in items for each in item)
-            raise Misfit(f"no key {shown(key)} for --columns{alternatives(key, keys, 'keys')}")
+            keys = dict.fromkeys(each for item, _ in items for each in item)
+            raise Misfit(f"no key {shown(key)} for --columns{alternatives(key, keys, 'keys')}", path)
     for each in found:
         yield from _search(*each, request)
 
@@ -218,16 +208,15 @@ def _bare_numbers(value: list[Any]) -> Misfit:
     return Misfit(f"a bare list of {len(value)} number{'s' * (len(value) != 1)} does not say what it is; write {write}")
 
 
-def _search(value: Any, path: Path, outer: tuple[Path, ...], request: Request) -> Iterator[RecordPlace]:
+def _search(value: Any, path: Path, request: Request) -> Iterator[Holder]:
     """Yield what holds numbers; where frames change, a mapping that does not move whole is refused."""
-    if type(value) is list and value and not any(type(item) in (dict, list) for item in value):
-        yield RecordPlace(path, outer)
-    elif type(value) is list:
-        if len(value) in (3, 4) and all(type(row) is list for row in value):
-            yield RecordPlace(path, outer)
+    if type(value) is list:
+        is_matrix = len(value) in (3, 4) and all(type(row) is list for row in value)
+        if is_matrix or (value and not any(type(item) in (dict, list) for item in value)):
+            yield path, "", ""
             return
         for index, item in enumerate(value):
-            yield from _search(item, (*path, index), outer, request)
+            yield from _search(item, (*path, index), request)
     elif type(value) is dict:
         operation = request.operation
         holds: dict[str, str] = {}  # which fields of a known message hold what, and which stay, by the fields it has
@@ -239,12 +228,12 @@ def _search(value: Any, path: Path, outer: tuple[Path, ...], request: Request) -
             known = [row for row in HELD.values() if there.issuperset(row[0])]
             holds, stays = max(known, key=lambda row: len(there.intersection(row[1])), default=({}, ()))
         if operation.moves and any(holds.values()):
-            found = [RecordPlace(path, outer, *field, (f"{field[0]}_covariance",)) for field in holds.items()]
+            found = [(path, field, kind) for field, kind in holds.items()]
         elif _holds_numbers(value):
             _refuse_several(value, ["the record's own keys"], path)
-            found = [RecordPlace(path, outer)]
+            found = [(path, "", "")]
         else:
-            found = _search_inside(value, path, (*outer, path), request, stays)
+            found = _search_inside(value, path, request, stays)
         if not operation.keeps_frames and (operation.formula is None or operation.formula.reads_row):
             _refuse_half(value, found, path, stays if operation.moves else ())
         if operation.turns and found and (rates := [key for key in value if is_rate(key)]):
@@ -253,28 +242,28 @@ def _search(value: Any, path: Path, outer: tuple[Path, ...], request: Request) -
         yield from found
 
 
-def _search_inside(
-    value: dict[str, Any], path: Path, outer: tuple[Path, ...], request: Request, stays: Sequence[str]
-) -> list[RecordPlace]:
+def _search_inside(value: dict[str, Any], path: Path, request: Request, stays: Sequence[str]) -> list[Holder]:
     """Return what the known keys of a message hold."""
     inner = [key for key in INNER if type(value.get(key)) in (dict, list)]
     if request.operation.moves:
         inner += [key for key in LISTS if _is_geometry(key, value.get(key), doubtful=False)]
-    held = {key: [*_search(value[key], (*path, key), outer, request)] for key in inner if key not in stays}
+    held = {key: [*_search(value[key], (*path, key), request)] for key in inner if key not in stays}
     if keys := [key for key, each in held.items() if each]:
         _refuse_several(value, keys, path)
     return [*chain.from_iterable(held.values())]
 
 
-def _refuse_half(value: dict[str, Any], found: Sequence[RecordPlace], path: Path, stays: Sequence[str]) -> None:
+def _refuse_half(value: dict[str, Any], found: Sequence[Holder], path: Path, stays: Sequence[str]) -> None:
     """Stop where another field of what moves is expressed in the same frame, or may be, and would stay as it is."""
     header = value.get("header")
     is_message = type(header) is dict and "frame_id" in header
     if is_message and not found:
         fields = first_of([key for key in value if key != "header"], MOST_KEYS, quote=shown)
         raise Misfit(f"a message that cannot be moved whole: its fields are {fields}; see help records", path)
-    used = {"header", *stays}.union(*((*each.path[len(path) :][:1], each.field, *each.covariances) for each in found))
-    if any(each.path == path and not each.field for each in found):
+    used = {"header", *stays}.union(*(
+        (*holder[len(path) :][:1], field, *covariance_keys(field)) for holder, field, _ in found
+    ))  # fmt: skip
+    if any(holder == path and not field for holder, field, _ in found):
         used |= USED
     rest = [key for key, each in value.items() if key not in used and _is_geometry(key, each, doubtful=is_message)]
     if found and rest:
@@ -345,50 +334,42 @@ def _holds_position(key: str, value: Any) -> bool:
     return key in POINT_KEYS and is_position(key, value) and not (key == "point" and type(value) is str)
 
 
-def _record(document: Any, place: RecordPlace, request: Request, reading: Reading, above: Path) -> Record:
-    """Read one record, with all its paths below `above`."""
-    path, has_poses = place.path, request.rows.poses > 0
-    value = value_at(document, path)
-    reading.here = here = (*above, *path)
-    formula = request.operation.formula
+def covariance_keys(field: str) -> Sequence[str]:
+    """Return the keys under which the covariance of a field of a message may be, or that of a record."""
+    return (f"{field}_covariance",) if field else COVARIANCES
+
+
+def _record(root: Any, path: Path, field: str, kind: str, request: Request, reading: Reading) -> Record:
+    """Read the record at a path; of a message its field, which holds something of this kind."""
+    value, formula = value_at(root, path), request.operation.formula
+    reading.here = path
     try:
         if type(value) is list:
-            return _bare_list(value, here, reading, request)
-        if place.kind:
-            record = _of_message(value, place, here, reading, request)
-        else:
-            record = _mapping(value, here, reading, request) if has_poses else _only_asked(value, here, request)
+            return _bare_list(value, path, reading, request)
+        if kind:
+            record = _of_message(value, path, reading, request, field=field, kind=kind)
+        elif request.rows.poses:
+            record = _mapping(value, path, reading, request)
     except Misfit as misfit:
-        raise misfit.below(*here) from None
-    if has_poses and formula is not None and record.shape.kind in PARTS:
-        raise Misfit(f"an expression takes poses, points and vectors; this is a {record.shape.kind}", here)
-    if has_poses and formula is not None and not (formula.reads_row or record.values or _is_holder(value)):
+        raise misfit.below(*path) from None
+    if not request.rows.poses:
+        record = _only_asked(value, path, request)
+    if formula is not None and record.shape.kind in PARTS:
+        raise Misfit(f"an expression takes poses, points and vectors; this is a {record.shape.kind}", path)
+    if formula is not None and not (formula.reads_row or record.values or _is_holder(value)):
         record = record._replace(shape=Shape("", None))
-    try:
-        # what says a covariance: the record, or the mapping around it where a message has it so
-        around = (path, path[:-1]) if path[-1:] == (record.shape.kind,) else (path,)
-        keys = {*place.covariances, *COVARIANCE_KEYS}
-        for each in () if record.keys.placed else around:
-            holder = value_at(document, each)
-            if type(holder) is dict and (not keys.isdisjoint(holder) or any(map(may_be_uncertain, holder))):
-                from frametool.stream.extra_numbers import with_covariances
+    # what says a covariance: the record, or the mapping around it where a message has it so
+    around = (path, path[:-1]) if path[-1:] == (record.shape.kind,) else (path,)
+    keys = {*covariance_keys(field), *COVARIANCE_KEYS}
+    for each in () if record.keys.placed else around:
+        holder = value_at(root, each)
+        if type(holder) is dict and (not keys.isdisjoint(holder) or any(map(may_be_uncertain, holder))):
+            from frametool.stream.extra_numbers import with_covariances
 
-                record = with_covariances(record, holder, each, place, above, request, reading)
-                break
-        record = _with_asked(record, document, path, above, request)
-        if request.operation.only_adds:
-            _refuse_repeated(record, document, path, request)
-        return _with_names(record, document, path, place.outer, above, request) if has_poses else record
-    except Misfit as misfit:
-        raise misfit.below(*above) from None
-
-
-def _refuse_repeated(record: Record, document: Any, path: Path, request: Request) -> None:
-    """Stop where a key that an expression adds is there already, unless it gives way."""
-    said, holder = request.operation.shown, value_at(document, outermost(path))
-    for name in (*request.extras(record.shape), *(said.members if said and not said.replaces else ())):
-        if (key := request.results.prefix + name) in holder:
-            raise Misfit(f"key {shown(key)} is there already; take another name, or --prefix", path)
+            record = with_covariances(record, holder, each, covariance_keys(field), request, reading)
+            break
+    record = _with_asked(record, root, request)
+    return _with_names(record, root, request) if request.rows.poses else record
 
 
 def _only_asked(value: dict[str, Any], path: Path, request: Request) -> Record:
@@ -404,10 +385,10 @@ def _only_asked(value: dict[str, Any], path: Path, request: Request) -> Record:
         if type(header) is dict:
             record = record._replace(parent=_named(header, ("frame_id",), (*path, "header"), Name(), request))
     elif there := next((key for key in value if key in (*POSITION_KEYS, *ROTATION_KEYS)), None):
-        raise Misfit(f"key {shown(there)} is there already, where the result would stand", (there,), key=True)
+        raise Misfit(f"key {shown(there)} is there already, where the result would stand", (*path, there), key=True)
     elif request.operation.shown is None:
         return record
-    return _with_stamp(record, header, ("header", "stamp"), path) if type(header) is dict else record
+    return _with_stamp(record, header, (*path, "header", "stamp")) if type(header) is dict else record
 
 
 def outermost(path: Path) -> Path:
@@ -415,40 +396,37 @@ def outermost(path: Path) -> Path:
     return path[: max((at for at, step in enumerate(path, 1) if type(step) is int), default=0)]
 
 
-def _with_asked(record: Record, document: Any, path: Path, above: Path, request: Request) -> Record:
-    """Add the numbers under the keys that an expression asks for."""
-    if not request.operation.columns:
-        return record
-    numbers, values = record.numbers, record.values
-    for name in request.operation.columns:
-        if request.operation.shown and value_at(document, path).get(name.partition(".")[0], "") is None:
-            numbers, values = (*numbers, None), (*values, nan)  # no pixel
-            continue
-        found = key_path(document, path, name, "a number")
-        text = value_at(document, found)
-        try:
-            values = (*values, parse_number(text if type(text) is str else ""))
-        except ValueInvalid as error:
-            raise Misfit(str(error), found) from None
-        numbers = (*numbers, (*above, *found))
-    shape = record.shape._replace(extra=len(request.operation.columns))
-    return record._replace(shape=shape, numbers=numbers, values=values)
+def _with_asked(record: Record, root: Any, request: Request) -> Record:
+    """Add the numbers under the keys that an expression asks for; stop where a key that it adds is there already."""
+    operation, value, said = request.operation, value_at(root, record.path), request.operation.shown
+    for name in operation.columns:
+        found, number = None, nan
+        if not said or value.get(name.partition(".")[0], "") is not None:  # else no pixel
+            found = key_path(root, record.path, name, "a number")
+            text = value_at(root, found)
+            number = within(found, parse_number, text if type(text) is str else "")
+        record = record._replace(numbers=(*record.numbers, found), values=(*record.values, number))
+    if operation.only_adds:
+        holder = value_at(root, outermost(record.path))
+        for name in (*request.extras(record.shape), *(said.members if said and not said.replaces else ())):
+            if (key := request.results.prefix + name) in holder:
+                raise Misfit(f"key {shown(key)} is there already; take another name, or --prefix", record.path)
+    return record._replace(shape=record.shape._replace(extra=len(operation.columns))) if operation.columns else record
 
 
-def _of_message(value: Any, place: RecordPlace, path: Path, reading: Reading, request: Request) -> Record:
+def _of_message(value: Any, path: Path, reading: Reading, request: Request, *, field: str, kind: str) -> Record:
     """Read a field of a message.
 
     An orientation with a covariance that begins with -1 is unknown: nothing of it is read, and it stays.
     """
-    field, kind = place.field, place.kind
     if request.rows.kind not in ("", kind):
         raise Misfit(f"{field} cannot be taken for a {request.rows.kind}")
     if kind == VECTOR:
         return _with_position(Record(path, Shape(kind), keys=RecordKeys(field)), value[field], 1.0, partial=False)
-    if known := value.get(place.covariances[0]):
+    if known := value.get(key := covariance_keys(field)[0]):
         from frametool.stream.extra_numbers import is_unknown
 
-        if within(place.covariances, is_unknown, known, (9,)):
+        if within((key,), is_unknown, known, (9,)):
             return Record(path, Shape("", None), keys=RecordKeys(rotation=field))
     reading.degrees = request.rows.degrees
     within((field,), read_rotation, field, value[field], reading)
@@ -755,32 +733,30 @@ def _is_there(value: Any, path: Path) -> bool:
     return True
 
 
-def _with_names(
-    record: Record, document: Any, path: Path, outer: tuple[Path, ...], above: Path, request: Request
-) -> Record:
+def _with_names(record: Record, root: Any, request: Request) -> Record:
     """Add the frames that the record and the message around it name, and the stamp of its header."""
-    parent, name = Name(), Name()
+    parent, name, path = Name(), Name(), record.path
     on_earth = record.parent.text in EARTH_FRAMES
-    for around in (path, *reversed(outer)):
-        value = value_at(document, around)
+    for depth in range(len(path), -1, -1):
+        value = value_at(root, around := path[:depth])
         if type(value) is not dict:
             continue
         if record.shape.kind == POSE and SCALE in value and (around == path or type(value[SCALE]) is str):
             from frametool.stream.extra_numbers import with_scale
 
-            record = with_scale(record, value[SCALE], around, above, request)  # around it, of a Marker: its shape's
+            record = with_scale(record, value[SCALE], around, request)  # around it, of a Marker: its shape's
         parent_keys, name_keys = (EARTH_PARENTS, EARTH_NAMES) if on_earth else (PARENT_KEYS, NAME_KEYS)
-        parent = _named(value, parent_keys, (*above, *around), parent, request)
+        parent = _named(value, parent_keys, around, parent, request)
         if record.shape.kind == POSE or around == path:
-            name = _named(value, name_keys, (*above, *around), name, request)
+            name = _named(value, name_keys, around, name, request)
         header = value.get("header")
         if type(header) is dict:
             inside = (*around, "header")
             if on_earth:  # the frame of a fix is that of its antenna
                 name = name if name.text else Name(header.get("frame_id") or None)
             else:
-                parent = _named(header, ("frame_id",), (*above, *inside), parent, request)
-            record = _with_stamp(record, header, (*inside, "stamp"), above)
+                parent = _named(header, ("frame_id",), inside, parent, request)
+            record = _with_stamp(record, header, (*inside, "stamp"))
         if request.gathered is not None:
             request.gathered.stamped |= record.stamp_ns is not None or any(key in value for key in STAMP_KEYS)
     if on_earth:
@@ -804,7 +780,7 @@ def _named(value: dict[str, Any], keys: Sequence[str], path: Path, found: Name, 
     return found
 
 
-def _with_stamp(record: Record, header: dict[str, Any], path: Path, above: Path) -> Record:
+def _with_stamp(record: Record, header: dict[str, Any], path: Path) -> Record:
     """Add the stamp of a header, and where its seconds and nanoseconds are; one further in said it better."""
     if "stamp" not in header:
         return record
@@ -812,7 +788,7 @@ def _with_stamp(record: Record, header: dict[str, Any], path: Path, above: Path)
 
     stamp_ns = within(path, read_stamp, header["stamp"])
     parts = (next(key for key in header["stamp"] if key.startswith(letter)) for letter in "sn")
-    stamps = (*record.stamps, *((*above, *path, part) for part in parts))
+    stamps = (*record.stamps, *((*path, part) for part in parts))
     return record._replace(stamps=stamps, stamp_ns=record.stamp_ns if record.stamps else stamp_ns)
 
 

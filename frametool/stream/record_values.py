@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import islice
 from math import isfinite, isinf
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -30,7 +30,7 @@ from frametool.errors import Finding, FormatError, FrametoolError, Misused, Valu
 from frametool.formats.table import is_recording
 from frametool.geometry import floats
 from frametool.grammar.pose import SCALE, Pose
-from frametool.grammar.readers import Misfit, NotARotation, Path, Reading, in_nanoseconds, stamp_column, tell, within
+from frametool.grammar.readers import Misfit, NotARotation, Path, Reading, in_nanoseconds, stamp_column, tell
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream.faults import ZONES, RowNote
 from frametool.stream.record import STALE, Record, find_records, pose_of, value_at
@@ -130,8 +130,8 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
 
 def _scalar(document: Document, record: Record, name: str = "") -> tuple[Path]:
     """Find a scalar of a record or of what is around it, by a name or that of a stamp; raises Misfit."""
-    find = partial(key_path, name=name) if name else stamp_keys
-    return ((document.index, *within((document.index,), find, document.value, record.path[1:])),)
+    documents = {document.index: document.value}
+    return (key_path(documents, record.path, name) if name else stamp_keys(documents, record.path),)
 
 
 def answer(entry: Entry, stamp: Sequence[str], request: Request) -> Answer:

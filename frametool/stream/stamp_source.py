@@ -143,17 +143,17 @@ def _shift(node: Node, offset_ns: int, edits: list[tuple[int, int, str]]) -> Non
                 edits += [(each.start, each.end, str(part)) for each, part in zip(pair, parts, strict=True)]
 
 
-def key_path(document: Any, holder: Path, name: str, wanted: str = "a time like 12.5") -> Path:
+def key_path(documents: Any, holder: Path, name: str, wanted: str = "a time like 12.5") -> Path:
     """Find a scalar of a point or pose, its stamp: its own key, else that of a mapping around it; raises Misfit.
 
     The name of a joint leads to its position in a JointState.
     """
     from frametool.ros import messages
 
-    around = [document]
+    around = [documents]
     for step in holder:
         around.append(around[-1][step])
-    for depth in range(len(holder), -1, -1):
+    for depth in range(len(holder), 0, -1):
         if (position := messages.position_of(name, around[depth])) is not None:
             return (*holder[:depth], *position)
         steps = name.split(".")
@@ -162,15 +162,15 @@ def key_path(document: Any, holder: Path, name: str, wanted: str = "a time like 
                 if type(found[0]) in (dict, list):
                     raise Misfit(f"expected {wanted}, found {kind(found[0])}", (*holder[:depth], *keys))
                 return (*holder[:depth], *keys)
-    known = [key for each in around if type(each) is dict for key in each]
+    known = [key for each in around[1:] if type(each) is dict for key in each]
     raise Misfit(f"no key {shown(name)}{did_you_mean(name, known)}", holder)
 
 
-def stamp_keys(document: Any, holder: Path) -> Path:
+def stamp_keys(documents: Any, holder: Path) -> Path:
     """Find the key of a record's stamp by the names such keys have; raises Misfit."""
     for name in STAMP_KEYS:
         try:
-            return key_path(document, holder, name)
+            return key_path(documents, holder, name)
         except Misfit:
             continue
     usual = ", ".join(STAMP_KEYS)

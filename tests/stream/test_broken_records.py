@@ -32,6 +32,13 @@ def test_what_only_yaml_would_read_is_a_fault_of_its_line(bad: str, count: int, 
     assert result.text.splitlines().count(b"null") == (on_error == "null")
 
 
+@pytest.mark.parametrize("count", [1, 80])
+def test_a_frame_that_is_wrong_is_found_at_its_own_place(count: int) -> None:
+    bad = '{"point":[1,2,3],"parent":"a","frame":"b"}\n'
+    result = flow((GOOD * count + bad).encode(), MOVE, "json")
+    assert result.told == [f"in:{count + 1}:frame: frame says 'b' and parent says 'a'; keep one"]
+
+
 def test_a_value_that_is_missing_is_no_error_in_yaml() -> None:
     assert flow(b'{"point":[1,2,3],"k":}\n', MOVE, "yaml").text == b'{"point":[-1.0,3.0,6.0],"k":}\n'
 
