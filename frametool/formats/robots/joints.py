@@ -376,7 +376,10 @@ def _of_table(file: InputFile, fmt: str, joints: Mapping[str, Joint], tally: Dia
         if line.lstrip().startswith("#"):
             continue
         cells = _cells(fmt, line.rstrip("\r"))
-        refuse = partial(_refused_row, file.name, number)
+
+        def refuse(problem: str, _below: Path = (), line: int = number) -> FormatError:
+            return file.error(problem, line)
+
         if len(cells) != len(names):
             raise refuse(f"expected {len(names)} cells, found {len(cells)}")
         try:
@@ -398,7 +401,3 @@ def _cells(fmt: str, line: str) -> list[str]:
 
 def _refused(message: TextMessage, path: Path, problem: str, below: Path) -> FormatError:
     return message.error(Misfit(problem, (*path, *below)))
-
-
-def _refused_row(name: str, line: int, problem: str, _below: Path = ()) -> FormatError:
-    return FormatError(problem, source=name, line=line)

@@ -102,7 +102,7 @@ def describe(file: InputFile, options: Options) -> tuple[dict[str, int], list[Li
 
 
 def _link(element: Element, joints: Mapping[str, tuple[Link, Element]], options: Options) -> Link:
-    """Read one joint; raises FormatError."""
+    """Read one joint, with its axis, limits, and the joint to mimic; raises FormatError."""
     parts: dict[str, Element] = {}
     for part in element.all("origin", "parent", "child", "axis", "limit", "mimic"):
         if parts.setdefault(part.tag, part) is not part:
@@ -117,8 +117,27 @@ def _link(element: Element, joints: Mapping[str, tuple[Link, Element]], options:
         raise element.error(f"joint {shown(name)} has no <{'child' if 'parent' in parts else 'parent'}>")
     parent, child = (options.tally.names.bare(parts[end].required("link")) for end in ("parent", "child"))
     origin = _origin(parts["origin"], options) if "origin" in parts else IDENTITY
-    moving = () if kind == "fixed" else (_moving(name, kind, element.line, parts, options),)
-    return Link(parent, child, origin, moving, element.line, fixed="" if moving else name)
+    if kind == "fixed":
+        return Link(parent, child, origin, line=element.line, fixed=name)
+    axis, lower, upper, mimic = (1.0, 0.0, 0.0), None, None, None
+    if "axis" in parts and kind != "floating":
+        x, y, z = parts["axis"].numbers(3, "xyz", "1 0 0")
+        if not (x or y or z):
+            raise parts["axis"].error(f"joint {shown(name)} has the axis 0 0 0, which is not a direction", "xyz")
+        axis = (x, y, z) if x * x + y * y + z * z == 1.0 else unit_vector(x, y, z, floats)
+    limit = parts.get("limit") if kind in ("revolute", "prismatic") else None
+    if limit and ("lower" in limit.attributes or "upper" in limit.attributes):
+        (lower,), (upper,) = limit.numbers(1, "lower", "0"), limit.numbers(1, "upper", "0")
+        if lower > upper:
+            message = f"joint {shown(name)} has the limits {lower:g} .. {upper:g}, which nothing fits"
+            options.tally.note(message, limit.line, "limit")
+    if follows := parts.get("mimic"):
+        leader = follows.required("joint")
+        if kind in ("planar", "floating"):
+            raise follows.error(f"joint {shown(name)} is {kind}: it follows no other")
+        mimic = Mimic(leader, *follows.numbers(1, "multiplier", "1"), *follows.numbers(1, "offset", "0"))
+    joint = Joint(name, kind, axis, lower, upper, mimic, line=element.line)
+    return Link(parent, child, origin, (joint,), element.line)
 
 
 def _origin(element: Element, options: Options) -> Rigid:
@@ -141,28 +160,6 @@ def _origin(element: Element, options: Options) -> Rigid:
         except ValueInvalid as error:
             raise element.error(str(error), "quat_xyzw", rule=error.rule) from None
     return x, y, z, *exact
-
-
-def _moving(name: str, kind: str, line: int, parts: Mapping[str, Element], options: Options) -> Joint:
-    """Read axis, limits, and the joint to mimic."""
-    axis, lower, upper, mimic = (1.0, 0.0, 0.0), None, None, None
-    if "axis" in parts and kind != "floating":
-        x, y, z = parts["axis"].numbers(3, "xyz", "1 0 0")
-        if not (x or y or z):
-            raise parts["axis"].error(f"joint {shown(name)} has the axis 0 0 0, which is not a direction", "xyz")
-        axis = (x, y, z) if x * x + y * y + z * z == 1.0 else unit_vector(x, y, z, floats)
-    limit = parts.get("limit") if kind in ("revolute", "prismatic") else None
-    if limit and ("lower" in limit.attributes or "upper" in limit.attributes):
-        (lower,), (upper,) = limit.numbers(1, "lower", "0"), limit.numbers(1, "upper", "0")
-        if lower > upper:
-            message = f"joint {shown(name)} has the limits {lower:g} .. {upper:g}, which nothing fits"
-            options.tally.note(message, limit.line, "limit")
-    if follows := parts.get("mimic"):
-        leader = follows.required("joint")
-        if kind in ("planar", "floating"):
-            raise follows.error(f"joint {shown(name)} is {kind}: it follows no other")
-        mimic = Mimic(leader, *follows.numbers(1, "multiplier", "1"), *follows.numbers(1, "offset", "0"))
-    return Joint(name, kind, axis, lower, upper, mimic, line=line)
 
 
 def read_solids(file: InputFile) -> Iterator[Solid]:

@@ -334,14 +334,25 @@ class GroupWriter:
         self.size = self.count = self.read = 0
 
     def of_rows(self, batch: Any, rows: Ints | None, made: Sequence[Made]) -> bytes:
-        """Return the bytes written once a group of rows is complete."""
+        """Return the bytes written once a group of rows is complete.
+
+        Raises ValueInvalid for a null that the schema does not allow.
+        """
         new, arrays = iter(made), []
         for column, field in zip(self.columns, self.schema, strict=True):
-            if column.passed is None or batch is None:
-                arrays.append(self._made(next(new), field))
-            else:
+            if column.passed is not None and batch is not None:
                 passed = batch.rows.column(column.passed)
                 arrays.append(passed if rows is None else passed.take(self.pa.array(rows)))
+                continue
+            values, absent = next(new)
+            if absent is not None and not field.nullable and absent.any():
+                raise ValueInvalid(f"column {field.name} is declared not to hold nulls, and a row becomes null there")
+            if isinstance(values, np.ndarray):
+                arrays.append(self.pa.array(values, type=field.type, mask=absent))
+                continue
+            texts = self.pa.array([text or None for text in values], self.pa.string())
+            is_dictionary = self.pa.types.is_dictionary(field.type)
+            arrays.append((texts.dictionary_encode() if is_dictionary else texts).cast(field.type))
         found = self.pa.RecordBatch.from_arrays(arrays, schema=self.schema)
         self.waiting.append(found)
         self.size += bytes_of(found)
@@ -358,17 +369,6 @@ class GroupWriter:
             self._write_group()
         self.writer.close()
         yield self.sink.taken()
-
-    def _made(self, made: Made, field: Any) -> Any:
-        """Return a new column; raises ValueInvalid for a null that the schema does not allow."""
-        if made.absent is not None and not field.nullable and made.absent.any():
-            raise ValueInvalid(f"column {field.name} is declared not to hold nulls, and a row becomes null there")
-        if isinstance(made.values, np.ndarray):
-            return self.pa.array(made.values, type=field.type, mask=made.absent)
-        texts = self.pa.array([text or None for text in made.values], self.pa.string())
-        if self.pa.types.is_dictionary(field.type):
-            texts = texts.dictionary_encode()
-        return texts.cast(field.type)
 
     def _write_group(self) -> None:
         """Write the collected rows; a group without rows is not written, unless the input has one."""

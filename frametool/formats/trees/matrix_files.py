@@ -362,7 +362,7 @@ class Matrices:
 
         frames: those of `--frames`, the reference frame, then the blocks; alone: the frame of a matrix outside of them.
         """
-        self.frames, self.alone, self.answers, self.reading = frames, alone, answers, reading
+        self.frames, self.answers, self.reading = frames, answers, reading
         self.base = frames[0] if frames else ""
         self.left: list[str] = []
         self.asked = 0
@@ -376,33 +376,28 @@ class Matrices:
         cameras.sort(key=lambda block: [int(number) for number in re.findall(r"[0-9]{1,9}", block.name)])
         chosen = {block.path: name for block, name in zip(cameras, frames[1:], strict=False)}
         blocks = [block._replace(name=chosen.get(block.path, block.name)) for block in blocks]
-        self.names = {block.path: block.name for block in blocks}
-        self.bodies = [each for each in blocks if "T_BS" in each.entries][:2]
-        self.poses = [pose for block in blocks for pose in self._of_block(block)]
-
-    def _of_block(self, block: MatrixBlock) -> Iterator[Stated]:
-        """Yield the poses of one map."""
-        before, body = "", self.base or "body"
-        if number := re.fullmatch(r"(.*?)([0-9]{1,9})", str(block.path[-1]) if block.path else ""):
-            before = self.names.get((*block.path[:-1], f"{number[1]}{int(number[2]) - 1}"), "")
-        known = {  # the names for the braces in the table
-            "me": block.name or self.alone,
-            "before": before,
-            "imu": self.base or "imu",
-            "body": body,
-            "sensor": next((each.name for each in self.bodies if each is not block), body),
-        }
-        paired: set[str] = set()
-        for key, value in block.entries.items():
-            if key in paired:
-                continue
-            path = self.reading.here = (*block.path, key)
-            grid = within(path, grid_of, value)
-            if grid is not None and (pair := partner_of(key, block.entries)):
-                paired.add(pair[0])
-                yield self._pair(block, key, grid, *pair)
-            elif (pose := self._single(block, key, grid, known)) is not None:
-                yield pose
+        names = {block.path: block.name for block in blocks}
+        bodies = [each for each in blocks if "T_BS" in each.entries][:2]
+        self.poses: list[Stated] = []
+        for block in blocks:
+            before, body = "", self.base or "body"
+            if number := re.fullmatch(r"(.*?)([0-9]{1,9})", str(block.path[-1]) if block.path else ""):
+                before = names.get((*block.path[:-1], f"{number[1]}{int(number[2]) - 1}"), "")
+            sensor = next((each.name for each in bodies if each is not block), body)
+            # the names for the braces in the table
+            known = {"me": block.name or alone, "before": before, "body": body, "sensor": sensor}
+            known["imu"] = self.base or "imu"
+            paired: set[str] = set()
+            for key, value in block.entries.items():
+                if key in paired:
+                    continue
+                path = reading.here = (*block.path, key)
+                grid = within(path, grid_of, value)
+                if grid is not None and (pair := partner_of(key, block.entries)):
+                    paired.add(pair[0])
+                    self.poses.append(self._pair(block, key, grid, *pair))
+                elif (pose := self._single(block, key, grid, known)) is not None:
+                    self.poses.append(pose)
 
     def _single(self, block: MatrixBlock, key: str, grid: Grid | None, known: dict[str, str]) -> Stated | None:
         """Return the pose under one key, if it is one."""
