@@ -360,10 +360,8 @@ def refuse_robots(text: bytes, name: str) -> None:
 
 def with_hint(error: FormatError, text: bytes, name: str, *, chosen: bool = False) -> FormatError:
     """Return the error for text without a pose; for frames it suggests `lookup`; prose is not quoted."""
-    from frametool.grammar.pasted import unsupported_tool
-
     begin = Beginning(text[:HEAD])
-    has_sign = bool(_fitting(begin, _STRONG, (*FORMATS, *UNSUPPORTED))[0] or unsupported_tool(begin.text))
+    has_sign = bool(_fitting(begin, _STRONG, (*FORMATS, *UNSUPPORTED))[0])
     is_known = begin.has_data or by_suffix(name, readers("records", "rows")) or has_sign
     if begin.data_line and not (chosen or is_known or not_text(begin.head)):
         error = _unknown(begin, "records", "rows", name=name)

@@ -1,4 +1,4 @@
-"""Numbers pasted from other tools, converted to the mappings that `read_pose` accepts.
+"""Numbers pasted from other tools, and poses as people write them by hand, converted to the keys of the grammar.
 
     array([[ 0., -1.], ..                  numpy, PyTorch, JAX; [0 -1; 1 0] is MATLAB
     0.7071 + 0.7071k                       algebra in tutorials: x, y, z of i, j, k, then w
@@ -8,6 +8,12 @@
 
 Printed 3x3, 3x4 and 4x4 arrays are matrices, other rows what the caller states.  Each number remains its text.  None
 means that a text is nothing of the kind; an ambiguous meaning returns the bare list that the grammar refuses.
+
+By hand: single numbers, and lists under various names:
+
+    {x: 0.9, y: 0.0, z: 2.0, roll: 0.0, pitch: 0.0, yaw: 1.57}          {x: 1, y: 2, theta: 90deg}
+    {trans_x: 0.1, trans_y: 0.0, trans_z: 0.0, rot_x: 0.0, rot_y: 0.0, rot_z: 0.0, rot_w: 1.0}
+    {x: 0.1, y: 0.0, z: 0.0, ax: 0.0, ay: 0.0, az: 1.0, theta: 0.1}
 """
 
 from __future__ import annotations
@@ -15,13 +21,25 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from frametool.errors import ValueInvalid, shown
+from frametool.documents.source import Verbatim
+from frametool.errors import ValueInvalid, bare, shown
 from frametool.geometry import floats, matrix
-from frametool.geometry.representations import Notation, notation
+from frametool.geometry.representations import RPY, Notation, notation
+from frametool.grammar.pose import (
+    POSE_KEYS,
+    POSITION_WORDS,
+    ROTATION_WORDS,
+    Pose,
+    is_position,
+    notation_of,
+    own_key,
+    read_pose,
+)
+from frametool.grammar.readers import COLUMN_WORDS, Misfit, Path, Reading, Unclear, kind, within
 from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
 
 Rows: TypeAlias = "list[list[str]]"
@@ -31,14 +49,7 @@ DECIMAL = r"(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][-+]?[0-9]++)?"
 NUMBER = rf"[-+]?{DECIMAL}"
 LABEL = r"\s*+[A-Za-z_]\w*+\s*+=(?!=)\s*+"  # MATLAB's and Python's `T =`
 _SCALE = rf"\s*({NUMBER})\s*\*\s*\n"  # MATLAB's `1.0e+03 *` above a matrix
-_BY_COLUMNS = r"(?:[dft]|high|med|low)?p?_?mat[34](?:x[34])?\("
-_UNSUPPORTED: Sequence[tuple[str, str]] = (  # prints that are recognised but not read, and the tools that print them
-    (r"Out\[\d+\](?://\w+)?\s*=|\{\{?[^{}]*?\d(?:`|\*\^)", "Mathematica"),
-    (r"\d+\xd7\d+ [A-Za-z]", "Julia"),
-    (r"\[,\d+\]|(?:structure\(|matrix\()?\bc\((?:[^,()]*,){8}", "R"),
-    (r"\$*\s*\\(?:begin|left)\b", "LaTeX"),
-    (r"[⎡⎛]|\w+\(\[\[(?:Float|Integer)\(", "SymPy"),
-)
+_BY_COLUMNS = r"(?:[dft]|high|med|low)?p?_?mat[34](?:x[34])?\(|(?:structure\(|matrix\()?c\((?:[^,()]*,){8}"  # and R's c(..)
 _NO_JSON = r"\d\.(?=[\s,\]])|;"
 
 _ROW = r"\[(?:[^\[\],]*,){%s}[^\[\],]*\]\s*,?\s*"
@@ -106,24 +117,16 @@ def number_rows(text: str, *, any_text: bool = False) -> Rows | None:
 def _undecorated(text: str) -> str:
     """Remove the names, headings and brackets that tools print around numbers.
 
-    Raises ValueInvalid for a matrix printed column by column, and for tools whose prints are not read.
+    Raises ValueInvalid for a matrix printed column by column.
     """
     if not re.search(_DECORATED, text):
         return text
     if by_columns := re.match(rf"(?:{LABEL})?\s*(?:{_BY_COLUMNS})", text):
         name = shown(by_columns[0].split("(")[0].strip())
         raise ValueInvalid(f"{name} holds a matrix column by column; write its rows, [[..], [..], [..]]")
-    if tool := unsupported_tool(text):
-        raise ValueInvalid(f"a print of {tool} is not read; write its rows, [[..], [..], [..]], as numpy does")
     for pattern, plain in _DECORATIONS:
         text = re.sub(pattern, plain, text)
     return text
-
-
-def unsupported_tool(text: str) -> str:
-    """Return the tool that printed a text, if its prints are recognised but not read, else ""."""
-    found = (tool for begin, tool in _UNSUPPORTED if re.match(rf"\s*+(?:{LABEL})?(?:{begin})", text))
-    return next(found, "")
 
 
 _TERM = re.compile(rf"([-+]*)((?:{DECIMAL})?)\*?([ijk]?)")
@@ -147,13 +150,13 @@ def _robot(text: str, default: Notation | None) -> dict[str, Any] | None:
     robot's configuration and external axes, which are not part of the pose.  default: the notation of the numbers
     Raises ValueInvalid for p[..] with another number of values, and for ABB's two lists alone.
     """
-    bare = re.sub(rf"\A(?:{LABEL})?(?={_UR}\[)|\A{_DECLARED}", "", text.strip().rstrip(";").strip())
-    if found := re.fullmatch(rf"{_UR}\[([^\[\]]*)\]", bare):
+    plain = re.sub(rf"\A(?:{LABEL})?(?={_UR}\[)|\A{_DECLARED}", "", text.strip().rstrip(";").strip())
+    if found := re.fullmatch(rf"{_UR}\[([^\[\]]*)\]", plain):
         cells = [cell.strip() for cell in found[1].split(",")]
         if len(cells) != 6:
             raise ValueInvalid(f"p[..] of Universal Robots has six numbers (x, y, z, rx, ry, rz); found {len(cells)}")
         return {"xyz": cells[:3], "rotvec_rad": cells[3:]}
-    if (found := re.fullmatch(ABB, bare)) is None or (default is not None and not found[3]):
+    if (found := re.fullmatch(ABB, plain)) is None or (default is not None and not found[3]):
         return None
     xyz, turn = ([cell.strip() for cell in found[at].split(",")] for at in (1, 2))
     if (len(xyz), len(turn)) != (3, 4):
@@ -340,6 +343,12 @@ def _spelled_rows(rows: Rows, rep: Notation) -> list[Any] | None:
     return found
 
 
+def mapping_of_numbers(texts: Sequence[str], default: Notation | None) -> dict[str, Any]:
+    """Return the mapping with the same meaning as bare numbers that `pose_of_numbers` has read."""
+    rep, rows = default or notation_of(texts), list[list[str]]([[*map(Verbatim, texts)]])
+    return matrix_pose(rows, rep, stated=default is not None) or (_spelled_rows(rows, rep) or [{}])[0]
+
+
 def begins_freely(head: str, default: Notation | None, *, moves: bool, alone: bool) -> bool | None:
     """Return True if a text begins with a pasted print, False for a stream of rows or records, None if undecided.
 
@@ -364,3 +373,90 @@ def begins_freely(head: str, default: Notation | None, *, moves: bool, alone: bo
     if matrix:
         return (len(cells), len(lines)) in ((4, 3), (4, 4))  # a line of twelve is a KITTI file with one pose
     return len(cells) == 1 and len(lines) > 1
+
+
+# --- written by hand: the names of single numbers, and of lists ---
+
+_POSITIONS = (*POSITION_WORDS, "translation", "position", "location")
+_TURNS = (*(word for word, meant in ROTATION_WORDS.items() if not meant), "q", "quaternion")
+_SPELLED = {"t": "xyz", "q": "quaternion", "r": "rotvec_rad"}  # by the first letter of a single number's name
+_WHOLE = ("value", "pose")  # seven numbers
+# the names of single numbers -> the key of the grammar for them
+_FLAT = {
+    **{f"{word}{axis}": ("xyz", axis) for axis in "xyz" for word in ("", "p", "t")},
+    **{f"q{axis}": ("quaternion", axis) for axis in "xyzw"},
+    **{word: (_SPELLED[name[0]], word[-1]) for word, name in COLUMN_WORDS.items()},
+    **{f"{axis}_{unit}": (f"xyz_{unit}", axis) for axis in "xyz" for unit in ("mm", "cm")},
+    **{f"{name}{unit}": (f"rpy{unit}", name) for name in RPY for unit in ("", "_deg", "_rad")},
+    **{f"a{axis}": ("axis", axis) for axis in "xyz"},
+    **{f"{name}{unit}": (f"axis_angle{unit}", "angle") for name in ("theta", "angle") for unit in ("", "_deg", "_rad")},
+}
+WORDS = frozenset((*POSE_KEYS, *_FLAT, *_POSITIONS, *_TURNS, *_WHOLE))
+
+
+def read_loose_pose(fields: dict[str, Any], reading: Reading, also: Collection[str] = (), *, order: str = "") -> Pose:
+    """Read a pose whose numbers may each have a name: x, y, z, yaw; raises Misfit."""
+    places: dict[Path, str] = {}
+    found: dict[str, Any] = {}
+    for key, value in fields.items():
+        is_number = type(value) is not list and type(value) is not dict
+        if is_number and key in _FLAT:
+            together, part = _FLAT[key]
+            parts = found.setdefault(together, {})
+            is_new = type(parts) is dict and part not in parts
+            if is_new:
+                parts[part], places[together, part] = value, key
+        else:
+            meant = _meant(key, value, order)
+            is_new = meant.keys().isdisjoint(found)
+            found |= meant
+            places |= {} if is_number else {(new,): key for new in meant}
+        if not is_new:
+            raise Misfit(f"{bare(key)} repeats another key; keep one", (key,), key=True)
+    angle = next((key for key in found if key.startswith("axis_angle") and type(found[key]) is dict), "")
+    if axis := found.pop("axis", None):
+        if not angle or axis.keys() != {"x", "y", "z"}:
+            raise Misfit("ax, ay, az and theta belong together: an axis and the angle about it")
+        found[angle] = {"axis": [axis[each] for each in "xyz"], **found[angle]}
+    elif angle and found[angle].keys() == {"angle"}:  # about z, as yaw alone
+        yaw = angle.replace("axis_angle", "rpy")
+        if yaw in found:
+            raise Misfit("theta repeats another key; keep one", key=True)
+        found[yaw] = {"yaw": found.pop(angle)["angle"]}
+        places[yaw, "yaw"] = places[angle, "angle"]
+    for key, present in found.items():
+        wanted = RPY if key.startswith("rpy") else "xyzw" if key == "quaternion" else ()
+        if wanted and type(present) is dict and present.keys() not in ({*wanted}, {"yaw"}):
+            missing = ", ".join(part for part in wanted if part not in present)
+            raise Misfit(f"incomplete rotation: missing {missing} beside {', '.join(present)}")
+    try:
+        return read_pose(found, reading, also)
+    except Misfit as misfit:  # at the key as written
+        known = next((end for end in (2, 1) if misfit.path[:end] in places), 0)
+        misfit.path = (places[misfit.path[:known]], *misfit.path[known:]) if known else misfit.path
+        raise
+
+
+def _meant(key: str, value: Any, order: str) -> dict[str, Any]:
+    """Return the values of the grammar that a key with its value means; raises Misfit."""
+    if key in _WHOLE:
+        if type(value) is not list or len(value) != 7:
+            found_here = f"{len(value)} numbers" if type(value) is list else kind(value)
+            raise Misfit(f"expected 7 numbers, found {found_here}", (key,))
+        return {"xyz": value[:3], _ordered(value[3:], order, key): value[3:]}
+    if key in _POSITIONS and is_position(key, value):
+        return {"xyz": value}
+    if key not in _TURNS:
+        return {key: value}
+    if type(value) is dict and value.keys() == {"qx", "qy", "qz", "qw"}:
+        return {"quaternion": {name[1]: each for name, each in value.items()}}
+    turned = within((key,), own_key, key if key in ROTATION_WORDS else "quat", value)
+    return {_ordered(value, order, key) if turned == "quaternion" and type(value) is list else turned: value}
+
+
+def _ordered(value: list[Any], order: str, key: str) -> str:
+    if not order:
+        numbers = ", ".join(str(each) for each in value)
+        what = f"{bare(key)} [{bare(numbers)}] does not state the position of w"
+        raise Unclear(f"{what}: give --from xyzw or --from wxyz, for all of the file", (key,), key=True)
+    return order

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.geometry import euler, floats, quaternion, rigid
 from frametool.geometry.representations import EARTH_FRAMES, Notation, notation
-from frametool.grammar.pose import NAMES, SCALE, Pose, notation_of
+from frametool.grammar.pose import NAMES, SCALE, Pose
 from frametool.grammar.readers import AXES_KEY, Quaternion
 
 if TYPE_CHECKING:
@@ -280,21 +280,6 @@ def rotation_entry(pose: Pose, notation: Notation, style: Style) -> tuple[str, A
     row = notation.representation
     key = f"{row.name}_deg" if row.angles and notation.in_degrees(style.degrees) else row.name
     return key, notation.spelled(pose_numbers(pose, notation, style))
-
-
-def mapping_of_numbers(texts: Sequence[str], default: Notation | None) -> str:
-    """Return the mapping with the same meaning as bare numbers that `pose_of_numbers` has read."""
-    from frametool.documents.source import Verbatim
-    from frametool.documents.writers import dump_json
-
-    rep = default or notation_of(texts)
-    whole = rep.representation.whole
-    size = len(texts) if whole and len(texts) == len(whole.columns) else len(rep.representation.columns)
-    unit = "" if rep.degrees is None else "_deg" if rep.degrees else "_rad"
-    numbers: Any = list(map(Verbatim, texts))  # texts in place of numbers, read as such
-    mapping = {"xyz": numbers[:-size]} if len(texts) > size else {}
-    mapping[rep.representation.name + unit] = rep.spelled(numbers[-size:])
-    return dump_json(mapping)
 
 
 METRES = 3

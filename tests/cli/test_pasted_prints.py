@@ -85,15 +85,8 @@ def test_what_manuals_show_is_read(run: Run, way: str, name: str) -> None:
         ("UnitQuaternion(array([0.7071, 0.0, 0.0, 0.7071]))", "or give --from"),
         ("(0.00, 0.00, 0.71, 0.71)", "or give --from"),  # Unity
         ("mat3x3((0, 1, 0), (-1, 0, 0), (0, 0, 1))", "column by column"),  # glm::to_string
-        ("c(0, 1, 0, -1, 0, 0, 0, 0, 1)", "a print of R is not read; write its rows"),
-        ("structure(c(0, 1, 0, -1, 0, 0, 0, 0, 1), dim = c(3L, 3L))", "a print of R is not read; write its rows"),  # dput
-        ("     [,1] [,2] [,3]\n[1,]    0   -1    0\n[2,]    1    0    0\n[3,]    0    0    1\n", "a print of R is not read"),
-        ("3\xd73 Matrix{Float64}:\n 0.0 -1.0 0.0\n 1.0 0.0 0.0\n 0.0 0.0 1.0\n", "a print of Julia is not read"),
-        (r"\begin{pmatrix} 0 & -1 & 0 \\ 1 & 0 & 0 \\ 0 & 0 & 1 \end{pmatrix}", "a print of LaTeX is not read; write its rows"),
-        ("Out[3]= {{1.1*^-16, -1., 0.}, {1., 0``15.65, 0.}, {0., 0., 1.`}}", "a print of Mathematica is not read"),
-        ("{{1.1*^-16, -1., 0.}, {1., 0., 0.}, {0., 0., 1.}}", "a print of Mathematica is not read"),
-        ("\u23a10.0  -1.0  0.0\u23a4\n\u23a21.0  0.0   0.0\u23a5\n\u23a30.0  0.0   1.0\u23a6", "a print of SymPy is not read"),
-        ("Matrix([[Float('0.5', precision=53), Integer(0), Integer(1)]])", "a print of SymPy is not read"),
+        ("c(0, 1, 0, -1, 0, 0, 0, 0, 1)", "column by column; write its rows"),
+        ("structure(c(0, 1, 0, -1, 0, 0, 0, 0, 1), dim = c(3L, 3L))", "column by column; write its rows"),  # dput
         ("[[100, 200, 300], [0, 0, 0, 1]]", "two lists state neither unit nor order; write {xyz: [..], wxyz: [..]}"),  # ABB?
         ("- Pose [ XYZ (m) ] [ RPY (rad) ]:\n [1 2 3]\n [0 0 0]\n- Pose [ XYZ (m) ] [ RPY (rad) ]:\n [1 2 3]\n [0 0 0]", "-p"),
     ],

@@ -55,6 +55,13 @@ def numbers_in(value: Any) -> list[float]:
     return [float(value)] if isinstance(value, (int, float)) and not isinstance(value, bool) else []
 
 
+@pytest.mark.parametrize("numbers", ["1 0 0 4 0 0 -1 5 0 1 0 6 --from matrix", "1 2 3 30 --from heading_deg:enu", "30 --from heading_deg:ned"])
+def test_a_row_of_a_matrix_and_a_heading_are_derived_as_they_are_read(numbers: str, run: Callable[..., Outcome]) -> None:
+    machine = run("convert", *numbers.split(), "--format", "json")
+    derived = run("convert", *numbers.split(), "--explain")
+    assert last_numbers(derived.out) == pytest.approx(numbers_in(json.loads(machine.out)))
+
+
 @pytest.mark.parametrize("spec", SPECS)
 def test_the_last_block_of_a_conversion_is_the_result_of_the_command(spec: str, run: Callable[..., Outcome]) -> None:
     random = seeded(spec)

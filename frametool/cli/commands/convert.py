@@ -17,7 +17,7 @@ from frametool.errors import ValueInvalid
 from frametool.geometry import floats
 from frametool.geometry.representations import REPRESENTATIONS, Notation, notation
 from frametool.grammar.pose import Pose
-from frametool.grammar.result import Result, Style, is_locked, mapping_of_numbers
+from frametool.grammar.result import Result, Style, is_locked
 from frametool.stream.request import Operation
 from frametool.text.numbers import parse_angle, parse_number
 
@@ -99,15 +99,23 @@ def convert_command(inputs: Inputs) -> int:
     if task.plan:
         refuse(len(found) != 1, f"--explain derives one pose, found {len(results)}")
         if not sources:
-            texts = list(map(repr, found[0].components[3:]))
-            own = (values, request.rows.given) if values else (texts, notation("xyzw"))
-            sources = [Source(poses.INLINE, mapping_of_numbers(*own))]
+            sources = [_source_of(values, request.rows.given, pose if values else found[0])]
         change = _named_change(axes, world, operation) if values else None
         return task.derive("convert", task.written(sources[0], warned=True), own=found[0], change=change)
     output.values(results)
     if len(found) == 1 and any(is_locked(found[0], each) for each in output.style.notations):
         say("note: gimbal lock: the angles are not unique; the third was set to 0")
     return 0
+
+
+def _source_of(values: Sequence[str], given: Notation | None, pose: Pose) -> Source:
+    """Return an argument with the meaning of bare numbers; the pose of named axes, and of a heading without a place."""
+    from frametool.documents.writers import dump_json
+    from frametool.grammar.pasted import mapping_of_numbers
+
+    if values and not (given and given.representation.on_earth):
+        return Source(poses.INLINE, dump_json(mapping_of_numbers(values, given)))
+    return Source(poses.INLINE, dump_json(Result(pose).mapping(Style("json", (notation("xyzw"),), keep_sign=True))))
 
 
 def _are_numbers(values: Sequence[str], *, has_from: bool) -> bool:

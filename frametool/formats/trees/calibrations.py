@@ -62,7 +62,7 @@ from frametool.formats.trees.tree_reader import XYZ, document_edges, line_error,
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge, Options
-from frametool.grammar.loose import WORDS, read_loose_pose
+from frametool.grammar.pasted import WORDS, read_loose_pose
 from frametool.grammar.pose import read_angle_unit, read_rotation, read_spelled
 from frametool.grammar.readers import INDICES, Misfit, Path, Reading, Unclear, as_mapping, kind, read_numbers, within
 from frametool.grammar.result import Style, angles_of, static_edges

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.formats.trees.tree_reader import CAMERA_KEYS, STAMP_KEYS, TREE_KEYS
 from frametool.geometry.camera import CAMERA_MODELS
 from frametool.geometry.representations import MAP, NAMED, POSITIONS
-from frametool.grammar.loose import WORDS
+from frametool.grammar.pasted import WORDS
 from frametool.grammar.place import EARTH_KEYS
 from frametool.grammar.pose import LISTED_WORDS, NAMES, POSITION_KEYS, ROTATION_KEYS, ROTATION_WORDS
 from frametool.grammar.readers import AXES_KEY

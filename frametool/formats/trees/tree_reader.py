@@ -190,7 +190,7 @@ def _pose(entry: dict[str, Any], reading: Reading, also: Collection[str]) -> Pos
 
         within(("camera",), Camera, **{"model": None, **within(("camera",), camera_fields, entry["camera"])})
     if not (POSE_KEYS.issuperset(entry) or LOOSE.isdisjoint(entry)):
-        from frametool.grammar.loose import read_loose_pose
+        from frametool.grammar.pasted import read_loose_pose
 
         return read_loose_pose(entry, reading, also)
     return read_pose(entry, reading, also)
