@@ -27,7 +27,7 @@ from frametool.ros.message_stream import edge_columns, unit_components
 from frametool.ros.messages import PATH, POSES, STAMPS, body_of, on_topic, stamp_problem
 from frametool.text.lines import Pieces
 from frametool.text.spans import MARGIN, Spans, framed, join
-from frametool.text.write import shortest_spans
+from frametool.text.write import float_spans
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
@@ -284,7 +284,7 @@ class BinaryLayout(NamedTuple):
     def lines(self, numbers: NDArray[np.float64]) -> bytes:
         """Return messages with these numbers, (n, k), as lines."""
         names = self.numbers.names or ()
-        written = shortest_spans(numbers, b" " * len(names))
+        written = float_spans(numbers, b" " * len(names))
         ends = written.ends - np.array([1 + POINT_ZERO * (self.numbers[name].kind != "f") for name in names])
         parts = [_repeated(self.texts[0], len(numbers))]
         for at, each in enumerate(self.texts[1:]):

@@ -28,7 +28,7 @@ from frametool.stream.stamp_source import read_header_stamp, read_stamp
 from frametool.text.numbers import parse_number
 from frametool.text.parse import FURTHEST, parse_floats, parse_stamps
 from frametool.text.spans import MARGIN, Floats, Ints, Spans, framed, join, without_quotes
-from frametool.text.write import fixed_spans, replaced, rounded_to_single, shortest_spans
+from frametool.text.write import float_spans, replaced, rounded_to_single
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -159,10 +159,8 @@ def number_spans(
     if not null and (gaps := np.isnan(values)).any():
         spans = number_spans(np.where(gaps, 0.0, values), precision, separators)
         return spans._replace(starts=np.where(gaps, spans.ends - 1, spans.starts))
-    if precision is not None:
-        return fixed_spans(values, precision, separators)
-    spans = shortest_spans(values, separators)
-    if not yaml:
+    spans = float_spans(values, separators, precision)
+    if precision is not None or not yaml:
         return spans
     size, shape = abs(values), values.shape
     far = np.flatnonzero(((size < 1e-4) & (size > 0.0)) | (size >= 1e16))  # 1e-05 is written as 1.0e-05
@@ -513,7 +511,7 @@ def texts_of(cells: Cells) -> list[str]:
     if not isinstance(cells, Spans):
         doubles = cells.astype(np.float64)
         doubles = doubles if cells.dtype.itemsize > 4 else rounded_to_single(doubles)
-        spans = shortest_spans(doubles.reshape(-1, 1), b",")
+        spans = float_spans(doubles.reshape(-1, 1), b",")
         cells = Spans(spans.data, spans.starts[:, 0], spans.ends[:, 0] - 1)
     bare = without_quotes(cells)
     data = bare.data.tobytes()

@@ -24,7 +24,7 @@ import numpy as np
 from frametool.text.spans import MARGIN, Bytes, Flags, Floats, Ints, Spans, Words, framed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
 
 _SPLITTER = 134217729.0
@@ -297,15 +297,17 @@ class Fields:
         return self.origins + POINT - count_digits(whole)
 
 
-def written(values: Floats, separators: bytes, write: Callable[[Floats], Spans]) -> Spans:
-    """Write rows of floats (n, c) by a function for a flat array; append its column's separator to each."""
-    rows, columns = values.shape
-    if len(separators) != columns:
-        raise ValueError(f"{columns} columns, but {len(separators)} separators")
+def float_spans(values: Floats, separators: bytes, precision: int | None = None) -> Spans:
+    """Write rows of floats as spans (n, c), each with its separator: shortest, or with a fixed number of decimals.
+
+    values: (n, c); separators: c bytes, the one that follows each column.
+    Nan and infinity become `nan` and `inf`, as in `repr` and `%`.
+    """
+    flat, shape = np.ascontiguousarray(values, np.float64).ravel(), values.shape
     with np.errstate(over="ignore", invalid="ignore"):
-        data, starts, ends = write(np.ascontiguousarray(values, np.float64).ravel())
-    data[ends] = np.tile(np.frombuffer(separators, np.uint8), rows)
-    return Spans(data, starts.reshape(rows, columns), (ends + 1).reshape(rows, columns))
+        data, starts, ends = _shortest(flat) if precision is None else _fixed(flat, precision)
+    data[ends] = np.tile(np.frombuffer(separators, np.uint8), len(values))
+    return Spans(data, starts.reshape(shape), (ends + 1).reshape(shape))
 
 
 def replaced(spans: Spans, places: Ints, texts: Sequence[str]) -> Spans:
@@ -325,15 +327,6 @@ _LEAST_PLAIN = 1e-4
 _LEAST_POWER = 1e16
 _MOST_DIGITS = 17
 _MOST_EXPONENT = 330
-
-
-def shortest_spans(values: Floats, separators: bytes) -> Spans:
-    """Write rows of floats as spans (n, c), each with its separator.
-
-    values: (n, c); separators: c bytes, the one that follows each column.
-    Nan and infinity become `nan` and `inf`, as in `repr`.
-    """
-    return written(values, separators, _shortest)
 
 
 def _shortest(flat: Floats) -> Spans:
@@ -444,15 +437,6 @@ _GREATEST_SCALED = 9e15
 # a product is off by half an ulp of itself; twice that is safe
 _DOUBT = 2.0**-52
 _MOST_DECIMALS = 15
-
-
-def fixed_spans(values: Floats, precision: int, separators: bytes) -> Spans:
-    """Write rows of floats with a fixed number of decimals, as spans (n, c), each with its separator.
-
-    values: (n, c); separators: c bytes, the one that follows each column.
-    Nan and infinity become `nan` and `inf`, as in `%`.
-    """
-    return written(values, separators, lambda flat: _fixed(flat, precision))
 
 
 def _fixed(flat: Floats, precision: int) -> Spans:

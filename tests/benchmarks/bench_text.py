@@ -15,7 +15,7 @@ import numpy as np
 
 from frametool.text.parse import parse_floats
 from frametool.text.spans import Cells, Spans, join, split_blank, split_delimited
-from frametool.text.write import fixed_spans, shortest_spans
+from frametool.text.write import float_spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -80,11 +80,11 @@ def by_loadtxt(block: bytes) -> Floats:
 
 
 def six_decimals(values: Floats, separators: bytes) -> Spans:
-    return fixed_spans(values, 6, separators)
+    return float_spans(values, separators, 6)
 
 
 def shortest(values: Floats) -> bytes:
-    return join([shortest_spans(values, b",,\n")])
+    return join([float_spans(values, b",,\n")])
 
 
 def print_floats() -> None:
@@ -92,7 +92,7 @@ def print_floats() -> None:
     for name, values in PRINTED.items():
         ours = best(partial(shortest, values), values.size)
         report(f"shortest, {name}", ours, "repr", best(partial(by_repr, values), values.size))
-    ours = best(lambda: join([fixed_spans(FULL, 6, b",,\n")]), FULL.size)
+    ours = best(lambda: join([float_spans(FULL, b",,\n", 6)]), FULL.size)
     report("fixed, 6 decimals", ours, "one bulk %", best(lambda: by_percent(FULL), FULL.size))
 
 
@@ -120,7 +120,7 @@ def whole_rows() -> None:
     print("split, read, move, write and join, ns a row of five")
     for name in ("6 decimals", "17 digits"):
         block = table(FULL, READ[name])
-        report(f"from {name}, shortest", best(partial(moved, block, shortest_spans), ROWS))
+        report(f"from {name}, shortest", best(partial(moved, block, float_spans), ROWS))
         report(f"from {name}, to 6 decimals", best(partial(moved, block, six_decimals), ROWS))
 
 

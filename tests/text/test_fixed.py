@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 from numbers_at_hand import HOSTILE, random_bits
 
 from frametool.text.spans import join
-from frametool.text.write import fixed_spans
+from frametool.text.write import float_spans
 
 
 def lines(values: list[float], precision: int) -> list[str]:
-    return join([fixed_spans(np.array(values, np.float64).reshape(-1, 1), precision, b"\n")]).decode().splitlines()
+    return join([float_spans(np.array(values, np.float64).reshape(-1, 1), b"\n", precision)]).decode().splitlines()
 
 
 def by_percent(values: list[float], precision: int) -> list[str]:
@@ -41,16 +41,11 @@ def test_decimal_halves_go_where_their_float_lies(digits: int, precision: int) -
 
 
 def test_rows_are_written_with_the_separator_of_each_column() -> None:
-    assert join([fixed_spans(np.array([[1.0, -0.0], [1e20, -2.5]]), 1, b",\n")]) == b"1.0,0.0\n100000000000000000000.0,-2.5\n"
+    assert join([float_spans(np.array([[1.0, -0.0], [1e20, -2.5]]), b",\n", 1)]) == b"1.0,0.0\n100000000000000000000.0,-2.5\n"
 
 
 def test_no_rows_are_no_text() -> None:
-    assert join([fixed_spans(np.empty((0, 2)), 6, b",\n")]) == b""
-
-
-def test_a_separator_for_each_column_is_demanded() -> None:
-    with pytest.raises(ValueError, match="1 columns, but 2 separators"):
-        join([fixed_spans(np.empty((4, 1)), 6, b",\n")])
+    assert join([float_spans(np.empty((0, 2)), b",\n", 6)]) == b""
 
 
 @pytest.mark.large

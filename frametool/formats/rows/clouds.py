@@ -37,7 +37,7 @@ from frametool.text.lines import read_blocks
 from frametool.text.numbers import explain_number
 from frametool.text.parse import parse_floats
 from frametool.text.spans import MARGIN, Cells, Spans, framed, join, split_blank
-from frametool.text.write import fixed_spans, rounded_to_single, shortest_spans
+from frametool.text.write import float_spans, rounded_to_single
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -247,10 +247,8 @@ def encode_text(
         if column.kind is None:
             raise ValueInvalid(f"column {column.name} holds texts; the rows of a cloud are numbers")
         values = np.asarray(next(new).values, np.float64).reshape(-1, 1)
-        if style.precision is not None:
-            spans = fixed_spans(values, style.precision, b" ")
-        else:
-            spans = shortest_spans(rounded_to_single(values) if column.kind == column_file.SINGLE else values, b" ")
+        is_single = column.kind == column_file.SINGLE and style.precision is None
+        spans = float_spans(rounded_to_single(values) if is_single else values, b" ", style.precision)
         written = Spans(spans.data, spans.starts[:, 0], spans.ends[:, 0] - 1)
         if place < len(batch.at):
             end = cells.ends[chosen, batch.at[place]]
