@@ -23,14 +23,15 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from frametool.documents.source import Verbatim
 from frametool.errors import ValueInvalid, bare, shown
-from frametool.geometry import floats, matrix
 from frametool.geometry.representations import RPY, Notation, notation
 from frametool.grammar.pose import (
     POSE_KEYS,
     POSITION_WORDS,
     ROTATION_WORDS,
     Pose,
+    are_rotation,
     is_position,
+    matrix_pose,
     notation_of,
     own_key,
     read_pose,
@@ -286,40 +287,6 @@ def pasted_poses(text: str, default: Notation | None = None) -> list[Any] | None
     return [rows[0] if len(rows) == 1 else rows]
 
 
-def matrix_pose(rows: Rows, rep: Notation, *, stated: bool = False) -> dict[str, Any] | None:
-    """Return a 3x3, a 3x4 or a 4x4 matrix, or its numbers row by row, as a mapping; None for another size.
-
-    stated: the user stated `matrix`; then 12 numbers in one row may also be x y z and nine numbers.
-    """
-    key = rep.spec
-    sizes = {len(row) for row in rows}
-    cells = [cell for row in rows for cell in row]
-    if (len(rows), sizes) in ((3, {3}), (4, {4})):
-        return {key: rows}
-    if (len(rows), sizes) not in ((3, {4}), (1, {9}), (1, {12}), (1, {16})):
-        return None
-    if len(cells) != 12:
-        size = 3 if len(cells) == 9 else 4
-        return {key: [cells[at : at + size] for at in range(0, len(cells), size)]}
-    as_rows = cells[3::4], [cells[at : at + 3] for at in (0, 4, 8)]
-    behind = cells[:3], [cells[at : at + 3] for at in (3, 6, 9)]
-    fitting = [each for each in (behind, as_rows) if is_rotation(each[1])] if stated and len(rows) == 1 else [as_rows]
-    if len(fitting) > 1:
-        hint = "write {xyz: [..], matrix: [..]}"
-        raise ValueInvalid(f"12 numbers may be x y z and a matrix, or the rows of a 3x4 pose; {hint}")
-    xyz, turned = fitting[0] if fitting else behind
-    return {"xyz": xyz, key: turned}
-
-
-def is_rotation(rows: Rows) -> bool:
-    """Return True if texts are three rows of three numbers that are a rotation to 1e-3."""
-    try:
-        numbers = [parse_number(cell) for row in rows for cell in row]
-    except ValueInvalid:
-        return False
-    return [*map(len, rows)] == [3, 3, 3] and matrix.defect(*matrix.nine(numbers), floats) < 1e-3
-
-
 def _spelled_rows(rows: Rows, rep: Notation) -> list[Any] | None:
     """Return the poses of rows in a notation: one per row, or one column, or a position and a rotation."""
     row, size = rep.representation, len(rep.columns)
@@ -369,7 +336,7 @@ def begins_freely(head: str, default: Notation | None, *, moves: bool, alone: bo
         return False
     matrix = default is None or default.representation.whole is not None
     if (len(cells), len(lines)) == (3, 3) and matrix:
-        return default is not None or alone or (None if is_rotation([line.split() for line in lines]) else False)
+        return default is not None or alone or (None if are_rotation([line.split() for line in lines]) else False)
     if matrix:
         return (len(cells), len(lines)) in ((4, 3), (4, 4))  # a line of twelve is a KITTI file with one pose
     return len(cells) == 1 and len(lines) > 1

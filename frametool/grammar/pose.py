@@ -13,7 +13,7 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, bare, did_you_mean, overheard, shown
-from frametool.geometry import floats, quaternion, rigid
+from frametool.geometry import floats, matrix, quaternion, rigid
 from frametool.geometry.representations import LIST, NAMED, NAMED_AXES, REPRESENTATIONS, ROTATIONS, ROWS, axes_name
 from frametool.geometry.representations import notation as parse_notation
 from frametool.grammar import readers
@@ -252,8 +252,6 @@ def pose_of_numbers(texts: Sequence[str], default: Notation | None, reading: Rea
     rep = default or notation_of(texts)
     whole, size = rep.representation.whole, len(rep.representation.columns)
     if whole and len(texts) == _ROWS_OF_A_POSE:
-        from frametool.grammar.pasted import matrix_pose
-
         return read_pose(matrix_pose([list(texts)], rep, stated=default is not None) or {}, reading)
     if whole and len(texts) == len(whole.columns):
         return Pose(*read_spelled(rep, texts, readers.INDICES, reading))
@@ -262,6 +260,40 @@ def pose_of_numbers(texts: Sequence[str], default: Notation | None, reading: Rea
     x, y, z = map(parse_length, texts[:-size] or ("0", "0", "0"))
     _, rotation = read_spelled(rep, texts[-size:], readers.INDICES, reading)
     return Pose((x, y, z) if len(texts) > size else None, rotation)
+
+
+def matrix_pose(rows: Sequence[Sequence[str]], rep: Notation, *, stated: bool = False) -> dict[str, Any] | None:
+    """Return a 3x3, a 3x4 or a 4x4 matrix, or its numbers row by row, as a mapping; None for another size.
+
+    stated: the user stated `matrix`; then 12 numbers in one row may also be x y z and nine numbers.
+    """
+    key = rep.spec
+    sizes = {len(row) for row in rows}
+    cells = [cell for row in rows for cell in row]
+    if (len(rows), sizes) in ((3, {3}), (4, {4})):
+        return {key: rows}
+    if (len(rows), sizes) not in ((3, {4}), (1, {9}), (1, {12}), (1, {16})):
+        return None
+    if len(cells) != 12:
+        size = 3 if len(cells) == 9 else 4
+        return {key: [cells[at : at + size] for at in range(0, len(cells), size)]}
+    as_rows = cells[3::4], [cells[at : at + 3] for at in (0, 4, 8)]
+    behind = cells[:3], [cells[at : at + 3] for at in (3, 6, 9)]
+    fitting = [each for each in (behind, as_rows) if are_rotation(each[1])] if stated and len(rows) == 1 else [as_rows]
+    if len(fitting) > 1:
+        hint = "write {xyz: [..], matrix: [..]}"
+        raise ValueInvalid(f"12 numbers may be x y z and a matrix, or the rows of a 3x4 pose; {hint}")
+    xyz, turned = fitting[0] if fitting else behind
+    return {"xyz": xyz, key: turned}
+
+
+def are_rotation(rows: Sequence[Sequence[str]]) -> bool:
+    """Return True if texts are three rows of three numbers that are a rotation to 1e-3."""
+    try:
+        numbers = [parse_number(cell) for row in rows for cell in row]
+    except ValueInvalid:
+        return False
+    return [*map(len, rows)] == [3, 3, 3] and matrix.defect(*matrix.nine(numbers), floats) < 1e-3
 
 
 def notation_of(texts: Sequence[str]) -> Notation:

@@ -108,13 +108,13 @@ def convert_command(inputs: Inputs) -> int:
     return 0
 
 
-def _source_of(values: Sequence[str], given: Notation | None, pose: Pose) -> Source:
+def _source_of(values: Sequence[str], default: Notation | None, pose: Pose) -> Source:
     """Return an argument with the meaning of bare numbers; the pose of named axes, and of a heading without a place."""
     from frametool.documents.writers import dump_json
     from frametool.grammar.pasted import mapping_of_numbers
 
-    if values and not (given and given.representation.on_earth):
-        return Source(poses.INLINE, dump_json(mapping_of_numbers(values, given)))
+    if values and not (default and default.representation.on_earth):
+        return Source(poses.INLINE, dump_json(mapping_of_numbers(values, default)))
     return Source(poses.INLINE, dump_json(Result(pose).mapping(Style("json", (notation("xyzw"),), keep_sign=True))))
 
 
