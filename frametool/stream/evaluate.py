@@ -18,20 +18,10 @@ from frametool.geometry.representations import UPPER_ROWS, BatchRule
 from frametool.geometry.validation import read_rotations
 from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
 from frametool.grammar.pose import FEW_DIGITS
+from frametool.stream import row_layout
 from frametool.stream.faults import DEGREES, NULL, Fault, RowNote
 from frametool.stream.request import PAIR, START, Request, thing_pose
-from frametool.stream.row_layout import (
-    FLAT,
-    IDENTITY,
-    LEAVES_PLANE,
-    NOWHERE,
-    POSE,
-    TURN,
-    Shape,
-    checked_rotation,
-    doubt,
-    wrong_tail,
-)
+from frametool.stream.row_layout import LEAVES_PLANE, NOWHERE, POSE, TURN, Shape, checked_rotation, doubt, wrong_tail
 from frametool.stream.rows import Block, assemble, chosen, coded, numbered, read_each, texts_as_rows
 from frametool.text.numbers import parse_number, read_number_or_angle
 from frametool.text.parse import half_units, parse_floats
@@ -327,7 +317,7 @@ class Run:
     def _rotation(self, shape: Shape, first: int, numbers: Components) -> Components:
         """Return the checked quaternions of a shape whose numbers begin at the column `first`."""
         if shape.notation is None:
-            return IDENTITY
+            return row_layout.IDENTITY
         values, names = list(shape.rotation(numbers)), self.plan.names[first : first + shape.size]
         tail = shape.joined.tail if shape.joined else ()  # the last row of a 4x4 matrix is 0 0 0 1
         last = numbers[len(numbers) - len(tail) :]
@@ -379,7 +369,7 @@ class Run:
         for target, parts in zip(self.plan.targets, self.moved, strict=True):
             numbers += target.written(parts, arrays)
             for name, number in target.left_out(parts, arrays):
-                for row in np.flatnonzero(abs(number) > FLAT).tolist():
+                for row in np.flatnonzero(abs(number) > row_layout.FLAT).tolist():
                     self._blame(row, "", LEAVES_PLANE.format(name, number[row]))
             if target.notations and (flags := target.locked(parts)) is not None:
                 locked |= flags

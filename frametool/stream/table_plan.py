@@ -8,48 +8,13 @@ from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from frametool.errors import FormatError, Misused, ValueInvalid, alternatives, shown
-from frametool.grammar.readers import (
-    AXES_KEY,
-    NAME_KEYS,
-    PARENT_COLUMNS,
-    PARENT_KEYS,
-    in_nanoseconds,
-    may_be_on_earth,
-    may_be_uncertain,
-    nanoseconds_beside,
-    stamp_places,
-    without_mark,
-)
+from frametool.grammar import readers
+from frametool.grammar.readers import AXES_KEY, may_be_uncertain, nanoseconds_beside, stamp_places, without_mark
+from frametool.stream import header, row_layout
 from frametool.stream.evaluate import Plan
-from frametool.stream.header import (
-    XYZ,
-    Columns,
-    PoseColumns,
-    find_poses,
-    find_six,
-    has_pose_column,
-    listed,
-    named_pose,
-    row_shape,
-    wholes_of,
-)
+from frametool.stream.header import XYZ, PoseColumns, has_pose_column, listed, named_pose, row_shape, wholes_of
 from frametool.stream.request import PAIR, PLAIN, Request
-from frametool.stream.row_layout import (
-    NORMAL,
-    POINT,
-    POSE,
-    SIX,
-    Const,
-    In,
-    Instead,
-    Out,
-    Piece,
-    Shape,
-    Target,
-    Word,
-    place_of,
-    six_names,
-)
+from frametool.stream.row_layout import POINT, POSE, SIX, Const, In, Piece, Shape, Target, Word, place_of, six_names
 from frametool.text.numbers import number_or_none
 
 if TYPE_CHECKING:
@@ -160,7 +125,7 @@ def plan_table(
     targets = tuple(map(request.target, shapes[:1] or (Shape(POSE),) if has_one else shapes))
     frames = _frame_columns(table, request, source, on_earth=on_earth)
     stays = not request.rows.poses or (request.operation.moves and request.rename is None)
-    name = None if stays else _first_called(NAME_KEYS, table)
+    name = None if stays else _first_called(readers.NAME_KEYS, table)
     moves_each = on_earth or request.rows.frames or (frames and request.operation.moves)
     edge_of = request.pose_from_frame if moves_each else None
     asked_at = range(shapes[0].own_size, shapes[0].size) if request.operation.shown else ()  # empty cells are not
@@ -203,7 +168,7 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
 
         return [chosen_pose(spec, table.names, width, request) for spec in specs]
     names = ["" if name == asked.extra_column or may_be_uncertain(name) else name for name in table.names]
-    six = find_six(names, asked.kind if asked.kind in SIX else "")
+    six = header.find_six(names, asked.kind if asked.kind in SIX else "")
     if asked.kind in SIX and six is None:
         wanted = " ".join(six_names(asked.kind))
         found = f"no columns of a {asked.kind} ({wanted}) among: {listed(names)}; name them with --columns"
@@ -213,12 +178,12 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
         return [PoseColumns(six, None)]
     if not (request.operation.moves or request.operation.changes_nothing):
         others = names  # what a pose has with it would no longer be true
-    if asked.poses == 1 and (asked.given_place or any(map(may_be_on_earth, names))):
+    if asked.poses == 1 and (asked.given_place or any(map(readers.may_be_on_earth, names))):
         from frametool.stream.earth_columns import find_pose
 
         if (pose := find_pose(others, request, source)) is not None:
             return [pose]
-    return find_poses(others, asked.given, asked.poses, source)
+    return header.find_poses(others, asked.given, asked.poses, source)
 
 
 def _by_width(width: int, request: Request, source: str) -> str:
@@ -252,12 +217,12 @@ def _turning_along(
     if there and operation.turns and (operation.left is not None or operation.mirrors):
         named = ", ".join(map(" ".join, there))
         raise Misused(f"{named} would keep to the old axes; --columns x,y,z turns the points alone, apply all of them")
-    found = [(tuple(map(names.index, each)), NORMAL) for each in there if operation.moves]
+    found = [(tuple(map(names.index, each)), row_layout.NORMAL) for each in there if operation.moves]
     if operation.turns or (operation.moves and re.search(r"(?i) (?:body[_.])?[vw]x\b", f" {' '.join(names)}")):
         from frametool.stream.extra_numbers import find_rates
 
         found += find_rates(names, poses[0].places, operation, source)
-    return [(PoseColumns(Columns(at, tuple(names[each] for each in at)), None), kind) for at, kind in found]
+    return [(PoseColumns(header.Columns(at, tuple(names[each] for each in at)), None), kind) for at, kind in found]
 
 
 def _without_position(pose: PoseColumns, request: Request, table: Table, source: str) -> PoseColumns:
@@ -279,12 +244,12 @@ def _frame_columns(table: Table, request: Request, source: str, *, on_earth: boo
     asked = request.rows
     names = table.names or ()
     if on_earth:
-        return tuple(place for place, name in enumerate(names) if name == PARENT_KEYS[0])[:1]
+        return tuple(place for place, name in enumerate(names) if name == readers.PARENT_KEYS[0])[:1]
     if not (asked.poses or asked.frames):
         return ()
     if asked.frames and asked.frames != ("",):
         return tuple(_place(name, names, source) for name in asked.frames)
-    found = _first_called(PARENT_COLUMNS, table)
+    found = _first_called(readers.PARENT_COLUMNS, table)
     if found is None and asked.frames:
         unsaid = "rows do not say their frame; name SOURCE, or give --frame-column; columns"
         raise FormatError(f"{unsaid}: {', '.join(names)}", source=source, line=1)
@@ -323,7 +288,7 @@ def _stamp_columns(
         time = _place(name, table.called, source)
         if request.gathered is None:  # else it is a weight
             try:
-                in_nanoseconds(table.name(time))
+                readers.in_nanoseconds(table.name(time))
             except ValueInvalid as error:
                 raise Misused(str(error), source=source, line=1) from None
         return time, nanoseconds_beside(table.names, time) if table.names else None
@@ -464,11 +429,11 @@ def lay_out(columns: Sequence[Column], width: int, delimiter: bytes) -> tuple[tu
             follows = follows and end == width - 1
         elif isinstance(first, Named):
             stretches += [(first.place, first.place, "cell", "cell"), (first.role, first.role, NAMED, NAMED)]
-            pieces.append(Instead(len(stretches) - 2, len(stretches) - 1))
+            pieces.append(row_layout.Instead(len(stretches) - 2, len(stretches) - 1))
         elif isinstance(first, Fixed):
             pieces.append(Const(first.word.encode()))
         else:
-            run = Out(first.number, first.number + len(group), between)
+            run = row_layout.Out(first.number, first.number + len(group), between)
             pieces.append(Word(first.number, first.words) if first.words else run)
         if follows:
             pieces.append(Const(between))

@@ -19,18 +19,9 @@ from frametool.documents.source import Verbatim
 from frametool.documents.writers import dump_json
 from frametool.documents.writers import quoted as quoted_in_yaml
 from frametool.errors import ValueInvalid, listing, warn
+from frametool.formats.rows import pose_rows
 from frametool.formats.rows.csv import cell, cells_of, quoted, row
-from frametool.formats.rows.pose_rows import (
-    IMAGE,
-    MOST_NAMED,
-    NUMBER,
-    Numbers,
-    RowForm,
-    image_name,
-    is_turned,
-    rows_of,
-    turned,
-)
+from frametool.formats.rows.pose_rows import IMAGE, MOST_NAMED, NUMBER, RowForm, image_name, is_turned, rows_of, turned
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import arrays, floats, quaternion, rigid
@@ -198,7 +189,7 @@ class TextWriter(SingleWriter):
             if isinstance(piece, bytes):
                 pieces.append(Const(piece))
                 continue
-            if isinstance(piece, Numbers):
+            if isinstance(piece, pose_rows.Numbers):
                 pieces.append(Out(first, first + piece.size, piece.between))
                 first += piece.size
                 continue
