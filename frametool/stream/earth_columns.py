@@ -74,10 +74,9 @@ if TYPE_CHECKING:
     Groups: TypeAlias = dict[str, dict[str, "NamedColumn"]]
 
 ECEF_COLUMNS = POSITIONS[ECEF].columns
-STATUS, DATUM, EPSG, PARENT = "status", "datum", "epsg", "parent"
+STATUS, PARENT = "status", "parent"
 STAYING = (STATUS, PARENT)  # read, and not rewritten
-OTHERS = ("easting", "northing", *ECEF_COLUMNS, ZONE, "heading", AXES,
-          STATUS, DATUM, EPSG, PARENT)  # fmt: skip
+OTHERS = ("easting", "northing", *ECEF_COLUMNS, ZONE, "heading", AXES, *STAYING, "datum", "epsg")
 FIELDS = PLACE_FIELDS | {name: name for names in (OTHERS, *FLAT.values()) for name in names}
 PATTERN = re.compile(
     rf"[#% ]*((?:.*[._/])??)({'|'.join(sorted(FIELDS, key=len, reverse=True))})"
@@ -85,8 +84,7 @@ PATTERN = re.compile(
     re.IGNORECASE,
 )
 FIX_ENTRY = re.compile(rf"(?:.*[./_])?{FIX}\[?_?([0-8])\]?")
-FIX_TYPE, NO_FIX = "position_covariance_type", "-1"
-STAYS = "{} stay data: x, y, z are the position; to read the place, leave these out"
+FIX_TYPE = "position_covariance_type"
 WHOLE = ("lat", "latitude", "lat_rad", AT, "ecef", "utm", "easting", *FLAT_KEYS)
 DEGREES = {"": False, "deg": False, "degrees": False, "°": False, "rad": True, "radians": True}
 
@@ -242,15 +240,16 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
     Raises Misused for names that are not there, or a count that the place does not have.
     """
     kind, earth = request.rows.given_place, request.earth or Earth()
-    most = len(POSITIONS[kind].names) - (kind == UTM and earth.zone is not None)
+    is_zoned = kind == UTM and earth.zone is not None
+    fields = POSITIONS[kind].names[is_zoned:]
+    most = len(fields)
     called, places = places_named(spec or f"{1 + (width == most + 1)}-{width}", names, width)
-    fields = POSITIONS[kind].names[-most:]
     own, behind = places[:most], places[most:]
-    if len(own) < (kernels(kind).least or len(fields)) - (kind == UTM and earth.zone is not None):
+    if len(own) < (kernels(kind).least or most) - is_zoned:
         raise Misused(f"--columns: {kind} has {most} numbers ({' '.join(fields)}); found {len(own)}")
-    spots = [NamedColumn(place, called[place], "") for place in own]
+    spots = {field: NamedColumn(place, called[place], "") for field, place in zip(fields, own, strict=False)}
     try:
-        position = _columns(kind, dict(zip(fields, spots, strict=False)), {}, earth)
+        position = _columns(kind, spots, {}, earth)
     except ValueInvalid as error:
         raise Misused(f"--columns: {error}") from None
     turned = find_rotations(_header_of(called, {*range(width)}.difference(behind)), None)
@@ -281,8 +280,9 @@ def readers_of(shape: Shape) -> tuple[dict[int, Reader], dict[int, Reader], int]
     """
     fields = shape.place.fields if shape.place is not None else ()
     words = {at: WORDS[field] for at, field in enumerate(fields) if field in WORDS}
-    angles = [(at, field) for at, field in enumerate(fields) if field in ("lat", "lon")]
-    marked: dict[int, Reader] = {at: partial(coordinate, field=field) for at, field in angles}
+    marked: dict[int, Reader] = {
+        at: partial(coordinate, field=field) for at, field in enumerate(fields) if field in ("lat", "lon")
+    }
     return words, marked, sum(field in STAYING for field in fields)
 
 
@@ -305,9 +305,7 @@ def _parent(text: str) -> float:
     return 0.0
 
 
-WORDS: dict[str, Reader] = {
-    ZONE: zone_number, AXES: _axes, STATUS: _status, PARENT: _parent
-}
+WORDS: dict[str, Reader] = {ZONE: zone_number, AXES: _axes, STATUS: _status, PARENT: _parent}
 
 
 def zone_notes(place: Place, columns: Sequence[Floats], line_of: Callable[[int], int]) -> list[RowNote]:
@@ -400,7 +398,8 @@ def placed_record(
     in_ecef = value.get("frame", value.get("parent")) in EARTH_FRAMES
     if AT not in value and ((positions and not in_ecef) or {"x", "y", "z"} <= value.keys()):
         if request.rows.poses and not request.operation.keeps_frames:
-            reading.note(STAYS.format(", ".join(own)), own[0], rule="stays")
+            what = f"{', '.join(own)} stay data: x, y, z are the position"
+            reading.note(f"{what}; to read the place, leave these out", own[0], rule="stays")
         return None
     if request.rows.kind == VECTOR:
         raise Misfit("a vector has no place on the Earth; leave --as vector out")
@@ -421,7 +420,12 @@ def placed_record(
     shape = Shape(POINT if is_point else POSE, 1.0, None if pose.rotation is None else notation("quaternion"))
     if covariance and not is_point:  # of a pose whose turn is exact
         covariance = tuple(covariance[3 * i + j] if max(i, j) < 3 else 0.0 for i in range(6) for j in range(6))
-    extra = covariance or _extra(pose, reading, request, is_point=is_point)
+    extra = covariance
+    if not extra and pose.covariance is not None:
+        if gathered is None and operation.formula is None and request.results.place is None:
+            extra = of_position(tuple(pose.covariance)) if is_point else tuple(pose.covariance)
+        else:
+            reading.note(LEFT_OUT.format("a result at a place" if request.results.place else "this"), rule="left-out")
     if extra:
         shape = shape._replace(covariance=(len(extra),), rewritten=True)
     keys = [*own, *used, *(key for key in (AXES_KEY, *COVARIANCE_KEYS) if key in value)]
@@ -443,23 +447,13 @@ def placed_record(
     return record._replace(numbers=(None,) * len(values), keys=own_keys)
 
 
-def _extra(pose: Pose, reading: Reading, request: Request, *, is_point: bool) -> tuple[float, ...]:
-    """Return the covariance of a pose or point in ECEF where it counts; where it does not, that is noted."""
-    if pose.covariance is None:
-        return ()
-    if request.gathered is not None or request.operation.formula is not None or request.results.place is not None:
-        reading.note(LEFT_OUT.format("a result at a place" if request.results.place else "this"), rule="left-out")
-        return ()
-    return of_position(tuple(pose.covariance)) if is_point else tuple(pose.covariance)
-
-
 def _of_fix(value: dict[str, Any], mapping: dict[str, Any], reading: Reading, request: Request) -> tuple[float, ...]:
     """Return the covariance of a NavSatFix, east, north, up there, in ECEF; () where it has none, or where it stays.
 
     Raises Misfit for a fix that was none.
     """
     status = value.get("status")
-    if type(status) is dict and status.get("status") == NO_FIX:
+    if type(status) is dict and status.get("status") == "-1":
         raise NotARotation("status -1: there was no fix", ("status", "status"))
     is_left_out = request.results.place is not None or request.gathered is not None
     if FIX not in value or value.get(FIX_TYPE, "1") == "0" or is_left_out:

@@ -107,23 +107,19 @@ def _of_sources(numbers: Sequence[Any], sigma: Sequence[tuple[int, str]], size: 
 def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Reading, flat: Sequence[str]) -> Record:
     """Add the covariance that sigmas say; none of its entries is in the text, and the result names them anew."""
     size = 36 if record.shape.kind == POSE else POINT_ENTRIES
-    degrees = reading.degrees
-    reading.degrees = read_angle_unit(own["angles"]) if "angles" in own else degrees
-    try:
-        if not flat:
-            entries = within(path, covariance.read_covariance, own, reading=reading)
-        else:  # keys as columns: c11 .. c66, or sigma_x ..
-            numbers = [within((*path, key), read_number, own[key]) for key in flat]
-            _, sigma = covariance.find_columns(flat, size)
-            negative = next((key for key, number in zip(flat, numbers, strict=True) if number < 0.0), "")
-            if sigma and negative:
-                raise NotARotation(f"sigma is negative: {own[negative]}", (*path, negative))
-            if not sigma:
-                within((*path, flat[0]), covariance.check, numbers)
-            sigma = _with_unit(sigma, degrees=reading.degrees)
-            entries = _of_sources(numbers, sigma, size) if sigma else tuple(numbers)
-    finally:
-        reading.degrees = degrees
+    degrees = read_angle_unit(own["angles"]) if "angles" in own else reading.degrees
+    if not flat:
+        entries = within(path, covariance.read_covariance, own, reading=Reading(reading.source, degrees=degrees))
+    else:  # keys as columns: c11 .. c66, or sigma_x ..
+        numbers = [within((*path, key), read_number, own[key]) for key in flat]
+        _, sigma = covariance.find_columns(flat, size)
+        negative = next((key for key, number in zip(flat, numbers, strict=True) if number < 0.0), "")
+        if sigma and negative:
+            raise NotARotation(f"sigma is negative: {own[negative]}", (*path, negative))
+        if not sigma:
+            within((*path, flat[0]), covariance.check, numbers)
+        sigma = _with_unit(sigma, degrees=degrees)
+        entries = _of_sources(numbers, sigma, size) if sigma else tuple(numbers)
     if size < len(entries) and any(entries[18:]):
         raise Misfit("a point does not turn; its sigma has xyz alone", (*path, covariance.SIGMA))
     entries = entries if size == len(entries) else covariance.of_position(entries)

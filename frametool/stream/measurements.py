@@ -33,7 +33,7 @@ from frametool.stream.request import COMBINED, Operation, Request, RowOptions
 from frametool.stream.row_layout import POSE, Shape
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
     from typing import TypeAlias
 
     from frametool.fit.measured_tree import TreeSolution
@@ -193,9 +193,9 @@ def _of_table(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
     for block, outcome in converter.steps(cast("ByteStream", file.stream)):
         rows, shape = converter.rows, converter.rows.shape
         has_place = shape.whole or shape.unit is not None
-        if not line and shape.notation is None and not has_place:
-            raise FormatError(f"no pose among the columns {rows.columns}; {LIKE}", source=file.name, line=1)
         if not line and shape.notation is None:
+            if not has_place:
+                raise FormatError(f"no pose among the columns {rows.columns}; {LIKE}", source=file.name, line=1)
             warn(f"{file.name}:1: no rotation among the columns {rows.columns}: each is taken for 0")
         line = line or 1
         BadRows(file.name).take(fault._replace(line=line + fault.line) for fault in outcome.faults)
@@ -210,11 +210,9 @@ def _of_table(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
             if (flag := cells.get("inverse")) not in (None, "true", "false"):
                 message = f"inverse must be true or false, found {shown(str(flag))}"
                 raise FormatError(message, source=file.name, line=at)
-            pose = pose._replace(covariance=cells.get("covariance"))
-            pose = inverted(pose) if flag == "true" else pose
-            made = _made(pose, bare(pose.parent or ""), bare(child), cells.get("id"))
-            written = None if flag == "true" else _written(shape, own)
-            yield MeasuredRow(made._replace(written=written), at, cells.get("stamp_ns"))
+            pose, turned = pose._replace(covariance=cells.get("covariance")), shape._replace(inverse=flag == "true")
+            pose = inverted(pose) if turned.inverse else pose
+            yield MeasuredRow(_made(pose, turned, own, bare, child, cells.get("id")), at, cells.get("stamp_ns"))
         line += outcome.lines
     file.tally.rough += [1] * converter.rows.mended
     file.tell()
@@ -289,9 +287,8 @@ def _of_row(row: Any, path: Path, request: Request, reading: Reading) -> Iterato
         pose = pose_of(record, request)
         child = within(path, _one_child, row.get(CHILD), pose.name)
         label = row.get("id") if type(row.get("id")) is str else None
-        made = _made(pose, reading.bare(pose.parent or ""), reading.bare(child), label)
         own = record.values[: record.shape.own_size]
-        yield record, made._replace(written=None if record.shape.inverse else _written(record.shape, own))
+        yield record, _made(pose, record.shape, own, reading.bare, child, label)
 
 
 def _one_child(child: Any, name: str | None) -> str:
@@ -303,14 +300,14 @@ def _one_child(child: Any, name: str | None) -> str:
     return str(child or name or "")
 
 
-def _made(pose: Pose, parent: str, child: str, label: str | None) -> Measurement:
-    return Measurement(parent, child, pose.components, pose.covariance, "", label and str(label))
-
-
-def _written(shape: Shape, own: Sequence[float]) -> tuple[str, tuple[float, float, float]] | None:
-    """Return the angles that a rotation was written in; None where it was written otherwise."""
-    name = shape.notation.representation.name if shape.notation else ""
-    if name not in ("rpy", "rotvec"):
-        return None
-    a, b, c = (radians(angle) if shape.degrees else angle for angle in shape.rotation(own))
-    return name, (a, b, c)
+def _made(
+    pose: Pose, shape: Shape, own: Sequence[float], bare: Callable[[str], str], child: str, label: str | None
+) -> Measurement:
+    """Return what a pose measures, with the angles that its rotation was written in, if these are its own."""
+    name = shape.notation.representation.name if shape.notation and not shape.inverse else ""
+    written: tuple[str, tuple[float, float, float]] | None = None
+    if name in ("rpy", "rotvec"):
+        a, b, c = (radians(angle) if shape.degrees else angle for angle in shape.rotation(own))
+        written = name, (a, b, c)
+    parent, child, label = bare(pose.parent or ""), bare(child), label and str(label)
+    return Measurement(parent, child, pose.components, pose.covariance, "", label, written)

@@ -237,8 +237,19 @@ def read_points(argument: str, *, fmt: str, answers: Answers, policy: Callable[[
     file = InputFile(argument)
     try:
         fmt = fmt or detect(file.head(), "rows", "arrays", "records", name=file.path)
-        is_record = "records" in FORMATS[fmt].reads and not re.search(TREE, file.head())
-        rows, places = _of_documents(file) if is_record else _of_rows(file, fmt, answers, policy(file.name))
+        reads = FORMATS[fmt].reads
+        if "records" in reads and not re.search(TREE, file.head()):
+            rows, places = _of_documents(file)
+        elif {"rows", "arrays"}.isdisjoint(reads):
+            raise FormatError(f"no points in it: {FORMATS[fmt].summary}", source=file.name)
+        else:
+            converter = FormatConverter(fmt, Request(Operation(moves=True)), file.name, answers=answers)
+            rows = gathered(converter.steps(cast("ByteStream", file.stream)), policy(file.name), (*IDS, WEIGHT))
+            if rows.numbers.shape[1] < 3 or not converter.placed:
+                raise FormatError("no positions in it: rotations alone are no points", source=file.name)
+            row = " row " if "arrays" in reads else ":"
+            lines = rows.lines if row == ":" else np.arange(1, len(rows.numbers) + 1)
+            places = [f"{file.name}{row}{line}" for line in lines.tolist()]
     finally:
         file.close()
     extras = {key: plain_cells(cells) for key, cells in rows.extras.items()}
@@ -262,19 +273,6 @@ def read_points(argument: str, *, fmt: str, answers: Answers, policy: Callable[[
             raise ValueInvalid(f"{place}: weight is negative: {text}")
     frame = rows.parents[0] if len({*rows.parents}) == 1 else None
     return Points(file.name, rows.numbers[:, :3], [*first] or None, weights or None, places, frame)
-
-
-def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows) -> tuple[RowPoses, list[str]]:
-    """Gather the points of a table, or of columns of numbers, and where each is."""
-    if {"rows", "arrays"}.isdisjoint(FORMATS[fmt].reads):
-        raise FormatError(f"no points in it: {FORMATS[fmt].summary}", source=file.name)
-    converter = FormatConverter(fmt, Request(Operation(moves=True)), file.name, answers=answers)
-    rows = gathered(converter.steps(cast("ByteStream", file.stream)), bad, (*IDS, WEIGHT))
-    if rows.numbers.shape[1] < 3 or not converter.placed:
-        raise FormatError("no positions in it: rotations alone are no points", source=file.name)
-    if "arrays" in FORMATS[fmt].reads:
-        return rows, [f"{file.name} row {at + 1}" for at in range(len(rows.numbers))]
-    return rows, [f"{file.name}:{line}" for line in rows.lines.tolist()]
 
 
 def _of_documents(file: InputFile) -> tuple[RowPoses, list[str]]:
