@@ -446,3 +446,40 @@ def by_suffix(path: str | None, names: tuple[str, ...]) -> str | None:
     """Return which of several formats has the suffix of a file, if any."""
     suffix = os.path.splitext(path or "")[1].lower()
     return next((name for name in names if suffix in FORMATS[name].suffixes), None)
+
+
+def format_entry(name: str) -> dict[str, Any]:
+    """Return the table row of a format as plain values."""
+    row = FORMATS[name]
+    return {
+        "name": name, "summary": row.summary, "suffixes": row.suffixes, "reads": row.reads, "writes": row.writes,
+        "states": row.conventions or None, "asks": tuple(map(option_of, row.required_options)),
+    }  # fmt: skip
+
+
+def option_of(ask: str) -> str:
+    """Return the spelling of an option: `--dh standard|modified`."""
+    choices = "|".join(CHOICES.get(ask, ()))
+    name = "from" if ask == "order" else ask.replace("_", "-")
+    return f"--{name}{' ' * bool(choices)}{choices}"
+
+
+def example_of(name: str, width: int) -> list[str]:
+    """Return the indented lines in the docstring of the format's reader, or else its writer.
+
+    In a module of several formats lines that follow the names of others are theirs.  Longer ones are cut to the width.
+    """
+    import re
+    from importlib import import_module
+
+    for module in filter(None, (FORMATS[name].reader, FORMATS[name].writer)):
+        formats = {other for other, row in FORMATS.items() if module in (row.reader, row.writer)}
+        said, lines = formats if len(formats) == 1 else set[str](), list[str]()
+        for line in (import_module(module).__doc__ or "").split("\n"):
+            if line.startswith("    "):
+                lines += [line[4:]] * (name in said)
+            elif line:
+                said = formats.intersection(re.findall(r"[\w-]+", line.lower())) or said
+        if lines:
+            return [line if len(line) <= width else f"{line[: width - 3].rstrip()} .." for line in lines]
+    return []

@@ -10,11 +10,15 @@
 Quaternions x, y, z, w; metres; header.frame_id is the parent: parent_from_child. Stamps become integer nanoseconds.
 Joint positions are radians or metres; a message may contain only some joints.
 
-Written are the texts of `rostopic echo` (ros1) and `ros2 topic echo` (ros2), `---` after each message, and Foxglove's
-FrameTransform and FrameTransforms in JSON, one message per line:
+Written are the texts of `rostopic echo` (ros1) and `ros2 topic echo` (ros2), `---` after each message:
 
     header:                     header:·             rostopic writes a blank after a key that opens a block,
       frame_id: map               frame_id: "map"    quotes names, and aligns nanoseconds to nine columns
+
+and those of Foxglove, FrameTransform and FrameTransforms in JSON, one message per line:
+
+    {"timestamp": {"sec": 1, "nsec": 0}, "parent_frame_id": "world", "child_frame_id": "base",
+     "translation": {"x": 0, ..}, "rotation": {"x": 0, "y": 0, "z": 0, "w": 1}}
 
 A message to be written is a mapping in the order of its fields, its stamps are mappings too; types of messages are not
 known, except that a transform, a point and a pose have a header.

@@ -18,8 +18,6 @@ import numpy as np
 from frametool import __version__
 from frametool.documents.writers import dump_json
 from frametool.errors import printable
-from frametool.explain.render import Explanation
-from frametool.explain.run import Sheet
 from frametool.fit.numbers import SHORT, number_at
 from frametool.formats.rows.csv import write_points
 from frametool.grammar.result import Style
@@ -95,28 +93,6 @@ def _statistics(label: str, summed: dict[str, float] | None) -> str:
     return f"{label:16} " + " ".join(f"{fixed(summed[key] if summed else None, 6):>9}" for key in STATISTICS)
 
 
-def write_explanation(found: dict[str, Any]) -> str:
-    """Write the formulas of a comparison with the numbers of this run."""
-    sheet, fit, ate = Sheet(9, clean=False), found["transform"], found["ate"]
-    errors = {name: ate[f"{name}_m"]["rmse"] for name in ("along", "across", "up")}
-    turned = {"turned": float(bool(ate["deg"])), "deg": ate["deg"]["rmse"] if ate["deg"] else 0.0}
-    values = {"sse": ate["m"]["sse"], "paired": float(found["poses"]["paired"]), "c": fit.get("scale", 1.0)}
-    sheet.play(
-        "comparison", values | errors | turned | {"offset": found["offset_s"]}, est=printable(found["est"]),
-        ref=printable(found["ref"]), possible=found["poses"]["possible"], align=found["settings"]["align"],
-        turn=sheet.numbers([*fit["quaternion"].values()]), shift=sheet.numbers(fit["xyz"]),
-    )  # fmt: skip
-    for row in found["rpe"]:
-        if row["m"]:
-            size = 0.0 if row["percent"] is None else float(row["delta"][:-1])
-            summed = {"sse": row["m"]["sse"], "pairs": float(row["pairs"]), "size": size}
-            sheet.play("relative error", summed, delta=row["delta"])
-    if kitti := found["kitti"]:
-        means = {key: kitti[key] for key in ("percent", "deg_per_m")}
-        sheet.play("kitti", means, segments=kitti["segments"])
-    return str(Explanation("comparison", sheet.items))
-
-
 def write_table(found: Sequence[dict[str, Any]], fmt: str = "text") -> str:
     """Write one row per comparison: `csv`, or `text`, `markdown`, `latex` with the best value of each column marked."""
     rows: list[list[Any]] = []
@@ -149,9 +125,7 @@ STRETCHES, FEWEST = 200, 20  # of all paths together, and of one at least, each 
 LEVELS, BINS = 12, 30  # of error: colours along a path, columns of a histogram
 ERROR_STOPS = ((47, 108, 216), (190, 90, 190), (235, 94, 20))  # seen on white paper and on dark
 SHADES = [pictures.shade_of(level / (LEVELS - 1), ERROR_STOPS) for level in range(LEVELS)]
-LEAST_LENGTHS = 3
 STILL = 1e-6  # metres: below, a path is a point
-FAR = 1e3  # times its size is a path away from 0 where the numbers along its axes are shortened
 
 
 class Curve(NamedTuple):
@@ -238,7 +212,7 @@ def _path(curves: Sequence[Curve]) -> tuple[Picture, Callable[[Any], list[Point]
     axes = np.sort(np.argsort(np.ptp(every, axis=0), kind="stable")[1:])
     low, high = every[:, axes].min(0), every[:, axes].max(0)
     span = (high - low).max() if (high - low).max() > STILL else 1.0
-    base = np.where(np.abs(low) > FAR * span, np.round(low), 0.0)
+    base = np.where(np.abs(low) > 1e3 * span, np.round(low), 0.0)  # of a path far from 0
     names = [f"{'xyz'[axis]}{f' - {at:.0f}' if at else ''} (m)" for axis, at in zip(axes, base, strict=True)]
     wide, tall = np.maximum(high - low, 1e-9)
     area = LEFT, TOP, WIDE, WIDE * min(max(float(tall / wide), 0.5), 1.0)
@@ -314,12 +288,12 @@ def _distribution(curves: Sequence[Curve]) -> Picture:
 
 
 def _by_length(curves: Sequence[Curve], numbers: Sequence[dict[str, Any]]) -> Picture | None:
-    """Draw errors by length, of KITTI or else of the deltas in metres; None for fewer than LEAST_LENGTHS lengths."""
+    """Draw errors by length, of KITTI or else of the deltas in metres; None for fewer than three lengths."""
     lines = []
     for curve, each in zip(curves, numbers, strict=True):
         points = [(row["length_m"], row["percent"]) for row in (each["kitti"] or {"lengths": []})["lengths"]]
         deltas = [(float(row["delta"][:-1]), row["percent"]) for row in each["rpe"] if row["percent"] is not None]
-        if len(points or deltas) >= LEAST_LENGTHS:
+        if len(points or deltas) >= 3:
             lines.append(ChartLine("", curve.colour, sorted(points or deltas), dots=True))
     shapes, _ = chart((LEFT, TOP, WIDE, HIGH), ("length (m)", "relative error (%)"), lines)
     return _figure(HIGH, shapes) if lines else None

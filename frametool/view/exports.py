@@ -110,9 +110,6 @@ def _legend(flat: Projection, step: float) -> Iterator[SvgElement]:
     yield words(end, HEIGHT - 46.0, f"in {flat.scene.fixed[:40]}, grid {step:g} m", "soft", "end", 11.0)
 
 
-SHORT = 0.05  # metres: two pixels
-
-
 WINDOW, METRE = 500.0, 45.0  # pixels, as turtlesim's
 MARGIN = 30.0
 LEFT = WINDOW + 110.0  # where the curves begin
@@ -152,7 +149,7 @@ def run_picture(scene: Scene) -> tuple[Callable[[SimulationStep], None], Callabl
                     current[name] = name, pen, points
                     if not pen.off:
                         strokes.append(current[name])
-                if not points or math.dist(points[-1], (x, y)) > SHORT:
+                if not points or math.dist(points[-1], (x, y)) > 0.05:  # metres: two pixels
                     points.append((x, y))
         for command in step.commands:
             ahead, turning, _ = command.twist
@@ -317,12 +314,11 @@ def write_page(
         parents = [index[parent] for parent in above] if moving.varies else index[moving.parent]
         tracks.append({"frame": index[name], "count": len(stamps), "at": len(blob), "parents": parents})
         blob += _packed("q", stamps) + _packed("d", chain.from_iterable(poses))
-    first, last = map(str, scene.span_ns)
     is_part = not scene.path_only and len(scene.chosen) < len(scene.names)
     head: dict[str, Any] = {
         "names": scene.names, "parents": [-1 if track is None else index[track.parent] for track in static],
-        "tracks": tracks, "first": first, "last": last, "title": title, "file": file or title,
-        "made": f"frametool {__version__}",
+        "tracks": tracks, "first": str(scene.span_ns[0]), "last": str(scene.span_ns[1]),
+        "title": title, "file": file or title, "made": f"frametool {__version__}",
         "show": {
             "fixed": scene.fixed, "path": scene.path_only, "target": scene.target, "source": scene.source,
             "t": None if scene.at_ns is None else format_stamp(scene.at_ns),

@@ -284,10 +284,10 @@ def chart(
         named = [each for each in named if each.dashes]
     for each in reversed(named):
         shapes.append(words(right, above, each.name, "ink", "end", 11.0))
-        right -= text_width(each.name) + 5.0
-        ends_of_line = [(right - 16.0, above), (right, above)]
-        shapes.append(line(ends_of_line, each.colour, max(each.width, 2.0), dashes=each.dashes))
-        right -= 28.0
+        right -= text_width(each.name) + 21.0
+        mark = [(right, above), (right + 16.0, above)]
+        shapes.append(line(mark, each.colour, max(each.width, 2.0), dashes=each.dashes))
+        right -= 12.0
     return shapes, place
 
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from importlib import import_module
 from shutil import get_terminal_size
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, cells, printable
-from frametool.formats.table import CHOICES, FORMATS
+from frametool.formats.table import FORMATS, example_of
 from frametool.frames.stamps import format_stamp
 from frametool.frames.topology import motion
 from frametool.geometry.transform import Transform
@@ -175,16 +174,13 @@ def _cell(key: str, entry: dict[str, Any]) -> str:
     return f"{value:.2f}" if key == "rate_hz" else f"{value:.3f}" if key.endswith("_s") else str(value)
 
 
-LONGEST = 22  # characters of a heading over two columns
-
-
 def write_diff(found: Iterable[Difference]) -> str:
     """Return a sentence for each difference but motion, and tables of what has moved."""
     every = [*found]
     moved = [each for each in every if each.kind in ("moved", SAME)]
     parts = ["".join(f"{line}\n" for each in every if each not in moved for line in folded(each.sentence))]
     for start in dict.fromkeys(each.seen_from for each in moved):
-        seen = short(f"seen from {start}" if start is not None else "seen from elsewhere", LONGEST)
+        seen = short(f"seen from {start}" if start is not None else "seen from elsewhere", 22)  # two columns wide
         rows = [["moved", "in its parent", "", seen, ""], ["", "mm", "deg", "mm", "deg"]]
         for each in moved:
             if each.seen_from == start:
@@ -206,22 +202,6 @@ def _distance(apart: Apart | None) -> tuple[str, str]:
 LIST_LABEL = 15  # columns, the indent included
 
 
-def format_entry(name: str) -> dict[str, Any]:
-    """Return the table row of a format as plain values."""
-    row = FORMATS[name]
-    return {
-        "name": name, "summary": row.summary, "suffixes": row.suffixes, "reads": row.reads, "writes": row.writes,
-        "states": row.conventions or None, "asks": tuple(map(option_of, row.required_options)),
-    }  # fmt: skip
-
-
-def option_of(ask: str) -> str:
-    """Return the spelling of an option: `--dh standard|modified`."""
-    choices = "|".join(CHOICES.get(ask, ()))
-    name = "from" if ask == "order" else ask.replace("_", "-")
-    return f"--{name}{' ' * bool(choices)}{choices}"
-
-
 def write_formats(entries: Sequence[dict[str, Any]]) -> str:
     """Return the list of formats, those that are only written last."""
     read = "".join(_described(entry) for entry in entries if entry["reads"])
@@ -231,11 +211,10 @@ def write_formats(entries: Sequence[dict[str, Any]]) -> str:
 
 def write_format(entry: dict[str, Any]) -> str:
     """Describe one format: also what it is recognised by, of a regular expression only the kind, and an example."""
-    signs = []
-    for kind, what in FORMATS[entry["name"]].magic:
-        words = what if isinstance(what, str) and re.fullmatch(r"[\w./*|-]+", what) else ""
-        signs.append(f"{kind} {words}".rstrip())
-    example = "".join(f"    {line}\n" for line in example_of(entry["name"]))
+    shown_as = re.compile(r"[\w./*|-]+").fullmatch
+    magic = FORMATS[entry["name"]].magic
+    signs = [f"{kind} {what}" if isinstance(what, str) and shown_as(what) else kind for kind, what in magic]
+    example = "".join(f"    {line}\n" for line in example_of(entry["name"], WIDTH - 4))
     return _described(entry, f"known by {', '.join(signs)}" * bool(signs)) + f"  example\n{example}" * bool(example)
 
 
@@ -248,27 +227,6 @@ def _described(entry: dict[str, Any], more: str = "") -> str:
     lines = [line for text in texts for line in wrap(text, WIDTH - LIST_LABEL, break_on_hyphens=False)]
     label, apart = f"  {entry['name']:{LIST_LABEL - 2}}", "\n" + " " * LIST_LABEL
     return f"{label if len(entry['name']) < LIST_LABEL - 2 else label + apart}{apart.join(lines)}\n"
-
-
-def example_of(name: str) -> list[str]:
-    """Return the indented lines in the docstring of the format's reader, or else its writer.
-
-    In a module of several formats lines that follow the names of others are theirs.
-    """
-    for module in filter(None, (FORMATS[name].reader, FORMATS[name].writer)):
-        formats = {other for other, row in FORMATS.items() if module in (row.reader, row.writer)}
-        said, lines = formats, list[str]()
-        for line in (import_module(module).__doc__ or "").split("\n"):
-            if line.startswith("    "):
-                lines += [line[4:]] * (name in said)
-            elif line:
-                said = formats.intersection(re.findall(r"[\w-]+", line.lower())) or said
-        if lines:
-            return [line if len(line) <= WIDTH - 4 else f"{line[: WIDTH - 7].rstrip()} .." for line in lines]
-    return []
-
-
-MOST = 50  # frames
 
 
 class Solution(NamedTuple):
@@ -315,7 +273,7 @@ def write_solution(found: Solution) -> str:
         lines.append(f"scale {last.scale:.9g} sigma {numbers['scale_sigma']:.2g}")
     root = numbers["root"] if numbers["shape"] == "tree" else None
     pairs = zip(found.poses, numbers["frames"], strict=True)
-    shown = [each for each in pairs if each[0].parent is not None or each[0].name == root][:MOST]
+    shown = [each for each in pairs if each[0].parent is not None or each[0].name == root][:50]
     rows = [["  frame", *"xyz", "sigma mm", "deg", "rows", ""]]
     for pose, entry in shown:
         name = f"  {printable(str(pose.name) if pose.parent in (None, root) else f'{pose.parent}<-{pose.name}')}"

@@ -29,8 +29,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    Cells = Sequence[tuple[str, float]]  # names and numbers
-    Line = tuple[str, Cells, str]  # of a description: what it is, its numbers, their unit
+    Line = tuple[str, Sequence[tuple[str, float]], str]  # what it is, its numbers with their names, their unit
 
 
 OVERVIEW = [name + unit for name, row in ROTATIONS.items() for unit in row.overview]
@@ -245,19 +244,16 @@ def write_blocks(results: Iterable[Result], target: str, source: str, style: Sty
     """Yield the blocks as they come; the first begins by saying in words which frame is seen from which."""
     heading = in_width(f"{source} seen from {target}", f"(maps points in {source} to points in {target})")
     decimals = 3 if style.precision is None else style.precision
-
-    def fixed(values: Sequence[float]) -> list[str]:
-        return [f"{value:z.{decimals}f}" for value in values]
-
+    number = style.changed(precision=decimals).number
     for result in results:
         stamp_ns, components = result.extras.get("stamp_ns"), result.pose.components
         time = "At any time: the frames stand still" if stamp_ns is None else f"At time {format_stamp(stamp_ns)}"
-        lines = [f"{heading}{time}", f"- Translation: [{', '.join(fixed(components[:3]))}]"]
+        lines = [f"{heading}{time}", f"- Translation: [{', '.join(map(number, components[:3]))}]"]
         for spec, name in ECHOED:
-            numbers = fixed(rotation_numbers(result.pose, notation(spec), style))
-            lines.append(f"- Rotation: in {name} [{', '.join(numbers)}]")
+            numbers = rotation_numbers(result.pose, notation(spec), style)
+            lines.append(f"- Rotation: in {name} [{', '.join(map(number, numbers))}]")
         lines.append("- Matrix:")
-        entries = [f" {entry:>{decimals + 3}}" for entry in fixed(rigid.to_homogeneous(*components, floats))]
+        entries = [f" {number(each):>{decimals + 3}}" for each in rigid.to_homogeneous(*components, floats)]
         lines += ["".join(entries[at : at + 4]) for at in range(0, 16, 4)]
         yield "\n".join(lines) + "\n"
         heading = ""

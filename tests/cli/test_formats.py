@@ -11,9 +11,8 @@ import pytest
 import yaml
 
 import frametool
-from frametool.formats.table import FORMATS, Format
+from frametool.formats.table import FORMATS, Format, option_of
 from frametool.grammar.edges import Answers
-from frametool.view.reports import option_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -142,3 +141,14 @@ def test_the_name_of_a_form_is_a_suffix_of_it(name: str, form: str, run: Run, tm
     files = {"a.tum": "0 1 2 3 0 0 0 1\n1 1 2 3 0 0 0 1\n"}
     assert run(*arguments, "-o", name, files=files).status == 0
     assert (tmp_path / name).read_text() == run(*arguments, "-f", form, files=files).out
+
+
+@pytest.mark.parametrize(
+    ("name", "begin"),
+    [
+        ("autoware", "base_link: {sensor_kit"), ("handeye", "parameters: "), ("nuscenes", "calibrated_sensor.json "), ("named", "lidar: "),
+        ("kitti-calib", "P0: "), ("kalibr", "baseline T_1_0:"), ("ros1", "header: "), ("foxglove", '{"timestamp": '), ("static2", "--x "),
+    ],
+)
+def test_the_example_of_a_form_is_its_own_where_several_share_a_module(name: str, begin: str, run: Run) -> None:
+    assert run("formats", name).out.partition("  example\n    ")[2].startswith(begin)

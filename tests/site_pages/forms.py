@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from textwrap import indent
 
-from frametool.formats.table import FORMATS, Format
-from frametool.view.reports import example_of, option_of
+from frametool.formats.table import FORMATS, Format, example_of, option_of
 from site_pages.cookbook import asked_about, example_files, form_of
 from site_pages.markup import Page, Section, bullets, fenced, inline, links, see_also
 
@@ -81,7 +80,7 @@ def _text(name: str, row: Format) -> str:
         "What is lost": [inline(row.not_stored)],
     }
     parts = [bullets(_fact(title, texts) for title, texts in facts.items() if any(texts))]
-    if lines := example_of(name):
+    if lines := example_of(name, 76):
         parts += ["## Example", fenced("\n".join(lines))]
     if asked := asked_about("forms", name):
         parts += ["## In the cookbook", bullets(asked)]

@@ -13,7 +13,7 @@ from frametool.cli.output import Output
 from frametool.cli.sink import folded, in_colour, say, say_error, say_first, show, writing
 from frametool.cli.trees import FRAME, frame_name, load_sides, opened, state
 from frametool.errors import Finding, FormatError, listing, warn
-from frametool.formats.table import FORMATS
+from frametool.formats.table import FORMATS, format_entry
 from frametool.lint.monitor import monitor
 from frametool.lint.rules import RULES, WRITERS, check, github_command, level
 from frametool.lint.tree_diff import Tolerance, diff, entry, parse_tolerance
@@ -239,7 +239,7 @@ def formats_command(inputs: Inputs) -> None:
     detected by content first, then by the suffix of the file; --in NAME overrides this. NAME shows one format in full,
     with an example if there is one. `frametool help formats` explains the options that files need.
     """
-    from frametool.view.reports import format_entry, write_format, write_formats
+    from frametool.view.reports import write_format, write_formats
 
     output, name = Output(inputs, "report", otherwise="text"), inputs.name
     entries = list(map(format_entry, FORMATS if name is None else [name]))

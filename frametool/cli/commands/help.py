@@ -16,7 +16,7 @@ from frametool.cli.command import EXIT_CODES, FILE, Inputs, Text, argument, comm
 from frametool.cli.commands import COMMANDS, group
 from frametool.cli.sink import refuse_existing, show, writing
 from frametool.errors import FileProblem, ValueInvalid, any_near, printable, shown
-from frametool.formats.table import FORMATS
+from frametool.formats.table import FORMATS, format_entry
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -211,7 +211,6 @@ def help_command(ctx: click.Context, inputs: Inputs) -> None:
     named = _commands(ctx).get(name) if words[:1] and words[0] in COMMANDS else None
     if inputs.fmt == "json":
         from frametool.documents.writers import dump_json
-        from frametool.view.reports import format_entry
 
         if name and not named:
             hint = any_near(name, COMMANDS, "`frametool help` lists all")

@@ -1,20 +1,27 @@
-r"""Calibrations: autoware, handeye, nuscenes, extrinsics by hand (named), and as text kitti-calib and kalibr.
+r"""Calibrations as other tools write them.
+
+autoware: the pose of the inner frame in the outer one; radians, about the fixed axes x, y, z
 
     base_link: {sensor_kit_base_link: {x: 0.9, y: 0.0, z: 2.0, roll: -0.001, pitch: 0.015, yaw: -0.0364}}
-        Autoware: the pose of the inner frame in the outer one; radians, about the fixed axes x, y, z
+
+handeye, of easy_handeye: the pose of tracking_base_frame in robot_effector_frame if the eye is on the hand, else in
+robot_base_frame
 
     parameters: {eye_on_hand: true, robot_effector_frame: tool0, tracking_base_frame: camera_link, ..}
     transformation: {x: .., y: .., z: .., qx: .., qy: .., qz: .., qw: ..}
     parameters: {calibration_type: eye_in_hand, ..}                        easy_handeye2
     transform: {translation: {x: .., ..}, rotation: {x: .., y: .., z: .., w: ..}}
-        easy_handeye: the pose of tracking_base_frame in robot_effector_frame if the eye is on the hand, else in
-        robot_base_frame
+
+nuscenes: ego<-sensor, and global<-ego, which moves; w first, microseconds.  Names of sensors are in sensor.json, in the
+same folder or passed with the other files.
 
     calibrated_sensor.json   [{"token": .., "sensor_token": .., "translation": [x, y, z], "rotation": [w, x, y, z]}, ..]
     ego_pose.json            [{"token": .., "timestamp": 1531883530449377, "translation": .., "rotation": ..}, ..]
     sensor.json              [{"token": .., "channel": "CAM_FRONT", "modality": "camera"}, ..]
-        nuScenes: ego<-sensor, and global<-ego, which moves; w first, microseconds.  Names of sensors are in
-        sensor.json, in the same folder or passed with the other files.
+
+named, by hand: a map of names, or a list under `transforms:`.  Radians unless a key states degrees.  The pose is that
+of the name, or of `child`, in `parent`, by default in `base` (--frames).  The order of a list of four or seven is
+ambiguous: --from xyzw|wxyz sets it, for all.
 
     lidar: {x: 0.9, y: 0.0, z: 2.0, roll: 0.0, pitch: 0.0, yaw: 1.57}
     camera: {parent: lidar, translation: [0.1, 0, -0.2], quaternion: {x: -0.5, y: 0.5, z: -0.5, w: 0.5}}
@@ -22,17 +29,18 @@ r"""Calibrations: autoware, handeye, nuscenes, extrinsics by hand (named), and a
     base_to_left: {x: 0.1, y: 0.0, z: 0.0, ax: 0.0, ay: 0.0, az: 1.0, theta: 0.1}         needs --direction
     left: {R: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], t: [0.1, 0.0, 0.0]}                      needs --direction
     gps: {value: [0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 1.0]}                                     needs --from
-        by hand: a map of names, or a list under `transforms:`.  Radians unless a key states degrees.  The pose is that
-        of the name, or of `child`, in `parent`, by default in `base` (--frames).  The order of a list of four or seven
-        is ambiguous: --from xyzw|wxyz sets it, for all.
+
+kitti-calib, text: cameras, lidar and IMU, row-major; cameras have optical axes.  A projection K [I t] contains the
+position of its camera: -t.
 
     P0: 718.856 0 607.193 0 0 718.856 185.216 0 0 0 1 0       odometry, object: projection of a rectified camera
     Tr: 12 numbers                                            odometry: cam0<-velo, cam0 rectified
     R0_rect: 9    Tr_velo_to_cam: 12    Tr_imu_to_velo: 12    object: cam0_rect<-cam0, cam0<-velo, velo<-imu
     R: 9    T: 3                                              raw: cam0<-velo of calib_velo_to_cam, velo<-imu
     R_01: 9    T_01: 3    R_rect_01: 9                        raw calib_cam_to_cam: cam1<-cam0, cam1_rect<-cam1
-        KITTI: cameras, lidar and IMU, row-major; cameras have optical axes.  A projection K [I t] contains the
-        position of its camera: -t.
+
+kalibr, text: results-cam-*.txt and results-imucam-*.txt.  The q of a baseline is the inverse of the matrix T_cn_cnm1 in
+the same camchain: its quaternions are those of JPL.  The result agrees with the matrix; t is the same.
 
     baseline T_1_0:
         q: [-0.00087935 -0.00270995 -0.0008824 0.99999555] +- [..]    x y z w, of the inverse rotation
@@ -40,8 +48,6 @@ r"""Calibrations: autoware, handeye, nuscenes, extrinsics by hand (named), and a
     T_ci:  (imu0 to cam0):                                            maps points of imu0 to cam0
     Transformation T_cam0_imu0 (imu0 to cam0, T_ci):                  the same
     [[ 0.00852045 .. ]]                                               four rows of four
-        Kalibr, results-cam-*.txt and results-imucam-*.txt.  The q of a baseline is the inverse of the matrix T_cn_cnm1
-        in the same camchain: Kalibr's quaternions are those of JPL.  The result agrees with the matrix; t is the same.
 
 Metres.
 """
