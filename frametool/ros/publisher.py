@@ -1,4 +1,4 @@
-"""The arguments of static_transform_publisher, in calls (static1, static2), one a line: the pose of a child in its parent.
+"""Arguments of static_transform_publisher, calls (static1, static2), one a line: the pose of the child in its parent.
 
     --x 0.1 --y 0.0 --z 0.2 --qx 0.0 --qy 0.0 --qz 0.0 --qw 1.0 --frame-id base --child-frame-id camera      static2
     0.1 0.0 0.2 0.0 0.0 0.0 1.0 base camera                                                                  static1
