@@ -12,7 +12,7 @@ from functools import reduce
 from itertools import pairwise
 from operator import itemgetter
 from string import ascii_lowercase
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import FrametoolError, ValueInvalid, printable, shown
 from frametool.explain.render import Explanation
@@ -525,3 +525,25 @@ def lookup(
         return product(sheet, first, second, (printable(target), printable(fixed), printable(source)))
 
     return derived_pose(plan, f"{printable(target)}_from_{printable(source)}", own, way)
+
+
+def write_explanation(found: dict[str, Any]) -> str:
+    """Write the formulas of a comparison of trajectories with the numbers of this run."""
+    sheet, fit, ate = Sheet(9, clean=False), found["transform"], found["ate"]
+    errors = {name: ate[f"{name}_m"]["rmse"] for name in ("along", "across", "up")}
+    turned = {"turned": float(bool(ate["deg"])), "deg": ate["deg"]["rmse"] if ate["deg"] else 0.0}
+    values = {"sse": ate["m"]["sse"], "paired": float(found["poses"]["paired"]), "c": fit.get("scale", 1.0)}
+    sheet.play(
+        "comparison", values | errors | turned | {"offset": found["offset_s"]}, est=printable(found["est"]),
+        ref=printable(found["ref"]), possible=found["poses"]["possible"], align=found["settings"]["align"],
+        turn=sheet.numbers([*fit["quaternion"].values()]), shift=sheet.numbers(fit["xyz"]),
+    )  # fmt: skip
+    for row in found["rpe"]:
+        if row["m"]:
+            size = 0.0 if row["percent"] is None else float(row["delta"][:-1])
+            summed = {"sse": row["m"]["sse"], "pairs": float(row["pairs"]), "size": size}
+            sheet.play("relative error", summed, delta=row["delta"])
+    if kitti := found["kitti"]:
+        means = {key: kitti[key] for key in ("percent", "deg_per_m")}
+        sheet.play("kitti", means, segments=kitti["segments"])
+    return str(Explanation("comparison", sheet.items))

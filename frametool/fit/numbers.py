@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import ValueInvalid, alternatives, printable, shown
+from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.fit.alignment import SCALED
 from frametool.fit.least_squares import length
 from frametool.frames.trajectory import Trajectory, way
@@ -196,31 +196,6 @@ def worlds(found: Comparison) -> tuple[str, str]:
     """Return the names of the worlds of reference and estimate; equal ones become `ref` and `est`."""
     ref, est = found.pairs.ref.world, found.pairs.est.world
     return ("ref", "est") if ref == est else (ref, est)
-
-
-def write_explanation(found: dict[str, Any]) -> str:
-    """Write the formulas of a comparison, as `numbers` returns it, with the numbers of this run."""
-    from frametool.explain.render import Explanation
-    from frametool.explain.run import Sheet
-
-    sheet, fit, ate = Sheet(9, clean=False), found["transform"], found["ate"]
-    errors = {name: ate[f"{name}_m"]["rmse"] for name in ("along", "across", "up")}
-    turned = {"turned": float(bool(ate["deg"])), "deg": ate["deg"]["rmse"] if ate["deg"] else 0.0}
-    values = {"sse": ate["m"]["sse"], "paired": float(found["poses"]["paired"]), "c": fit.get("scale", 1.0)}
-    sheet.play(
-        "comparison", values | errors | turned | {"offset": found["offset_s"]}, est=printable(found["est"]),
-        ref=printable(found["ref"]), possible=found["poses"]["possible"], align=found["settings"]["align"],
-        turn=sheet.numbers([*fit["quaternion"].values()]), shift=sheet.numbers(fit["xyz"]),
-    )  # fmt: skip
-    for row in found["rpe"]:
-        if row["m"]:
-            size = 0.0 if row["percent"] is None else float(row["delta"][:-1])
-            summed = {"sse": row["m"]["sse"], "pairs": float(row["pairs"]), "size": size}
-            sheet.play("relative error", summed, delta=row["delta"])
-    if kitti := found["kitti"]:
-        means = {key: kitti[key] for key in ("percent", "deg_per_m")}
-        sheet.play("kitti", means, segments=kitti["segments"])
-    return str(Explanation("comparison", sheet.items))
 
 
 def _pose(pose: Transform) -> dict[str, Any]:

@@ -14,7 +14,6 @@ from frametool import TransformBuffer, explain
 from frametool.explain import derive
 from frametool.explain.derive import BLOCKS
 from frametool.explain.run import sheets
-from frametool.fit import numbers
 from frametool.sim import followed
 
 if TYPE_CHECKING:
@@ -244,7 +243,7 @@ LINES = {name: [*lines_of(body)] for name, body in sheets().items()}
 def test_what_a_sheet_uses_is_there_and_every_sheet_is_used() -> None:
     used = {text.removeprefix("use ") for lines in LINES.values() for text in lines if text.startswith("use ")}
     assert used <= set(LINES)
-    files = [*Path(derive.__file__).parent.glob("*.py"), Path(followed.__file__), Path(numbers.__file__)]
+    files = [*Path(derive.__file__).parent.glob("*.py"), Path(followed.__file__)]
     code = "".join(path.read_text(encoding="utf-8") for path in files)
     ways = {f"{name} {way}" for name in BLOCKS for way in ("to", "from")} | {"point", "vector"}  # the kinds of records
     assert [name for name in LINES if name not in used | ways and f'"{name}"' not in code] == []

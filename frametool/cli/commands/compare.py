@@ -151,7 +151,7 @@ def compare_command(inputs: Inputs) -> int:
             with writing(path, force=force) as write:
                 write(write_report(found, REPORTS[options.suffix_of(path)], line))
         if explain:
-            from frametool.fit.numbers import write_explanation
+            from frametool.explain.derive import write_explanation
 
             output.text("\n".join(map(write_explanation, every)))
         elif not instead:
