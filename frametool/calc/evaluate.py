@@ -173,8 +173,6 @@ class _Walk:
     def _number(self, branch: Branch) -> Term:
         text, unit = branch.value
         if unit and unit not in UNITS:
-            if unit in ("pi", *self.scope.names):
-                raise CalcError(f"{shown(unit)} is not a unit; write {text} * {unit}")
             raise CalcError(f"unknown unit {shown(unit)}{did_you_mean(unit, UNITS) or ';'} units: {' '.join(UNITS)}")
         value = float(text)
         times, below, dimension = UNITS[unit] if unit else (1.0, 1.0, PLAIN)
@@ -238,8 +236,6 @@ class _Walk:
         name = branch.value
         if name not in FUNCTIONS:
             hint = did_you_mean(name, FUNCTIONS) or f"; functions: {' '.join(FUNCTIONS)}"
-            if name in self.scope.names:
-                hint = f"; {name} is a value, poses are joined by *"
             raise CalcError(f"unknown function {shown(name)}{hint}")
         read = self.term if name == "mean" and len(branch.parts) == 1 else self._value
         terms = [read(part) for part in branch.parts]

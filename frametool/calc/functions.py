@@ -415,10 +415,6 @@ OPERATORS: dict[str, tuple[str, Sequence[Overload]]] = {
         Overload("scale scale scale angle angle angle -> twist", _SAME),
     ]),
 }  # fmt: skip
-REMEDIES = {
-    POSE: "; poses have a * b, inv(a), inv(a) * b, a ^ 0.5 and a * point",
-    POINT: "; points have p - q and mean(p, q), a direction is vector([x, y, z])",
-}
 
 
 def operated(sign: str, *terms: Term) -> Term:
@@ -427,8 +423,7 @@ def operated(sign: str, *terms: Term) -> Term:
     for each in overloads:  # the first that suits the arguments
         if (found := each.result(sign, terms)) is not None:
             return found
-    remedy = next((text for kind, text in REMEDIES.items() if kind in [term.type.kind for term in terms]), "")
-    raise CalcError(f"cannot {refusal.format(*(term.type.named for term in terms), count=len(terms))}{remedy}")
+    raise CalcError(f"cannot {refusal.format(*(term.type.named for term in terms), count=len(terms))}")
 
 
 def _angular(pick: Callable[[Number, Number], Number]) -> list[Overload]:

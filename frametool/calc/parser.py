@@ -214,12 +214,10 @@ class _Parser:
         return tree
 
     def _hint(self) -> str:
-        """Return what may be meant by an unexpected token."""
+        """Return how a unit is written that stands apart from its number."""
         token, before = self.next, self.tokens[self.index - 1] if self.index else None
         if before is not None and before.kind == "number" and not before.unit and token.text in UNITS:
             return f"; write a unit directly after its number: {before.text}{token.text}"
-        if token.kind in ("lookup", "name", "pose", "column"):
-            return "; poses are joined by *"
         return ""
 
     def _deeper(self, at: int) -> None:

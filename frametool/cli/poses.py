@@ -336,17 +336,11 @@ def _only(poses: list[Pose], argument: str | Source) -> Pose:
     return poses[0]
 
 
-@contextmanager
-def misuse_unless_rotations(reading: Reading) -> Iterator[None]:
-    """Turn what cannot be read of arguments into misuse, but not what is no rotation; then warn of what was noted."""
-    with misuse():
-        yield
-    for note in reading.notes:
-        warn(note.message)
-
-
 def pose_from_numbers(texts: Sequence[str], request: Request) -> Pose:
     """Read bare numbers; raises click.UsageError for what is no such list, ValueInvalid for what is no rotation."""
     reading = Reading(Source(INLINE, ""), degrees=request.rows.degrees, normalize=request.rows.normalize)
-    with misuse_unless_rotations(reading):
-        return pose_of_numbers(texts, request.rows.given, reading)
+    with misuse():
+        found = pose_of_numbers(texts, request.rows.given, reading)
+    for note in reading.notes:
+        warn(note.message)
+    return found

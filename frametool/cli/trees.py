@@ -15,7 +15,7 @@ from frametool.cli.options import input_formats, tree_on_the_line
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.sink import say
 from frametool.documents.source import ReadCache
-from frametool.errors import bare, listing, shown, warn
+from frametool.errors import bare, shown, warn
 from frametool.formats.table import FORMATS, ORDERS
 from frametool.grammar.edges import Answers
 from frametool.grammar.pose_algebra import Lookups
@@ -55,22 +55,19 @@ def load_sides(a: Sequence[str], b: Sequence[str], *, normalize: bool) -> list[t
 
     refuse_two_readers((*a, *b))
     count = len(a) + len(b)
-    every: list[FrameFile] = []
     sides: list[tuple[Frames, dict[str, EdgePlace]]] = []
     for arguments, behind in ((a, 0), (b, len(a))):
         earth = next((name for name in EARTH_FRAMES if sides and name in sides[0][0].frames), "")
-        sides.append(_load(arguments, Rules(normalize=normalize, earth=earth), every, behind=behind, of=count))
-    if len(every) == count:  # in a batch they may have been read before, and looked at
-        refuse_idle(every)
+        sides.append(_load(arguments, Rules(normalize=normalize, earth=earth), placed=True, behind=behind, of=count))
     return sides
 
 
 def _load(
-    arguments: Sequence[str], rules: Rules, every: list[FrameFile] | None = None, **how: Any
+    arguments: Sequence[str], rules: Rules, *, placed: bool = False, **how: Any
 ) -> tuple[Frames, dict[str, EdgePlace]]:
     """Merge files into a tree; in a batch only if they have changed since they were read.  Also: each frame's place.
 
-    every: takes the files of this side of two; of one tree no place is returned
+    placed: whether the places are wanted
     how: they are opened
     """
     from frametool.formats.load import load_sources
@@ -81,12 +78,10 @@ def _load(
     def read() -> tuple[tuple[Frames, dict[str, EdgePlace]], set[str]]:
         files = opened(arguments, **how)
         places: dict[str, EdgePlace] = {}
-        tree = load_sources(files, rules, None if every is None else places)
+        tree = load_sources(files, rules, places if placed else None)
         if tree.moves:
             passed.ask("time_offset")
-        if every is not None:
-            every.extend(files)
-        state(files, whole=every is None)
+        state(files)
         return (tree, places), idle - passed.idle.keys()
 
     context = click.get_current_context(silent=True)
@@ -109,21 +104,14 @@ def lookups_in(tree: Frames, *, carried: bool) -> Lookups:
     return Lookups(tree, carried=carried)
 
 
-def refuse_idle(files: Sequence[FrameFile]) -> None:
-    """Refuse --topic where the files that were read name none."""
-    if inputs().topics and not any(file.topics.counts or file.topics.seen for file in files):
-        named = listing(file.name for file in files)
-        raise click.UsageError(f"--topic has no effect here: no topic is named in {named}")
-
-
-def state(files: Sequence[FrameFile], *, whole: bool = True) -> None:
+def state(files: Sequence[FrameFile]) -> None:
     """Report on stderr what files that were read were taken for: those of other formats than the own one, with -v all.
 
-    whole: these are all; of one of two sides, the other may need an option that this one does not
+    Where one of them names a topic, --topic has an effect.
     """
-    if whole:
-        refuse_idle(files)
     for file in files:
+        if file.topics.counts or file.topics.seen:
+            inputs().ask("topics")
         if inputs().verbose:
             say(f"{file.name}: {FORMATS[file.format].summary}")
         inputs().note(file.tally.assumed and f"{file.name}: {file.tally.assumed}")
@@ -158,7 +146,7 @@ def opened(
         FrameFile.inline(source_of(each))
         if is_inline(each)
         else FrameFile(
-            tree_file(each), fmt=next(format_of_next, None), topics=chosen.topics, answers=general, reads=reads
+            tree_file(each), fmt=next(format_of_next, None), topics=chosen.peek("topics"), answers=general, reads=reads
         )
         for each in arguments
     )

@@ -199,6 +199,10 @@ def find_euler(rotation: Rotation, angles: Sequence[float], *, tolerance: float 
         off[axes] = quaternion.distance(*made, *rotation.components, floats)
     near = min(off, key=off.__getitem__)
     if off[near] > tolerance:
-        found = f"{near} is off by {off[near]:g}, which --tolerance {1.01 * off[near]:.2g} takes"
+        found = f"{near} is off by {off[near]:g}"
+        if off[near] < 0.1:
+            found += f", which --tolerance {1.01 * off[near]:.2g} takes"
+        elif max(map(abs, angles)) > 4.0 * floats.RIGHT_ANGLE:
+            found += "; --deg, where these are degrees"
         raise ValueInvalid(f"no Euler convention gives these angles within {tolerance:g} rad; {found}")
     return [axes for axes, angle in off.items() if angle <= tolerance]

@@ -153,16 +153,16 @@ frametool: map<-lidar * a point in 'camera_optical': 'lidar' and 'camera_optical
 frametool: map<-lidar * a point in 'map': 'lidar' and 'map' do not touch
   (map<-lidar) * trans(map<-tool)
                ^
-frametool: cannot multiply a point by the pose map<-lidar; poses have a * b, inv(a), inv(a) * b, a ^ 0.5 and a * point
+frametool: cannot multiply a point by the pose map<-lidar
   [1, 2, 3] * (map<-lidar)
             ^
-frametool: cannot subtract the pose map<-tool and the pose map<-lidar; poses have a * b, inv(a), inv(a) * b, a ^ 0.5 and a * point
+frametool: cannot subtract the pose map<-tool and the pose map<-lidar
   (map<-tool) - (map<-lidar)
               ^
-frametool: cannot multiply a number by the pose map<-tool; poses have a * b, inv(a), inv(a) * b, a ^ 0.5 and a * point
+frametool: cannot multiply a number by the pose map<-tool
   2 * (map<-tool)
     ^
-frametool: cannot negate the pose map<-tool; poses have a * b, inv(a), inv(a) * b, a ^ 0.5 and a * point
+frametool: cannot negate the pose map<-tool
   -(map<-tool)
   ^
 frametool: unknown name 'map'; a frame is asked for as TARGET<-SOURCE
@@ -222,7 +222,7 @@ frametool: quaternion 0 0 0 0 has no direction; give a non-zero one
 frametool: unknown unit 'foo'; units: m mm cm km rad deg s ms us ns
   12foo
   ^
-frametool: 'pi' is not a unit; write 2 * pi
+frametool: unknown unit 'pi'; units: m mm cm km rad deg s ms us ns
   2pi
   ^
 frametool: something is missing here
@@ -231,7 +231,7 @@ frametool: something is missing here
 frametool: sin() takes an angle, found a number in m
   sin(1m)
   ^
-frametool: cannot add a point in 'map' and a point in 'map'; points have p - q and mean(p, q), a direction is vector([x, y, z])
+frametool: cannot add a point in 'map' and a point in 'map'
   trans(map<-tool) + trans(map<-lidar)
                    ^
 frametool: cannot multiply a number in m by a number in m
@@ -277,10 +277,8 @@ def test_what_does_not_fit_is_refused_with_its_place(sentence: str, text: str, c
     ("e[map<-tool]", "unknown name 'e'"),
     ("d[map<-lidr]", "did you mean 'lidar'?"),
     ("map tool", "unexpected 'tool'"),
-    ("(map<-tool) map<-lidar", "unexpected 'map<-lidar'; poses are joined by *"),
     ("3 * deg", "unknown name 'deg'; write a unit directly after its number: 1deg"),
     ("inv", "inv is a function: inv(..) takes a pose"),
-    ("goal = map<-tool;goal(1)", "unknown function 'goal'; goal is a value, poses are joined by *"),
 ])  # fmt: skip
 def test_a_mistake_names_what_was_meant(text: str, hint: str) -> None:
     here = scope()

@@ -98,6 +98,7 @@ def test_a_subject_is_found_in_any_number_and_case(word: str, found: str, run: C
     ("words", "message"),
     [
         (("rotatoins",), "no topic, command or text has 'rotatoins'; did you mean 'rotations'?"),
+        (("quaternoin",), "no topic, command or text has 'quaternoin'; did you mean 'quaternion'?"),
         (("eular",), "no topic, command or text has 'eular'; did you mean 'euler'?"),
         (("recrods",), "no topic, command or text has 'recrods'; did you mean 'records' or 'record' or 'recordings'?"),
         (("xyzzyx",), "no topic, command or text has 'xyzzyx'; `frametool help` lists all topics"),

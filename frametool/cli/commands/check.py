@@ -82,7 +82,7 @@ def check_command(inputs: Inputs) -> int:
 
             recordings = opened(measured, behind=len(files), of=count)
             rows = read_measurements(recordings, normalize=normalize)
-            state(recordings, whole=False)
+            state(recordings)
         recordings = opened(files, of=count)
         findings = _with_loops(recordings, rows, inputs.tolerance, normalize=normalize)
         state(recordings)

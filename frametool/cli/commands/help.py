@@ -140,7 +140,10 @@ def _search(ctx: click.Context, name: str) -> str:
     if about and not (about[1:] or calls or formats or titles):
         return topic(about[0])
     if not (about or calls or formats or titles):
-        hint = any_near(name.lower(), [*known, *MADE, *COMMANDS], "`frametool help` lists all topics")
+        from frametool.geometry.representations import REPRESENTATIONS
+
+        words = known | MADE | COMMANDS | {each: "" for each in REPRESENTATIONS if len(each) > len("xyzw")}
+        hint = any_near(name.lower(), words, "`frametool help` lists all topics")
         raise click.UsageError(f"no topic, command or text has {shown(name)}{hint}")
     parts = {
         f"Topics with {shown(name)} (frametool help TOPIC):\n\n{_listed({each: known[each] for each in about})}": about,

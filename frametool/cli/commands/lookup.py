@@ -169,7 +169,11 @@ def _many(task: PoseTask, lookups: algebra.Lookups, target: str, source: str) ->
         skipped.add(None if is_full else algebra.why_missing(tree, target, source, at_ns))
 
     found = lookups.results(target, source, asked, miss if skip else None)
-    task.output.poses_as_they_come(skipped.counted(found))
+    try:
+        task.output.poses_as_they_come(skipped.counted(found))
+    except NoDataAt as error:
+        error.remedy = "; --on-error skip goes on" * (len(asked) > 1)  # type: ignore[attr-defined]
+        raise
     return skipped.finish()
 
 

@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli import options
-from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, together
+from frametool.cli.command import FILE, Inputs, argument, command_named, misuse, option, refuse, together
 from frametool.cli.output import Output
-from frametool.cli.poses import misuse_unless_rotations
 from frametool.cli.sink import refuse_existing, say, writing
 from frametool.cli.trees import FRAME, frame_name, load_tree, opened, tree_file
 from frametool.documents.source import Source
-from frametool.errors import FormatError, ValueInvalid, listing, shown
+from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
 from frametool.frames.lookups import FrameTree
 from frametool.frames.stamps import format_stamp
 from frametool.grammar.readers import Reading
@@ -97,8 +96,10 @@ def static_command(inputs: Inputs) -> None:
     tree = FrameTree("arguments")
     refuse(flags and arguments, f"extra arguments {shown(' '.join(arguments))} beside the flags")
     reading = Reading(Source("arguments", ""), normalize=inputs.normalize)
-    with misuse_unless_rotations(reading):
+    with misuse():
         pose = read_flags(flags, reading) if flags else read_positional(arguments, reading)
+    for note in reading.notes:  # the flags are in radians
+        warn(note.message.partition("; degrees?")[0])
     tree.add_components(pose.parent or "", pose.name or "", pose.components)
     output.tree(tree)
 
