@@ -313,7 +313,9 @@ def _spelled_rows(rows: Rows, rep: Notation) -> list[Any] | None:
 def mapping_of_numbers(texts: Sequence[str], default: Notation | None) -> dict[str, Any]:
     """Return the mapping with the same meaning as bare numbers that `pose_of_numbers` has read."""
     rep, rows = default or notation_of(texts), list[list[str]]([[*map(Verbatim, texts)]])
-    return matrix_pose(rows, rep, stated=default is not None) or (_spelled_rows(rows, rep) or [{}])[0]
+    is_matrix = rep.representation.whole is not None
+    whole = matrix_pose(rows, rep, stated=default is not None) if is_matrix else None
+    return whole or (_spelled_rows(rows, rep) or [{}])[0]
 
 
 def begins_freely(head: str, default: Notation | None, *, moves: bool, alone: bool) -> bool | None:

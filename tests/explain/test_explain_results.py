@@ -55,7 +55,7 @@ def numbers_in(value: Any) -> list[float]:
     return [float(value)] if isinstance(value, (int, float)) and not isinstance(value, bool) else []
 
 
-@pytest.mark.parametrize("numbers", ["1 0 0 4 0 0 -1 5 0 1 0 6 --from matrix", "1 2 3 30 --from heading_deg:enu", "30 --from heading_deg:ned"])
+@pytest.mark.parametrize("numbers", ["1 0 0 4 0 0 -1 5 0 1 0 6 --from matrix", "1 2 3 30 --from heading_deg:enu", "30 --from heading_deg:ned", "1 2 3 0 1 0 -1 0 0 --from six_d"])
 def test_a_row_of_a_matrix_and_a_heading_are_derived_as_they_are_read(numbers: str, run: Callable[..., Outcome]) -> None:
     machine = run("convert", *numbers.split(), "--format", "json")
     derived = run("convert", *numbers.split(), "--explain")
