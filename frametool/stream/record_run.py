@@ -38,7 +38,7 @@ from frametool.recordings.messages import POSE_ARRAY, TYPES, RawTransform, numbe
 from frametool.recordings.read import ITSELF, SERIALIZED, Recorded, broken, read_metadata, typestore
 from frametool.recordings.write import KINDS, SECONDS_ROS2, RecordingFile, new_channel, serialised
 from frametool.ros.message_stream import unit_components
-from frametool.ros.messages import PATH, STAMPS, stamp_problem
+from frametool.ros.messages import PATH, POSES, STAMPS, stamp_problem
 from frametool.stream.faults import STOP, BadRows, Fault
 
 if TYPE_CHECKING:
@@ -163,10 +163,7 @@ def put(part: Any, numbers: Sequence[float]) -> None:
 
 
 LISTS = (POSE_ARRAY, PATH)
-MOVED_TYPES = frozenset((
-    "geometry_msgs/msg/PointStamped", "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped",
-    "nav_msgs/msg/Odometry", *LISTS,
-))  # fmt: skip
+MOVED_TYPES = POSES | {"geometry_msgs/msg/PointStamped", POSE_ARRAY}
 
 
 class MessageMover:
