@@ -13,23 +13,8 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from frametool.errors import ValueInvalid, alternatives, shown
-from frametool.explain.run import (
-    CAVEAT,
-    HEADING,
-    OPERATORS,
-    POWER,
-    PRODUCT,
-    SENTENCE,
-    SIGN,
-    SUM,
-    Item,
-    MatrixLine,
-    Row,
-    SheetResult,
-    SheetStep,
-    Words,
-    parsed,
-)
+from frametool.explain import run
+from frametool.explain.run import HEADING, PRODUCT, SENTENCE, SUM, MatrixLine, SheetResult, SheetStep, Words, parsed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -40,7 +25,7 @@ if TYPE_CHECKING:
 WIDTH = 80
 INDENT = "   "
 GLUE, CUT = "\u00a0", "\v"  # a non-breaking blank, and a place for a line break
-INDENTS = {HEADING: ("", INDENT), SENTENCE: (INDENT, INDENT), CAVEAT: (f"{INDENT}! ", f"{INDENT}  ")}
+INDENTS = {HEADING: ("", INDENT), SENTENCE: (INDENT, INDENT), run.CAVEAT: (f"{INDENT}! ", f"{INDENT}  ")}
 
 
 def _wrapped(text: str, first: str, further: str) -> list[str]:
@@ -116,7 +101,7 @@ def _side_by_side(left: str, block: Sequence[str], right: str = "") -> list[str]
     return [left + row + right if at == middle else before + row + behind for at, row in enumerate(block)]
 
 
-def result_lines(rows: Sequence[Row]) -> list[str]:
+def result_lines(rows: Sequence[run.Row]) -> list[str]:
     """Write the result: one line per notation, or per number if that is too long."""
     width = max((len(row.label) for row in rows), default=0)
     lines = []
@@ -156,9 +141,9 @@ def as_text(
     if isinstance(node, ast.Name):
         text = leaf(node.id)
         loose = text.startswith("-") and (outer > SUM or right)
-        loose = loose or (r"\times" in text and outer > PRODUCT) or ("^" in text and outer >= POWER)
+        loose = loose or (r"\times" in text and outer > PRODUCT) or ("^" in text and outer >= run.POWER)
     elif isinstance(node, ast.UnaryOp):
-        text = f"-{write(node.operand, outer=SIGN, right=True)}"
+        text = f"-{write(node.operand, outer=run.SIGN, right=True)}"
         loose = outer > SUM or right
     elif not isinstance(node, ast.BinOp):
         raise TypeError(ast.dump(node))
@@ -166,7 +151,7 @@ def as_text(
         text = rf"\frac{{{write(node.left)}}}{{{write(node.right)}}}"
         loose = outer > PRODUCT + 1
     else:
-        binds, sign, _ = OPERATORS[type(node.op)]
+        binds, sign, _ = run.OPERATORS[type(node.op)]
         first, second = write(node.left, outer=binds), write(node.right, outer=binds + 1, right=True)
         text = first + sign + second
         if latex and isinstance(node.op, ast.Pow):
@@ -201,7 +186,7 @@ SYMBOLS = {
 INDEXED = re.compile(r"([a-zA-Z])([0-9]{1,2}|[a-zA-Z][0-9]?)")
 LONG = 90  # approximate characters of LaTeX in a line of a formula
 SPECIAL = frozenset("\\`*_{}[]<>#|~$&")
-WORDS = {HEADING: "### %s", SENTENCE: "%s", CAVEAT: "> **Note.** %s"}
+WORDS = {HEADING: "### %s", SENTENCE: "%s", run.CAVEAT: "> **Note.** %s"}
 FORMULAS = "$$\n\\begin{aligned}\n%s\n\\end{aligned}\n$$"
 RESULT = "**Result**%s\n\n```text\n%s\n```"
 
@@ -225,7 +210,7 @@ class Explanation:
     title: what is derived
     """
 
-    def __init__(self, title: str, items: Sequence[Item]) -> None:
+    def __init__(self, title: str, items: Sequence[run.Item]) -> None:
         """Store the parts in their order."""
         self.title = title
         self.items = tuple(items)

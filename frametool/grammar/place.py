@@ -19,18 +19,8 @@ from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.earth import NORTH, SOUTH, ZONES, standard_zone, utm, zone_number
 from frametool.geometry.place import ECEF, ENU, GRID, GRIDDED, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place, Spot
 from frametool.geometry.representations import HEADING, POSITIONS
-from frametool.grammar.readers import (
-    AXES_KEY,
-    EARTH_FRAMES,
-    FLAT,
-    Misfit,
-    Quaternion,
-    Reading,
-    kind,
-    read_number,
-    read_numbers,
-    within,
-)
+from frametool.grammar import readers
+from frametool.grammar.readers import AXES_KEY, EARTH_FRAMES, FLAT, Misfit, Reading, kind, read_number, within
 from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:
@@ -115,7 +105,8 @@ def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
     if AT in own:
         found.append(within((AT,), read_at, own[AT], reading))
     if ECEF in own:
-        found.append(Spot(Place(ECEF, ("x", "y", "z")), within((ECEF,), read_numbers, own[ECEF], ("x", "y", "z"))))
+        xyz = within((ECEF,), readers.read_numbers, own[ECEF], ("x", "y", "z"))
+        found.append(Spot(Place(ECEF, ("x", "y", "z")), xyz))
     if UTM in own:
         found.append(within((UTM,), _utm, own[UTM], reading))
     elif "easting" in own:
@@ -268,7 +259,7 @@ def check_parent(mapping: dict[str, Any], own: dict[str, Any]) -> None:
             raise Misfit(f"{what} places a frame in ecef; {key} is {shown(value)}", (key,))
 
 
-def _heading(own: dict[str, Any], axes: str) -> Quaternion | None:
+def _heading(own: dict[str, Any], axes: str) -> readers.Quaternion | None:
     """Read a heading as a rotation in the axes."""
     key = next((key for key in HEADINGS if key in own), "")
     if not key:

@@ -24,6 +24,7 @@ from frametool.geometry.earth import ZONES as ZONE_NAMES
 from frametool.geometry.earth import zone_number
 from frametool.geometry.place import AXES, ECEF, ENU, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Earth, Place, kernels
 from frametool.geometry.representations import HEADING, POSITIONS, Notation, notation
+from frametool.grammar import readers
 from frametool.grammar.covariance import check, entries_of, of_position
 from frametool.grammar.place import (
     AT,
@@ -42,20 +43,7 @@ from frametool.grammar.place import (
 )
 from frametool.grammar.place import FIELDS as PLACE_FIELDS
 from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose
-from frametool.grammar.readers import (
-    AXES_KEY,
-    EARTH_FRAMES,
-    FIX,
-    FLAT,
-    FLAT_KEYS,
-    PARENT_COLUMNS,
-    Misfit,
-    NotARotation,
-    Reading,
-    may_be_on_earth,
-    may_be_uncertain,
-    within,
-)
+from frametool.grammar.readers import AXES_KEY, EARTH_FRAMES, FIX, Misfit, Reading, may_be_uncertain, within
 from frametool.stream.faults import ZONES, RowNote
 from frametool.stream.header import Columns, Header, PoseColumns, find_positions, find_rotations, listed, places_named
 from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape, place_of
@@ -77,7 +65,7 @@ ECEF_COLUMNS = POSITIONS[ECEF].columns
 STATUS, PARENT = "status", "parent"
 STAYING = (STATUS, PARENT)  # read, and not rewritten
 OTHERS = ("easting", "northing", *ECEF_COLUMNS, ZONE, "heading", AXES, *STAYING, "datum", "epsg")
-FIELDS = PLACE_FIELDS | {name: name for names in (OTHERS, *FLAT.values()) for name in names}
+FIELDS = PLACE_FIELDS | {name: name for names in (OTHERS, *readers.FLAT.values()) for name in names}
 PATTERN = re.compile(
     rf"[#% ]*((?:.*[._/])??)({'|'.join(sorted(FIELDS, key=len, reverse=True))})"
     r"(?:[_ ]?(deg|rad|e7|m|mm|cm|ft))?\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*",
@@ -85,7 +73,7 @@ PATTERN = re.compile(
 )
 FIX_ENTRY = re.compile(rf"(?:.*[./_])?{FIX}\[?_?([0-8])\]?")
 FIX_TYPE = "position_covariance_type"
-WHOLE = ("lat", "latitude", "lat_rad", AT, "ecef", "utm", "easting", *FLAT_KEYS)
+WHOLE = ("lat", "latitude", "lat_rad", AT, "ecef", "utm", "easting", *readers.FLAT_KEYS)
 DEGREES = {"": False, "deg": False, "degrees": False, "°": False, "rad": True, "radians": True}
 
 
@@ -181,7 +169,7 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
     in_ecef = {spot.place for spot, field in every if field in ECEF_COLUMNS and not expected}
     positions = find_positions(_header_of(names, in_ecef))
     if not expected and positions:
-        said = [spot.name for spot, field in every if may_be_on_earth(spot.name) or field == "lon"]
+        said = [spot.name for spot, field in every if readers.may_be_on_earth(spot.name) or field == "lon"]
         if not request.operation.keeps_frames and said:
             message = f"{', '.join(said[:2])} stay data: {positions[0].shown} are the position"
             warn(f"{source}: {message}; --columns lat,lon,alt --from lla turns it round")
@@ -362,7 +350,7 @@ def settle(
             shapes = (shape._replace(unit=place._replace(level=level)),)
     is_formula = operation.formula is not None
     stays = not (is_formula or operation.moves)
-    says_itself = stays and (on_earth or not {*PARENT_COLUMNS}.isdisjoint(names))
+    says_itself = stays and (on_earth or not {*readers.PARENT_COLUMNS}.isdisjoint(names))
     if says_itself or (not is_formula and (request.results.place is None or request.rows.frames)):
         return request, shapes  # a look-up looks at each row, an expression at its own frames
     rename = (request.for_kind(shapes[0].kind) if shapes else request).rename
@@ -454,7 +442,7 @@ def _of_fix(value: dict[str, Any], mapping: dict[str, Any], reading: Reading, re
     """
     status = value.get("status")
     if type(status) is dict and status.get("status") == "-1":
-        raise NotARotation("status -1: there was no fix", ("status", "status"))
+        raise readers.NotARotation("status -1: there was no fix", ("status", "status"))
     is_left_out = request.results.place is not None or request.gathered is not None
     if FIX not in value or value.get(FIX_TYPE, "1") == "0" or is_left_out:
         return ()

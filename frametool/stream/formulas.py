@@ -9,19 +9,9 @@ from collections import Counter
 from math import degrees
 from typing import TYPE_CHECKING, Any
 
+from frametool import errors
 from frametool.documents.document import parse_documents
-from frametool.errors import (
-    BadAnswer,
-    FormatError,
-    Misused,
-    ValueInvalid,
-    bare,
-    did_you_mean,
-    first_of,
-    listing,
-    shown,
-    warn,
-)
+from frametool.errors import FormatError, Misused, ValueInvalid, bare, did_you_mean, first_of, listing, shown, warn
 from frametool.formats.table import FORMATS
 from frametool.geometry import quaternion, rigid
 from frametool.stream.request import Formula, Shown
@@ -217,7 +207,7 @@ class JointRows(Formula):
         self.base = base
         self.tip = tip
         if posture.moving:
-            raise BadAnswer(f"--joints: {listing(posture.moving)} moves over time; stream that file with -i")
+            raise errors.BadAnswer(f"--joints: {listing(posture.moving)} moves over time; stream that file with -i")
         self.constants = {name: posture.still[name] for name in posture.named}
         self._read: Sequence[JointColumn] = ()
         self._beyond: set[str] = set()

@@ -15,20 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import (
-    BadTopology,
-    FormatError,
-    LookupFailed,
-    Misused,
-    NoDataAt,
-    ValueInvalid,
-    alternatives,
-    bare,
-    did_you_mean,
-    first_of,
-    shown,
-    warn,
-)
+from frametool import errors
+from frametool.errors import BadTopology, FormatError, ValueInvalid, bare, did_you_mean, first_of, shown, warn
 from frametool.formats.load import FrameFile, Rules, load_sources
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.frames.topology import resolve_name, static_and_moving, to_root, two_parents
@@ -297,7 +285,8 @@ class RecordRun:
         self._check_topics()
         if request.window and not self.inside:
             there = f"they are logged from {' to '.join(map(format_stamp, self.span))}" if self.span else "it has none"
-            raise NoDataAt(f"{self.path}: no messages from {' to '.join(map(format_stamp, request.window))}; {there}")
+            span = " to ".join(map(format_stamp, request.window))
+            raise errors.NoDataAt(f"{self.path}: no messages from {span}; {there}")
         others = [each for each in reader.all if each not in reader.channels]
         for each in others if request.tree is not None or request.into else ():
             if each.type.replace(".", "/").rpartition("/")[2].startswith("FrameTransform"):  # as protobuf's
@@ -345,7 +334,7 @@ class RecordRun:
         known = {channel.topic for channel in self.reader.all}
         for topic in self.request.topics:
             if topic.strip("/") not in {each.strip("/") for each in known}:
-                raise FormatError(f"no topic {topic}{alternatives(topic, known, 'topics')}", source=self.path)
+                raise FormatError(f"no topic {topic}{errors.alternatives(topic, known, 'topics')}", source=self.path)
         for each in self.named:
             if each.type not in MOVED_TYPES:
                 what = f"{each.topic} holds {each.type or 'no type'}; --into moves {MOVES}"
@@ -353,14 +342,14 @@ class RecordRun:
         if self.request.into and not self.named:
             movable = sorted({each.topic for each in self.reader.all if each.type in MOVED_TYPES})
             remedy = f"--topic {first_of(movable, MOST_NAMED, gap='|')}" if movable else f"none of them is {MOVES}"
-            raise Misused(f"--into moves the messages of topics that are named; {remedy}", source=self.path)
+            raise errors.Misused(f"--into moves the messages of topics that are named; {remedy}", source=self.path)
 
     def _moved(self, mover: MessageMover, channel: Channel, data: bytes) -> bytes | None:
         """Return a message in the other frame; one that cannot be moved is an error, or left out."""
         number = self.moved[channel.topic] = self.moved.get(channel.topic, 0) + 1
         try:
             new = mover.moved(channel, data)
-        except (LookupFailed, ValueInvalid) as error:
+        except (errors.LookupFailed, ValueInvalid) as error:
             stamp = "" if mover.header is None else f", stamp {format_stamp(mover.header[1])}"
             reason = f"on {channel.topic}{stamp}: {error}"
             if self.request.bad.on_error == STOP:

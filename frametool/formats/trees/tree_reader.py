@@ -20,21 +20,10 @@ from frametool.documents.source import InputFile, Source, pointer
 from frametool.errors import Finding, FormatError, alternatives, bare, first_of, shown
 from frametool.frames.stamps import parse_stamp
 from frametool.geometry.rigid import IDENTITY
+from frametool.grammar import readers
 from frametool.grammar.edges import Diagnostics, Edge, Options
 from frametool.grammar.pose import COVARIANCE_KEYS, NAMES, POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
-from frametool.grammar.readers import (
-    AXES_KEY,
-    EARTH_FRAMES,
-    Misfit,
-    Path,
-    Reading,
-    Unclear,
-    as_mapping,
-    kind,
-    may_be_on_earth,
-    tell,
-    within,
-)
+from frametool.grammar.readers import AXES_KEY, Misfit, Path, Reading, as_mapping, kind, may_be_on_earth, tell, within
 from frametool.ros import messages
 from frametool.text.numbers import parse_number
 
@@ -221,7 +210,7 @@ def _above(pose: Pose, parent: str | None, entry: dict[str, Any]) -> str | None:
     """Return the reference frame of a pose: the enclosing one, or its own; raises Misfit if they conflict."""
     if pose.parent is None or "parent" in entry:
         return pose.parent or parent
-    if parent not in (None, *EARTH_FRAMES):  # a position on the Earth implies its frame
+    if parent not in (None, *readers.EARTH_FRAMES):  # a position on the Earth implies its frame
         key = next(filter(may_be_on_earth, entry))
         raise Misfit(f"{key} places a frame in ecef; its parent is {shown(parent)}", (key,), key=True)
     return parent or pose.parent
@@ -350,7 +339,7 @@ def document_edges(file: InputFile, options: Options, take: Take, tags: Collecti
     notes, faults = list[Finding](), list[Misfit]()
     yield from edges_of(documents, take, notes, faults, normalize=options.normalize, bare_numbers=True)
     for at, (fault, line, column) in enumerate(located(faults, source)):
-        if isinstance(fault, Unclear):
+        if isinstance(fault, readers.Unclear):
             raise fault.placed(source)
         placed = FormatError(str(fault), source=source.name, line=line, column=column, rule=fault.rule)
         options.report(placed if at else fault.placed(source))
