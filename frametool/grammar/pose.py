@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components, Rigid
     from frametool.grammar.readers import Path, Quaternion, Vector
 
+    Written = tuple[Notation, list[float], bool, Sequence[Path]]
     Spelled = tuple[Notation, Sequence[Any], Sequence[Path]]  # notation, one text per component, the path of each
 
 # names of other tools (OpenCV, COLMAP) for a position in metres and a rotation, and the key of the grammar; "" if the
@@ -41,6 +42,7 @@ ROTATION_WORDS = {
 LISTED_WORDS = frozenset((*POSITION_WORDS, *ROTATION_WORDS)).difference(("rotation", "orientation"))
 XYZ = ("x", "y", "z")
 TURN = 2.0 * math.pi
+IDENTITY = (0.0, 0.0, 0.0, 1.0)
 AGREEMENT = 1e-6  # radians, metres: the largest difference between two notations in one entry
 
 
@@ -352,12 +354,28 @@ def read_rotation(key: str, value: Any, reading: Reading) -> tuple[Vector | None
 
     Raises Misfit or ValueInvalid: wrong shape, not a number, not a rotation, or several that do not agree.
     """
-    if not _is_several(key, value):
-        return read_spelled(*shape_of(key, value), reading)
-    read = [within((index,), read_rotation, key, each, reading) for index, each in enumerate(value)]
-    for _, turned in read[1:]:
-        agreeing_rotation(read[0][1], turned)
-    return None, read[0][1]
+    return read_written(key, value, reading)[:2]
+
+
+def read_written(
+    key: str, value: Any, reading: Reading, *, check: bool = True
+) -> tuple[Vector | None, Quaternion, Written]:
+    """Read a rotation as `read_rotation` does, and return it also as it is written; of several that agree the first.
+
+    That is its notation, a number per component, whether angles are in degrees, and the path of each number below the
+    key; no paths if none of the numbers may be replaced.
+    check: False for the multiple of a matrix, whose rotation is then none
+    """
+    several = type(value) is list and key != readers.AXES_KEY and ROTATION_KEYS[key].representation.axes == NAMED_AXES
+    if several and value and all(type(each) is dict for each in value):  # Euler angles about different axes
+        read = [within((index,), read_written, key, each, reading) for index, each in enumerate(value)]
+        for _, turned, _ in read[1:]:
+            agreeing_rotation(read[0][1], turned)
+        return None, read[0][1], (*read[0][2][:3], ())
+    notation, texts, places = _shape_of(key, value)
+    numbers, degrees = read_components(notation, texts, places, reading)
+    position, rotation = _checked(notation, numbers, reading, degrees=degrees) if check else (None, IDENTITY)
+    return position, rotation, (notation, numbers, degrees, places)
 
 
 def agreeing_rotation(first: Quaternion, second: Quaternion) -> Quaternion:
@@ -368,28 +386,15 @@ def agreeing_rotation(first: Quaternion, second: Quaternion) -> Quaternion:
     return first
 
 
-def _is_several(key: str, value: Any) -> bool:
-    """Return True for a list of Euler angles about different axes, False for a single rotation."""
-    if type(value) is not list or key == readers.AXES_KEY or ROTATION_KEYS[key].representation.axes != NAMED_AXES:
-        return False
-    return bool(value) and all(type(each) is dict for each in value)
-
-
-def shape_of(key: str, value: Any) -> Spelled:
-    """Split the value of a rotation key: its notation, one text per component, and the path of each below it.
-
-    For several rotations under one key it returns the first; its numbers have no paths, so that they are not replaced.
-    """
+def _shape_of(key: str, value: Any) -> Spelled:
+    """Split the value of a rotation key: its notation, one text per component, and the path of each below it."""
     if key == readers.AXES_KEY:  # the name of a change of axes: optical, ned_from_enu
         from frametool.geometry.conventions import named_rotation
 
         if type(value) is not str:
             raise Misfit(f"expected the name of axes like optical or ned_from_enu, found {kind(value)}")
         parts = named_rotation(value).components
-        return parse_notation("quaternion"), [*map(repr, parts)], [(name,) for name in "xyzw"]
-    if _is_several(key, value):
-        bound, texts, places = shape_of(key, value[0])
-        return bound, texts, [("", *place) for place in places]
+        return parse_notation("quaternion"), [*map(repr, parts)], ()
     notation = ROTATION_KEYS[own_key(key, value)]
     row, is_list = notation.representation, type(value) is list
     if isinstance(row.shape, tuple):
@@ -417,10 +422,17 @@ def read_spelled(
     notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading
 ) -> tuple[Vector | None, Quaternion]:
     """Read one text per component: a rotation, or the numbers of a whole pose; the rotation is checked."""
+    numbers, degrees = read_components(notation, texts, places, reading)
+    return _checked(notation, numbers, reading, degrees=degrees)
+
+
+def _checked(
+    notation: Notation, numbers: list[float], reading: Reading, *, degrees: bool
+) -> tuple[Vector | None, Quaternion]:
+    """Return the position of a whole pose, and the rotation, which is checked."""
     row, whole = notation.representation, notation.representation.whole
     position: Vector | None = None
-    numbers, degrees = read_components(notation, texts, places, reading)
-    if whole is not None and len(texts) == len(whole.columns):
+    if whole is not None and len(numbers) == len(whole.columns):
         end = len(numbers) - len(whole.tail)
         if tuple(numbers[end:]) != whole.tail:
             found = " ".join(f"{number:g}" for number in numbers[end:])

@@ -15,6 +15,7 @@ from frametool.errors import FrametoolError
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import arrays, floats, quaternion, uncertainty
 from frametool.geometry.representations import UPPER_ROWS, BatchRule
+from frametool.geometry.rigid import EXACT, SCALED
 from frametool.geometry.validation import read_rotations
 from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
 from frametool.grammar.pose import FEW_DIGITS
@@ -289,7 +290,14 @@ class Run:
         full = np.stack([np.broadcast_to(np.asarray(part, np.float64), self.count) for part in pose])
         if state.previous is None:
             state.previous = full[:, good[0]]
-        earlier = np.repeat(state.previous[:, None], self.count, axis=1)
+        before = state.previous
+        if len(before) == EXACT < len(full):  # exact, or of the scale 1
+            before = np.append(before, np.full(len(full) - EXACT, float(len(full) == SCALED)))
+        elif len(before) != len(full):
+            for row in good.tolist()[: None if self.operation.of == START else 1]:
+                self._blame(row, "", "the one before has a covariance or a scale, which this one has not")
+            before = np.append(before[:EXACT], full[EXACT:, good[0]])
+        earlier = np.repeat(before[:, None], self.count, axis=1)
         if self.operation.of != START:
             later = np.arange(good[0] + 1, self.count)
             earlier[:, later] = full[:, good[np.searchsorted(good, later) - 1]]

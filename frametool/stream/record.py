@@ -32,10 +32,8 @@ from frametool.grammar.pose import (
     is_position,
     is_rotation,
     read_angle_unit,
-    read_components,
     read_pose,
-    read_rotation,
-    shape_of,
+    read_written,
     unknown_keys,
 )
 from frametool.grammar.readers import (
@@ -429,8 +427,7 @@ def _of_message(value: Any, path: Path, reading: Reading, request: Request, *, f
         if within((key,), is_unknown, known, (9,)):
             return Record(path, Shape("", None), keys=RecordKeys(rotation=field))
     reading.degrees = request.rows.degrees
-    within((field,), read_rotation, field, value[field], reading)
-    record = _with_rotation(value[field], field, Record(path, Shape(POSE, None)), (field,), reading)
+    record = _with_rotation(value[field], field, Record(path, Shape(POSE, None)), (field,), reading, request)
     return record._replace(shape=record.shape._replace(kind=kind))
 
 
@@ -439,9 +436,7 @@ def _bare_list(value: list[Any], path: Path, reading: Reading, request: Request)
     if request.operation.only_adds or request.operation.columns:
         raise Misfit("a bare list has no keys; write a mapping like {point: [x, y, z]}")
     if type(value[0]) is list:
-        if not request.operation.multiples:
-            read_rotation("matrix", value, reading)  # for what is worth telling about it
-        return _with_rotation(value, "matrix", Record(path, Shape(POSE, None)), (), reading)
+        return _with_rotation(value, "matrix", Record(path, Shape(POSE, None)), (), reading, request)
     if len(value) != 3 or not request.operation.moves:
         raise _bare_numbers(value)
     return Record(path, Shape(_kind("", (), request)), *_three(value, path, 1.0))
@@ -491,10 +486,7 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     if flat and flat.rotation:
         record = _with_flat_rotation(record, value, flat, flat.rotation, reading, request)
     elif rotations:
-        row = ROTATION_KEYS.get(rotations[0])
-        if not (operation.multiples and row and row.representation.whole):
-            within((rotations[0],), read_rotation, rotations[0], value[rotations[0]], reading)
-        record = _with_rotation(value[rotations[0]], rotations[0], record, (rotations[0],), reading)
+        record = _with_rotation(value[rotations[0]], rotations[0], record, (rotations[0],), reading, request)
     if len(rotations) > 1 or len(positions) > 1:
         keys = (*rotations, *(positions if len(positions) > 1 else ()))
         read_pose({key: value[key] for key in value if key in keys}, reading)  # they have to say the same
@@ -707,30 +699,26 @@ def _three(
     return tuple((*below, axis) if axis in value else None for axis in XYZ), numbers
 
 
-def _with_rotation(value: Any, key: str, record: Record, below: Path, reading: Reading) -> Record:
-    """Add the rotation's numbers."""
-    notation, texts, places = shape_of(key, value)
+def _with_rotation(
+    value: Any, key: str, record: Record, below: Path, reading: Reading, request: Request
+) -> Record:
+    """Add the rotation's numbers; whether that of a multiple s R is one is seen where s is known."""
+    row = ROTATION_KEYS.get(key)
+    is_multiple = request.operation.multiples and row is not None and row.representation.whole is not None
+    quiet = Reading(reading.source) if is_multiple else reading
+    *_, (notation, values, degrees, places) = within(below, read_written, key, value, quiet, check=not is_multiple)
     joined = notation.representation.whole
-    whole = joined is not None and len(texts) == len(joined.columns)
+    whole = joined is not None and len(values) == len(joined.columns)
     if whole and record.shape.unit is not None:
         raise Misfit("a 4x4 matrix is the whole pose; remove xyz, or write the 3x3 rotation", below)
-    values, degrees = read_components(notation, texts, places, Reading(reading.source, degrees=reading.degrees))
-    paths: tuple[Path | None, ...] = (None,) * len(texts)
-    if degrees == (reading.degrees if notation.degrees is None else notation.degrees):
-        above = (*record.path, *below)
-        paths = tuple((*above, *each) if _is_there(value, each) else None for each in places[: len(texts)])
+    paths: tuple[Path | None, ...] = (None,) * len(values)
+    if places and degrees == (reading.degrees if notation.degrees is None else notation.degrees):
+        above, is_list = (*record.path, *below), type(value) is list
+        paths = tuple((*above, *each) if is_list or each[0] in value else None for each in places[: len(values)])
     # else the numbers say another unit than their key: the member is written anew
     shape = record.shape._replace(kind=POSE, notation=notation, degrees=degrees, whole=whole)
     keys, every = record.keys._replace(rotation=key), (*record.values, *values)
     return record._replace(shape=shape, numbers=record.numbers + paths, values=every, keys=keys)
-
-
-def _is_there(value: Any, path: Path) -> bool:
-    try:
-        value_at(value, path)
-    except (KeyError, IndexError, TypeError):
-        return False
-    return True
 
 
 def _with_names(record: Record, root: Any, request: Request) -> Record:

@@ -53,6 +53,15 @@ def test_consecutive_poses_follow_the_text_however_they_are_spelled(count: int, 
     assert steps == [0.0, *(2.0 * i + 1.0 for i in range(count - 1))]
 
 
+def test_a_pose_is_compared_with_one_before_that_has_another_covariance() -> None:
+    exact, sure = '{"xyz":[1,0,0],"xyzw":[0,0,0,1]}\n', '{"xyz":[3,0,0],"xyzw":[0,0,0,1],"sigma":{"xyz":0.5}}\n'
+    result = flow((exact + sure + exact + exact).encode(), CONSECUTIVE._replace(on_error="skip"), "json")
+    lines = [json.loads(line) for line in result.text.splitlines()]
+    assert [each["distance"] for each in lines] == [0.0, 2.0, 0.0]
+    assert [each.get("covariance", [0.0])[0] for each in lines] == [0.0, 0.25, 0.0]
+    assert result.told[0] == "in:3: the one before has a covariance or a scale, which this one has not (row skipped)"
+
+
 def test_angles_of_records_go_on_beyond_half_a_turn() -> None:
     text = "".join(f'{{"rpy_deg":[0,0,{yaw}]}}\n' for yaw in (170, 190, 320, 90)).encode()
     result = flow(text, convert("rpy_deg").with_results(unwrap=True), "json")
