@@ -256,11 +256,11 @@ def pose_of_numbers(texts: Sequence[str], default: Notation | None, reading: Rea
     if whole and len(texts) == _ROWS_OF_A_POSE:
         return read_pose(matrix_pose([list(texts)], rep, stated=default is not None) or {}, reading)
     if whole and len(texts) == len(whole.columns):
-        return Pose(*read_spelled(rep, texts, readers.INDICES, reading))
+        return Pose(*_read_checked(rep, texts, readers.INDICES, reading)[:2])
     if len(texts) not in rep.counts:
         raise ValueInvalid(f"{rep.counted}; found {len(texts)}")
     x, y, z = map(parse_length, texts[:-size] or ("0", "0", "0"))
-    _, rotation = read_spelled(rep, texts[-size:], readers.INDICES, reading)
+    rotation = _read_checked(rep, texts[-size:], readers.INDICES, reading)[1]
     return Pose((x, y, z) if len(texts) > size else None, rotation)
 
 
@@ -373,8 +373,10 @@ def read_written(
             agreeing_rotation(read[0][1], turned)
         return None, read[0][1], (*read[0][2][:3], ())
     notation, texts, places = _shape_of(key, value)
-    numbers, degrees = read_components(notation, texts, places, reading)
-    position, rotation = _checked(notation, numbers, reading, degrees=degrees) if check else (None, IDENTITY)
+    if check:
+        position, rotation, numbers, degrees = _read_checked(notation, texts, places, reading)
+    else:
+        position, rotation, (numbers, degrees) = None, IDENTITY, read_components(notation, texts, places, reading)
     return position, rotation, (notation, numbers, degrees, places)
 
 
@@ -422,15 +424,18 @@ def read_spelled(
     notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading
 ) -> tuple[Vector | None, Quaternion]:
     """Read one text per component: a rotation, or the numbers of a whole pose; the rotation is checked."""
+    return _read_checked(notation, texts, places, reading)[:2]
+
+
+def _read_checked(
+    notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading
+) -> tuple[Vector | None, Quaternion, list[float], bool]:
+    """Read a position and a checked rotation as `read_spelled` does; return its numbers and their unit too.
+
+    The numbers are those of the texts, those of a whole pose too; the unit is True for degrees.
+    """
     numbers, degrees = read_components(notation, texts, places, reading)
-    return _checked(notation, numbers, reading, degrees=degrees)
-
-
-def _checked(
-    notation: Notation, numbers: list[float], reading: Reading, *, degrees: bool
-) -> tuple[Vector | None, Quaternion]:
-    """Return the position of a whole pose, and the rotation, which is checked."""
-    row, whole = notation.representation, notation.representation.whole
+    own, row, whole = numbers, notation.representation, notation.representation.whole
     position: Vector | None = None
     if whole is not None and len(numbers) == len(whole.columns):
         end = len(numbers) - len(whole.tail)
@@ -438,18 +443,18 @@ def _checked(
             found = " ".join(f"{number:g}" for number in numbers[end:])
             tail = " ".join(f"{number:g}" for number in whole.tail)
             raise NotARotation(f"the last row of a 4x4 pose is {tail}, found {found}", rule="denormalized")
-        position, numbers = whole.split(numbers)
+        position, own = whole.split(numbers)
     if row.complaint is None:
-        return position, notation.to_quaternion(tuple(numbers), floats, degrees=degrees)
+        return position, notation.to_quaternion(tuple(own), floats, degrees=degrees), numbers, degrees
     try:
         rotation, warnings = overheard(
-            notation.checked_quaternion, numbers, floats, degrees=degrees, normalize=reading.normalize
+            notation.checked_quaternion, own, floats, degrees=degrees, normalize=reading.normalize
         )
     except ValueInvalid as error:
         raise NotARotation(str(error), rule=error.rule) from None
     for rule, message in warnings:
         reading.note(message, rule=rule)
-    return position, rotation
+    return position, rotation, numbers, degrees
 
 
 def read_components(
