@@ -142,27 +142,25 @@ class ColumnsWriter:
         if parts and all(map(is_typed, parts)):
             own: Kind = parts[0].dtype.newbyteorder("=")  # type: ignore[union-attr]
             return OutColumn(name, DOUBLE if own.kind == "f" and own.itemsize > DOUBLE.itemsize else own)
-        values = [value for part in parts for value in _values(part)]
+        values = [value for part in parts for value in plain_cells(part)]
         there = [value for value in values if value is not None and value != ""]
-        has_gaps = (has_gaps or len(there) < len(values)) and not self.has_nulls
-        is_open = all(isinstance(part, Spans) for part in parts) or all(isinstance(value, Verbatim) for value in there)
-        if there and is_open:
-            kinds = [kind for kind in PATTERNS if fit(there, kind)][:1]
-            if has_gaps and kinds not in ([], [DOUBLE]):
-                kinds = [DOUBLE] if FLAG not in kinds and all(abs(int(value)) < EXACT for value in there) else []
-            if kinds:
-                return OutColumn(name, kinds[0])
+        if there and all(isinstance(value, Verbatim) for value in there):
+            kind = next((kind for kind in PATTERNS if fit(there, kind)), None)
+            if kind != DOUBLE and not self.has_nulls and (has_gaps or len(there) < len(values)):
+                kind = DOUBLE if _is_exact(kind, parts) else None
+            if kind is not None:
+                return OutColumn(name, kind)
         is_json = any(isinstance(value, (dict, list)) for value in there)
-        text = dump_json if is_json else text_of
-        longest = max((len(text(value)) for value in there), default=1)
+        longest = max((len(dump_json(value) if is_json else text_of(value)) for value in there), default=1)
         return OutColumn(name, None, None, longest, is_json)
 
     def _typed(self, column: OutColumn, made: Made) -> Made:
         """Return a column of a block in its type; raises ValueInvalid for a cell that is of another one."""
         cells, kind = made.values, column.kind
         if kind is None:
-            text = dump_json if column.is_json else text_of
-            return Made(["" if value is None else text(value) for value in _values(cells)])
+            if not column.is_json:
+                return Made(texts_of(cells))
+            return Made(["" if value is None else dump_json(value) for value in plain_cells(cells)])
         if is_typed(cells):
             if kind == DOUBLE and not _is_exact(cells.dtype, [cells]) and cells.dtype.kind in WHOLE:
                 raise self._another(column, str(max(cells.tolist(), key=abs)))
@@ -197,11 +195,6 @@ def _is_exact(kind: Kind | None, parts: Sequence[Any]) -> bool:
         known = plain_cells(part) if not (is_typed(part) and part.size) else [part.min(), part.max()]
         numbers += [int(each) for each in known if each is not None]
     return all(-EXACT < number < EXACT for number in numbers)  # of the least int64 there is no absolute value
-
-
-def _values(cells: Cells) -> list[Any]:
-    """Return cells of text as texts, all else as plain values."""
-    return texts_of(cells) if isinstance(cells, Spans) else plain_cells(cells)
 
 
 class ArrayWriter(PoseWriter):

@@ -39,7 +39,7 @@ from frametool.grammar.edges import Answers, Diagnostics, Edge, Options, Samples
 from frametool.grammar.readers import EARTH_FRAMES
 from frametool.grammar.result import Style
 from frametool.stream.evaluate import Plan, Run, State
-from frametool.stream.faults import NULL, STOP, BadRow, Fault, Outcome, RowNote
+from frametool.stream.faults import NULL, STOP, BadRow, Fault, Outcome
 from frametool.stream.request import Request, RowOptions
 from frametool.stream.row_layout import POINT, POSE, Shape, Target
 from frametool.stream.rows import Block, RowPoses, kept, spans_of
@@ -49,7 +49,6 @@ from frametool.stream.writers import LEARNED, RowsWriter, SingleWriter, TextWrit
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Sequence
 
-    from frametool.geometry.place import Place
     from frametool.geometry.types import Components
     from frametool.stream.array_writer import ArrayWriter
     from frametool.text.lines import ByteStream
@@ -127,7 +126,11 @@ class FormatConverter:
             if self.request.on_error == STOP and outcome.faults:
                 poses = kept(made, slice(0, int(np.searchsorted(made.lines, outcome.faults[0].line))))
             if style.place is not None and style.place.words:
-                notes += _zones(style.place, poses)
+                from frametool.stream.earth_columns import zone_notes
+
+                if len(there := np.flatnonzero(~np.isnan(poses.numbers[:, 0]))):
+                    columns = style.place.numbers(*np.ascontiguousarray(poses.numbers[there, :3].T))
+                    notes += zone_notes(style.place, columns, poses.lines[there].tolist().__getitem__)
             yield outcome._replace(text=writer.of_block(poses), notes=notes)
         if writer is None and self.request.gathered is None:
             raise FormatError("nothing in it", source=self.source)
@@ -270,17 +273,6 @@ class FormatConverter:
             found, count = sorted(faults + done.faults()), len(lines) + len(faults)
             yield poses, Outcome(b"", found, count, notes=sorted(done.notes))
             faults.clear()
-
-
-def _zones(place: Place, poses: RowPoses) -> list[RowNote]:
-    """Return the warnings about the zones of results in UTM."""
-    there = np.flatnonzero(~np.isnan(poses.numbers[:, 0]))
-    if not len(there):
-        return []
-    from frametool.stream.earth_columns import zone_notes
-
-    x, y, z = (np.ascontiguousarray(poses.numbers[there, at]) for at in range(3))
-    return zone_notes(place, place.numbers(x, y, z), lambda row: int(poses.lines[there[row]]))
 
 
 # --- tables as frames ---

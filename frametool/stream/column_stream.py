@@ -188,7 +188,7 @@ class ColumnRows(PlannedRows):
                 nanoseconds, more = batch.stamps(below, in_ns=1)
                 times, reasons = times + nanoseconds, {**more, **reasons}
             return [times], {row: (name, reason) for row, reason in reasons.items()}
-        if request.gathered is not None and request.gathered.labelled:
+        if request.gathered is not None and request.gathered.by:
             return [np.array(batch.texts(place), object)], {}
         weights, nulls = batch.numbers(place)
         invalid = ~np.isfinite(weights) if nulls is None else nulls | ~np.isfinite(weights)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import copy
 from math import degrees, sqrt
 from typing import TYPE_CHECKING, Any
 
@@ -26,9 +25,9 @@ if TYPE_CHECKING:
 class Gathered:
     """The poses that were read so far, in metres and as unit quaternions, and a number or text with each."""
 
-    def __init__(self, *, named: bool = False, labelled: bool = False) -> None:
-        """Begin with none; named: so that `places` says where each was read; labelled: by texts with them."""
-        self.labelled = labelled
+    def __init__(self, *, named: bool = False, by: str = "") -> None:
+        """Begin with none; named: so that `places` says where each was read; by: the column or key of their labels."""
+        self.by = by
         self.places: list[str] = []
         self._lines: list[int] | None = [] if named else None  # of the block that was read last
         self.placed = self.turned = self.uncertain = self.stamped = False
@@ -79,51 +78,50 @@ class Gathered:
             raise ValueInvalid("no poses to take the mean of")
         return Transform.of(*map(np.ascontiguousarray, rows.T))
 
-    def groups(self) -> Iterator[tuple[str, Gathered]]:
-        """Yield the poses by their labels, in the order in which these came."""
-        if not self._extra:
-            raise ValueInvalid("what was pasted has no columns or keys to group it by; leave --by out")
-        rows, labels = self.transforms, np.concatenate(self._extra).tolist()
-        for label in dict.fromkeys(labels):
-            at = [row for row, each in enumerate(labels) if each == label]
-            part = copy(self)
-            part._poses = [np.stack(rows.components, -1)[at]]  # noqa: SLF001 - its own
-            part._extra, part.places = [], [self.places[row] for row in at] if self.places else []  # noqa: SLF001
-            yield label, part
-
     @property
-    def weights(self) -> Floats | None:
-        """Return the numbers with the poses; None if there are none."""
+    def extra(self) -> Any:
+        """Return the numbers or texts with the poses, (n,); None if there are none."""
         return np.concatenate(self._extra) if self._extra else None
 
 
-def mean_of_rows(gathered: Gathered, values: list[float] | None, *, robust: bool) -> tuple[Result, list[str]]:
-    """Return the mean of gathered poses, with its spread, and a message for each outlier."""
+def means_of(
+    gathered: Gathered, values: list[float] | None, *, robust: bool
+) -> Iterator[tuple[Result, list[str]]]:
+    """Yield the mean of all poses, or of those of each label, with its spread, and a message for each outlier."""
     from frametool.fit.closed_forms import solve_mean
     from frametool.fit.least_squares import off_text
     from frametool.grammar.pose import Pose
     from frametool.grammar.result import Result, uncertain
 
-    weights = gathered.weights if values is None else values
-    found = solve_mean(gathered.transforms, weights=weights, robust=robust)
-    (metres, radians), (farthest, widest), covariance = found.rms, found.most, found.covariance
-    extras: dict[str, Any] = {"count": len(found.used)} | ({"used": int(found.used.sum())} if robust else {})
-    left_out: list[str] = []
-    for row in found.left_out.nonzero()[0].tolist():
-        off = off_text(found.residuals[row], 2)
-        left_out.append(f"{gathered.places[row]}: left out, {off} off (u {found.u[row]:.1f})")
-    pose = Pose.of(found.transform.components)
-    if gathered.placed:
-        extras |= {"distance_rms": metres, "distance_max": farthest}
-    if gathered.turned:
-        extras |= {"angle_rms": radians, "angle_rms_deg": degrees(radians)}
-        extras |= {"angle_max": widest, "angle_max_deg": degrees(widest)}
-    if covariance is not None:
+    poses, extra = gathered.transforms, gathered.extra
+    rows_of: dict[str, Any] = {}
+    if gathered.by:
+        if extra is None:
+            raise ValueInvalid("what was pasted has no columns or keys to group it by; leave --by out")
+        for row, label in enumerate(extra.tolist()):
+            rows_of.setdefault(label, []).append(row)
+    weights = None if gathered.by else extra if values is None else values
+    for label, rows in (rows_of or {"": range(len(poses))}).items():
+        found = solve_mean(poses[rows] if rows_of else poses, weights=weights, robust=robust)
+        (metres, radians), (farthest, widest), covariance = found.rms, found.most, found.covariance
+        extras: dict[str, Any] = {gathered.by: label} if gathered.by else {}
+        extras |= {"count": len(found.used)} | ({"used": int(found.used.sum())} if robust else {})
+        left_out: list[str] = []
+        for at in found.left_out.nonzero()[0].tolist():
+            off = off_text(found.residuals[at], 2)
+            left_out.append(f"{gathered.places[rows[at]]}: left out, {off} off (u {found.u[at]:.1f})")
+        pose = Pose.of(found.transform.components)
         if gathered.placed:
-            extras |= {f"std_{axis}": sqrt(covariance[at, at]) for at, axis in enumerate("xyz")}
+            extras |= {"distance_rms": metres, "distance_max": farthest}
         if gathered.turned:
-            angle = sqrt(covariance[3:, 3:].trace())
-            extras |= {"std_angle": angle, "std_angle_deg": degrees(angle)}
-        extras |= uncertain((covariance if gathered.turned else covariance[:3, :3]).ravel().tolist())
-    position, rotation = pose.position if gathered.placed else None, pose.rotation if gathered.turned else None
-    return Result(Pose(position, rotation, None, gathered.frame), extras), left_out
+            extras |= {"angle_rms": radians, "angle_rms_deg": degrees(radians)}
+            extras |= {"angle_max": widest, "angle_max_deg": degrees(widest)}
+        if covariance is not None:
+            if gathered.placed:
+                extras |= {f"std_{axis}": sqrt(covariance[at, at]) for at, axis in enumerate("xyz")}
+            if gathered.turned:
+                angle = sqrt(covariance[3:, 3:].trace())
+                extras |= {"std_angle": angle, "std_angle_deg": degrees(angle)}
+            extras |= uncertain((covariance if gathered.turned else covariance[:3, :3]).ravel().tolist())
+        position, rotation = pose.position if gathered.placed else None, pose.rotation if gathered.turned else None
+        yield Result(Pose(position, rotation, None, gathered.frame), extras), left_out

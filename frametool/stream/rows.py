@@ -284,7 +284,7 @@ def read_extra(cells: Sequence[Spans], request: Request, name: str) -> tuple[Any
     if not request.weighs:
         values, reasons = read_stamps(cells, in_ns=in_nanoseconds(name) if len(cells) == 1 else 0)
         values[[*reasons]] = NO_STAMP
-    elif request.gathered is not None and request.gathered.labelled:
+    elif request.gathered is not None and request.gathered.by:
         return np.array(texts_of(cells[0]), object), {}
     else:
         values, bad = parse_floats(cells[0])

@@ -197,11 +197,11 @@ def mean_command(inputs: Inputs) -> int:
     numbers are those of the plain mean. Weights are in proportion to 1 / variance.
     """
     task, weights, by, robust = PoseTask(inputs), inputs.weights, inputs.by, inputs.robust
-    from frametool.stream.gathering import Gathered, mean_of_rows
+    from frametool.stream.gathering import Gathered, means_of
     from frametool.stream.record_values import read_poses
 
     arguments, status, numbers = inputs.poses, 0, None
-    gathered = Gathered(named=robust, labelled=by is not None)
+    gathered = Gathered(named=robust, by=by or "")
     request = task.request(extra_column=by or weights, gathered=gathered)
     bare, is_inverse = poses.without_inverse(arguments[0]) if len(arguments) == 1 else ("", False)
     if bare == "-" or (bare and not task.path and not poses.is_pasted(bare, task.notation)):
@@ -223,11 +223,9 @@ def mean_command(inputs: Inputs) -> int:
         warn("covariances left out: mean's is that of the rows")
     if gathered.stamped:
         warn("stamps left out: a mean is of no one time")
-    groups = [("", gathered)] if by is None else gathered.groups()
-    found = [(label, *mean_of_rows(each, numbers, robust=robust)) for label, each in groups]
-    labels: list[dict[str, Any]] = [{} if by is None else {by: label} for label, *_ in found]
-    task.output.values([Result(mean.pose, own | mean.extras) for own, (_, mean, _) in zip(labels, found, strict=True)])
-    say_first([line for *_, lines in found for line in lines], MOST, "poses left out", warn, warn)
+    found = [*means_of(gathered, numbers, robust=robust)]
+    task.output.values([mean for mean, _ in found])
+    say_first([line for _, lines in found for line in lines], MOST, "poses left out", warn, warn)
     return status
 
 
