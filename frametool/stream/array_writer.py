@@ -78,22 +78,20 @@ class ColumnsWriter:
             is_open = any(not is_typed(each.values) for each in made.values())
             if not size or (is_open and sum(count for count, _ in self.waiting) < sizes.TYPED):
                 return b""
-        return b"".join(self._written(is_all=False))
+        self.writer = self.writer or self._begin(is_all=False)
+        return b"".join(self._written(self.writer))
 
     def end(self) -> Iterator[bytes]:
         """Yield what waits, what comes behind the last block, and warn of what was left out."""
-        yield from self._written(is_all=True)
-        assert self.writer is not None  # noqa: S101 - for the types
+        self.writer = self.writer or self._begin(is_all=True)
+        yield from self._written(self.writer)
         yield from self.writer.end()
         for reason in dict.fromkeys(self.left_out.values()):
             names = listing(name for name, why in self.left_out.items() if why == reason)
             warn(f"{self.style.format}: {names} left out: {reason}")
 
-    def _written(self, *, is_all: bool) -> Iterator[bytes]:
+    def _written(self, writer: ColumnWriter) -> Iterator[bytes]:
         """Yield what is written of the blocks that wait."""
-        if self.writer is None:
-            self._begin(is_all=is_all)
-        assert self.writer is not None  # noqa: S101 - for the types
         known = {column.name for column in self.columns}
         for size, made in self.waiting:
             for name in made.keys() - known:
@@ -101,11 +99,11 @@ class ColumnsWriter:
             if size:
                 none = Made(objects([None] * size))
                 typed = [self._typed(column, made.get(column.name, none)) for column in self.columns]
-                yield bytes(self.writer.of_rows(None, None, typed))
+                yield bytes(writer.of_rows(None, None, typed))
         self.waiting = []
 
-    def _begin(self, *, is_all: bool) -> None:
-        """Choose the columns and their types."""
+    def _begin(self, *, is_all: bool) -> ColumnWriter:
+        """Choose the columns and their types, and begin the file; is_all: no other rows come."""
         blocks = [made for size, made in self.waiting if size] or [made for _, made in self.waiting[-1:]]
         for name in dict.fromkeys(name for made in blocks for name in made):
             parts = [made[name].values for made in blocks if name in made]
@@ -128,7 +126,8 @@ class ColumnsWriter:
         if (named := [column for column in self.columns if column.name in texts]) and self.has_nulls:
             types = ", ".join(f"{each.name} {TYPE_NAMES.get(each.kind, each.kind)}" for each in named)
             warn(f"types of other columns, by their cells: {types}")
-        self.writer = self.module.create(self.columns, None, self.style)
+        writer: ColumnWriter = self.module.create(self.columns, None, self.style)
+        return writer
 
     def _misfit(self, column: OutColumn) -> str:
         """Return the reason why a column has no place in the format; "" where it has one."""

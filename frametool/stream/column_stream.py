@@ -19,7 +19,7 @@ from frametool.formats.rows import pcd
 from frametool.formats.rows.column_file import FLOATS, ColumnFile, Made, OutColumn, RecordFile, not_finite
 from frametool.formats.table import FORMATS
 from frametool.grammar.readers import NORMALS, in_nanoseconds
-from frametool.stream.array_writer import ColumnsWriter
+from frametool.stream.array_writer import DOUBLE, ColumnsWriter
 from frametool.stream.faults import SKIP, STOP, Fault, Outcome, RowNote
 from frametool.stream.request import VELOCITIES, Operation, Request
 from frametool.stream.rows import Block, RowPoses, coded_texts, objects, taken
@@ -35,8 +35,6 @@ if TYPE_CHECKING:
     from frametool.recordings.messages import PointCloud
     from frametool.stream.evaluate import Run
     from frametool.text.spans import Flags, Floats, Ints
-
-DOUBLE = np.dtype(np.float64)
 
 
 class RowResults(NamedTuple):

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 
 PLACED = (POSE, POINT, VECTOR)
-POINT_ENTRIES = 9
 
 
 def with_covariances(
@@ -45,7 +44,7 @@ def with_covariances(
     there = [key for key in keys if key in holder]
     is_own = shape.kind in PLACED and around == path
     flat = [*holder] if is_own and covariance.SIGMA not in holder and not there else []
-    flat = [flat[at] for at in covariance.find_columns(flat, 36 if shape.kind == POSE else POINT_ENTRIES)[0]]
+    flat = [flat[at] for at in covariance.find_columns(flat, 36 if shape.kind == POSE else uncertainty.POINT)[0]]
     has_sigma = is_own and (covariance.SIGMA in holder or bool(flat))
     said = (*there, *(flat or [covariance.SIGMA] * has_sigma))
     is_left_out = operation.formula is not None and around == path and not operation.only_adds
@@ -106,7 +105,7 @@ def _of_sources(numbers: Sequence[Any], sigma: Sequence[tuple[int, str]], size: 
 
 def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Reading, flat: Sequence[str]) -> Record:
     """Add the covariance that sigmas say; none of its entries is in the text, and the result names them anew."""
-    size = 36 if record.shape.kind == POSE else POINT_ENTRIES
+    size = 36 if record.shape.kind == POSE else uncertainty.POINT
     degrees = read_angle_unit(own["angles"]) if "angles" in own else reading.degrees
     if not flat:
         entries = within(path, covariance.read_covariance, own, reading=Reading(reading.source, degrees=degrees))
@@ -252,7 +251,7 @@ def in_full(shape: Shape, own: Components, extra: Components) -> tuple[Shape, Co
     size, place = shape.covariance[0], shape.place
     entries = extra[:size]
     if shape.sigma:
-        entries = _of_sources(entries, shape.sigma, 36 if shape.kind == POSE else POINT_ENTRIES)
+        entries = _of_sources(entries, shape.sigma, 36 if shape.kind == POSE else uncertainty.POINT)
     if place is not None:
         turn = place._replace(level=False).turned(own[: place.size], IDENTITY)
         entries = uncertainty.rotate_covariance(entries, *turn)

@@ -129,22 +129,20 @@ class PointsOfPixels(Seen):
         self.far, self.constant = far
         self.height = height
         self.into = into
-        members: dict[str, Any] = {"frame": target} if target and into is None else {}
-        if self.extras("") == RAY:
-            members |= {"origin": (0, 1, 2), "ray": (3, 4, 5)}
-        elif into is None:
-            members["point"] = 0, 1, 2
-        elif self.columns[0].startswith("pixel"):
-            members["pixel"] = 0, 1
-        else:
-            members |= {self.columns[at]: (at,) for at in range(2)}
-        self.shown = Shown({}, members, replaces=into is not None)
+        self.names: tuple[str, ...] = ("x", "y", "z")
+        members: dict[str, Any] = {"point": (0, 1, 2)}
+        if into is None and height is None and not self.far:
+            self.names, members = RAY, {"origin": (0, 1, 2), "ray": (3, 4, 5)}
+        elif into is not None and self.columns[0].startswith("pixel"):
+            self.names, members = ("u", "v"), {"pixel": (0, 1)}
+        elif into is not None:
+            self.names, members = self.columns[:2], {self.columns[at]: (at,) for at in range(2)}
+        named = {"frame": target} if target and into is None else {}
+        self.shown = Shown({}, named | members, replaces=into is not None)
 
     def extras(self, row: str) -> tuple[str, ...]:  # noqa: ARG002
         """Name the numbers."""
-        if self.into is not None:
-            return ("u", "v") if self.columns[0].startswith("pixel") else self.columns[:2]
-        return RAY if self.height is None and not self.far else ("x", "y", "z")
+        return self.names
 
     def result(
         self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace  # noqa: ARG002
