@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import re
-from importlib import import_module
 from textwrap import fill
 from typing import Any
 
@@ -25,7 +24,7 @@ def section() -> Section:
 def _meant(name: str) -> Any:
     """Return what a name stands for; of a folder that can be called, the function in it."""
     value = getattr(frametool, name)
-    return getattr(import_module(value.entry), name) if inspect.ismodule(value) and callable(value) else value
+    return frametool.__getattr__(name) if inspect.ismodule(value) and callable(value) else value
 
 
 def _page(name: str, value: Any) -> Page:

@@ -30,7 +30,7 @@ from frametool.sim.turtle import TICK_NS, VARIANTS
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from frametool.sim.simulate import Watch
     from frametool.sim.turtle import MakeLeader
@@ -85,83 +85,70 @@ output_options = together(  # what is shown of a run
 )  # fmt: skip
 
 
-class SimOutput:
-    """What is shown of a run, and where: what the options of a command say."""
+def show_run(inputs: Inputs, scene: Scene, *, leaders: bool = False) -> None:
+    """Run a scene to its end, show of it what the options say, and sum it up on stderr.
 
-    def __init__(self, inputs: Inputs, *, leaders: bool = False) -> None:
-        """Check what can be checked before anything runs; raises click.UsageError, FileProblem."""
-        self.style, self.leaders = Output(inputs, "report").style, leaders
-        self.output: str | None = None if inputs.output == "-" else inputs.output
-        self.emit, self.reach, self.realtime, self.live = inputs.emit, inputs.reach, inputs.realtime, inputs.live
-        self.plot, self.view, self.force = inputs.plot, inputs.view, inputs.force
-        refuse(self.reach < 0.0, f"--reach must be 0 or more, found {self.reach:g}")
-        if self.live and not (sys.stdout.isatty() or sys.stderr.isatty()):
-            raise click.UsageError("--live draws in a terminal, and neither stdout nor stderr is one; see --plot")
-        files = [*filter(None, (self.output, self.plot, self.view))]
-        refuse(len({*map(os.path.realpath, files)}) < len(files), "the same file: --output, --plot or --view")
-        for path in files:
-            refuse_existing(path, force=self.force)
-            if path != "-" and not os.path.isdir(os.path.dirname(path) or "."):
-                raise FileProblem(f"{path}: no directory {os.path.dirname(path)}")
-        if suffix_of(self.plot or "") == ".png":
-            from frametool.view.pictures import require_matplotlib
+    Raises click.UsageError, FileProblem before anything runs; KeyboardInterrupt, if it came, after the summary.
+    """
+    style, live, emit, reach = Output(inputs, "report").style, inputs.live, inputs.emit, inputs.reach
+    plot, view, force = inputs.plot, inputs.view, inputs.force
+    output: str | None = None if inputs.output == "-" else inputs.output
+    refuse(reach < 0.0, f"--reach must be 0 or more, found {reach:g}")
+    if live and not (sys.stdout.isatty() or sys.stderr.isatty()):
+        raise click.UsageError("--live draws in a terminal, and neither stdout nor stderr is one; see --plot")
+    files = [*filter(None, (output, plot, view))]
+    refuse(len({*map(os.path.realpath, files)}) < len(files), "the same file: --output, --plot or --view")
+    for path in files:
+        refuse_existing(path, force=force)
+        if path != "-" and not os.path.isdir(os.path.dirname(path) or "."):
+            raise FileProblem(f"{path}: no directory {os.path.dirname(path)}")
+    summary, interrupted = RunSummary(scene, reach), False
+    # what is written after the run, by file: what watches the steps, and what then makes the content
+    pictures: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
+    if plot:
+        from frametool.view.exports import run_picture
+        from frametool.view.pictures import require_matplotlib, write_picture
 
+        if (suffix := suffix_of(plot)) == ".png":
             require_matplotlib()
+        watch_run, drawn = run_picture(scene)
+        pictures[plot] = watch_run, lambda: write_picture(drawn(), suffix)
+    if view:
+        from frametool.view.exports import run_page
 
-    def run(self, scene: Scene) -> None:
-        """Run a scene to its end and sum it up on stderr.
+        pictures[view] = run_page()
+    try:
+        with ExitStack() as stack:  # closes what the steps go to
+            watchers: list[Watch] = [summary.watch]
+            if inputs.realtime or live:
+                start = monotonic()  # simulated time does not run ahead of the clock
+                watchers.append(lambda step: sleep(max(0.0, step.t_ns / BILLION - (monotonic() - start))))
+            if live:
+                from frametool.view.terminal import Screen
 
-        Raises KeyboardInterrupt after the summary if it was interrupted.
-        """
-        summary, interrupted = RunSummary(scene, self.reach), False
-        # what is written after the run, by file: what watches the steps, and what then makes the content
-        pictures: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
-        if self.plot:
-            from frametool.view.exports import run_picture
-            from frametool.view.pictures import write_picture
-
-            (watch_run, drawn), suffix = run_picture(scene), suffix_of(self.plot)
-            pictures[self.plot] = watch_run, lambda: write_picture(drawn(), suffix)
-        if self.view:
-            from frametool.view.exports import run_page
-
-            pictures[self.view] = run_page()
-        try:
-            with ExitStack() as stack:
-                watchers = [summary.watch, *self._watchers(scene, stack), *(watch for watch, _ in pictures.values())]
-                for step in simulate(scene):
-                    for watch in watchers:
-                        watch(step)
-        except KeyboardInterrupt:  # leaves no file: what it holds is not the whole run
-            interrupted = True
-        for line in summary.lines():
-            say(line)
-        for path, (_, content) in pictures.items():
-            with writing(path, force=self.force) as write:
-                write(content())
-        if interrupted:
-            raise KeyboardInterrupt
-
-    def _watchers(self, scene: Scene, stack: ExitStack) -> Iterator[Watch]:
-        """Open what the steps go to; the stack closes it."""
-        if self.realtime or self.live:
-            start = monotonic()  # simulated time does not run ahead of the clock
-            yield lambda step: sleep(max(0.0, step.t_ns / BILLION - (monotonic() - start)))
-        if self.live:
-            from frametool.view.terminal import Screen
-
-            STATE.cleans_up = True  # the terminal's cursor
-            screen = Screen(scene, to_stderr=not sys.stdout.isatty())
-            stack.enter_context(screen.live)
-            yield screen.watch
-        else:
-            yield event_log(say)
-        if self.output is not None or not (self.live and sys.stdout.isatty()):
-            several = self.leaders or self.emit == "poses" or len(scene.followers) > 1
-            records_of = step_writer(self.emit, self.style, leaders=self.leaders, labelled=several)
-            write = stack.enter_context(writing(self.output, force=self.force))
-            # each record at once, so that a reader at the other end of a pipe sees it
-            yield lambda step: [write(text) for text in records_of(step)]
+                STATE.cleans_up = True  # the terminal's cursor
+                screen = Screen(scene, to_stderr=not sys.stdout.isatty())
+                stack.enter_context(screen.live)
+            watchers.append(screen.watch if live else event_log(say))
+            if output is not None or not (live and sys.stdout.isatty()):
+                several = leaders or emit == "poses" or len(scene.followers) > 1
+                records_of = step_writer(emit, style, leaders=leaders, labelled=several)
+                write = stack.enter_context(writing(output, force=force))
+                # each record at once, so that a reader at the other end of a pipe sees it
+                watchers.append(lambda step: [write(text) for text in records_of(step)])
+            watchers += [watch for watch, _ in pictures.values()]
+            for step in simulate(scene):
+                for watch in watchers:
+                    watch(step)
+    except KeyboardInterrupt:  # leaves no file: what it holds is not the whole run
+        interrupted = True
+    for line in summary.lines():
+        say(line)
+    for path, (_, content) in pictures.items():
+        with writing(path, force=force) as write:
+            write(content())
+    if interrupted:
+        raise KeyboardInterrupt
 
 
 SUBCOMMANDS = {
@@ -223,7 +210,7 @@ def follow(inputs: Inputs) -> None:
             raise click.UsageError(f"no leader {shown(argument)}{known}, or a file")
         leader = drivers.scripted(read_script(Source(argument, read_text(argument))))
     if inputs.explain_step is None:
-        SimOutput(inputs).run(scene_of(inputs, leader))
+        show_run(inputs, scene_of(inputs, leader))
         return
     scene, output = scene_of(inputs, leader), Output(inputs, "report", otherwise="text")
     refuse(output.style.format != "text", f"--explain-step writes text, not {output.style.format}")
@@ -267,7 +254,7 @@ def run(inputs: Inputs) -> None:
     law, rate, gain_linear, gain_angular, max_linear, max_angular, target, delay. Events are turtlesim's services:
     spawn, kill, reset, clear, teleport_absolute, teleport_relative, rotate_absolute (ROS 2), set_pen.
     """
-    output, duration = SimOutput(inputs), inputs.duration
+    duration = inputs.duration
     with inline_misuse():
         read = read_scene(source_of(inputs.scene), seed=inputs.seed)
     with misuse():
@@ -278,7 +265,7 @@ def run(inputs: Inputs) -> None:
         end = f"{(chosen.duration_ns or 0) / BILLION:g} s"
         more = f", nor do{f'es {late[1].place}' if len(late) == 2 else f' {len(late) - 1} more'}" if late[1:] else ""
         say(f"warning: {late[0].place} ({late[0].service}) never happens, the run ends at {end}{more}")
-    output.run(chosen)
+    show_run(inputs, chosen)
 
 
 @sim_command.command("teleop", cls=Command)
@@ -296,7 +283,6 @@ def teleop(inputs: Inputs) -> None:
     g t r e d c v b around f turn to a heading. When stdout is no terminal, every command goes there.
     """
     refuse(sys.stdin is None or not sys.stdin.isatty(), f"standard input is no terminal; {drivers.INSTEAD}")
-    output = SimOutput(inputs.but(live=True), leaders=True)
     STATE.cleans_up = True  # the terminal's keys
     with drivers.keyboard(headings=inputs.turtlesim == "ros2") as leader:
-        output.run(scene_of(inputs, leader))
+        show_run(inputs.but(live=True), scene_of(inputs, leader), leaders=True)
