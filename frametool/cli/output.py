@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import sys
 from importlib import import_module
-from itertools import islice
+from itertools import chain, islice
 from os.path import splitext
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,7 @@ from click import UsageError
 from frametool.cli.command import Inputs, refuse
 from frametool.cli.options import FULL
 from frametool.cli.sink import in_colour, is_special, say, writing
-from frametool.errors import FrametoolError, ValueInvalid, first_of, listing, printable, shown, warn
+from frametool.errors import ValueInvalid, first_of, listing, printable, shown, warn
 from frametool.formats import table
 from frametool.geometry.representations import EARTH_FRAMES, Notation, notation
 from frametool.grammar.result import RecordingStyle, Result, Style, sample_results
@@ -82,7 +82,6 @@ class Output:
     """Where results go and how they look: what the options of a command say."""
 
     marks: tuple[str, ...] = (ZEROS,)  # patterns of what has a style in text on a terminal
-    fault: FrametoolError | None = None  # ends a stream behind its good rows
 
     def __init__(self, inputs: Inputs, *what: str, otherwise: str | None = None) -> None:
         """Choose the format: as chosen, else by the file's suffix, else text for a terminal and YAML for a pipe.
@@ -153,25 +152,28 @@ class Output:
             names = ", ".join(each.name for each in (self.style.place, *self.style.place.more))
             raise ValueInvalid(f"{self.style.format} has no place for {names}; write csv, json, yaml or text")
 
-    def values(self, values: Iterable[Result | dict[str, Any]]) -> None:
+    def values(self, values: Iterable[Value]) -> None:
         """Write results: poses as poses; points, vectors and messages as the mappings they are."""
         self._refuse_place()
         if self._in_blocks:
-            self.pieces(self._blocks(_batched(iter(values))))
+            self.pieces(self._blocks(values))
             return
-        found = list(values)
+        text, keys = self.text_of([*values])
+        self.pieces([text])
+        self.warn_dropped(keys)
+
+    def text_of(self, found: list[Value]) -> tuple[str, set[str]]:
+        """Return the text of all results, and the keys of what they say besides."""
         poses = [each for each in found if isinstance(each, Result)]
         if len(poses) < len(found) and self.style.format != "csv":
             if self.style.format in table.FORMATS and "points" not in self._writes:
                 raise ValueInvalid(f"{self.style.format} holds poses; a point has no rotation")
             mappings = [each.mapping(self.style) if isinstance(each, Result) else each for each in found]
             placed = [each for each in mappings if not {"point", "vector"}.isdisjoint(each) and "header" not in each]
-            self._warn_dropped(key for each in placed for key in each)
             # for a person one a line, but what has more than three numbers as a mapping
             is_plain = all(any(isinstance(each.get(kind), list) for kind in ("point", "vector")) for each in mappings)
             text_module = "frametool.view.text" if is_plain else table.FORMATS["yaml"].writer
-            self.text(self._module(text_module).write_points(mappings, self.style))
-            return
+            return self._module(text_module).write_points(mappings, self.style), {*chain.from_iterable(placed)}
         keys = {key for each in poses for key in each.said(self.style)}
         if len(poses) > 1 or "covariance" in keys:
             self._shorten()
@@ -179,17 +181,17 @@ class Output:
             from frametool.stream.writers import refuse_scale_in
 
             refuse_scale_in(self.style.format, keys)
-        self.text(self._module("frametool.view.text").write_poses(found, self.style))
-        self._warn_dropped(key for each in poses for key in each.extras)
+        text = self._module("frametool.view.text").write_poses(found, self.style)
+        return text, {*chain.from_iterable(each.extras for each in poses)}
 
     def _shorten(self) -> None:
         """Show poses on a terminal by quaternion and rpy only, where no representation is asked for."""
         if self.style.screen and not self.style.notations:
             self.style.notations = notation("quaternion"), notation("rpy_deg")
 
-    def _warn_dropped(self, keys: Iterable[str]) -> None:
+    def warn_dropped(self, keys: set[str]) -> None:
         """Name what results say besides where the format has no place for it."""
-        others = {*keys} - {"stamp_ns", "point", "vector", "frame"}
+        others = keys - {"stamp_ns", "point", "vector", "frame"}
         if others and self.style.format not in ("text", "yaml", "json", "csv"):
             warn(f"{self.style.format}: {listing(others)} left out")
 
@@ -197,7 +199,7 @@ class Output:
         """Write poses that have the same keys, in batches."""
         self._refuse_place()
         self._shorten()
-        self.pieces(self._blocks(_batched(results)) if self._in_blocks else self._batches(results))
+        self.pieces(self._blocks(results) if self._in_blocks else self._batches(results))
 
     def _batches(self, results: Iterator[Result]) -> Iterator[str | bytes]:
         """Yield the text of some results after the other, short batches first.
@@ -213,20 +215,20 @@ class Output:
             yield write_poses([begin[0], *batch], self.style)[known:]
             size = min(2 * size, BATCH)
 
-    def _blocks(self, batches: Iterator[list[Value]]) -> Iterator[bytes]:
+    def _blocks(self, values: Iterable[Value]) -> Iterator[bytes]:
         """Yield a trajectory, columns of numbers or a recording, block after block of things of one kind."""
         writer = Blocks(self)
-        yield from map(writer.of, batches)
+        yield from map(writer.of, _batched(values))
         yield from writer.end()
 
     def writer(self) -> ResultWriter:
         """Return what writes the results of a stream of records."""
-        from frametool.stream.record_results import CollectedResults, CsvTable, Documents
+        from frametool.stream.record_results import CsvTable, Documents
 
         if self.style.format in ("csv", "json", "yaml"):
             return CsvTable(self.style) if self.style.format == "csv" else Documents(self.style)
         self._refuse_place()
-        return Blocks(self) if self._in_blocks else CollectedResults()
+        return Blocks(self) if self._in_blocks else AllTogether(self)
 
     def tree(self, tree: Frames, color: str = "auto") -> None:
         """Write a tree; on a terminal in colour, or as `color` says; in a format made of poses with every sample."""
@@ -280,18 +282,20 @@ class Output:
 
     def pieces(self, pieces: Iterable[str | bytes]) -> None:
         """Write text as it comes; into a file, whole or not at all."""
-        is_plain = self.style.format == "text"
         if not table.has_no_text(self.style.format):
             self._inputs.ask("precision")
         with self.opened() as write:
             for piece in pieces:
-                for_people = is_plain and isinstance(piece, str)
-                text = "\n".join(map(printable, str(piece).split("\n"))) if for_people else piece
-                write(in_colour(str(text), self.marks) if for_people and self.style.screen else text)
-            if self.fault is not None:
-                raise self.fault
+                write(self.shown(piece) if isinstance(piece, str) else piece)
         if self.path:
             self.report_suffix()
+
+    def shown(self, text: str) -> str:
+        """Return text as it is written: that for people printable, and on a terminal in colour."""
+        if self.style.format == "text":
+            text = "\n".join(map(printable, text.split("\n")))
+            return in_colour(text, self.marks) if self.style.screen else text
+        return text
 
     def opened(self) -> AbstractContextManager[Write]:
         """Open the place where results go."""
@@ -323,9 +327,29 @@ def _as_point(value: Result | dict[str, Any]) -> Result | dict[str, Any]:
     return {key: each for key, each in named.items() if each is not None} | value.extras
 
 
-def _batched(values: Iterator[Value]) -> Iterator[list[Value]]:
+def _batched(values: Iterable[Value]) -> Iterator[list[Value]]:
     """Yield values, many together."""
-    return iter(lambda: list(islice(values, BLOCK)), [])
+    rest = iter(values)
+    return iter(lambda: list(islice(rest, BLOCK)), [])
+
+
+class AllTogether:
+    """Keep the results of a stream of records, for formats that are written of all of them at once."""
+
+    def __init__(self, output: Output) -> None:
+        """Begin without any."""
+        self.output, self.values = output, list[Any]()
+
+    def of_block(self, block: BlockResults) -> bytes:
+        """Keep those of a block; nothing is written."""
+        self.values += block.in_order()
+        return b""
+
+    def end(self) -> Iterator[bytes]:
+        """Yield the text of all, and warn of what it leaves out."""
+        text, keys = self.output.text_of(self.values)
+        yield self.output.shown(text).encode()
+        self.output.warn_dropped(keys)
 
 
 class Blocks:

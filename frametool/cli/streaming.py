@@ -19,11 +19,11 @@ from frametool.cli.output import Output
 from frametool.cli.poses import inline_misuse, is_pasted, pasted_stream, pose_source, values_of, without_inverse
 from frametool.cli.sink import say, say_error
 from frametool.documents.source import HEAD, InputFile, Source, has_line, has_record, opened
-from frametool.errors import FormatError, FrametoolError, heard_by, warn
+from frametool.errors import FormatError, heard_by, warn
 from frametool.formats import table
 from frametool.formats.table import BAG, FORMATS, has_no_text, holds_arrays, is_trajectory, readers
 from frametool.grammar.result import Style
-from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRow, BadRows, Outcome, run
+from frametool.stream.faults import MOST, NULL, ON_ERROR, STOP, BadRow, BadRows, Outcome, run
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence
@@ -242,33 +242,27 @@ class Stream:
         output.take_axes(FORMATS[fmt].rows.axes, request.operation)
         if is_trajectory(fmt) and not output.notations:
             request = request.with_results(notations=())  # its rows stay what they are
-        if fmt in RECORDS and (output.chosen or fmt) != fmt and request.gathered is None:
-            return self._run_as_values(stream, fmt, request)
         gathered = request.gathered
         outcomes, written, tally = self._outcomes(stream, fmt, request)
         bad = self.policy(self.name, "row" if holds_arrays(fmt) else "line")
         outcomes = outcomes if gathered is None else gathered.placing(outcomes, bad.place)
-        status = self._write(outcomes, bad, gathers=gathered is not None)
-        if gathered is None:
-            output.report_suffix(written)
-        if tally is not None and tally.assumed:
-            self.inputs.note(f"{self.name}: {tally.assumed}")
-        return status
-
-    def _write(self, outcomes: Generator[Outcome], bad: BadRows, *, gathers: bool = False) -> int:
-        """Write what becomes of each block as it comes, or nothing of it, and report its bad rows."""
         progress: AbstractContextManager[Callable[[int, int], None] | None] = nullcontext()
         if not self.inputs.quiet and sys.stderr is not None and sys.stderr.isatty():
             from frametool.view.text import progress_bar
 
             progress = progress_bar(os.path.getsize(self.path) if self.path else None)
         with (
-            nullcontext(lambda _: None) if gathers else self.output.opened() as write,
+            output.opened() if gathered is None else nullcontext(lambda _: None) as write,
             progress as advance,
             self.opened(),  # closed before a file takes its place, which Windows asks for
             closing(outcomes),
         ):
-            return run(outcomes, write, bad, advance)
+            status = run(outcomes, write, bad, advance)
+        if gathered is None:
+            output.report_suffix(written)
+        if tally is not None and tally.assumed:
+            self.inputs.note(f"{self.name}: {tally.assumed}")
+        return status
 
     def detected(self, begin: bytes, *, is_table: bool = False) -> str:
         """Find the format of the stream by what it begins with, and by its name."""
@@ -299,7 +293,17 @@ class Stream:
         if fmt in RECORDS:
             from frametool.stream.record_stream import run_records
 
-            return run_records(stream, fmt, request, source=self.name), fmt, None
+            if gathers or chosen in (None, fmt):
+                return run_records(stream, fmt, request, source=self.name), fmt, None
+            from frametool.stream.record_results import written_by
+
+            if self.inputs.on_error == NULL and chosen not in ("csv", *RECORDS):
+                raise click.UsageError(f"--on-error null: {chosen} cannot hold a row without a result; give skip")
+            request = request.with_results(by_default=has_no_text(chosen) and not output.notations)
+            if table.is_recording(chosen):
+                request = request.with_results(place=None)  # a fix is made of ecef, unless of what was read
+            outcomes = run_records(stream, fmt, request, source=self.name, style=output.style)
+            return written_by(output.writer(), outcomes, self.inputs.on_error), chosen, None
         from frametool.stream.table import run_table
 
         return run_table(stream, fmt, request, source=self.name, header=self.inputs.header), fmt, None
@@ -340,33 +344,6 @@ class Stream:
 
         request.gathered.add(read_poses(source, request), source.name)
         return 0
-
-    def _run_as_values(self, stream: Any, fmt: str, request: Request) -> int:
-        """Write the results of records in another format than theirs."""
-        from frametool.stream.record_results import CollectedResults, written_by
-        from frametool.stream.record_stream import run_records
-
-        chosen, output = self.output.chosen or "", self.output
-        if self.inputs.on_error == NULL and chosen not in ("csv", *RECORDS):
-            raise click.UsageError(f"--on-error null: {chosen} cannot hold a row without a result; give skip")
-        request = request.with_results(by_default=has_no_text(chosen) and not output.notations)
-        if table.is_recording(chosen):
-            request = request.with_results(place=None)  # a fix is made of ecef, unless of what was read
-        bad, writer = self.policy(self.name), output.writer()
-        outcomes = run_records(stream, fmt, request, source=self.name, style=output.style)
-        outcomes = written_by(writer, outcomes, bad.on_error)
-        if not isinstance(writer, CollectedResults):
-            status = self._write(outcomes, bad)
-            output.report_suffix()
-            return status
-        try:
-            self._write(outcomes, bad, gathers=True)
-        except FrametoolError as error:
-            output.fault = error
-            if not writer.values:
-                raise
-        output.values(writer.values)
-        return ROWS_SKIPPED if bad.count else 0
 
     def policy(self, name: str, counted: str = "line") -> BadRows:
         """Return what reports and counts the bad rows of a source."""

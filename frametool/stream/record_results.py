@@ -148,16 +148,3 @@ class CsvTable(ResultWriter):
         self.waiting.write(text)
         self.sizes.append((len(self.columns), len(text)))
         return b""
-
-
-class CollectedResults(ResultWriter):
-    """Keep results, for formats that are written of all of them at once."""
-
-    def __init__(self) -> None:
-        """Begin without any."""
-        self.values: list[Value] = []
-
-    def of_block(self, block: BlockResults) -> bytes:
-        """Keep those of a block; nothing is written."""
-        self.values += block.in_order()
-        return b""
