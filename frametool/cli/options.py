@@ -8,12 +8,13 @@ from __future__ import annotations
 import os
 import re
 from functools import partial
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import Inputs, Text, inputs, misuse, option, refuse, say_if_typed, together
-from frametool.errors import FormatError, ValueInvalid, did_you_mean, shown
+from frametool.cli.command import OPTIONAL, Inputs, Text, inputs, misuse, option, refuse, say_if_typed, together
+from frametool.errors import SHOWN, FormatError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
 from frametool.geometry.euler import AXES
 from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, WORLDS, Notation, notations
@@ -376,3 +377,49 @@ def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int
 
     say_if_typed(text)
     return read_stamps(text, report)
+
+
+# --- misuse --------------------------------------------------------------------------------------------------------
+
+# an option, alone or behind its command, an option with a value, or a subcommand -> what to use instead
+REPLACED = {
+    "--jobs": "split the input, `split -n l/8 ROWS part. && ls part.* | xargs -P 8 -I{} frametool .. -i {} -o {}.out`",
+    "sim sweep": 'a loop in Python over `frametool.simulate(..)` of `FollowController("ros1", gain_linear=2)`',
+    "view --live": "the page plays what moves, `frametool view TREE --open`",
+    "--explain=latex": "--explain=markdown has the formulas as LaTeX; pandoc makes a document of it",
+    "view --sliders": "a robot's page has its sliders; --no-sliders leaves them out",
+    "compare --end": "--stop says the same",
+    "align --end": "--stop says the same",
+    "--tf2": "numbers are tf2's anyway; --cache 10 keeps as much as its buffer, --moving reads one stamp as it does",
+    "--explain-full": "--explain writes every product",
+    "--array": 'NPZ is not read; one NPY for each array, `numpy.save("NEW.npy", numpy.load("OLD.npz")["NAME"])`',
+    **{f"{name} {value}": f"{name}={value}" for name, values in OPTIONAL.items() for value in values},
+}
+
+
+def replacement(arguments: Sequence[str]) -> str | None:
+    """Return the sentence on the first word of a command line that went; None where all are in use."""
+    for before, word in pairwise(("", *arguments)):
+        option = word.partition("=")[0]
+        for name in (option, word, f"{before} {word}", f"{arguments[0]} {option}"):
+            if name in REPLACED:
+                return f"{name} is gone: {REPLACED[name]}"
+    return None
+
+
+def usage_sentence(error: click.ClickException, arguments: Sequence[str]) -> str:
+    """Put a usage error on one line that ends in where help is; what it quotes of the arguments is cut."""
+    ctx = getattr(error, "ctx", None)
+    message = error.format_message().replace("\n", " ").rstrip(".")
+    if isinstance(error, click.NoSuchOption):  # each version of click has its own words
+        name, near = error.option_name, error.possibilities or ()
+        message = f"no such option {shown(name)}{did_you_mean(name, near)}"
+    message = replacement(arguments) or message
+    for text in (part for each in arguments for part in (each, *each.split("=", 1)) if len(repr(part)) > SHOWN):
+        message = message.replace(repr(text), shown(text)).replace(text, shown(text)[1:-1])
+    if message[1:2].islower():
+        message = message[0].lower() + message[1:]
+    if ctx is None or ctx.parent is None:
+        return message
+    help_on = f"{' ' if message[-1] == '?' else '; '}`{ctx.command_path} --help` shows the options"
+    return f"{ctx.info_name}: {message}{'' if '`frametool' in message else help_on}"

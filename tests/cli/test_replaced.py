@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from frametool.cli.commands.help import REPLACED, replacement
+from frametool.cli.options import REPLACED, replacement
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -214,11 +214,11 @@ def answered(call: Callable[[], object], arguments: Sequence[str]) -> int:
     except click.exceptions.Exit as end:
         return end.exit_code
     except click.ClickException as error:
-        from frametool.cli.commands.help import usage_sentence
+        from frametool.cli.options import usage_sentence
 
         raise Misused(usage_sentence(error, arguments)) from None
     except FileProblem as error:
-        from frametool.cli.commands.help import replacement
+        from frametool.cli.options import replacement
 
         if gone := replacement(arguments):  # its value was taken for a file
             raise Misused(gone) from error

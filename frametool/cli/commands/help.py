@@ -1,13 +1,9 @@
-"""What comes with the program: `help` on subjects, commands and words, the cookbook, the files of `examples`.
-
-Also the sentences on what is misused, and on what went: only errors look at these.
-"""
+"""What comes with the program: `help` on subjects, commands and words, the cookbook, and the files of `examples`."""
 
 from __future__ import annotations
 
 import os
 import re
-from itertools import pairwise
 from shutil import get_terminal_size
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
@@ -19,11 +15,11 @@ from frametool.cli import command as shared
 from frametool.cli.command import EXIT_CODES, FILE, Inputs, Text, argument, command_named, option, refuse
 from frametool.cli.commands import COMMANDS, group
 from frametool.cli.sink import refuse_existing, show, writing
-from frametool.errors import SHOWN, FileProblem, ValueInvalid, any_near, did_you_mean, printable, shown
+from frametool.errors import FileProblem, ValueInvalid, any_near, printable, shown
 from frametool.formats.table import FORMATS, format_entry
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable
 
 
 PACKAGE = os.path.dirname(os.path.dirname(os.path.dirname(__file__)))
@@ -298,47 +294,3 @@ def examples_command(inputs: Inputs) -> None:
     for each, path in targets.items():
         with writing(path, force=force) as write:
             write(example(each))
-
-
-# an option, alone or behind its command, an option with a value, or a subcommand -> what to use instead
-REPLACED = {
-    "--jobs": "split the input, `split -n l/8 ROWS part. && ls part.* | xargs -P 8 -I{} frametool .. -i {} -o {}.out`",
-    "sim sweep": 'a loop in Python over `frametool.simulate(..)` of `FollowController("ros1", gain_linear=2)`',
-    "view --live": "the page plays what moves, `frametool view TREE --open`",
-    "--explain=latex": "--explain=markdown has the formulas as LaTeX; pandoc makes a document of it",
-    "view --sliders": "a robot's page has its sliders; --no-sliders leaves them out",
-    "compare --end": "--stop says the same",
-    "align --end": "--stop says the same",
-    "--tf2": "numbers are tf2's anyway; --cache 10 keeps as much as its buffer, --moving reads one stamp as it does",
-    "--explain-full": "--explain writes every product",
-    "--array": 'NPZ is not read; one NPY for each array, `numpy.save("NEW.npy", numpy.load("OLD.npz")["NAME"])`',
-    **{f"{name} {value}": f"{name}={value}" for name, values in shared.OPTIONAL.items() for value in values},
-}
-
-
-def replacement(arguments: Sequence[str]) -> str | None:
-    """Return the sentence on the first word of a command line that went; None where all are in use."""
-    for before, word in pairwise(("", *arguments)):
-        option = word.partition("=")[0]
-        for name in (option, word, f"{before} {word}", f"{arguments[0]} {option}"):
-            if name in REPLACED:
-                return f"{name} is gone: {REPLACED[name]}"
-    return None
-
-
-def usage_sentence(error: click.ClickException, arguments: Sequence[str]) -> str:
-    """Put a usage error on one line that ends in where help is; what it quotes of the arguments is cut."""
-    ctx = getattr(error, "ctx", None)
-    message = error.format_message().replace("\n", " ").rstrip(".")
-    if isinstance(error, click.NoSuchOption):  # each version of click has its own words
-        name, near = error.option_name, error.possibilities or ()
-        message = f"no such option {shown(name)}{did_you_mean(name, near)}"
-    message = replacement(arguments) or message
-    for text in (part for each in arguments for part in (each, *each.split("=", 1)) if len(repr(part)) > SHOWN):
-        message = message.replace(repr(text), shown(text)).replace(text, shown(text)[1:-1])
-    if message[1:2].islower():
-        message = message[0].lower() + message[1:]
-    if ctx is None or ctx.parent is None:
-        return message
-    help_on = f"{' ' if message[-1] == '?' else '; '}`{ctx.command_path} --help` shows the options"
-    return f"{ctx.info_name}: {message}{'' if '`frametool' in message else help_on}"
