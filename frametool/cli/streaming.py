@@ -71,16 +71,17 @@ EXPLAIN = explain_option()
 class Stream:
     """The stream of a command and where its results go, as the options describe them."""
 
+    _opened: BufferedReader | None = None
+    within = ""  # the format of the records in a bag
+
     def __init__(self, inputs: Inputs, output: Output) -> None:
         """Look at what the options say; each is asked for where it counts."""
         self.inputs, self.output = inputs, output
         path = inputs.peek("input_path")
         self.paths: Sequence[str] = path if isinstance(path, tuple) else () if path is None else (path,)
         self.path: str | None = self.paths[0] if self.paths and self.paths[0] != "-" else None
-        self._opened: BufferedReader | None = None
-        self.within = ""  # the format of the records in a bag
-        looked = inputs.peek  # an option may say that the stream is a table
-        self._is_table = bool(looked("columns") or looked("keep") or looked("prefix") or looked("header") is False)
+        # an option may say that the stream is a table
+        self._is_table = any(map(inputs.peek, ("columns", "keep", "prefix"))) or inputs.peek("header") is False
         notations: Any = inputs.peek("from_rep") or (None,)
         refuse(len(notations) > 1, "--from takes one representation")
         self.notation: Any = notations[0]
