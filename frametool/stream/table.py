@@ -120,11 +120,12 @@ class Table(NamedTuple):
 
 
 def open_table(
-    block: bytes, fmt: str, *, header: bool, source: str, expected: object = None
-) -> tuple[Table, bytes]:
+    block: bytes, fmt: str, *, header: bool, source: str, expected: object = None,
+    known: Callable[[Sequence[str]], bool] = has_pose_column,
+) -> tuple[Table, bytes]:  # fmt: skip
     """Look at the first block; return the table and the block without what is before the first row.
 
-    expected: what --from says of numbers without names
+    expected: what --from says of numbers without names; known: whether words of a comment are names of columns
     """
     row = FORMATS[fmt].rows
     delimiter = (row.delimiter or "").encode()
@@ -139,12 +140,12 @@ def open_table(
     if delimiter and torn_record(line, delimiter) is not None:
         raise FormatError(UNCLOSED, source=source, line=1)
     cells = cells_of(line, delimiter)
-    named = _named_comment(comments, delimiter, len(cells)) if header and comments else None
+    named = _named_comment(comments, delimiter, len(cells), known) if header and comments else None
     if not cells and not (delimiter and comments):
         raise FormatError("no rows in it", source=source)
     numeric = [_is_number(_unquoted(cell)) for cell in cells]
     own = header and not (all(numeric) if delimiter else any(numeric))
-    if named is not None and not (own and has_pose_column(map(_unquoted, cells))):
+    if named is not None and not (own and known([*map(_unquoted, cells)])):
         return named._replace(head=mark + named.head), rest
     if not own:
         if header and not expected and delimiter and not row.columns and len(cells) != len(FORMATS["tum"].rows.columns):
@@ -165,8 +166,10 @@ def without_comments(text: bytes) -> bytes:
     return text[end:]
 
 
-def _named_comment(comments: bytes, delimiter: bytes, width: int) -> Table | None:
-    """Take the last comment for the header if it has a word for each column and one of them is a name of ours."""
+def _named_comment(
+    comments: bytes, delimiter: bytes, width: int, known: Callable[[Sequence[str]], bool]
+) -> Table | None:
+    """Take the last comment for the header if it has a word for each column and they are known as names."""
     lines = [line for line in comments.splitlines(keepends=True) if line.strip()]
     if not lines:
         return None
@@ -175,7 +178,7 @@ def _named_comment(comments: bytes, delimiter: bytes, width: int) -> Table | Non
     words = text.lstrip(b"# \t")
     cells = cells_of(words, delimiter)
     names = tuple(map(_unquoted, cells))
-    if not cells or (width and len(cells) != width) or not has_pose_column(names):
+    if not cells or (width and len(cells) != width) or not known(names):
         return None
     before, behind = comments[: start + len(text) - len(words)], comments[start + len(text) :]
     return Table(delimiter, names, len(cells), before, tuple(cells), words, behind)

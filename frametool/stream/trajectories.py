@@ -155,9 +155,9 @@ def read_stamps(path: str, report: Report) -> list[int]:
         file.close()
     if not words:
         raise FormatError(NO_TIMES, source=file.name)
-    text = _with_title(text, (known.rows.delimiter or "").encode() or None)
     titled = not is_list or stamp_column([words[0].decode("utf-8", "replace")]) is not None
-    table, rest = open_table(text, fmt, header=titled, source=file.name)
+    known_by = lambda names: stamp_column(names) is not None  # noqa: E731
+    table, rest = open_table(text, fmt, header=titled, source=file.name, known=known_by)
     named = table.names or (known.rows.columns or ("t",))[: table.width]
     at, below = (0, None) if fmt == "euroc" else stamp_places(named)
     if at is None:
@@ -182,15 +182,6 @@ def read_stamps(path: str, report: Report) -> list[int]:
     if any(map(ge, found, found[1:])):
         warn(f"{file.name}: stamps are out of order or doubled; used as they stand")
     return found
-
-
-def _with_title(text: bytes, delimiter: bytes | None) -> bytes:
-    """Make the comment above the first row its title, where it names stamps and all columns: `#timestamp [ns],file`."""
-    found = re.match(rb"((?:#.*\n)*?)#(.*\n)([^#\n].*)", text)
-    if found is None or len(found[2].split(delimiter)) != len(found[3].split(delimiter)):
-        return text
-    names = [each.decode("utf-8", "replace").strip() for each in found[2].split(delimiter)]
-    return text if stamp_column(names) is None else found[1] + found[2] + text[found.start(3) :]
 
 
 NO_TIMES = "no times in it; write one a line"

@@ -125,6 +125,7 @@ def test_a_result_reads_back(run: Run) -> None:
     [
         ("", [], "nothing in it"),
         ("x,y,z\n", [], "no poses"),
+        ("tag,x,y,z\n", ["--by", "tag"], "no poses"),
         ("x,y,z,weight\n1,2,3,-1\n", ["--weights", "weight"], "negative"),
         ("x,y,z,weight\n1,2,3,foo\n", ["--weights", "weight"], "'foo' is not a number"),
         ("x,y,z,weight\n1,2,3,0\n", ["--weights", "weight"], "weight"),

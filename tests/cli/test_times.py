@@ -297,7 +297,9 @@ def test_random_options_never_end_in_a_traceback(run: Run) -> None:
 STAMPS = {
     "lines.txt": "0.5\n# between\n\n1.5\n",
     "titled.txt": "stamp_ns\n500000000\n1500000000\n",
+    "noted.txt": "# stamp\n0.5\n1.5\n",
     "rows.csv": "name,t\na,0.5\nb,1500ms\n",
+    "both.csv": "# x,t\nname,t\na,0.5\nb,1.5\n",
     "images.csv": "#timestamp [ns],filename\n500000000,a.png\n1500000000,b.png\n",
     "seconds.csv": "sec,nanosec\n0,500000000\n1,500000000\n",
     "walk.tum": "# timestamp tx ty tz qx qy qz qw\n0.5 0 0 0 0 0 0 1\n1.5 1 0 0 0 0 0 1\n",
