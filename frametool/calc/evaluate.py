@@ -226,7 +226,7 @@ class _Walk:
     def _list(self, branch: Branch) -> Term:
         items = tuple(map(self._value, branch.parts))
         if all(item.type.kind == NUMBER for item in items):
-            return functions.operated("list", *items)
+            return functions.called("list", items)
         other = next((item for item in items if item.type.kind != items[0].type.kind), None)
         if other is not None:
             raise CalcError(f"a list holds values of one kind, found {items[0].type.named} and {other.type.named}")
@@ -246,12 +246,12 @@ class _Walk:
         for (operator, at), part in zip(branch.value, branch.parts[1:], strict=True):
             right = self._value(part)
             with located(at):
-                left = functions.operated(operator, left, right)
+                left = functions.called(operator, [left, right])
         return left
 
     def _sign(self, branch: Branch) -> Term:
         below = self._value(branch.parts[0])
-        return functions.operated("negate", below) if branch.value == "-" else below
+        return functions.called("negate", [below]) if branch.value == "-" else below
 
     def _power(self, branch: Branch) -> Term:
         """Raise a number to a power, or scale a pose's screw motion: exp(f log); -1 is the inverse."""
@@ -259,7 +259,7 @@ class _Walk:
         known = exponent.parts[0] if exponent.parts and exponent.type == PLAIN_NUMBER else None
         if base.type.kind == POSE and type(known) is float and abs(known) == 1.0:
             return base if known == 1.0 else functions.called("inv", [base])
-        return functions.operated("^", base, exponent)
+        return functions.called("^", [base, exponent])
 
     def _as(self, branch: Branch) -> Term:
         """Name both frames of a pose."""

@@ -417,15 +417,6 @@ OPERATORS: dict[str, tuple[str, Sequence[Overload]]] = {
 }  # fmt: skip
 
 
-def operated(sign: str, *terms: Term) -> Term:
-    """Return the result of an operator; raises CalcError."""
-    refusal, overloads = OPERATORS[sign]
-    for each in overloads:  # the first that suits the arguments
-        if (found := each.result(sign, terms)) is not None:
-            return found
-    raise CalcError(f"cannot {refusal.format(*(term.type.named for term in terms), count=len(terms))}")
-
-
 def _angular(pick: Callable[[Number, Number], Number]) -> list[Overload]:
     """Return the meanings of a function of an angle, from its sine and cosine; exact at quarter turns in degrees."""
     return [
@@ -489,10 +480,12 @@ FUNCTIONS: dict[str, tuple[str, Sequence[Overload]]] = {
 
 
 def called(name: str, terms: Sequence[Term]) -> Term:
-    """Return the result of a function; raises CalcError."""
-    takes, overloads = FUNCTIONS[name]
-    for each in overloads:
+    """Return the result of an operator or a function; raises CalcError."""
+    takes, overloads = FUNCTIONS.get(name) or OPERATORS[name]
+    for each in overloads:  # the first that suits the arguments
         if (found := each.result(name, terms)) is not None:
             return found
-    what = first_of([term.type.named for term in terms], 3) or "nothing"
-    raise CalcError(f"{name}() takes {takes}, found {what}")
+    types = [term.type.named for term in terms]
+    if name in FUNCTIONS:
+        raise CalcError(f"{name}() takes {takes}, found {first_of(types, 3) or 'nothing'}")
+    raise CalcError(f"cannot {takes.format(*types, count=len(terms))}")

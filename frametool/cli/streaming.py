@@ -292,22 +292,25 @@ class Stream:
             return self._poses(stream, fmt, request)
         request = request.with_results(notations=()) if gathers else request
         if fmt in RECORDS:
-            from frametool.stream.record_stream import run_records
-
-            if gathers or chosen in (None, fmt):
-                return run_records(stream, fmt, request, source=self.name), fmt, None
-            from frametool.stream.record_results import written_by
-
-            if self.inputs.on_error == NULL and chosen not in ("csv", *RECORDS):
-                raise click.UsageError(f"--on-error null: {chosen} cannot hold a row without a result; give skip")
-            request = request.with_results(by_default=has_no_text(chosen) and not output.notations)
-            if table.is_recording(chosen):
-                request = request.with_results(place=None)  # a fix is made of ecef, unless of what was read
-            outcomes = run_records(stream, fmt, request, source=self.name, style=output.style)
-            return written_by(output.writer(), outcomes, self.inputs.on_error), chosen, None
+            return self._records(stream, fmt, request, "" if gathers else chosen or "")
         from frametool.stream.table import run_table
 
         return run_table(stream, fmt, request, source=self.name, header=self.inputs.header), fmt, None
+
+    def _records(self, stream: Any, fmt: str, request: Request, chosen: str) -> tuple[Generator[Outcome], str, None]:
+        """Write the results of records in place, or in a format that was chosen."""
+        from frametool.stream.record_results import written_by
+        from frametool.stream.record_stream import run_records
+
+        if chosen in ("", fmt):
+            return run_records(stream, fmt, request, source=self.name), fmt, None
+        if self.inputs.on_error == NULL and chosen not in ("csv", *RECORDS):
+            raise click.UsageError(f"--on-error null: {chosen} cannot hold a row without a result; give skip")
+        request = request.with_results(by_default=has_no_text(chosen) and not self.output.notations)
+        if table.is_recording(chosen):
+            request = request.with_results(place=None)  # a fix is made of ecef, unless of what was read
+        outcomes = run_records(stream, fmt, request, source=self.name, style=self.output.style)
+        return written_by(self.output.writer(), outcomes, self.inputs.on_error), chosen, None
 
     def _poses(self, stream: Any, fmt: str, request: Request) -> tuple[Generator[Outcome], str, Diagnostics]:
         """Write the results of rows, or of poses that no table holds, in another format."""

@@ -33,20 +33,8 @@ from frametool.formats.rows.csv import split_line
 from frametool.frames.stamps import BILLION, FURTHEST_NS, format_stamp, parse_time
 from frametool.grammar.readers import Misfit, Path, as_mapping, kind, read_numbers, within
 from frametool.ros.messages import is_noise
-from frametool.sim.turtle import (
-    CENTRE,
-    KEYS,
-    LAWS,
-    LEADERS,
-    SERVICES,
-    TARGETS,
-    VARIANTS,
-    FollowController,
-    Twist,
-    built_in,
-    complete,
-    scripted,
-)
+from frametool.sim import turtle as drivers
+from frametool.sim.turtle import CENTRE, KEYS, LEADERS, SERVICES, TARGETS, FollowController, Twist, built_in, scripted
 from frametool.text.numbers import parse_number, read_number_or_angle
 
 if TYPE_CHECKING:
@@ -170,7 +158,7 @@ def _whole(text: str, most: int) -> int:
     return int(text)
 
 
-CHOICES = {"turtlesim": VARIANTS, "law": (*LAWS,), "target": TARGETS}
+CHOICES = {"turtlesim": drivers.VARIANTS, "law": (*drivers.LAWS,), "target": TARGETS}
 # key, also of a service's argument or a command -> how its text is read, and what it is; others are numbers
 READERS: dict[str, tuple[Callable[[str], Any], str]] = {
     "duration": (_duration, "a duration in seconds, or inf"),
@@ -464,5 +452,5 @@ def _call(value: Any) -> ServiceCall:
     if service == "kill" and type(arguments) is str:
         arguments = {"name": arguments}
     read = within((service,), _fields, arguments or {}, SERVICES[service], f"the arguments of {service}")
-    within((service,), complete, service, read)
+    within((service,), drivers.complete, service, read)
     return ServiceCall(within(("t",), read_value, "t", entry["t"]), service, read)

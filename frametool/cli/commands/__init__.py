@@ -121,25 +121,27 @@ class Group(WithHelp, click.Group):
         return named + click.Command.shell_complete(self, ctx, incomplete)
 
 
-def _show_version(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:  # click's signature
-    """Print the version; a literal, because asking importlib.metadata for it takes 25 ms."""
-    if chosen:
-        with writing(None) as write:
-            write(f"frametool {__version__}\n{_surroundings() if ctx.params.get('all_versions') else ''}")
-        ctx.exit()
-
-
 PACKAGES = ("numpy", "click", "rich", "pyyaml", "rosbags", "pyarrow", "laspy", "matplotlib")
 
 
-def _surroundings() -> str:
-    """Return the versions of Python and of the packages there are, one a line, for a report of a fault."""
-    import platform
-    from importlib.metadata import distributions
+def _show_version(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:  # click's signature
+    """Print the version, with -v also those of Python and of the packages there are, for a report of a fault.
 
-    there = {str(each.name).lower(): each.version for each in distributions()}
-    python = f"Python {platform.python_version()} on {platform.system()} {platform.machine()}\n"
-    return python + "".join(f"{package} {there.get(package, 'not installed')}\n" for package in PACKAGES)
+    It is a literal, because asking importlib.metadata for it takes 25 ms.
+    """
+    if not chosen:
+        return
+    lines = [f"frametool {__version__}"]
+    if ctx.params.get("all_versions"):
+        import platform
+        from importlib.metadata import distributions
+
+        there = {str(each.name).lower(): each.version for each in distributions()}
+        lines.append(f"Python {platform.python_version()} on {platform.system()} {platform.machine()}")
+        lines += [f"{package} {there.get(package, 'not installed')}" for package in PACKAGES]
+    with writing(None) as write:
+        write("".join(f"{line}\n" for line in lines))
+    ctx.exit()
 
 
 group = Group("group", help=HELP, params=[

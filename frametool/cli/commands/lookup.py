@@ -26,7 +26,6 @@ from frametool.stream.faults import NULL, SKIP, RowsSkipped
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.frames.lookups import Replayed
     from frametool.geometry.types import Components
     from frametool.grammar.result import Result
 
@@ -42,7 +41,7 @@ class Skipped:
 
     def __init__(self, *, in_json: bool) -> None:
         """Create an empty count; `in_json` says how errors are written."""
-        self.in_json, self.count, self.found = in_json, 0, 0
+        self.in_json, self.count = in_json, 0
         self.errors: list[FrametoolError] = []
 
     def add(self, error: FrametoolError | None, count: int = 1) -> None:
@@ -51,19 +50,13 @@ class Skipped:
         if error is not None and len(self.errors) < MOST_REPORTED:
             self.errors.append(error)
 
-    def counted(self, results: Iterator[Result]) -> Iterator[Result]:
-        """Yield results and count them."""
-        for result in results:
-            self.found += 1
-            yield result
-
-    def finish(self) -> int:
-        """Report what was left out; return the exit status."""
+    def finish(self, found: int) -> int:
+        """Report what was left out next to so many results; return the exit status."""
         if not self.count:
             return 0
         for error in self.errors:
             say_error(error, in_json=self.in_json, fate="skipped")
-        asked = self.found + self.count
+        asked = found + self.count
         total = RowsSkipped(f"{self.count} of {asked} times skipped", bad=self.count, rows=asked)
         say_error(total, in_json=self.in_json)
         return total.exit_code
@@ -168,13 +161,13 @@ def _many(task: PoseTask, lookups: algebra.Lookups, target: str, source: str) ->
         is_full = len(skipped.errors) == MOST_REPORTED  # to say why takes longest
         skipped.add(None if is_full else algebra.why_missing(tree, target, source, at_ns))
 
-    found = lookups.results(target, source, asked, miss if skip else None)
+    unread = skipped.count
     try:
-        task.output.poses_as_they_come(skipped.counted(found))
+        task.output.poses_as_they_come(lookups.results(target, source, asked, miss if skip else None))
     except NoDataAt as error:
         error.remedy = "; --on-error skip goes on" * (len(asked) > 1)  # type: ignore[attr-defined]
         raise
-    return skipped.finish()
+    return skipped.finish(len(asked) + unread - skipped.count)
 
 
 def _by_row(task: PoseTask, lookups: algebra.Lookups, target: str | None, source: str | None) -> int:
@@ -253,27 +246,28 @@ def echo_command(inputs: Inputs) -> int:
     if frames.covariances:
         warn(LEFT_OUT.format("echo"))
     replayed = frames.replay(target, source, rate_hz=inputs.rate, start_ns=start, stop_ns=stop)
-    skipped = Skipped(in_json=out.chosen == "json")
-    results = skipped.counted(_results(replayed, target, source, skipped))
-    shown = islice(results, None if limit is None else min(limit, sys.maxsize))
+    skipped, found = Skipped(in_json=out.chosen == "json"), 0
+
+    def results() -> Iterator[Result]:
+        """Yield the answers and count the errors; raise the first error where no time has data."""
+        nonlocal found
+        for at_ns, answer, steps in replayed:
+            if isinstance(answer, NoDataAt):
+                skipped.add(answer, steps)
+            else:
+                found += 1
+                yield algebra.result_at(answer.components, target, source, at_ns)
+        if skipped.errors and not found:
+            raise skipped.errors[0]
+
+    shown = islice(results(), None if limit is None else min(limit, sys.maxsize))
     if out.style.format == "text":
         from frametool.view.text import write_blocks
 
         out.pieces(write_blocks(shown, target, source, out.style))
     else:
         out.poses_as_they_come(shown)
-    return skipped.finish()
-
-
-def _results(replayed: Iterator[Replayed], target: str, source: str, skipped: Skipped) -> Iterator[Result]:
-    """Yield the answers and count the errors; raise the first error where no time has data."""
-    for at_ns, found, steps in replayed:
-        if isinstance(found, NoDataAt):
-            skipped.add(found, steps)
-        else:
-            yield algebra.result_at(found.components, target, source, at_ns)
-    if skipped.errors and not skipped.found:
-        raise skipped.errors[0]
+    return skipped.finish(found)
 
 
 @command_named("fk", own=("input_path", "joints"))
