@@ -159,6 +159,8 @@ class Pairs(NamedTuple):
     possible: the possible number of pairs: poses of the sampled trajectory within the time of the other
     shared: the number of poses of one trajectory with more than one partner
     interpolated: "ref", "est" or None; max_gap_s: the maximum interval for interpolation
+    offset_ns: what was added to the estimate's stamps; offset_score: of an estimated one
+    mount: by which the estimate's poses were multiplied
     """
 
     ref: Trajectory
@@ -167,6 +169,9 @@ class Pairs(NamedTuple):
     shared: int = 0
     interpolated: str | None = None
     max_gap_s: float | None = None
+    offset_ns: int = 0
+    offset_score: float | None = None
+    mount: Transform | None = None
 
     def at(self, index: Array | slice) -> Pairs:
         """Select pairs as numpy does."""

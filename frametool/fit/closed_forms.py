@@ -118,7 +118,7 @@ class PointsFit(NamedTuple):
 
     used: the inliers; left_out: outliers with a weight
     residuals: target - (c R source + t), (n, 3); u: the residual of each in sigmas; sigma: of each axis for weight 1
-    dof: 3 n - 6, with a scale 3 n - 7; rms_distance: of the inliers; hints: warnings
+    dof: 3 n - 6, with a scale 3 n - 7; rms: of the inliers, metres and None; hints: warnings
     """
 
     transform: Transform
@@ -131,7 +131,7 @@ class PointsFit(NamedTuple):
     u: Array
     sigma: float
     dof: int
-    rms_distance: float
+    rms: tuple[float, None]
     hints: list[str]
 
 
@@ -186,7 +186,7 @@ def solve_points(
     return PointsFit(
         best.transform.canonical(), best.scale, scale_sigma, covariance, used, (mass > 0.0) & ~used, residuals,
         np.sqrt(mass / 3.0) * lsq.length(residuals) / sigma, sigma, 3 * int(kept.sum()) - 6 - scale,
-        sqrt((residuals[used] ** 2).sum() / used.sum()), hints,
+        (sqrt((residuals[used] ** 2).sum() / used.sum()), None), hints,
     )  # fmt: skip
 
 

@@ -12,7 +12,15 @@ from frametool.errors import ValueInvalid, shown
 from frametool.fit import alignment
 from frametool.fit.alignment import ALIGNMENTS, Fit, Pairs, Unaligned, clock_offset, fitted, lever_arm, principal_axes
 from frametool.fit.least_squares import require_near
-from frametool.fit.numbers import ROUNDING, absolute_errors, all_pairs, chained, relative_errors, segment_errors
+from frametool.fit.numbers import (
+    ROUNDING,
+    absolute_errors,
+    all_pairs,
+    chained,
+    numbers,
+    relative_errors,
+    segment_errors,
+)
 from frametool.frames.stamps import format_stamp
 from frametool.frames.trajectory import Trajectory, way
 from frametool.geometry import earth
@@ -143,8 +151,8 @@ DELTAS = (Delta(1.0, "m"), Delta(10.0, "m"), Delta(100.0, "m"))
 class Comparison(NamedTuple):
     """The errors of an estimate relative to its reference.
 
-    names, sizes: of the two; ref_duration_ns: 0 if poses have no stamps
-    est: all of it, in order; pairs: as they were compared, in their own worlds
+    names: of the two
+    ref, est: all of them, as they were read; pairs: as they were compared, in their own worlds
     moved: the aligned poses of the estimate
     ate_by_alignment: the rmse under each of ALIGNMENTS, None if it is not determined
     relative: relative errors for each delta; segments: KITTI's, None without rotations
@@ -152,15 +160,11 @@ class Comparison(NamedTuple):
     """
 
     names: tuple[str, str]
-    sizes: tuple[int, int]
-    ref_duration_ns: int
     settings: Settings
+    ref: Trajectory
     est: Trajectory
     pairs: Pairs
     moved: Trajectory
-    offset_ns: int
-    offset_score: float | None
-    mount: Transform | None
     fit: Fit
     ate_by_alignment: dict[str, float | None]
     ate: AbsoluteErrors
@@ -176,15 +180,13 @@ class Comparison(NamedTuple):
 
     def whole_estimate(self) -> Trajectory:
         """Return the whole estimate as it was compared: on the reference's clock, mounted and aligned."""
-        est = self.est
+        est, mount = self.est if self.settings.reporting.evo else self.est.in_order(), self.pairs.mount
         if est.stamps_ns is not None:
-            est = est._replace(stamps_ns=est.stamps_ns + self.offset_ns)
-        return self.fit.moved(est if self.mount is None else est.with_poses(est.poses @ self.mount))
+            est = est._replace(stamps_ns=est.stamps_ns + self.pairs.offset_ns)
+        return self.fit.moved(est if mount is None else est.with_poses(est.poses @ mount))
 
     def as_dict(self) -> dict[str, Any]:
         """Return every setting and number, as `frametool compare -f json` prints them."""
-        from frametool.fit.numbers import numbers
-
         return numbers(self)
 
 
@@ -196,15 +198,14 @@ def compared(
     Raises ValueInvalid if they have no stamps in common, or a requested quantity is not determined.
     """
     hints: list[str] = []
-    sizes, (pairing, fitting, reporting) = (ref.size, est.size), settings
+    pairing, fitting, reporting = settings
     for each, name in zip((ref, est), names, strict=True):
         require_near(each.xyz, name)
-    ref, est = _on_the_ground((ref, est), names, hints)
+    both = ref, est = _on_the_ground((ref, est), names, hints)
     if not reporting.evo:
         hints += [*ref.disorder(names[0]), *est.disorder(names[1])]
-        ref, est = ref.in_order(), est.in_order()
-    pairs, offset_ns, score = _paired(ref, est, settings, names, hints)
-    pairs, mount = _mounted(_cut(pairs, pairing), fitting)
+        both = ref.in_order(), est.in_order()
+    pairs = _mounted(_cut(_paired(*both, settings, names, hints), pairing), fitting)
     up, first = np.array(fitting.up), pairs
     if (limit := fitting.align_first) is not None:
         along = limit.along(pairs.ref)
@@ -231,8 +232,7 @@ def compared(
             hints.append("positions lie nearly on a line: the turn about it rests on noise")
     walked = pairs.ref if reporting.pairs_from == "reference" else moved
     return Comparison(
-        names, sizes, 0 if ref.stamps_ns is None else int(np.ptp(ref.stamps_ns)), settings, est, pairs, moved,
-        offset_ns, score, mount, fit, by_alignment, ate,
+        names, settings, ref, est, pairs, moved, fit, by_alignment, ate,
         list(_relative(pairs.ref, moved, walked, reporting, hints)),
         segment_errors(pairs.ref, moved, reporting.segments, reporting.segment_step), hints,
     )  # fmt: skip
@@ -264,15 +264,15 @@ def _on_the_ground(
 
 def _paired(
     ref: Trajectory, est: Trajectory, settings: Settings, names: tuple[str, str], hints: list[str]
-) -> tuple[Pairs, int, float | None]:
-    """Return the pairs, and the offset of the clocks with its score if it was estimated."""
+) -> Pairs:
+    """Return the pairs, with the offset of the clocks, and with its score if it was estimated."""
     pairing, is_nearest = settings.pairing, settings.pairing.match == "nearest"
     if ref.stamps_ns is None or est.stamps_ns is None:
         if (ref.stamps_ns is None) != (est.stamps_ns is None):
             raise ValueInvalid(f"{names[ref.stamps_ns is not None]} has no stamps; give them with --stamps FILE")
         if pairing.offset:
             raise ValueInvalid("poses that are counted have no clock; leave the offset out")
-        return alignment.paired(ref, est), 0, None
+        return alignment.paired(ref, est)
     offset_ns, score = 0, None
     if pairing.offset == AUTO:
         kind = "sim3" if settings.fitting.align in alignment.SCALED else "se3"
@@ -300,7 +300,7 @@ def _paired(
         hints.append(f"{pairs.shared} poses have more than one partner")
     if pairing.offset is None:
         _warn_of_clock(ref, est, names[1], hints)
-    return pairs, offset_ns, score
+    return pairs._replace(offset_ns=offset_ns, offset_score=score)
 
 
 def _span(each: Trajectory, name: str) -> str:
@@ -339,11 +339,11 @@ def _cut(pairs: Pairs, pairing: Pairing) -> Pairs:
     return found
 
 
-def _mounted(pairs: Pairs, fitting: Fitting) -> tuple[Pairs, Transform | None]:
+def _mounted(pairs: Pairs, fitting: Fitting) -> Pairs:
     """Replace EST's body by REF's body: est_i X."""
     ref, est, mount = pairs.ref, pairs.est, fitting.mount
     if mount is None:
-        return pairs, None
+        return pairs
     if est.rotation is None:
         raise ValueInvalid("a mount needs rotations of the estimate")
     if isinstance(mount, str):  # the lever arm from the fit, and a rotation common to all pairs
@@ -354,7 +354,7 @@ def _mounted(pairs: Pairs, fitting: Fitting) -> tuple[Pairs, Transform | None]:
         if ref.rotation is not None and placed.rotation is not None:
             shared = _shared(placed.rotation.inverse() @ ref.rotation)
         mount = Transform(Rotation.identity() if shared is None else shared, arm)
-    return pairs._replace(est=est.with_poses(est.poses @ mount)), mount
+    return pairs._replace(est=est.with_poses(est.poses @ mount), mount=mount)
 
 
 def _spread(rotations: Rotation) -> float:

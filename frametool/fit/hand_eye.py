@@ -17,7 +17,7 @@ from frametool.fit import least_squares as lsq
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Sequence
     from typing import TypeAlias
 
     from frametool.fit.least_squares import Mask, Rows
@@ -50,8 +50,8 @@ class HandEye(NamedTuple):
 
     noise_at: the frame in which errors are equal, None if there are none
     used: the inliers; u: the residual of each sample in sigmas; residuals: (n, 6), metres and radians
-    sigma: of each axis, metres and radians; dof: 3 n - 6 for each of them; rms_distance, rms_angle: of the inliers
-    turns: rms about the two main axes of the pairs of inliers, radians; warnings: messages
+    sigma: of each axis, metres and radians; dof: 3 n - 6 for each of them; rms: of the inliers, metres and radians
+    turns: rms about the two main axes of the pairs of inliers, radians
     """
 
     x: Transform
@@ -64,10 +64,8 @@ class HandEye(NamedTuple):
     residuals: Array
     sigma: tuple[float, float]
     dof: int
-    rms_distance: float
-    rms_angle: float
+    rms: tuple[float, float]
     turns: tuple[float, float]
-    warnings: list[str]
 
 
 def solve_hand_eye(
@@ -98,8 +96,8 @@ def solve_hand_eye(
     others = _start(other, robust=robust)[1]
     if (CLEARLY * others <= medians).all() and BETTER**2 * others.prod() <= medians.prod():
         raise ValueInvalid(
-            f"the samples do not fit ({_off(medians)}); they do ({_off(others)}) {'without' if eye_to_hand else 'with'}"
-            f" --eye-to-hand, or with TARGET inverted ({names[3]}<-{names[2]})"
+            f"the samples do not fit ({lsq.off_text(*medians)}); they do ({lsq.off_text(*others)}) "
+            f"{'without' if eye_to_hand else 'with'} --eye-to-hand, or with TARGET inverted ({names[3]}<-{names[2]})"
         )
 
     def likeliest(model: _Model, weights: Array) -> _Model:
@@ -115,23 +113,20 @@ def solve_hand_eye(
 
     found = lsq.settled(start, samples.residuals, rough, likeliest, unknown=6, robust=robust)
     model = found.model
-    s_t, s_r = model.sigmas.tolist()
-    count, off = int(found.kept.sum()), lsq.lengths(found.residuals[found.kept]).T
-    rms = np.sqrt((off**2).mean(1))
+    s_t, s_r = found.sigmas.tolist()
+    rms = np.sqrt((lsq.lengths(found.residuals[found.kept]) ** 2).mean(0))
     turns = _turns(hand[found.kept])
     if turns[0] < lsq.KEPT * s_r * sqrt(2.0):
         raise _unfitting(rms)
     _require_two_axes(turns, s_r, holder, names[2])
     covariance = lsq.inverse(model.hessian)
     both = " fit with and without --eye-to-hand, and" * bool(others.prod() <= BETTER**2 * medians.prod())
-    warnings = [*_warnings(samples.at(found.kept), model.x, turns, holder, both)]
-    for warning in warnings:
-        warn(warning)
+    _warn_of(samples.at(found.kept), model.x, turns, holder, both)
     noise_at = "base" if eye_to_hand and model.cut == "gripper" else model.cut
     return HandEye(
         model.x.canonical(), model.z.canonical(), covariance[:6, :6], covariance[6:, 6:],
-        None if s_t == s_r == lsq.LEAST else noise_at, found.kept, lsq.deviations(found.residuals, model.sigmas),
-        found.residuals, (s_t, s_r), 3 * count - 6, float(rms[0]), float(rms[1]), turns[:2], warnings,
+        None if s_t == s_r == lsq.LEAST else noise_at, found.kept, found.u, found.residuals, (s_t, s_r),
+        3 * int(found.kept.sum()) - 6, (float(rms[0]), float(rms[1])), turns[:2],
     )  # fmt: skip
 
 
@@ -192,8 +187,7 @@ class _Samples(NamedTuple):
     def _linear(self, model: _Model, weights: Array) -> tuple[_Model, Array]:
         """Return a model with its Hessian and its cost, and the gradient."""
         left, right, before, after = CUTS[model.cut](*self, model.x, model.z)
-        off = left @ model.x @ right
-        errors = np.concatenate([off.xyz, off.rotation.as_rotvec()], 1)
+        errors = self.residuals(model)
         turn, back = left.rotation.as_matrix(), (before.rotation @ model.z.rotation.inverse()).as_matrix()
         bent = lsq.inverse_left_jacobian(errors[:, 3:])
         slopes: Array = np.zeros((len(errors), 6, 12))  # the derivatives of the errors by steps of X and of Z
@@ -249,22 +243,20 @@ def _motions(gripper: Transform, camera: Transform) -> tuple[Transform, Transfor
     return gripper[i].inverse() @ gripper[j], camera[i] @ camera[j].inverse()
 
 
-def _warnings(
-    samples: _Samples, x: Transform, turns: tuple[float, float, str], holder: str, both: str
-) -> Iterator[str]:  # fmt: skip
-    """Yield what limits the result; both: of a few samples that another setting fits too, else ""."""
+def _warn_of(samples: _Samples, x: Transform, turns: tuple[float, float, str], holder: str, both: str) -> None:
+    """Warn of what limits the result; both: of a few samples that another setting fits too, else ""."""
     if turns[1] < SLIGHT:
         small = f"{degrees(turns[1]):.1f} deg rms, first axis {turns[2]} in {holder}"
-        yield f"turns about a second axis are small ({small}): turn more"
+        warn(f"turns about a second axis are small ({small}): turn more")
     if (count := len(samples.gripper)) < FEWEST_CERTAIN:
-        yield f"{count} samples{both} say little of their own noise: the sigmas are rough; take 8 or more"
+        warn(f"{count} samples{both} say little of their own noise: the sigmas are rough; take 8 or more")
     # does a factor on the target's translations fit better?  (R_A - I) t_X - s R_X t_B = -t_A
     a, b = _motions(*samples)
     lever, turned = (a.rotation.as_matrix() - np.eye(3)).reshape(-1, 3), x.rotation.apply(b.xyz).reshape(-1)
     place, plain = _least_squares(lever, turned - a.xyz.reshape(-1))
     place, scaled = _least_squares(np.column_stack([lever, -turned]), -a.xyz.reshape(-1))
     if place[3] > 0.0 and plain > max(BETTER * scaled, lsq.LEAST):
-        yield f"TARGET fits better with its places times {place[3]:.4g}: another unit, or the size of a marker?"
+        warn(f"TARGET fits better with its places times {place[3]:.4g}: another unit, or the size of a marker?")
 
 
 def _least_squares(slopes: Array, wanted: Array) -> tuple[Array, float]:
@@ -304,8 +296,5 @@ def _require_two_axes(turns: tuple[float, float, str], s_r: float, holder: str, 
 
 
 def _unfitting(off: Array) -> ValueInvalid:
-    return ValueInvalid(f"the samples do not fit ({_off(off)}); does each row of GRIPPER belong to that of TARGET?")
-
-
-def _off(parts: Array) -> str:
-    return f"{1000.0 * parts[0]:.1f} mm {degrees(parts[1]):.1f} deg"
+    text = lsq.off_text(*off)
+    return ValueInvalid(f"the samples do not fit ({text}); does each row of GRIPPER belong to that of TARGET?")

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from frametool.fit.tree_problem import Fitted
     from frametool.geometry.types import Array
 
     Mask: TypeAlias = NDArray[np.bool_]
@@ -105,9 +106,8 @@ def errors(poses: Transform, measured: Transform) -> Array:
     return np.concatenate([poses.xyz - measured.xyz, turned], -1)
 
 
-def off_text(error: Array, digits: int = 1) -> str:
-    """Format the lengths of both halves of an error (6) for messages."""
-    metres, radians = length(error.reshape(2, 3)).tolist()
+def off_text(metres: float, radians: float, *, digits: int = 1) -> str:
+    """Format the lengths of both halves of an error for messages."""
     return f"{1e3 * metres:.1f} mm {degrees(radians):.{digits}f} deg"
 
 
@@ -157,6 +157,7 @@ def stacked(transforms: Iterable[Transform]) -> Transform:
 
 
 Model = TypeVar("Model")
+Found = TypeVar("Found", bound="Settled[Any] | Fitted")
 
 KEPT = 3.0  # sigmas: a larger residual is an outlier
 CERTAIN = 2.5  # sigmas: up to here a first weight is 1
@@ -189,12 +190,13 @@ def draws(count: int, size: int, among: int) -> Iterator[list[int]]:
 
 
 class Settled(NamedTuple, Generic[Model]):
-    """A fit of the inliers: residuals of all (n, 3 or 6), and a sigma for each three of them."""
+    """A fit of the inliers: residuals of all (n, 3 or 6), a sigma for each three of them, and u of each row."""
 
     model: Model
     kept: Mask
     residuals: Array
     sigmas: Array
+    u: Array
 
 
 def settled(
@@ -206,22 +208,23 @@ def settled(
     residuals: (n, 3) or (n, 6) of a model; unknown: the number of unknowns that each three of them share
     rough, fit: return an improved model and the best one, for a weight per row
     """
-    off = residuals(model)
-    kept, share = np.ones(len(off), bool), np.sqrt(1.0 - unknown / (3.0 * len(off)))
+    count = len(residuals(model))
+    kept, share = np.ones(count, bool), np.sqrt(1.0 - unknown / (3.0 * count))
 
     def by_medians(model: Model) -> Array:
         off = residuals(model)
         return deviations(off, np.array([median_sigma(part, share) for part in lengths(off).T]))
 
-    def fitted(found: Settled[Model], kept: Mask) -> tuple[Settled[Model], Mask, Array]:
+    def fitted(found: Settled[Model], kept: Mask) -> Settled[Model]:
         model = fit(found.model, kept.astype(float))
         off = residuals(model)
         sigmas = fitted_sigmas(off, kept, unknown)
-        return Settled(model, kept, off, sigmas), kept, deviations(off, sigmas)
+        return Settled(model, kept, off, sigmas, deviations(off, sigmas))
 
     if robust:
         model, kept = first_inliers(model, by_medians, rough)
-    return reselected(Settled(model, kept, off, np.ones(1)), kept, fitted, robust=robust)
+    nothing = np.ones(0)
+    return reselected(Settled(model, kept, nothing, nothing, nothing), fitted, robust=robust)
 
 
 def first_inliers(
@@ -238,19 +241,18 @@ def first_inliers(
     return model, u <= KEPT
 
 
-def reselected(
-    model: Model, kept: Mask, fit: Callable[[Model, Mask], tuple[Model, Mask, Array]], *, robust: bool
-) -> Model:
-    """Fit the rows of a selection, and those within 3 sigmas of that fit again, until they do not change.
+def reselected(found: Found, fit: Callable[[Found, Mask], Found], *, robust: bool) -> Found:
+    """Fit the rows that are kept, and those within 3 sigmas of that fit again, until they do not change.
 
-    fit: returns a better model of some rows, the rows that it used, and u of all
+    fit: returns a better fit of some rows, with the rows that it used as `kept`, and `u` of all
     """
+    kept = found.kept
     for at in range(ROUNDS):
-        model, used, u = fit(model, kept)
-        kept = u <= KEPT if at < ROUNDS // 2 else used | (u <= KEPT)
-        if not robust or (kept == used).all():
+        found = fit(found, kept)
+        kept = found.u <= KEPT if at < ROUNDS // 2 else found.kept | (found.u <= KEPT)
+        if not robust or (kept == found.kept).all():
             break
-    return model
+    return found
 
 
 def lengths(residuals: Array) -> Array:

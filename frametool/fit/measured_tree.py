@@ -16,9 +16,9 @@ import numpy as np
 
 from frametool.errors import Finding, NotConnected, ValueInvalid, alternatives, first_of, printable, shown, warn
 from frametool.fit import least_squares as lsq
-from frametool.fit.tree_problem import Fitted, Noise, TreeProblem, bodies_of, bridges, jacobians, of_body, top_of
+from frametool.fit.tree_problem import Fitted, Noise, TreeProblem, bodies_of, bridges, jacobians, of_body
 from frametool.frames.lookups import Frames, FrameTree
-from frametool.frames.topology import Groups
+from frametool.frames.topology import Groups, Snapshot
 from frametool.geometry.conventions import axes_change
 from frametool.geometry.transform import Rotation, Transform
 from frametool.lint.tree_diff import Tolerance
@@ -61,13 +61,13 @@ class Measurement(NamedTuple):
         x, y, z, *turn = self.components
         return Transform.of(x * factor, y * factor, z * factor, *turn)
 
-    def reread(self, change: Callable[[float], float]) -> Transform | None:
-        """Return it with the numbers of its rotation changed; None where it was not written in angles."""
-        if self.written is None:
+    def reread(self, change: Callable[[Array], Array], *kinds: str) -> Transform | None:
+        """Return it with its angles changed; None where its rotation was not written in one of these kinds."""
+        kind, angles = self.written or ("", ())
+        if kind not in kinds:
             return None
-        kind, angles = self.written
         read = Rotation.from_rpy if kind == "rpy" else Rotation.from_rotvec
-        return self.turned(*read([change(angle) for angle in angles]).components)
+        return self.turned(*read(change(np.array(angles))).components)
 
 
 NEAR = Tolerance(0.01, math.radians(1.0))  # the tolerance without any sigmas
@@ -78,12 +78,6 @@ TIE = 1e-9  # of u: an improvement below this does not count
 O = Transform(axes_change("flu", "optical"), (0.0, 0.0, 0.0))  # body_from_optical, in the notation of papers
 
 
-def _yaw_first(m: Measurement) -> Transform | None:
-    if m.written is None or m.written[0] != "rpy":
-        return None
-    return m.turned(*Rotation.from_rpy(m.written[1][::-1]).components)
-
-
 # the intended measurement, if this mistake was made
 BLUNDERS: dict[str, Callable[[Measurement], Transform | None]] = {
     "inverted": lambda m: m.transform.inverse(),
@@ -92,9 +86,9 @@ BLUNDERS: dict[str, Callable[[Measurement], Transform | None]] = {
     "wxyz taken for xyzw": lambda m: m.turned(*m.components[4:], m.components[3]),
     "xyzw taken for wxyz": lambda m: m.turned(m.components[6], *m.components[3:6]),
     "millimetres": lambda m: m.shifted(1e-3), "metres taken for millimetres": lambda m: m.shifted(1e3),
-    "degrees taken for radians": lambda m: m.reread(math.radians),
-    "radians taken for degrees": lambda m: m.reread(math.degrees),
-    "yaw, pitch, roll taken for roll, pitch, yaw": _yaw_first,
+    "degrees taken for radians": lambda m: m.reread(np.radians, "rpy", "rotvec"),
+    "radians taken for degrees": lambda m: m.reread(np.degrees, "rpy", "rotvec"),
+    "yaw, pitch, roll taken for roll, pitch, yaw": lambda m: m.reread(np.flip, "rpy"),
     "optical axes of the child": lambda m: m.transform @ O.inverse(),
     "optical axes of the parent": lambda m: O @ m.transform, "body axes of the child": lambda m: m.transform @ O,
     "body axes of the parent": lambda m: O.inverse() @ m.transform,
@@ -158,7 +152,8 @@ def loops(
             information = np.diag(sigma**-2.0)
         if not agrees:
             words = best_blunder(each, pose, information)
-            message = f"{printable(each.parent)}<-{printable(each.child)} is {lsq.off_text(error)}{sigmas} off the tree"
+            off = f"{lsq.off_text(metres, radians)}{sigmas} off the tree"
+            message = f"{printable(each.parent)}<-{printable(each.child)} is {off}"
             message += f"; fits when {words}" if words else ""
             findings.append(Finding("loop", message, *parted(each.place)))
     return findings, [*lacking], apart
@@ -225,10 +220,11 @@ class TreeFit:
             tried.add(kept.tobytes())
             bodies = problem.placed(problem.tree(np.flatnonzero(kept).tolist()))
             start = Fitted(bodies, kept, fit.found.noise)
-            fit = TreeFit(problem, lsq.reselected(start, kept, problem.refitted, robust=True))
+            fit = TreeFit(problem, lsq.reselected(start, problem.refitted, robust=True))
         if undecided:
             row, rivals = undecided
-            off, places = lsq.off_text(fit.errors[row]), [problem.place(each) for each in sorted([row, *rivals])]
+            off = lsq.off_text(*lsq.length(fit.errors[row].reshape(2, 3)))
+            places = [problem.place(each) for each in sorted([row, *rivals])]
             leave = f" (--without {problem.place(row)})" if problem.measurements[row].place else ""
             loop = f"{first_of(places, 2)} form a loop open by {off}"
             raise ValueInvalid(f"undecided: {loop}; measure again or leave one out{leave}")
@@ -329,7 +325,7 @@ class TreeSolution:
     residuals (n, 6), u, used, checked, fits: of each measurement
     sigma: estimated (metres, radians) of those without a covariance, or None; sigma_factor: 1, or the factor by which
         the stated sigmas are too small, without changing them
-    dof: degrees of freedom of metres and of radians; rms_distance, rms_angle: of the inliers
+    dof: degrees of freedom of metres and of radians; rms: of the inliers, metres and radians
     tree: all of that as a tree with covariances: frames in the root, or in the frame that they are fixed in
     hints: warnings about the sigmas
     poses: of all frames in the root; rows: the number of used measurements of each frame
@@ -343,7 +339,7 @@ class TreeSolution:
         self.root, self.frames = bodies.root, bodies.frames
         self._number, self._fit = bodies.number, fit
         self.residuals, self.used = fit.errors, found.kept
-        self.u: Array = problem.u(fit.errors, found.noise)
+        self.u = found.u
         self.sigma = (found.noise.place, found.noise.turn) if found.estimated else None
         self.sigma_factor = found.noise.factor
         loops = int(found.kept.sum()) - problem.unknown
@@ -353,7 +349,7 @@ class TreeSolution:
             verb = "loop does" if loops == 1 else "loops do"
             self.hints = [f"{loops} {verb} not tell metres from radians: the sigmas are rough; give sigma"]
         squares = (fit.errors[found.kept] ** 2).reshape(-1, 2, 3).sum((0, 2))
-        self.rms_distance, self.rms_angle = np.sqrt(squares / found.kept.sum()).tolist()
+        self.rms: tuple[float, float] = tuple(np.sqrt(squares / found.kept.sum()).tolist())
         self.checked = ~np.isin(np.arange(problem.size), list(fit.alone))
         sure = [True] * problem.count
         for body in fit.tree.order[1:]:
@@ -365,7 +361,7 @@ class TreeSolution:
         number = np.array([bodies.number[name] for name in self.frames])
         self._poses = found.bodies[number] @ lsq.stacked(bodies.pose[name] for name in self.frames)
         self.poses = dict(zip(self.frames, self._poses.canonical(), strict=True))
-        self.tree, top = FrameTree("the result"), top_of(fixed, self.root)
+        self.tree, top = FrameTree("the result"), Snapshot(fixed).roots.get(self.root, self.root)
         for name in self.frames:
             if (track := fixed.track(name)) is not None:
                 self.tree.add(track.parent, name, Transform.of(*track.components), fixed.covariances.get(name))

@@ -139,18 +139,16 @@ def segment_errors(ref: Trajectory, est: Trajectory, lengths: Sequence[float], s
     """
     if ref.xyzw is None or est.xyzw is None:
         return None
-    path = way(ref.xyz)
-    firsts = np.arange(0, ref.size, step)
-    ends = np.stack([np.searchsorted(path, path[firsts] + length, "right") for length in lengths], -1)
-    there = ends < ref.size
-    shares = np.zeros((2, *ends.shape))
-    for at, metres in enumerate(lengths):  # one by one, which needs an eighth of the memory
-        fits = there[:, at]
-        errors = relative_errors(ref, est, firsts[fits], ends[fits, at])
-        shares[:, fits, at] = errors.m, errors.rad
-        shares[:, :, at] /= metres
-    start, all_lengths = (np.broadcast_to(each, ends.shape)[there] for each in (firsts[:, None], lengths))
-    return SegmentErrors(start, ends[there], all_lengths, *shares[:, there])
+    path, firsts = way(ref.xyz), np.arange(0, ref.size, step)
+    found: list[tuple[Any, ...]] = []
+    for metres in lengths:  # one by one, which needs an eighth of the memory
+        ends = np.searchsorted(path, path[firsts] + metres, "right")
+        there = ends < ref.size
+        start, end, *errors, _ = relative_errors(ref, est, firsts[there], ends[there])
+        found.append((start, end, np.full(len(start), metres), *(np.asarray(each) / metres for each in errors)))
+    columns = [*map(np.concatenate, zip(*found, strict=True))]
+    order = np.argsort(columns[0], kind="stable")  # those from one pose together
+    return SegmentErrors(*(column[order] for column in columns))
 
 
 SQRT8 = 8**0.5
@@ -172,14 +170,14 @@ def numbers(found: Comparison) -> dict[str, Any]:
         "est": found.names[1],
         "settings": _settings(found),
         "poses": {
-            "ref": found.sizes[0], "est": found.sizes[1], "possible": pairs.possible, "paired": pairs.ref.size,
+            "ref": found.ref.size, "est": found.est.size, "possible": pairs.possible, "paired": pairs.ref.size,
             "shared": pairs.shared,
         },
-        "ref_duration_s": None if stamps is None else found.ref_duration_ns / 1e9,
+        "ref_duration_s": None if stamps is None else int(np.ptp(found.ref.stamps_ns)) / 1e9,
         "duration_s": None if stamps is None else int(stamps[-1] - stamps[0]) / 1e9,
         "path_m": {"ref": float(way(pairs.ref.xyz)[-1]), "est": float(way(found.moved.xyz)[-1])},
-        "offset_s": found.offset_ns / 1e9,
-        "offset_score": found.offset_score,
+        "offset_s": pairs.offset_ns / 1e9,
+        "offset_score": pairs.offset_score,
         "transform": {"name": name, "parent": parent, **_pose(found.fit.transform), **scale},
         "ate_by_alignment": found.ate_by_alignment,
         "ate": {
@@ -211,9 +209,9 @@ def _settings(found: Comparison) -> dict[str, Any]:
         "match": pairing.match if has_stamps else "number", "interpolated": pairs.interpolated,
         "max_gap_s": pairs.max_gap_s, "max_diff_s": pairing.max_diff_ns / 1e9 if is_nearest and has_stamps else None,
         "min_match": pairing.min_match,
-        "offset": pairing.offset if pairing.offset == "auto" else found.offset_ns / 1e9, "align": fitting.align,
+        "offset": pairing.offset if pairing.offset == "auto" else pairs.offset_ns / 1e9, "align": fitting.align,
         "align_first": fitting.align_first and str(fitting.align_first), "tie_first": fitting.tie_first,
-        "mount": None if found.mount is None else _pose(found.mount), "up": list(fitting.up),
+        "mount": None if pairs.mount is None else _pose(pairs.mount), "up": list(fitting.up),
         "delta": [str(delta) for delta, _ in found.relative], "all_pairs": reporting.all_pairs,
         "tolerance": reporting.tolerance if reporting.all_pairs else None, "pairs_from": reporting.pairs_from,
         "segments_m": list(reporting.segments), "segment_step": reporting.segment_step,
@@ -328,9 +326,7 @@ def parse_limits(text: str) -> list[Limit]:
         if match is None or match[4] not in UNITS:
             raise ValueInvalid(f"{shown(part)} is not a limit; write a name, > or <, and a bound: ate>5cm, paired<90%")
         name = match[1]
-        if ":" in name and not name.startswith("rpe:"):
-            raise ValueInvalid(f"no number is called {shown(name)}; rpe has a delta behind a colon: rpe:10m")
-        if "." not in name and ":" not in name and name not in SHORT:
+        if "." not in name and not name.startswith("rpe:") and name not in SHORT:
             raise ValueInvalid(f"no number is called {shown(name)}{alternatives(name, [*SHORT, 'rpe:10m'], 'numbers')}")
         found.append(Limit(part, name, match[2], float(match[3]) * UNITS[match[4]], match[4]))
     if not found:
@@ -341,10 +337,8 @@ def parse_limits(text: str) -> list[Limit]:
 def number_at(value: Any, path: str) -> Any:
     """Follow a path of keys and indices into a mapping; None if it ends."""
     for step in path.split("."):
-        if isinstance(value, dict):
-            value = value.get(step)
-        elif isinstance(value, list) and step.isdigit() and int(step) < len(value):
-            value = value[int(step)]
-        else:
+        try:
+            value = value[int(step) if isinstance(value, list) else step]
+        except (KeyError, IndexError, TypeError, ValueError):
             return None
     return value

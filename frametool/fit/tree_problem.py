@@ -14,7 +14,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid, alternatives, first_of, listing, printable, shown
 from frametool.fit import least_squares as lsq
-from frametool.frames.topology import Groups
+from frametool.frames.topology import Groups, Snapshot
 from frametool.geometry.rigid import IDENTITY, compose
 from frametool.geometry.transform import Transform
 
@@ -114,20 +114,14 @@ def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Fram
     if len(groups) > 1:
         texts = [listing(group, 3) for group in groups.values()]
         raise ValueInvalid(f"no measurement connects {first_of(texts, 3, gap=' | ')}")
+    tops = {name: name for name in frames} | Snapshot(fixed).roots
     first: dict[str, str] = {}  # of each body, by the top of its tree
     for name in (root, *frames):
-        first.setdefault(top_of(fixed, name), name)
+        first.setdefault(tops[name], name)
     number = {top: at for at, top in enumerate(first)}
-    anchors = {name: first[top_of(fixed, name)] for name in frames}
+    anchors = {name: first[tops[name]] for name in frames}
     pose = {name: Transform.identity() if name == at else fixed.lookup(at, name) for name, at in anchors.items()}
-    return Bodies(root, frames, {name: number[top_of(fixed, name)] for name in frames}, pose)
-
-
-def top_of(fixed: Frames, name: str) -> str:
-    """Return the root of the tree of fixed frames that holds a frame."""
-    while name in fixed.frames and (above := fixed.parent(name)) is not None:
-        name = above
-    return name
+    return Bodies(root, frames, {name: number[tops[name]] for name in frames}, pose)
 
 
 TREES = 200
@@ -159,6 +153,7 @@ class Fitted(NamedTuple):
 
     estimated: whether these rows determine their own noise
     few_loops: whether rotations can close all loops, so that metres alone do not determine their sigma
+    u: the residual of each row in sigmas
     """
 
     bodies: Transform
@@ -166,6 +161,7 @@ class Fitted(NamedTuple):
     noise: Noise
     estimated: bool = False
     few_loops: bool = False
+    u: Array = np.ones(0)
 
 
 def jacobians(parent: Transform, child: Transform, turned: Array) -> tuple[Array, Array]:
@@ -375,9 +371,9 @@ class TreeProblem:
         if robust and looped.any():
             bodies, kept = lsq.first_inliers(bodies, by_medians, rough)
             noise = self.medians(self.errors(bodies), looped)
-        return lsq.reselected(Fitted(bodies, kept, noise), kept, self.refitted, robust=robust)
+        return lsq.reselected(Fitted(bodies, kept, noise), self.refitted, robust=robust)
 
-    def refitted(self, found: Fitted, kept: Any) -> tuple[Fitted, Any, Array]:
+    def refitted(self, found: Fitted, kept: Any) -> Fitted:
         """Fit the used rows, and the nearest of the others if frames would be disconnected.
 
         Bodies and noise are those of the least-squares solution, both converged.
@@ -399,7 +395,7 @@ class TreeProblem:
             changes = (abs(new / old - 1) for new, old in zip(noise, before, strict=True))
             if size <= REST and max(changes) <= REST:
                 break
-        return Fitted(bodies, kept, noise, estimate, few_loops), kept, self.u(self.errors(bodies), noise)
+        return Fitted(bodies, kept, noise, estimate, few_loops, self.u(self.errors(bodies), noise))
 
 
 def _odd_count(values: Array) -> Array:

@@ -89,7 +89,7 @@ def means_of(
 ) -> Iterator[tuple[Result, list[str]]]:
     """Yield the mean of all poses, or of those of each label, with its spread, and a message for each outlier."""
     from frametool.fit.closed_forms import solve_mean
-    from frametool.fit.least_squares import off_text
+    from frametool.fit.least_squares import length, off_text
     from frametool.grammar.pose import Pose
     from frametool.grammar.result import Result, uncertain
 
@@ -108,7 +108,7 @@ def means_of(
         extras |= {"count": len(found.used)} | ({"used": int(found.used.sum())} if robust else {})
         left_out: list[str] = []
         for at in found.left_out.nonzero()[0].tolist():
-            off = off_text(found.residuals[at], 2)
+            off = off_text(*length(found.residuals[at].reshape(2, 3)), digits=2)
             left_out.append(f"{gathered.places[rows[at]]}: left out, {off} off (u {found.u[at]:.1f})")
         pose = Pose.of(found.transform.components)
         if gathered.placed:

@@ -358,7 +358,7 @@ def compare(
 def align(ref: TrajectoryLike, est: TrajectoryLike, **settings: Any) -> Alignment:
     """Align a trajectory with a reference; settings as for `compare`."""
     found = compare(ref, est, **settings)
-    return Alignment(found.fit.transform, found.fit.scale, found.offset_ns / BILLION, found.whole_estimate())
+    return Alignment(found.fit.transform, found.fit.scale, found.pairs.offset_ns / BILLION, found.whole_estimate())
 
 
 def resample(

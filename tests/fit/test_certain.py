@@ -9,7 +9,7 @@ import pytest
 from rigs import rig
 from worlds import ring
 
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, overheard
 from frametool.fit.alignment import clock_offset
 from frametool.fit.comparison import AUTO, EVO, Comparison, Settings, parse_delta
 from frametool.fit.comparison import compared as compare
@@ -66,13 +66,13 @@ def test_one_loop_does_not_tell_metres_from_radians() -> None:
 @pytest.mark.parametrize("eye_to_hand", [False, True])
 def test_three_samples_fit_either_setting_and_say_so(eye_to_hand: bool) -> None:  # noqa: FBT001 - of a test
     made = rig("target", seed=3, count=3, turn=0.5)
-    found = solve_hand_eye(made.gripper, made.target, eye_to_hand=eye_to_hand)
-    assert any(each.startswith("3 samples fit with and without --eye-to-hand") for each in found.warnings)
+    _, told = overheard(solve_hand_eye, made.gripper, made.target, eye_to_hand=eye_to_hand)
+    assert any(each.startswith("3 samples fit with and without --eye-to-hand") for _, each in told)
 
 
 def test_enough_samples_fit_one_setting() -> None:
     made = rig("target", seed=3, count=5, turn=0.5)
-    assert not any("without" in each for each in solve_hand_eye(made.gripper, made.target).warnings)
+    assert not any("without" in each for _, each in overheard(solve_hand_eye, made.gripper, made.target)[1])
 
 
 # clocks
@@ -105,9 +105,10 @@ def test_a_lever_arm_does_not_move_the_clock(arm: float) -> None:
     body = Transform(Rotation.identity(), (arm, 0.3, -0.2))
     ref = est.with_poses(est.poses @ body)
     found = compared(ref, late(est.at(slice(100, 800, 2)), 0.15), offset=AUTO, mount=AUTO)
-    assert found.offset_ns / 1e9 == pytest.approx(0.15, abs=1e-4)
-    assert found.mount is not None
-    assert found.mount.xyz == pytest.approx(body.xyz, abs=1e-3)
+    assert found.pairs.offset_ns / 1e9 == pytest.approx(0.15, abs=1e-4)
+    mount = found.pairs.mount
+    assert mount is not None
+    assert mount.xyz == pytest.approx(body.xyz, abs=1e-3)
 
 
 # mounts, worlds and lines
@@ -116,8 +117,9 @@ def test_a_lever_arm_does_not_move_the_clock(arm: float) -> None:
 def test_a_turned_body_is_part_of_what_mount_auto_finds() -> None:
     est = drive()
     found = compared(est.with_poses(est.poses @ MOUNT), est, mount=AUTO)
-    assert found.mount is not None
-    assert found.mount.is_close(MOUNT, angle=1e-9, distance=1e-9)
+    mount = found.pairs.mount
+    assert mount is not None
+    assert mount.is_close(MOUNT, angle=1e-9, distance=1e-9)
     assert found.ate.rad is not None
     assert np.degrees(found.ate.rad).max() < 1e-6
 

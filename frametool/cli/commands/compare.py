@@ -137,9 +137,7 @@ def compare_command(inputs: Inputs) -> int:
     refuse(explain and output.style.format != "text", f"--explain writes text, not {output.style.format}")
     try:
         found, skipped = comparisons(inputs.ref, inputs.est, inputs)
-        from frametool.fit.numbers import numbers
-
-        every = [numbers(each) for each in found]
+        every = [each.as_dict() for each in found]
         asked = [(each, limit) for each in every for limit in limits]
         passed = [(each, limit, now) for each, limit in asked if (now := limit.passed(each)) is not None]
         for path in reports:

@@ -108,7 +108,7 @@ def _solution(
     ]  # fmt: skip
     numbers = {
         "shape": shape, "root": root, "count": count, "used": sum(used), "dof": found.dof,
-        "rms_distance": found.rms_distance, "rms_angle": of("rms_angle"),
+        **dict(zip(("rms_distance", "rms_angle"), found.rms, strict=True)),
         "sigma": sigma and dict(zip(("xyz", "rpy"), sigma, strict=True)), "noise_at": of("noise_at"),
         "scale_sigma": of("scale_sigma"), "frames": frames, "measurements": rows,
     }  # fmt: skip
