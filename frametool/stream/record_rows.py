@@ -119,7 +119,7 @@ class RecordRows:
         text += template.text[begin:]
         if operation.formula is None:
             size = 7 if shape.kind in (POSE, ROTATION) else len(NUMBERS[: shape.own_size])
-            carried = sum(shape.covariance)
+            carried = 0 if shape.rewritten else sum(shape.covariance)
         else:  # of numbers alone, what was the row's own counts for nothing
             size, carried = 3 if operation.result_kind(shape.kind) in (POINT, VECTOR) else 7, 0
         parts = (*NUMBERS[:size], *(MORE_NUMBERS + at for at in range(len(operation.extras(shape)) + carried)))

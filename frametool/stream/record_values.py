@@ -401,30 +401,7 @@ def values_of_unit(node: Node, unit: Path, answers: list[Answer], request: Reque
         yield _of_several(node, unit, answers, request)
         return
     for each in answers:
-        made = _result if request.operation.formula is None else _formula_result
-        yield made(node, unit, each, request, style.format)
-
-
-def _formula_result(node: Node, unit: Path, made: Answer, request: Request, fmt: str) -> Value:
-    """Return what an expression made of a record, with what else the record says."""
-    entry, operation = made.entry, request.operation
-    shape = entry.record.shape
-    kind = operation.result_kind(shape.kind)
-    names = [request.results.prefix + name for name in request.extras(shape)]
-    extras: dict[str, Any] = dict(zip(names, made.parts[len(made.parts) - len(names) :], strict=True))
-    if operation.shown is not None:
-        numbers = tuple(extras.values())
-        members = operation.shown.values(request.results.prefix, numbers)
-        extras = operation.shown.cells(names, numbers) if fmt == "csv" else members
-    if operation.only_adds:
-        return with_stamp_ns(plain(node), fmt) | extras if type(node.value) is dict else extras
-    rest = with_stamp_ns(_rest(node, unit, entry.record), fmt)
-    if kind == POSE:
-        stamp = _header_stamp(entry.record) if not request.rows.poses else {}
-        return Result(Pose.of(made.parts[:7], entry.name, entry.parent), stamp | extras | rest)
-    seen_from = "frame" if kind or shape.kind != POSE else "parent"
-    named = {key: name for key, name in (("name", entry.name), (seen_from, entry.parent)) if name is not None}
-    return named | ({kind: list(made.parts[:3])} if kind else {}) | extras | rest
+        yield _result(node, unit, each, request, style.format)
 
 
 def _header_stamp(record: Record) -> dict[str, int]:
@@ -434,34 +411,41 @@ def _header_stamp(record: Record) -> dict[str, int]:
 
 def _result(node: Node, unit: Path, made: Answer, request: Request, fmt: str) -> Value:
     """Return what a record becomes, with its frames and what else it says: a pose, or a mapping without levels."""
-    entry, parts, keeps_frames = made.entry, made.parts, request.operation.keeps_frames
-    record, target = entry.record, entry.target
-    kind, stamp = record.shape.kind, _header_stamp(record)
-    named: dict[str, Any] = {} if entry.parent is None else {"frame": entry.parent}
+    entry, parts, operation, extras = made.entry, made.parts, request.operation, _extras(made, request)
+    record, target, kind = entry.record, entry.target, operation.result_kind(entry.record.shape.kind)
+    if operation.shown is not None:
+        cells = tuple(extras.values())
+        members = operation.shown.values(request.results.prefix, cells)
+        extras = operation.shown.cells([*extras], cells) if fmt == "csv" else members
+    if operation.only_adds:
+        return with_stamp_ns(plain(node), fmt) | extras if type(node.value) is dict else extras
+    keeps_stamp = operation.formula is None or (kind == POSE and not request.rows.poses)
+    said = (_header_stamp(record) if keeps_stamp else {}) | extras | with_stamp_ns(_rest(node, unit, record), fmt)
+    seen_from = "frame" if kind or record.shape.kind != POSE else "parent"
+    named = {key: name for key, name in (("name", entry.name), (seen_from, entry.parent)) if name is not None}
     if kind in (POSE, ROTATION):
         placed, turned = target.unit is not None or target.whole, bool(target.notations)
-        extras = _extras(made, request, 7) | with_stamp_ns(_rest(node, unit, record), fmt)
         # a vector that nothing turns is at no place
-        if record.keys.position == VECTOR and placed and not turned and keeps_frames:
-            return named | {VECTOR: [*parts[:3]]} | stamp | extras
+        if record.keys.position == VECTOR and placed and not turned and operation.keeps_frames:
+            return named | {VECTOR: [*parts[:3]]} | said
         pose = Pose.of(parts[:7], entry.name, entry.parent)
         pose = pose._replace(position=pose.position if placed else None, rotation=pose.rotation if turned else None)
-        if request.operation.similar and isinstance(extras.get(SCALE), float):
-            pose = pose._replace(scale=extras.pop(SCALE))
-        return Result(pose, stamp | extras)
-    numbers = written(made)[: target.size]
-    if kind in PARTS:
-        named |= dict(zip(PARTS[kind], (numbers[:3], numbers[3:]), strict=True))
-    elif target.place is not None:
+        if operation.similar and isinstance(said.get(SCALE), float):
+            pose = pose._replace(scale=said.pop(SCALE))
+        return Result(pose, said)
+    place: dict[str, Any] = {}
+    if target.place is not None:
         from frametool.grammar.place import point_entry
 
-        named = point_entry(entry.parent, parts[:3], target.place, getattr(parts, "read", None))
-    else:
-        named[kind] = numbers
-    if is_recording(fmt) and keeps_frames:
-        named |= _place_as_read(node.at(record.path[len(unit) :]), record)
-    named = ({"name": entry.name} if entry.name else {}) | named | stamp | _extras(made, request, len(numbers))
-    return named | with_stamp_ns(_rest(node, unit, record), fmt)
+        written(made)  # raises where it has no place there
+        named.pop(seen_from, None)  # which it says itself
+        place = point_entry(entry.parent, parts[:3], target.place, getattr(parts, "read", None))
+    elif kind:
+        numbers = written(made)[: target.size]
+        place = dict(zip(PARTS.get(kind, (kind,)), (numbers[:3], numbers[3:]), strict=False))
+    if is_recording(fmt) and operation.keeps_frames:
+        place |= _place_as_read(node.at(record.path[len(unit) :]), record)
+    return named | place | said
 
 
 def _place_as_read(holder: Node, record: Record) -> dict[str, list[float]]:
@@ -545,16 +529,20 @@ def _of_several(node: Node, unit: Path, answers: list[Answer], request: Request)
         if numbers:
             found.pop(field, None)
         found |= {f"{field}_{axis}": number for axis, number in zip("xyzw", numbers, strict=False)}
-        found |= _extras(each, request, len(each.parts) - sum(record.shape.covariance))
+        found |= _extras(each, request)
     return found
 
 
-def _extras(made: Answer, request: Request, own: int) -> dict[str, Any]:
+def _extras(made: Answer, request: Request) -> dict[str, Any]:
     """Return what a result says behind its own numbers, by its keys: a distance, its covariances, a scale."""
     shape = made.entry.record.shape
-    numbers = iter([number + 0.0 for number in made.parts[own:]])
-    extras = with_entries({name: next(numbers) for name in request.operation.extras(shape)})
-    for key, size in zip(made.entry.record.keys.covariances, shape.covariance, strict=False):
+    names = [request.results.prefix + name for name in request.operation.extras(shape)]
+    sizes = () if shape.rewritten else shape.covariance
+    numbers = iter([number + 0.0 for number in made.parts[len(made.parts) - len(names) - sum(sizes) :]])
+    extras: dict[str, Any] = {name: next(numbers) for name in names}
+    if request.operation.shown is None:
+        extras = with_entries(extras)
+    for key, size in zip(made.entry.record.keys.covariances, sizes, strict=False):
         entries = list(islice(numbers, size))
         extras[key] = entries if size > 1 else entries[0]
     return extras

@@ -132,3 +132,14 @@ def test_what_is_no_scale_of_a_pose_passes(run: Run) -> None:
 def test_a_scale_that_is_none_is_bad_data_as_other_numbers_are(run: Run, scale: str) -> None:
     for pose in (f"{{xyz: [1, 2, 3], scale: {scale}}}", "{xyz: [1, 2, .nan]}"):
         assert run("apply", "--transform", pose, "1", "2", "3").status == 1
+
+
+@pytest.mark.parametrize("count", [0, 1, 70])
+@pytest.mark.parametrize("fmt", ["json", "yaml", "csv"])
+def test_a_scale_beside_a_matrix_counts(run: Run, count: int, fmt: str) -> None:
+    for size, status in ((1.0, 0), (2.0, 1)):  # one that says it too may mean 2 or 4
+        record = json.dumps({"xyz": [1, 2, 3], "matrix": times(size), "scale": 2})
+        given = ("-",) if count else (record,)
+        done = run("invert", "--scale", *given, "--to", "quaternion", "-f", fmt, stdin=f"{record}\n" * count)
+        assert done.status == status
+        assert (BY_A_MATRIX in done.err) if status else done.out.rstrip("}\n").endswith("0.5"), done.out

@@ -209,3 +209,14 @@ def test_points_keep_their_names_in_another_format(run: Callable[..., Any], sour
     assert done.status == 0
     lines = done.out.splitlines()[source == "json" :]
     assert [line.split(",")[0] if source == "json" else json.loads(line)["name"] for line in lines] == names
+
+
+@pytest.mark.parametrize("record", [{"xyz_mm": [1000, 2000, 500]}, {"x_mm": 1000, "y_mm": 2000, "z_mm": 500}])
+@pytest.mark.parametrize("count", [1, 70])
+def test_points_in_millimetres_are_in_metres_elsewhere(run: Run, record: dict[str, Any], count: int) -> None:
+    stdin = f"{json.dumps(record)}\n" * count
+    move = ("apply", "--transform", "{xyz: [1, 0, 0]}", "-f")
+    assert run(*move, "csv", stdin=stdin).out == "x,y,z\n" + "2.0,2.0,0.5\n" * count
+    assert [*yaml.safe_load_all(run(*move, "yaml", stdin=stdin).out)] == [{"point": [2.0, 2.0, 0.5]}] * count
+    same = json.loads(run(*move, "json", stdin=stdin).out.splitlines()[0])
+    assert [*same.values()] in ([[2000.0, 2000.0, 500.0]], [2000.0, 2000.0, 500.0])
