@@ -159,7 +159,7 @@ class Operation(NamedTuple):
 
     def reads_scale(self, shape: Shape) -> bool:
         """Return True if the matrix of a shape may be a multiple of one of a rotation, whose scale counts."""
-        may_be = self.multiples and 1 not in shape.covariance  # a scale beside it says it already
+        may_be = self.multiples and 1 not in shape.covariance  # a scale that comes with it says it already
         return may_be and shape.notation is not None and shape.notation.representation.whole is not None
 
     def result_kind(self, kind: str) -> str:
