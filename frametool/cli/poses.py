@@ -180,10 +180,10 @@ def pose_source(argument: str | Source, request: Request) -> Source:
     source = source_of(argument)
     if request.offset_ns:
         from frametool.documents.document import parse_documents
-        from frametool.stream.stamp_source import at_other_times
+        from frametool.stream.record_stream import with_offset
 
         parse_documents(source.text, source.name)  # raises where it is broken
-        text, count = at_other_times(source.text, request.offset_ns)
+        text, count = with_offset(source.text, request.offset_ns)
         if not count:
             raise FormatError("--time-offset has no effect: no timestamps in it", source=source.name)
         source = Source(source.name, text)

@@ -145,3 +145,48 @@ def format_stamp(stamp_ns: int) -> str:
     sign = "-" if stamp_ns < 0 else ""
     seconds, nanoseconds = divmod(abs(stamp_ns), BILLION)
     return f"{sign}{seconds}.{nanoseconds:09d}"
+
+
+def read_header_stamp(seconds: str, nanoseconds: str) -> int:
+    """Read the two numbers of a header's stamp as nanoseconds; raises ValueInvalid."""
+    whole, below = (text.strip(" \t\"'") for text in (seconds, nanoseconds))
+    if not (whole.lstrip("+-").isdecimal() and below.isdecimal()):
+        raise ValueInvalid(f"a stamp is two whole numbers, found {shown(whole)} and {shown(below)}")
+    return int(whole) * BILLION + int(below)
+
+
+def read_stamp(text: str, *, in_ns: int) -> int:
+    """Read a cell as nanoseconds, quotes and blanks around it left out; raises ValueInvalid.
+
+    in_ns: how many a whole number is, by its name; 0 are seconds, or what its size says
+    """
+    bare = text.strip(" \t\"'")
+    if in_ns and not bare.endswith("ns"):
+        if not bare.lstrip("+-").replace(".", "", in_ns > 1).isdecimal():
+            unit = "integer nanoseconds" if in_ns == 1 else SUFFIXES[in_ns]
+            raise ValueInvalid(f"{shown(bare)} is not a time in {unit}")
+        bare += SUFFIXES[in_ns]
+    elif bare.isdecimal() and len(bare) < 20:
+        each = nanoseconds_each(int(bare))
+        tell_size(int(bare), each)
+        bare += SUFFIXES[each]
+    stamp_ns = parse_stamp(bare)
+    if abs(stamp_ns) >= 1 << 63:
+        remedy = "; are these some? then write ns behind them, or call them stamp_ns"
+        raise ValueInvalid(f"{shown(text.strip())} is beyond 64 bits of nanoseconds{remedy}")
+    return stamp_ns
+
+
+def stamp_text(written: str, stamp_ns: int, *, in_ns: int) -> str:
+    """Write another stamp as one was written: whole units as such, seconds with no fewer decimals."""
+    bare = written.strip()
+    if bare.endswith("ns"):
+        return f"{stamp_ns}ns"
+    if in_ns and not bare.endswith("s"):
+        whole, below = divmod(abs(stamp_ns), in_ns)
+        decimals = f"{below:0{len(str(in_ns)) - 1}d}".rstrip("0") if below else ""
+        return f"{'-' * (stamp_ns < 0)}{whole}" + f".{decimals}" * bool(below)
+    seconds, _, decimals = format_stamp(stamp_ns).partition(".")
+    wanted = 0 if bare.endswith("s") or "e" in bare.lower() else len(bare.partition(".")[2])
+    decimals = decimals.rstrip("0").ljust(wanted, "0")
+    return f"{seconds}.{decimals}" if decimals else seconds

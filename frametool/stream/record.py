@@ -54,7 +54,6 @@ from frametool.grammar.readers import (
     within,
 )
 from frametool.stream.row_layout import ACCEL, PARTS, POINT, POSE, TURN, VECTOR, Shape, checked_rotation, doubt
-from frametool.stream.stamp_source import key_path
 from frametool.text.numbers import parse_number, read_number_or_angle
 
 if TYPE_CHECKING:
@@ -785,3 +784,47 @@ def value_at(value: Any, path: Path) -> Any:
     for step in path:
         value = value[step]
     return value
+
+
+def key_path(documents: Any, holder: Path, name: str, wanted: str = "a time like 12.5") -> Path:
+    """Find a scalar of a point or pose, its stamp: its own key, else that of a mapping around it; raises Misfit.
+
+    The name of a joint leads to its position in a JointState.
+    """
+    from frametool.ros import messages
+
+    around = [documents]
+    for step in holder:
+        around.append(around[-1][step])
+    for depth in range(len(holder), 0, -1):
+        if (position := messages.position_of(name, around[depth])) is not None:
+            return (*holder[:depth], *position)
+        steps = name.split(".")
+        for keys in ((name,), steps, [int(each) if each.isdecimal() else each for each in steps]):
+            if (found := _below(around[depth], keys)) is not None:
+                if type(found[0]) in (dict, list):
+                    raise Misfit(f"expected {wanted}, found {kind(found[0])}", (*holder[:depth], *keys))
+                return (*holder[:depth], *keys)
+    known = [key for each in around[1:] if type(each) is dict for key in each]
+    raise Misfit(f"no key {shown(name)}{did_you_mean(name, known)}", holder)
+
+
+def stamp_keys(documents: Any, holder: Path) -> Path:
+    """Find the key of a record's stamp by the names such keys have; raises Misfit."""
+    for name in STAMP_KEYS:
+        try:
+            return key_path(documents, holder, name)
+        except Misfit:
+            continue
+    usual = ", ".join(STAMP_KEYS)
+    raise Misfit(f"no stamp: neither a header nor {usual}; name its key with --time-column", holder)
+
+
+def _below(value: Any, keys: Sequence[str | int]) -> tuple[Any] | None:
+    """Follow keys and indices down; None where one is not there."""
+    for key in keys:
+        is_index = type(value) is list and type(key) is int and key < len(value)
+        if not (is_index or (type(value) is dict and key in value)):
+            return None
+        value = value[key]
+    return (value,)

@@ -14,17 +14,18 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from frametool import sizes
-from frametool.documents.document import parse_nodes
-from frametool.errors import FormatError, FrametoolError
+from frametool.documents.document import Node, parse_nodes
+from frametool.errors import FormatError, FrametoolError, ValueInvalid
+from frametool.frames.stamps import read_header_stamp, read_stamp, stamp_text
 from frametool.grammar.pose import Pose
+from frametool.grammar.readers import STAMP_KEYS, in_nanoseconds
 from frametool.grammar.result import NoResult, Style
-from frametool.stream import stamp_source
 from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote
 from frametool.stream.record_results import BlockResults, text_in_order
 from frametool.stream.record_values import MOST_ENTRIES, ROUNDED, Outside, RecordText, plain, values_of_text
 from frametool.stream.splice import attempt, column_in, fault_at, null_of, nulled, rendered
 from frametool.stream.splitter import ARRAY, NO_END, Part, Splitter
-from frametool.text.lines import Pieces, read_blocks, readiness
+from frametool.text.lines import Pieces, read_blocks, readiness, with_edits
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterable, Iterator, Sequence
@@ -84,11 +85,44 @@ def at_other_times(stream: ByteStream, fmt: str, offset_ns: int) -> BufferedRead
             edits = []
             for part in splitter.parts(block)[0]:
                 with suppress(FrametoolError, TypeError, UnicodeDecodeError):  # a list is no key
-                    moved, _ = stamp_source.at_other_times(block[part.start : part.end].decode(), offset_ns)
+                    moved, _ = with_offset(block[part.start : part.end].decode(), offset_ns)
                     edits.append((part.start, part.end, moved.encode()))
-            yield stamp_source.replaced(block, edits)
+            yield with_edits(block, edits)
 
     return BufferedReader(Pieces(filter(None, pieces())))
+
+
+def with_offset(text: str, offset_ns: int) -> tuple[str, int]:
+    """Return documents with so much added to all stamps in them, and how many these are."""
+    edits: list[tuple[int, int, str]] = []
+    for root in parse_nodes(text):
+        _shift(root, offset_ns, edits)
+    return with_edits(text, edits), len(edits)
+
+
+def _shift(node: Node, offset_ns: int, edits: list[tuple[int, int, str]]) -> None:
+    """Add to `edits` those of the stamps below a node: one of a mapping by its key, or the seconds it is made of."""
+    if type(node.value) is list:
+        for each in node.value:
+            _shift(each, offset_ns, edits)
+    if type(node.value) is not dict:
+        return
+    own = next((key for key in STAMP_KEYS if key in node.value and type(node.value[key][1].value) is str), "")
+    for key, (_, value) in node.value.items():
+        if key != own:
+            _shift(value, offset_ns, edits)
+            continue
+        with suppress(ValueInvalid):
+            in_ns = in_nanoseconds(key)
+            new = stamp_text(value.value, read_stamp(value.value, in_ns=in_ns) + offset_ns, in_ns=in_ns)
+            edits.append((value.start + bool(value.quote), value.end - bool(value.quote), new))
+    for seconds, below in (("sec", "nanosec"), ("secs", "nsecs")):
+        pair = [node.value[key][1] for key in (seconds, below) if key in node.value]
+        if len(pair) == 2:
+            with suppress(ValueInvalid):
+                stamp_ns = read_header_stamp(*(each.value for each in pair)) + offset_ns
+                parts = divmod(stamp_ns, 1_000_000_000)
+                edits += [(each.start, each.end, str(part)) for each, part in zip(pair, parts, strict=True)]
 
 
 def _as_array(outcomes: Iterable[Outcome], on_error: str) -> Iterator[Outcome]:

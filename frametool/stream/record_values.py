@@ -33,7 +33,7 @@ from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.readers import Misfit, NotARotation, Path, Reading, in_nanoseconds, stamp_column, tell
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream.faults import ZONES, RowNote
-from frametool.stream.record import STALE, Record, find_records, pose_of, value_at
+from frametool.stream.record import STALE, Record, find_records, key_path, pose_of, stamp_keys, value_at
 from frametool.stream.request import Request, RowOptions
 from frametool.stream.row_layout import (
     AS_READ,
@@ -46,7 +46,6 @@ from frametool.stream.row_layout import (
     Target,
     checked_rotation,
 )
-from frametool.stream.stamp_source import key_path, read_header_stamp, read_stamp, stamp_keys
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -143,6 +142,8 @@ def answer(entry: Entry, stamp: Sequence[str], request: Request) -> Answer:
     operation, shape, timed = request.operation, entry.record.shape, request.timed
     edge, at_ns = entry.edge, None
     if stamp and (timed is not None or request.window):
+        from frametool.frames.stamps import read_header_stamp, read_stamp
+
         key = str(entry.stamp[0][-1])
         try:
             at_ns = read_header_stamp(*stamp) if stamp[1:] else read_stamp(stamp[0], in_ns=in_nanoseconds(key))
@@ -494,7 +495,9 @@ def _read_stamp(key: str, value: Any) -> int:
         from frametool.ros import messages
 
         return messages.read_stamp(value)
-    return read_stamp(str(value), in_ns=in_nanoseconds(key))
+    from frametool.frames import stamps
+
+    return stamps.read_stamp(str(value), in_ns=in_nanoseconds(key))
 
 
 def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components, Namespace, Number, Rigid
     from frametool.stream.gathering import Gathered
     from frametool.stream.row_layout import Word
-    from frametool.stream.stamp_source import Timed
 
     Rename: TypeAlias = Callable[[str | None, str | None], tuple[str | None, str | None]]
 
@@ -319,6 +318,38 @@ def thing_pose(shape: Shape, own: Components, rotation: Callable[[Components], C
     """Return the pose that numbers say, which may be the inverse of what is written."""
     pose: Any = (*shape.position(own), *shape.turned(own, rotation(own)))
     return rigid.inverse(*pose) if shape.inverse else pose
+
+
+class Timed(NamedTuple):
+    """Where the stamps of rows are, and the poses that move from a frame (None: the one SOURCE) at such times.
+
+    name: the column or key of the stamps; "" for the stamp in the header of each message
+    many: columns of poses at an array of nanoseconds, nan where there is no data
+    one: a pose at one time, or the reason raised
+    moves: True if what lies between a frame and the target depends on the time
+    width: how many numbers such a pose has, with its covariance if that counts
+    """
+
+    name: str
+    many: Callable[[str | None, Any], Components]
+    one: Callable[[str | None, int], Components]
+    moves: Callable[[str | None], bool] = bool
+    width: int = EXACT
+
+    @classmethod
+    def of_rows(cls, name: str) -> Timed:
+        """Return where the stamps of rows stand for an expression, which knows by itself what they are for."""
+        return cls(name, lambda *_: (), lambda *_: (), lambda _: True)
+
+    @property
+    def column(self) -> str:
+        """Name the column or key for messages."""
+        return self.name or "header.stamp"
+
+    def pose(self, frame: str | None, stamp_ns: int) -> Components:
+        """Return the pose at one time, to the bit as `many` does; raises FrametoolError if absent."""
+        found = tuple(float(column[0]) for column in self.many(frame, [stamp_ns]))
+        return found if found[0] == found[0] else self.one(frame, stamp_ns)
 
 
 class RowOptions(NamedTuple):

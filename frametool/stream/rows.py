@@ -19,12 +19,11 @@ from frametool.documents.document import JSON_NUMBER
 from frametool.documents.source import Verbatim
 from frametool.documents.writers import dump_json
 from frametool.errors import FrametoolError, ValueInvalid
-from frametool.frames.stamps import BILLION
+from frametool.frames.stamps import BILLION, read_header_stamp, read_stamp
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.readers import in_nanoseconds
 from frametool.grammar.result import NoResult, Result, with_entries
 from frametool.stream.row_layout import AS_READ, NOWHERE, PARTS, POSE, Const, IfLocked, In, Instead, Out, Piece, Word
-from frametool.stream.stamp_source import read_header_stamp, read_stamp
 from frametool.text.numbers import parse_number
 from frametool.text.parse import FURTHEST, parse_floats, parse_stamps
 from frametool.text.spans import MARGIN, Floats, Ints, Spans, framed, join, without_quotes

@@ -1,4 +1,4 @@
-"""Records in the text of a stream: numbers are replaced where they are, members are replaced, added or left out.
+"""Records in the text of a stream: numbers are with_edits where they are, members are with_edits, added or left out.
 
 Everything else stays as it is, byte for byte.  Knows the syntax of JSON and YAML only as far as members go: what
 stands between them, and how one is written.
@@ -36,7 +36,7 @@ from frametool.stream.row_layout import (
     count_of,
     number_text,
 )
-from frametool.stream.stamp_source import replaced
+from frametool.text.lines import with_edits
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -215,7 +215,7 @@ class Splicer:
         return members
 
     def _extras(self, first: int) -> list[tuple[Piece, ...]]:
-        """Return what comes with a result as members; one of the record that gives way to such a one is replaced."""
+        """Return what comes with a result as members; one of the record that gives way to such a one is with_edits."""
         said, prefix = self.request.operation.shown, self.request.results.prefix
         members = []
         if said is None:
@@ -400,7 +400,7 @@ def nulled(record: bytes, *, json: bool) -> str | None:
         edits = [(node.start, node.end, "null") for root in parse_nodes(text) for node in numbers_in(root)]
     except (FormatError, UnicodeDecodeError):
         return None
-    return replaced(text, edits) if edits else None
+    return with_edits(text, edits) if edits else None
 
 
 def null_of(record: bytes, *, json: bool) -> bytes:

@@ -19,7 +19,7 @@ import numpy as np
 
 from frametool.errors import FormatError, FrametoolError, Misused, listing
 from frametool.formats.table import FORMATS
-from frametool.frames.stamps import BILLION
+from frametool.frames.stamps import BILLION, stamp_text
 from frametool.geometry.representations import UPPER_ROWS, notation
 from frametool.grammar.readers import EARTH_FRAMES, NORMALS, in_nanoseconds, stamp_column, stamp_places
 from frametool.stream.evaluate import Run, State
@@ -39,9 +39,8 @@ from frametool.stream.rows import (
     taken,
     written,
 )
-from frametool.stream.stamp_source import replaced, stamp_text
 from frametool.stream.table_plan import ADDED, NAMED, Layout, New, plan_table, quoted
-from frametool.text.lines import read_blocks, whole_lines
+from frametool.text.lines import read_blocks, whole_lines, with_edits
 from frametool.text.spans import (
     MARGIN,
     Cells,
@@ -508,4 +507,4 @@ class TableRows(PlannedRows):
             for column, part in zip(columns, divmod(stamp, BILLION), strict=False):
                 new = str(part) if len(columns) > 1 else stamp_text(column.text(row).decode(), stamp, in_ns=in_ns)
                 edits.append((int(column.starts[row]) - MARGIN, int(column.ends[row]) - MARGIN, new.encode()))
-        return replaced(text, edits)
+        return with_edits(text, edits)

@@ -9,13 +9,13 @@ import sys
 from io import BufferedReader, RawIOBase
 from itertools import chain
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, AnyStr
 
 from frametool import sizes
 from frametool.errors import FormatError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
     from io import BufferedIOBase
     from typing import TypeAlias
 
@@ -145,3 +145,14 @@ def arrived(stream: BufferedReader, is_enough: Callable[[bytes], bool], most: in
             break
     pieces = chain((held,) if held else (), iter(lambda: stream.read1(most), b""))
     return BufferedReader(Pieces(pieces, stream), most)
+
+
+def with_edits(text: AnyStr, edits: Iterable[tuple[int, int, AnyStr]]) -> AnyStr:
+    """Return text, or bytes, with others in the place of some stretches."""
+    pieces: list[AnyStr] = []
+    end = 0
+    for start, stop, new in sorted(edits):
+        pieces += [text[end:start], new]
+        end = stop
+    pieces.append(text[end:])
+    return text[:0].join(pieces)

@@ -16,6 +16,7 @@ from frametool import sizes
 from frametool.documents.source import Source
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.formats.table import readers
+from frametool.frames.stamps import read_stamp
 from frametool.geometry.representations import notation
 from frametool.grammar.readers import Reading
 from frametool.grammar.result import Style
@@ -25,7 +26,6 @@ from frametool.stream.record_stream import run_records
 from frametool.stream.record_values import Entry, answer, read_poses, results
 from frametool.stream.request import Operation, Request, ResultOptions, RowOptions
 from frametool.stream.rows import read_stamps
-from frametool.stream.stamp_source import read_stamp
 from frametool.stream.table import run_table
 from frametool.text.spans import MARGIN, Spans, framed
 

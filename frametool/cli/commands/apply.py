@@ -352,7 +352,7 @@ class TreeWay(Way):
 
     def request(self, frame_column: str | None, time_column: str | None) -> Request:
         """Return how records move, unless all move at one time each at its own."""
-        from frametool.stream.stamp_source import Timed
+        from frametool.stream.request import Timed
 
         timed = None if not self.in_time else Timed(
             time_column or "", self.at_times, self.from_frame, width=UNCERTAIN if self.uncertain else EXACT,

@@ -365,8 +365,7 @@ def _over_rows(lines: Sequence[Line], behind: int, scope: Scope, inputs: Inputs,
     behind: so many lines come before those of -e
     """
     from frametool.calc.rows import RowExpressions
-    from frametool.stream.request import Operation, Request, RowOptions
-    from frametool.stream.stamp_source import Timed
+    from frametool.stream.request import Operation, Request, RowOptions, Timed
 
     results = [line for at, line in enumerate(lines) if at >= behind or not line.name] or [lines[-1]]
     names = [line.name for line in results]

@@ -172,8 +172,7 @@ def _many(task: PoseTask, lookups: algebra.Lookups, target: str, source: str) ->
 
 def _by_row(task: PoseTask, lookups: algebra.Lookups, target: str | None, source: str | None) -> int:
     """Add the pose of SOURCE in TARGET to every row; a frame named on the command line is every row's."""
-    from frametool.stream.request import Operation
-    from frametool.stream.stamp_source import Timed
+    from frametool.stream.request import Operation, Timed
 
     inputs, tree, place = task.inputs, lookups.tree, task.output.style.place
     columns = inputs.target_column, inputs.source_column
