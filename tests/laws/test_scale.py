@@ -136,7 +136,7 @@ def test_a_scale_that_is_none_is_bad_data_as_other_numbers_are(run: Run, scale: 
 
 @pytest.mark.parametrize("count", [0, 1, 70])
 @pytest.mark.parametrize("fmt", ["json", "yaml", "csv"])
-def test_a_scale_beside_a_matrix_counts(run: Run, count: int, fmt: str) -> None:
+def test_a_scale_that_comes_with_a_matrix_counts(run: Run, count: int, fmt: str) -> None:
     for size, status in ((1.0, 0), (2.0, 1)):  # one that says it too may mean 2 or 4
         record = json.dumps({"xyz": [1, 2, 3], "matrix": times(size), "scale": 2})
         given = ("-",) if count else (record,)
