@@ -157,9 +157,13 @@ class Operation(NamedTuple):
         return columns(36 if shape.kind == POSE else 9)
 
     def reads_scale(self, shape: Shape) -> bool:
-        """Return True if the matrix of a shape may be a multiple of one of a rotation, whose scale counts."""
-        may_be = self.multiples and 1 not in shape.covariance  # a scale that comes with it says it already
-        return may_be and shape.notation is not None and shape.notation.representation.whole is not None
+        """Return True if the matrix of a shape may be a multiple of one of a rotation, whose scale counts.
+
+        A scale that comes with it says it already.
+        """
+        return self.multiples and shape.notation is not None and (
+            shape.notation.representation.whole is not None and 1 not in shape.covariance
+        )
 
     def result_kind(self, kind: str) -> str:
         """Return what a row of some kind becomes; "" for numbers alone."""
@@ -507,9 +511,8 @@ class Request(NamedTuple):
         asked = self.results
         if asked.place is not None and shape.unit is not None:
             return asked.place
-        own = shape.unit if shape.place is None else 1.0
-        in_metres = asked.canonical or (asked.all_numbers and (asked.notations or shape.notation is None))
-        return 1.0 if own is not None and in_metres else own
+        own = shape.unit if shape.place is None and not (asked.canonical and shape.unit) else 1.0
+        return 1.0 if own is not None and asked.all_numbers and (asked.notations or shape.notation is None) else own
 
     def extras(self, shape: Shape) -> tuple[str, ...]:
         """Name the numbers that come with a result as columns or keys of their own."""
