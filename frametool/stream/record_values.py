@@ -397,8 +397,8 @@ def unit_of(record: Record, document: Any) -> Path:
 
 def values_of_unit(node: Node, unit: Path, answers: list[Answer], request: Request, style: Style) -> Iterator[Value]:
     """Yield what one document or item becomes: a pose, or a mapping, for each record in it."""
-    is_one = len({each.entry.record.path for each in answers}) < len(answers)  # of several things, as an Imu
-    if request.operation.moves and is_one:
+    # several things at one place are one message, as an Imu
+    if request.operation.moves and len({each.entry.record.path for each in answers}) < len(answers):
         yield _of_several(node, unit, answers, request)
         return
     for each in answers:
@@ -412,16 +412,18 @@ def _header_stamp(record: Record) -> dict[str, int]:
 
 def _result(node: Node, unit: Path, made: Answer, request: Request, fmt: str) -> Value:
     """Return what a record becomes, with its frames and what else it says: a pose, or a mapping without levels."""
-    entry, parts, operation, extras = made.entry, made.parts, request.operation, _extras(made, request)
+    (entry, parts, _), operation, extras = made, request.operation, _extras(made, request)
     record, target, kind = entry.record, entry.target, operation.result_kind(entry.record.shape.kind)
-    if operation.shown is not None:
-        cells = tuple(extras.values())
-        members = operation.shown.values(request.results.prefix, cells)
-        extras = operation.shown.cells([*extras], cells) if fmt == "csv" else members
-    if operation.only_adds:
-        return with_stamp_ns(plain(node), fmt) | extras if type(node.value) is dict else extras
-    keeps_stamp = operation.formula is None or (kind == POSE and not request.rows.poses)
-    said = (_header_stamp(record) if keeps_stamp else {}) | extras | with_stamp_ns(_rest(node, unit, record), fmt)
+    if operation.formula is not None:
+        if operation.shown is not None:
+            cells = tuple(extras.values())
+            members = operation.shown.values(request.results.prefix, cells)
+            extras = operation.shown.cells([*extras], cells) if fmt == "csv" else members
+        if operation.only_adds:
+            return with_stamp_ns(plain(node), fmt) | extras if type(node.value) is dict else extras
+        if kind != POSE or request.rows.poses:
+            record = record._replace(stamp_ns=None)
+    said = _header_stamp(record) | extras | with_stamp_ns(_rest(node, unit, record), fmt)
     seen_from = "frame" if kind or record.shape.kind != POSE else "parent"
     named = {key: name for key, name in (("name", entry.name), (seen_from, entry.parent)) if name is not None}
     if kind in (POSE, ROTATION):
@@ -434,16 +436,13 @@ def _result(node: Node, unit: Path, made: Answer, request: Request, fmt: str) ->
         if operation.similar and isinstance(said.get(SCALE), float):
             pose = pose._replace(scale=said.pop(SCALE))
         return Result(pose, said)
-    place: dict[str, Any] = {}
+    values = written(made)[: target.size]
+    place: dict[str, Any] = dict(zip(PARTS.get(kind, (kind,)), (values[:3], values[3:]), strict=False)) if kind else {}
     if target.place is not None:
         from frametool.grammar.place import point_entry
 
-        written(made)  # raises where it has no place there
-        named.pop(seen_from, None)  # which it says itself
+        named.pop(seen_from, None)  # which the place says itself
         place = point_entry(entry.parent, parts[:3], target.place, getattr(parts, "read", None))
-    elif kind:
-        numbers = written(made)[: target.size]
-        place = dict(zip(PARTS.get(kind, (kind,)), (numbers[:3], numbers[3:]), strict=False))
     if is_recording(fmt) and operation.keeps_frames:
         place |= _place_as_read(node.at(record.path[len(unit) :]), record)
     return named | place | said
@@ -542,9 +541,8 @@ def _extras(made: Answer, request: Request) -> dict[str, Any]:
     names = [request.results.prefix + name for name in request.operation.extras(shape)]
     sizes = () if shape.rewritten else shape.covariance
     numbers = iter([number + 0.0 for number in made.parts[len(made.parts) - len(names) - sum(sizes) :]])
-    extras: dict[str, Any] = {name: next(numbers) for name in names}
-    if request.operation.shown is None:
-        extras = with_entries(extras)
+    found = dict(zip(names, numbers, strict=False))  # the covariances come behind them
+    extras: dict[str, Any] = found if request.operation.shown else with_entries(found)
     for key, size in zip(made.entry.record.keys.covariances, sizes, strict=False):
         entries = list(islice(numbers, size))
         extras[key] = entries if size > 1 else entries[0]
