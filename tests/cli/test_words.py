@@ -97,7 +97,7 @@ def test_two_lists_are_what_from_says(run: Run) -> None:
     ("{rot: [0, 0, 1, 0], trans: [1, 2, 3]}", "argument:1:7: rot [0, 0, 1, 0] has no order; write xyzw: [..], wxyz: [..] or {x:, y:, z:, w:}"),
     ("{rot: [0, 0, 1], trans: [1, 2, 3]}", "argument:1:7: rot [0, 0, 1] does not say what it is; write rpy: [..], rpy_deg: [..] or rotvec: [..]"),
     ("{R: [0, 0, 1], t: [1, 2, 3]}", "argument:1:5: R [0, 0, 1] does not say what it is; write rpy: [..], rpy_deg: [..] or rotvec: [..]"),
-    ("{child: a, name: b, xyz: [0, 0, 1]}", "argument:1:1: name says 'b' and child says 'a'; keep one"),
+    ("{child: a, name: b, xyz: [0, 0, 1]}", "argument:1:18: name says 'b' and child says 'a'; keep one"),
     ("{rvec: [0, 0, 1], tvec: [1, 2, 3], xyz: [1, 2, 4]}", "argument:1:41: two positions in one entry disagree by 1 m; keep one"),
     ("{rvec: [0, 0, 0], rpy_deg: [0, 0, 90]}", "argument:1:28: two rotations in one entry disagree by 90 degrees; keep one"),
     ("{xyz: [1, 2, 3], x: 4, y: 5, z: 6, rpy: [0, 0, 0]}", "argument:1:18: expected one position, found xyz and x y z"),
