@@ -24,10 +24,28 @@ from contextlib import contextmanager
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
-    from typing import TypeVar
+    from typing import Any, TypeVar
+    from typing import NamedTuple as NamedTuple  # noqa: PLC0414 - for others
 
     Result = TypeVar("Result")
     Listener = Callable[[str, str], None]
+else:
+
+    class _Records(type):
+        """Make a class of named fields as typing.NamedTuple does, but compile none of its types: 40 us instead of 200.
+
+        That is 4 of the 57 ms that `frametool compose` takes, of some 40 such classes.
+        """
+
+        def __new__(cls: Any, name: str, _bases: Any, body: dict[str, Any]) -> Any:
+            fields = body.pop("__annotations__", {})
+            defaults = [body.pop(field) for field in fields if field in body]
+            made = namedtuple(name, fields, defaults=defaults, module=body.pop("__module__"))  # noqa: PYI024 - the base
+            for key, value in body.items():
+                setattr(made, key, value)
+            return made
+
+    NamedTuple = type.__new__(_Records, "NamedTuple", (), {})
 
 SHOWN = 60  # maximum length of quoted input in a message
 LONGEST_NAME = 200  # names up to this length are compared with others

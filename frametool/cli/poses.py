@@ -10,13 +10,13 @@ import re
 from contextlib import contextmanager
 from functools import lru_cache, partial
 from io import BufferedReader, BytesIO
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool.cli.command import misuse, refuse, refuse_two_readers, say_if_typed
 from frametool.documents.source import Pasted, Source, decode, read_text
-from frametool.errors import FormatError, Misused, ValueInvalid, heard_by, shown, warn
+from frametool.errors import FormatError, Misused, NamedTuple, ValueInvalid, heard_by, shown, warn
 from frametool.grammar.pose import Pose, pose_of_numbers
 from frametool.grammar.readers import NotARotation, Reading, stamp_column
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import re
 import sys
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from frametool import sizes
 from frametool.documents.source import END, LEAF, LIST, MAP, Source, error_at, places_of, repeated_key, too_much
-from frametool.errors import FormatError
+from frametool.errors import FormatError, NamedTuple
 from frametool.text.numbers import odd_characters
 
 if TYPE_CHECKING:

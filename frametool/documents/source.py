@@ -17,10 +17,10 @@ from bisect import bisect_right
 from contextlib import contextmanager, suppress
 from functools import cached_property
 from io import BufferedReader, BytesIO, FileIO
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from frametool import sizes
-from frametool.errors import LONGEST_NAME, FileProblem, FormatError, cells, shown
+from frametool.errors import LONGEST_NAME, FileProblem, FormatError, NamedTuple, cells, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence

@@ -33,10 +33,9 @@ import os
 import re
 from functools import cached_property
 from itertools import chain, repeat
-from typing import NamedTuple
 
 from frametool.documents.source import HEAD, LOOKED_AT, UTF16, not_text
-from frametool.errors import FormatError, ValueInvalid, bare, first_of
+from frametool.errors import FormatError, NamedTuple, ValueInvalid, bare, first_of
 from frametool.formats.table import BAG, FORMATS, NUMBER, by_suffix, readers
 
 TYPE_CHECKING = False

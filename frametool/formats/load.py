@@ -16,11 +16,21 @@ from itertools import islice
 from operator import gt, lt
 from os import PathLike
 from types import MappingProxyType
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO
 
 from frametool.documents.document import format_error, locate_many
 from frametool.documents.source import InputFile, Source, paused_collector
-from frametool.errors import BadAnswer, BadTopology, FileProblem, FormatError, ValueInvalid, alternatives, shown, warn
+from frametool.errors import (
+    BadAnswer,
+    BadTopology,
+    FileProblem,
+    FormatError,
+    NamedTuple,
+    ValueInvalid,
+    alternatives,
+    shown,
+    warn,
+)
 from frametool.formats.detect import Beginning, detect, of_folder
 from frametool.formats.table import CHOICES, FORMATS, readers
 from frametool.frames import topology

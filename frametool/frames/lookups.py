@@ -11,9 +11,19 @@ from functools import partial, reduce
 from itertools import chain, repeat
 from math import ceil, floor
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from frametool.errors import BadTopology, NoDataAt, NotConnected, UnknownFrame, ValueInvalid, bare, listing, warn
+from frametool.errors import (
+    BadTopology,
+    NamedTuple,
+    NoDataAt,
+    NotConnected,
+    UnknownFrame,
+    ValueInvalid,
+    bare,
+    listing,
+    warn,
+)
 from frametool.frames import topology
 from frametool.frames.stamps import BILLION, FURTHEST_NS, whole_stamp
 from frametool.frames.topology import FramePath, Groups, Query, Snapshot, left_out, no_data, path_between, to_root

@@ -11,9 +11,19 @@ from collections.abc import Hashable
 from contextlib import suppress
 from functools import cached_property
 from operator import attrgetter
-from typing import Generic, NamedTuple, TypeVar
+from typing import Generic, TypeVar
 
-from frametool.errors import BadTopology, LookupFailed, NoDataAt, NotConnected, TooEarly, TooLate, bare, shown
+from frametool.errors import (
+    BadTopology,
+    LookupFailed,
+    NamedTuple,
+    NoDataAt,
+    NotConnected,
+    TooEarly,
+    TooLate,
+    bare,
+    shown,
+)
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.frames.track import MovingTrack, StaticTransform, Track
 from frametool.geometry import floats, quaternion, rigid

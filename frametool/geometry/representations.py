@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from functools import partial
 from math import isfinite, isqrt, tau
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from frametool.errors import ValueInvalid, did_you_mean, listing, nearest, shown, warn
+from frametool.errors import NamedTuple, ValueInvalid, did_you_mean, listing, nearest, shown, warn
 from frametool.geometry import euler, floats, matrix, quaternion
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ are those for a single one (`Representation.checked`), which also words the erro
 from __future__ import annotations
 
 from math import inf, isfinite
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from frametool.errors import ValueInvalid, warn
+from frametool.errors import NamedTuple, ValueInvalid, warn
 from frametool.geometry import floats
 from frametool.geometry.quaternion import SILENT, TOLERATED
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from itertools import repeat
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
-from frametool.errors import Finding, FormatError, listing, shown
+from frametool.errors import Finding, FormatError, NamedTuple, listing, shown
 from frametool.grammar.readers import Path, is_slashed, slash_note
 
 TYPE_CHECKING = False

@@ -10,9 +10,9 @@ have them; everything is checked here.  The shapes of rotations are those of the
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from frametool.errors import ValueInvalid, bare, did_you_mean, overheard, shown
+from frametool.errors import NamedTuple, ValueInvalid, bare, did_you_mean, overheard, shown
 from frametool.geometry import floats, matrix, quaternion, rigid
 from frametool.geometry.representations import LIST, NAMED, NAMED_AXES, REPRESENTATIONS, ROTATIONS, ROWS, axes_name
 from frametool.geometry.representations import notation as parse_notation

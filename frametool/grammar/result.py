@@ -9,9 +9,9 @@ a degree.
 from __future__ import annotations
 
 from copy import copy
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from frametool.errors import ValueInvalid, listing, shown, warn
+from frametool.errors import NamedTuple, ValueInvalid, listing, shown, warn
 from frametool.geometry import euler, floats, quaternion, rigid
 from frametool.geometry.representations import EARTH_FRAMES, Notation, notation
 from frametool.grammar.pose import NAMES, SCALE, Pose

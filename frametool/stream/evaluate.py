@@ -7,11 +7,11 @@ from functools import partial
 from itertools import accumulate, zip_longest
 from operator import itemgetter
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from frametool.errors import FrametoolError
+from frametool.errors import FrametoolError, NamedTuple
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import arrays, floats, quaternion, uncertainty
 from frametool.geometry.representations import UPPER_ROWS, BatchRule

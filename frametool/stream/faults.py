@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from frametool.errors import FormatError, FrametoolError, UnknownFrame, shown, warn
+from frametool.errors import FormatError, FrametoolError, NamedTuple, UnknownFrame, shown, warn
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

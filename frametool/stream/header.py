@@ -12,9 +12,9 @@ from copy import copy
 from functools import lru_cache
 from itertools import product
 from os.path import commonprefix
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from frametool.errors import FormatError, Misused, ValueInvalid, bare, did_you_mean, listing, shown
+from frametool.errors import FormatError, Misused, NamedTuple, ValueInvalid, bare, did_you_mean, listing, shown
 from frametool.geometry.representations import NAMED, ROTATIONS, UPPER_ROWS, Notation, Representation
 from frametool.geometry.representations import notation as parse_notation
 from frametool.grammar.readers import COLUMN_WORDS, NORMALS

@@ -13,11 +13,12 @@ from functools import partial
 from itertools import chain, islice
 from math import nan
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from frametool.errors import MOST_COMPARED, ValueInvalid, alternatives, did_you_mean, first_of, shown
+from frametool.errors import MOST_COMPARED, NamedTuple, ValueInvalid, alternatives, did_you_mean, first_of, shown
 from frametool.geometry import floats
 from frametool.geometry.representations import ROTATIONS, notation
+from frametool.grammar import readers
 from frametool.grammar.pose import (
     COVARIANCE_KEYS,
     LISTED_WORDS,
@@ -36,23 +37,7 @@ from frametool.grammar.pose import (
     read_written,
     unknown_keys,
 )
-from frametool.grammar.readers import (
-    AXES_KEY,
-    EARTH_FRAMES,
-    NAME_KEYS,
-    PARENT_KEYS,
-    STAMP_KEYS,
-    Misfit,
-    NotARotation,
-    Reading,
-    is_rate,
-    kind,
-    may_be_on_earth,
-    may_be_uncertain,
-    places_in,
-    read_numbers,
-    within,
-)
+from frametool.grammar.readers import EARTH_FRAMES, NAME_KEYS, PARENT_KEYS, STAMP_KEYS, Misfit, Reading, kind, within
 from frametool.stream.row_layout import ACCEL, PARTS, POINT, POSE, TURN, VECTOR, Shape, checked_rotation, doubt
 from frametool.text.numbers import parse_number, read_number_or_angle
 
@@ -76,7 +61,7 @@ KNOWN = frozenset((*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS))
 XYZ = ("x", "y", "z")
 MOST_KEYS = 8  # named in a message
 QUATERNION = (*XYZ, "w")
-USED = KNOWN.difference(NAME_KEYS).union(ROTATION_KEYS, (AXES_KEY, "sigma"), COVARIANCES, *PARTS.values())
+USED = KNOWN.difference(NAME_KEYS).union(ROTATION_KEYS, (readers.AXES_KEY, "sigma"), COVARIANCES, *PARTS.values())
 NUMBER_BEGINS = frozenset("+-.0123456789n")  # n: of nan
 KEYS_REMEDY = "name the keys _deg"
 EARTH_PARENTS, EARTH_NAMES = ("parent", "frame"), ("child_frame_id", "name", "frame_id")
@@ -233,7 +218,7 @@ def _search(value: Any, path: Path, request: Request) -> Iterator[Holder]:
             found = _search_inside(value, path, request, stays)
         if not operation.keeps_frames and (operation.formula is None or operation.formula.reads_row):
             _refuse_half(value, found, path, stays if operation.moves else ())
-        if operation.turns and found and (rates := [key for key in value if is_rate(key)]):
+        if operation.turns and found and (rates := [key for key in value if readers.is_rate(key)]):
             what = f"{first_of(rates, 3, quote=shown)} would keep to the old axes; a table turns vx, vy, vz along"
             raise Misfit(f"{what}; leave them out, or convert to CSV first", (*path, rates[0]), key=True)
         yield from found
@@ -290,7 +275,7 @@ def _holds_numbers(value: dict[str, Any]) -> bool:
         return True
     if any(type(value.get(key)) in (dict, list) for key in INNER):
         return False
-    if any(map(may_be_on_earth, value)):
+    if any(map(readers.may_be_on_earth, value)):
         from frametool.stream.earth_columns import is_on_earth
 
         if is_on_earth(value):
@@ -360,7 +345,7 @@ def _record(root: Any, path: Path, field: str, kind: str, request: Request, read
     keys = {*covariance_keys(field), *COVARIANCE_KEYS}
     for each in () if record.keys.placed else around:
         holder = value_at(root, each)
-        if type(holder) is dict and (not keys.isdisjoint(holder) or any(map(may_be_uncertain, holder))):
+        if type(holder) is dict and (not keys.isdisjoint(holder) or any(map(readers.may_be_uncertain, holder))):
             from frametool.stream.extra_numbers import with_covariances
 
             record = with_covariances(record, holder, each, covariance_keys(field), request, reading)
@@ -446,7 +431,7 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     if (name := _parts_of(value)) is not None and not _is_holder(value):
         return _two_vectors(value, ACCEL if path[-1:] == (ACCEL,) else name, path, request)
     positions = [key for key in value if _holds_position(key, value[key])]
-    if any(map(may_be_on_earth, value)):
+    if any(map(readers.may_be_on_earth, value)):
         from frametool.stream.earth_columns import placed_record
 
         inner = partial(_pose_at_place, path=path, reading=reading, request=request)
@@ -556,7 +541,7 @@ def pose_of(record: Record, request: Request) -> Pose:
 def _two_vectors(value: dict[str, Any], name: str, path: Path, request: Request) -> Record:
     """Read a twist or a wrench."""
     if request.rows.kind not in ("", name) or not request.operation.moves:
-        raise NotARotation(f"a {name} cannot be taken for a {request.rows.kind or POSE}")
+        raise readers.NotARotation(f"a {name} cannot be taken for a {request.rows.kind or POSE}")
     halves = [within((part,), _three, value[part], (*path, part)) for part in PARTS[name]]
     paths, numbers = (first + second for first, second in zip(*halves, strict=True))
     return Record(path, Shape(name, None), paths, numbers)
@@ -645,7 +630,7 @@ def _with_flat_rotation(
     try:
         _, doubts = checked_rotation(shape, every, normalize=reading.normalize)
     except ValueInvalid as error:
-        raise NotARotation(str(error), (names[0],)) from None
+        raise readers.NotARotation(str(error), (names[0],)) from None
     for rule, message in doubts:
         reading.note(message, names[0], rule=rule)
     angles = shape.rotation(every)
@@ -692,9 +677,9 @@ def _three(
 
     parts: how many of a length's make a metre, 0 for what is no length
     """
-    numbers = read_numbers(value, XYZ, partial=partial, metres=parts == 1.0)
+    numbers = readers.read_numbers(value, XYZ, partial=partial, metres=parts == 1.0)
     if type(value) is list:
-        return tuple((*below, *step) for step in places_in(value)), numbers
+        return tuple((*below, *step) for step in readers.places_in(value)), numbers
     return tuple((*below, axis) if axis in value else None for axis in XYZ), numbers
 
 

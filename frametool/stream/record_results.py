@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from itertools import chain
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from frametool import sizes
-from frametool.errors import FrametoolError
+from frametool.errors import FrametoolError, NamedTuple
 from frametool.formats.rows.csv import cells_of, row
 from frametool.grammar.result import Style, write_poses
 from frametool.stream.faults import STOP, Outcome

@@ -11,7 +11,7 @@ from contextlib import suppress
 from functools import cached_property
 from itertools import islice
 from math import isfinite, isinf
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import (
     JSON_NUMBER,
@@ -26,26 +26,17 @@ from frametool.documents.document import (
     strict_json,
 )
 from frametool.documents.source import Source, Verbatim
-from frametool.errors import Finding, FormatError, FrametoolError, Misused, ValueInvalid, shown, warn
+from frametool.errors import Finding, FormatError, FrametoolError, Misused, NamedTuple, ValueInvalid, shown, warn
 from frametool.formats.table import is_recording
 from frametool.geometry import floats
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.readers import Misfit, NotARotation, Path, Reading, in_nanoseconds, stamp_column, tell
 from frametool.grammar.result import Result, Style, with_entries
+from frametool.stream import row_layout
 from frametool.stream.faults import ZONES, RowNote
 from frametool.stream.record import STALE, Record, find_records, key_path, pose_of, stamp_keys, value_at
 from frametool.stream.request import Request, RowOptions
-from frametool.stream.row_layout import (
-    AS_READ,
-    FLAT,
-    LEAVES_PLANE,
-    PARTS,
-    POSE,
-    ROTATION,
-    VECTOR,
-    Target,
-    checked_rotation,
-)
+from frametool.stream.row_layout import FLAT, LEAVES_PLANE, PARTS, POSE, ROTATION, VECTOR, Target, checked_rotation
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -456,7 +447,7 @@ def _place_as_read(holder: Node, record: Record) -> dict[str, list[float]]:
     if not keys:
         return {}
     place, numbers = read_at({key: str(plain(holder.at((key,)))) for key in keys}, Reading(Source("", "")))
-    return {AS_READ: [*place.lla(numbers)]}
+    return {row_layout.AS_READ: [*place.lla(numbers)]}
 
 
 def with_stamp_ns(extras: dict[str, Any], fmt: str) -> dict[str, Any]:

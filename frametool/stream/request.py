@@ -5,9 +5,9 @@ One `Operation` serves floats and arrays alike.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from frametool.errors import ValueInvalid
+from frametool.errors import NamedTuple, ValueInvalid
 from frametool.geometry import quaternion, rigid
 from frametool.geometry.floats import RADIAN
 from frametool.geometry.representations import HEADING, Notation, notation

@@ -5,9 +5,9 @@ Knows no text; works on floats and on arrays alike.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
-from frametool.errors import ValueInvalid, overheard
+from frametool.errors import NamedTuple, ValueInvalid, overheard
 from frametool.geometry import euler, floats, quaternion, rigid
 
 if TYPE_CHECKING:

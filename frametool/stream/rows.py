@@ -11,14 +11,14 @@ from importlib import import_module
 from math import isnan
 from operator import itemgetter
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from frametool.documents.document import JSON_NUMBER
 from frametool.documents.source import Verbatim
 from frametool.documents.writers import dump_json
-from frametool.errors import FrametoolError, ValueInvalid
+from frametool.errors import FrametoolError, NamedTuple, ValueInvalid
 from frametool.frames.stamps import BILLION, read_header_stamp, read_stamp
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.readers import in_nanoseconds

@@ -6,36 +6,21 @@ stands between them, and how one is written.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import Aliased, Node, parse_documents, parse_nodes
 from frametool.documents.source import Source, Verbatim, decode
 from frametool.documents.writers import dump_json, dump_yaml, flow, quoted
-from frametool.errors import FormatError, FrametoolError
+from frametool.errors import FormatError, FrametoolError, NamedTuple
 from frametool.geometry.representations import ROTATIONS
 from frametool.grammar.pose import LISTED_WORDS, ROTATION_KEYS, Pose
 from frametool.grammar.readers import AXES_KEY, EARTH_FRAMES, PLACE_KEYS
 from frametool.grammar.result import Result, Style, with_entries
+from frametool.stream import row_layout
 from frametool.stream.faults import Fault
 from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ, Name, outermost
 from frametool.stream.record_values import Answer, Entry, RecordText, json_documents, written
-from frametool.stream.row_layout import (
-    POINT,
-    POSE,
-    SIX,
-    TURNED,
-    VECTOR,
-    Const,
-    IfLocked,
-    In,
-    Item,
-    Out,
-    Piece,
-    Renamed,
-    Word,
-    count_of,
-    number_text,
-)
+from frametool.stream.row_layout import POSE, SIX, Const, IfLocked, In, Out, Piece, Renamed, Word, count_of, number_text
 from frametool.text.lines import with_edits
 
 if TYPE_CHECKING:
@@ -118,7 +103,7 @@ class Splicer:
             self._numbers(range(6), 0)
             return self.edits
         self._position()
-        if shape.kind in TURNED:
+        if shape.kind in row_layout.TURNED:
             self._rotation()
             self.dropped.update({*STALE, "inverse", *self.record.keys.others} - set(self.record.keys.flat))
         else:
@@ -146,7 +131,7 @@ class Splicer:
         record, target, shape = self.record, self.target, self.record.shape
         kind = "xyz" if shape.kind == POSE else shape.kind
         members, there = (record.keys.position,) if record.keys.position else record.keys.members, shape.position_size
-        if record.keys.position in (POINT, VECTOR) and record.keys.position != kind:
+        if record.keys.position in (row_layout.POINT, row_layout.VECTOR) and record.keys.position != kind:
             node = self.members[record.keys.position][0]
             text = f'"{kind}"' if self.json else kind
             self.edits.append(Edit(node.start, node.end, (Const(text.encode()),)))
@@ -242,8 +227,8 @@ class Splicer:
         fmt, exponent = "" if precision is None else f"z.{precision}f", b"e" if self.json else b".0e"
         opens, closes = ("[", "]") if value[1:] else ("", "")
         return (*begin, *(
-            Item(self.first + at, (opens * first, closes if at == value[-1] else ", ", "null" * first, fmt), exponent)
-            for at in value for first in [at == value[0]]
+            row_layout.Item(self.first + at, (opens * first, behind, "null" * first, fmt), exponent)
+            for at in value for first, behind in [(at == value[0], closes if at == value[-1] else ", ")]
         ))  # fmt: skip
 
     def _names(self) -> None:

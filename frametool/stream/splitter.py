@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
+from frametool.errors import NamedTuple
 from frametool.text.lines import whole_lines
 
 if TYPE_CHECKING:

@@ -13,11 +13,11 @@ from contextlib import suppress
 from functools import cache
 from itertools import chain
 from shlex import quote
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frametool.errors import FormatError, FrametoolError, Misused, listing
+from frametool.errors import FormatError, FrametoolError, Misused, NamedTuple, listing
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION, stamp_text
 from frametool.geometry.representations import UPPER_ROWS, notation

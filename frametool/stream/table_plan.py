@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from contextlib import suppress
 from itertools import chain
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
-from frametool.errors import FormatError, Misused, ValueInvalid, alternatives, shown
+from frametool.errors import FormatError, Misused, NamedTuple, ValueInvalid, alternatives, shown
 from frametool.grammar import readers
 from frametool.grammar.readers import AXES_KEY, may_be_uncertain, nanoseconds_beside, stamp_places, without_mark
 from frametool.stream import header, row_layout

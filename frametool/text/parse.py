@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 import re
 from decimal import Decimal
-from typing import NamedTuple
 
 import numpy as np
 
+from frametool.errors import NamedTuple
 from frametool.frames.stamps import BILLION, nanoseconds_each, tell_size
 from frametool.text import write
 from frametool.text.numbers import half_unit

@@ -17,10 +17,11 @@ Source: Dekker 1971 (splitting, exact product); Veltkamp's constant 2^27 + 1.
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frametool.errors import NamedTuple
 from frametool.text.spans import MARGIN, Bytes, Flags, Floats, Ints, Spans, Words, framed
 
 if TYPE_CHECKING:

@@ -48,11 +48,11 @@ class Cost(NamedTuple):
 
 
 MOST = {
-    "one CSV point": Cost(functions=498, files=48, lines=3528),  # the aim: 320 functions, 30 files
-    "40 JSON records": Cost(functions=467, files=46, lines=3276),  # 340, 32
-    "40 JSON records to CSV": Cost(functions=470, files=46, lines=3273),  # 340, 32
-    "TUM to KITTI": Cost(functions=408, files=38, lines=2774),  # 320, 30
-    "YAML lookup": Cost(functions=298, files=34, lines=1908),  # 220, 28
+    "one CSV point": Cost(functions=494, files=45, lines=3519),  # the aim: 320 functions, 30 files
+    "40 JSON records": Cost(functions=465, files=44, lines=3273),  # 340, 32
+    "40 JSON records to CSV": Cost(functions=469, files=44, lines=3273),  # 340, 32
+    "TUM to KITTI": Cost(functions=406, files=38, lines=2772),  # 320, 30
+    "YAML lookup": Cost(functions=297, files=33, lines=1908),  # 220, 28
     "convert of numbers": Cost(functions=133, files=21, lines=840),  # 120, 20
 }
 

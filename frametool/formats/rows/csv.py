@@ -10,9 +10,9 @@ as in RFC 4180; `text.spans` processes blocks of lines.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from frametool.errors import ValueInvalid
+from frametool.errors import NamedTuple, ValueInvalid
 from frametool.grammar.pose import NAMES
 from frametool.grammar.result import NoResult, Result, Style, in_columns, pose_numbers
 

@@ -32,11 +32,11 @@ from __future__ import annotations
 import re
 from importlib import import_module
 from itertools import chain, islice
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import format_error, parse_documents
 from frametool.documents.source import InputFile, lines, read_text
-from frametool.errors import FormatError, ValueInvalid, listing, shown
+from frametool.errors import FormatError, NamedTuple, ValueInvalid, listing, shown
 from frametool.formats.table import FORMATS, Rows
 from frametool.frames.stamps import BILLION, format_stamp, parse_stamp, whole_stamp
 from frametool.geometry import euler, floats, quaternion, rigid
