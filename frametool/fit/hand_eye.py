@@ -131,12 +131,11 @@ def solve_hand_eye(
 
 
 class _Model(NamedTuple):
-    """X and Z, the location of the noise, and what a fit found: sigmas, Hessian (12, 12) and 2 ln s_t + 2 ln s_r."""
+    """X and Z, the location of the noise, and what a fit found: Hessian (12, 12) and 2 ln s_t + 2 ln s_r."""
 
     x: Transform
     z: Transform
     cut: str = "target"
-    sigmas: Array = np.ones(2)
     hessian: Array = np.eye(12)
     misfit: float = 0.0
 
@@ -202,7 +201,7 @@ class _Samples(NamedTuple):
         slopes = slopes.reshape(-1, 12)
         gradient = slopes.T @ (weighed * errors.reshape(-1, 1))
         misfit = 2.0 * fsum(map(log, sigmas.tolist()))
-        return model._replace(sigmas=sigmas, hessian=slopes.T @ (weighed * slopes), misfit=misfit), gradient[:, 0]
+        return model._replace(hessian=slopes.T @ (weighed * slopes), misfit=misfit), gradient[:, 0]
 
 
 def _start(samples: _Samples, *, robust: bool) -> tuple[_Model, Array]:

@@ -356,16 +356,20 @@ class Frames:
         except NotConnected:
             if at_ns is not None and self._varies:
                 with suppress(NotConnected):  # perhaps a changing parent is not known at that time
-                    parents = {child: track.parent_near(at_ns) for child, track in self._tracks.items()}
-                    near = path_between(target, source, parents.get)
+                    near = path_between(target, source, partial(self._parent_near, at_ns=at_ns))
                     raise self._no_data(target, source, at_ns, near) from None
             raise
         except BadTopology:
             self._loops = self._varies = True
             if at_ns is None:
                 raise
-            there = {child: track.parent_at(at_ns) for child, track in self._tracks.items() if track.covers(at_ns)}
-            return path_between(target, source, there.get)  # of the edges that have data then
+            parent = partial(self._parent_near, at_ns=at_ns, is_covered=True)
+            return path_between(target, source, parent)  # of the edges that have data then
+
+    def _parent_near(self, child: str, at_ns: int, *, is_covered: bool = False) -> str | None:
+        """Return the parent of a frame at a time, or nearest to it, unless that has to be covered; None for none."""
+        track = self._tracks.get(child)
+        return track.parent_near(at_ns) if track and (track.covers(at_ns) or not is_covered) else None
 
     def require(self, *frames: str) -> list[str]:
         """Return the names of frames in this tree; raise UnknownFrame unless all exist."""

@@ -202,7 +202,5 @@ def find_euler(rotation: Rotation, angles: Sequence[float], *, tolerance: float 
         found = f"{near} is off by {off[near]:g}"
         if off[near] < 0.1:
             found += f", which --tolerance {1.01 * off[near]:.2g} takes"
-        elif max(map(abs, angles)) > 4.0 * floats.RIGHT_ANGLE:
-            found += "; --deg, where these are degrees"
         raise ValueInvalid(f"no Euler convention gives these angles within {tolerance:g} rad; {found}")
     return [axes for axes, angle in off.items() if angle <= tolerance]

@@ -50,7 +50,8 @@ DECIMAL = r"(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][-+]?[0-9]++)?"
 NUMBER = rf"[-+]?{DECIMAL}"
 LABEL = r"\s*+[A-Za-z_]\w*+\s*+=(?!=)\s*+"  # MATLAB's and Python's `T =`
 _SCALE = rf"\s*({NUMBER})\s*\*\s*\n"  # MATLAB's `1.0e+03 *` above a matrix
-_BY_COLUMNS = r"(?:[dft]|high|med|low)?p?_?mat[34](?:x[34])?\(|(?:structure\(|matrix\()?c\((?:[^,()]*,){8}"  # R too
+# of GLSL, and of R
+_BY_COLUMNS = r"(?:[dft]|high|med|low)?p?_?mat[34](?:x[34])?\(|(?:structure\(|matrix\()?c\((?:[^,()]*,){8}(?!.*byrow)"
 _NO_JSON = r"\d\.(?=[\s,\]])|;"
 
 _ROW = r"\[(?:[^\[\],]*,){%s}[^\[\],]*\]\s*,?\s*"

@@ -295,7 +295,7 @@ class Run:
             before = np.append(before, np.full(len(full) - EXACT, float(len(full) == SCALED)))
         elif len(before) != len(full):
             for row in good.tolist()[: None if self.operation.of == START else 1]:
-                self._blame(row, "", "the one before has a covariance or a scale, which this one has not")
+                self._blame(row, "", "what it is compared with has a covariance or a scale, which this one has not")
             before = np.append(before[:EXACT], full[EXACT:, good[0]])
         earlier = np.repeat(before[:, None], self.count, axis=1)
         if self.operation.of != START:

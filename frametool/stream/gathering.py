@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 class Gathered:
     """The poses that were read so far, in metres and as unit quaternions, and a number or text with each."""
 
-    def __init__(self, *, named: bool = False, by: str = "") -> None:
+    def __init__(self, *, named: bool = False, by: str | None = None) -> None:
         """Begin with none; named: so that `places` says where each was read; by: the column or key of their labels."""
         self.by = by
         self.places: list[str] = []
@@ -95,16 +95,16 @@ def means_of(
 
     poses, extra = gathered.transforms, gathered.extra
     rows_of: dict[str, Any] = {}
-    if gathered.by:
+    if gathered.by is not None:
         if extra is None:
             raise ValueInvalid("what was pasted has no columns or keys to group it by; leave --by out")
         for row, label in enumerate(extra.tolist()):
             rows_of.setdefault(label, []).append(row)
-    weights = None if gathered.by else extra if values is None else values
+    weights = None if gathered.by is not None else extra if values is None else values
     for label, rows in (rows_of or {"": range(len(poses))}).items():
         found = solve_mean(poses[rows] if rows_of else poses, weights=weights, robust=robust)
         (metres, radians), (farthest, widest), covariance = found.rms, found.most, found.covariance
-        extras: dict[str, Any] = {gathered.by: label} if gathered.by else {}
+        extras: dict[str, Any] = {} if gathered.by is None else {gathered.by: label}
         extras |= {"count": len(found.used)} | ({"used": int(found.used.sum())} if robust else {})
         left_out: list[str] = []
         for at in found.left_out.nonzero()[0].tolist():

@@ -689,7 +689,7 @@ def _with_rotation(
     """Add the rotation's numbers; whether that of a multiple s R is one is seen where s is known."""
     row = ROTATION_KEYS.get(key)
     is_multiple = request.operation.multiples and row is not None and row.representation.whole is not None
-    quiet = Reading(reading.source) if is_multiple else reading
+    quiet = Reading(reading.source, degrees=reading.degrees) if is_multiple else reading
     *_, (notation, values, degrees, places) = within(below, read_written, key, value, quiet, check=not is_multiple)
     joined = notation.representation.whole
     whole = joined is not None and len(values) == len(joined.columns)
@@ -697,8 +697,8 @@ def _with_rotation(
         raise Misfit("a 4x4 matrix is the whole pose; remove xyz, or write the 3x3 rotation", below)
     paths: tuple[Path | None, ...] = (None,) * len(values)
     if places and degrees == (reading.degrees if notation.degrees is None else notation.degrees):
-        above, is_list = (*record.path, *below), type(value) is list
-        paths = tuple((*above, *each) if is_list or each[0] in value else None for each in places[: len(values)])
+        above, has_all = (*record.path, *below), type(value) is not dict
+        paths = tuple((*above, *each) if has_all or each[0] in value else None for each in places[: len(values)])
     # else the numbers say another unit than their key: the member is written anew
     shape = record.shape._replace(kind=POSE, notation=notation, degrees=degrees, whole=whole)
     keys, every = record.keys._replace(rotation=key), (*record.values, *values)

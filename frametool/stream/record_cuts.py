@@ -20,7 +20,7 @@ from frametool.grammar.pose import DESCRIPTIVE, LISTED_WORDS, POSE_KEYS, ROTATIO
 from frametool.grammar.readers import AXES_KEY, NAME_KEYS, PARENT_KEYS, Path, may_be_uncertain
 from frametool.stream.evaluate import Plan
 from frametool.stream.faults import NULL, SKIP, Fault
-from frametool.stream.record import KEYS_REMEDY, POINT_KEYS, Record
+from frametool.stream.record import KEYS_REMEDY, POINT_KEYS
 from frametool.stream.row_layout import POSE, Const, In, Renamed
 from frametool.stream.rows import Block, read_extra
 from frametool.stream.splice import OURS, column_in, quoted_name, stretches_of
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from frametool.documents.document import Node
-    from frametool.stream.record_values import RecordText
+    from frametool.stream.record_values import Entry, RecordText
     from frametool.stream.request import Request
 
     Names: TypeAlias = tuple[str | None, str | None]
@@ -108,7 +108,7 @@ class Template:
         self._patterns = self._patterns if self.regular else {}
         stamps = [[known.root.at(path) for path in entry.stamp] for entry in self.entries]
         cuts = {*numbers, *((node.start, node.end) for node in chain(*stamps))}
-        frames = [_frames_of(known.root, entry.record, known.request, json=self.json) for entry in self.entries]
+        frames = [_frames_of(known.root, entry, known.request, json=self.json) for entry in self.entries]
         self._patterns |= {_text_of(node): FRAME[self.json, node.quote] for node in chain(*frames) if node is not None}
         leaves: dict[tuple[int, int], Node] = {}
         if known.request.results.canonical and self.regular:
@@ -265,15 +265,17 @@ def _leaves(node: Node, path: Path) -> Iterator[tuple[Path, Node]]:
         yield path, node
 
 
-def _frames_of(root: Node, record: Record, request: Request, *, json: bool) -> list[Node | None]:
+def _frames_of(root: Node, entry: Entry, request: Request, *, json: bool) -> list[Node | None]:
     """Return where the frames of a record are named, parent and name, if all that is alike may name others.
 
-    None where no other name may be: a name is written as plainly there as all that are alike are.
+    None where no other name may be: a name is written as plainly there as all that are alike are, and is no label.
     """
+    record = entry.record
     is_placed = record.keys.placed or record.shape.place or request.results.place or request.rows.given_place
+    varies = request.rows.poses and not is_placed
     found: list[Node | None] = []
     for name in (record.parent, record.name):
-        is_one = name.text and len(name.paths) == 1 and request.rows.poses and not is_placed
+        is_one = varies and name.text and len(name.paths) == 1 and name.paths[0] not in entry.stamp
         node = root.at(name.paths[0]) if is_one else None
         is_plain = node and type(node.value) is str and len(node.value) == node.end - node.start - 2 * bool(node.quote)
         pattern = FRAME.get((json, node.quote)) if node and is_plain else None

@@ -1,4 +1,4 @@
-"""Records in the text of a stream: numbers are with_edits where they are, members are with_edits, added or left out.
+"""Records in the text of a stream: numbers are replaced where they are, members are replaced, added or left out.
 
 Everything else stays as it is, byte for byte.  Knows the syntax of JSON and YAML only as far as members go: what
 stands between them, and how one is written.
@@ -200,7 +200,7 @@ class Splicer:
         return members
 
     def _extras(self, first: int) -> list[tuple[Piece, ...]]:
-        """Return what comes with a result as members; one of the record that gives way to such a one is with_edits."""
+        """Return what comes with a result as members; one of the record that gives way to such a one is replaced."""
         said, prefix = self.request.operation.shown, self.request.results.prefix
         members = []
         if said is None:

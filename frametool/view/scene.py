@@ -140,10 +140,10 @@ class FrameScene:
 
         It is cut into stretches where its parent changes or data are missing.
         """
-        import numpy as np
-
         found = {}
         for name in (name for name in self.tracks if name in self.chosen):
+            import numpy as np
+
             # looked up at, and between, the stamps of all moving frames on its path
             movers = self._movers_above(name) | self._movers_above(self.fixed)
             stamps = sorted({stamp for mover in movers for stamp, _, _ in self.tracks[mover].walk()})

@@ -327,3 +327,10 @@ def test_places_whose_squares_overflow_have_no_spread(run: Run) -> None:
     done = run("mean", "{xyz: [1, 2, 3]}", "{xyz: [1e300, 0, 0]}")
     assert (done.status, done.err) == (1, "frametool: poses: a place at 1e+300 m; at most 1e+100 m can be fitted\n")
     assert run("mean", "{xyz: [1, 2, 3]}", "{xyz: [1e99, 0, 0]}").status == 0
+
+
+@pytest.mark.parametrize("count", [1, 40])
+def test_frames_names_are_labels_too(run: Run, count: int) -> None:
+    lines = ('{"xyz": [1, 2, 3], "name": "a"}\n{"xyz": [1, 2, 5], "name": "b"}\n{"xyz": [3, 2, 3], "name": "a"}\n') * count
+    found = [json.loads(line) for line in run("mean", "-", "--by", "name", "-f", "json", stdin=lines).out.splitlines()]
+    assert [(each["name"], each["count"], each["xyz"]) for each in found] == [("a", 2 * count, [2.0, 2.0, 3.0]), ("b", count, [1.0, 2.0, 5.0])]

@@ -201,7 +201,7 @@ def mean_command(inputs: Inputs) -> int:
     from frametool.stream.record_values import read_poses
 
     arguments, status, numbers = inputs.poses, 0, None
-    gathered = Gathered(named=robust, by=by or "")
+    gathered = Gathered(named=robust, by=by)
     request = task.request(extra_column=by or weights, gathered=gathered)
     bare, is_inverse = poses.without_inverse(arguments[0]) if len(arguments) == 1 else ("", False)
     if bare == "-" or (bare and not task.path and not poses.is_pasted(bare, task.notation)):
