@@ -272,7 +272,7 @@ def _several(read: Sequence[ArgumentPoses | None]) -> list[int]:
     return found
 
 
-class Rows(NamedTuple):
+class Operands(NamedTuple):
     """Which argument holds the records that make the results, one each; and the one pose of each other argument.
 
     timed: the time of single poses, {} where they have none or several; None where each result has its record's
@@ -285,7 +285,7 @@ class Rows(NamedTuple):
     timed: dict[str, Any] | None
 
 
-def rows_among(arguments: Sequence[str], request: Request, task: PoseTask) -> Rows:
+def rows_among(arguments: Sequence[str], request: Request, task: PoseTask) -> Operands:
     """Choose them: standard input, a table, what holds several poses, or the last that says more than a pose."""
     bare = [without_inverse(each)[0] for each in arguments]
     refuse_two_readers(bare)
@@ -312,7 +312,7 @@ def rows_among(arguments: Sequence[str], request: Request, task: PoseTask) -> Ro
         for side in (read[:at], read[at + 1 :])
     )
     streamed = "inv(-)" if without_inverse(arguments[at])[1] else "-"
-    return Rows(at, rows.source if rows else streamed, before, behind, timed)
+    return Operands(at, rows.source if rows else streamed, before, behind, timed)
 
 
 def combinations(arguments: Sequence[str], request: Request) -> list[tuple[Pose, ...]]:

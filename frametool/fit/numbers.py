@@ -137,7 +137,7 @@ def segment_errors(ref: Trajectory, est: Trajectory, lengths: Sequence[float], s
 
     Source: Geiger, Lenz, Urtasun 2012, and its devkit: up to the first pose that is more than the length further.
     """
-    if ref.xyzw is None or est.xyzw is None:
+    if not lengths or ref.xyzw is None or est.xyzw is None:
         return None
     path, firsts = way(ref.xyz), np.arange(0, ref.size, step)
     found: list[tuple[Any, ...]] = []

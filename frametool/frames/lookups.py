@@ -444,10 +444,10 @@ class FrameTree(Frames):
         return True
 
     def near(self, target: str, source: str) -> Rigid:
-        """Return target_from_source of two frames of one tree.
+        """Return target_from_source of two frames that exist.
 
         Both ways up are climbed in turn until they meet: neighbours deep in a long chain cost no more than others.
-        Raises UnknownFrame, NotConnected.
+        Raises NotConnected.
         """
         if self.groups.of(target) != self.groups.of(source):
             self.between(target, source, None)  # raises

@@ -8,7 +8,7 @@ from __future__ import annotations
 from array import array
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import FormatError, Misused, UnknownFrame, shown
 from frametool.formats.load import FrameFile, refuse_unknown_joints
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Array, Indices
     from frametool.grammar.edges import Edge, Report
     from frametool.lint.rules import Statement
-
-Sample = TypeVar("Sample", bound="Edge | Statement")
 
 JUMP_FACTOR = 10.0  # a jump is a step of at least this many median steps of its edge ..
 JUMP_METRES, JUMP_RADIANS = 0.1, 0.2  # .. and longer than noise and low rates explain
@@ -48,22 +46,19 @@ class SampleStep(NamedTuple):
     returns: bool
 
 
-class EdgeLog(Generic[Sample]):
+class EdgeLog:
     """The samples of one child frame, in order of arrival; stamps in nanoseconds.
 
-    newest: the last one, under `parent`
-    changes: samples under another parent than the one before; backward: those that arrive after a later stamp
+    parent: that of the last one
+    changes: how many are under another parent than the one before; backward: how many arrive after a later stamp
     """
 
-    def __init__(self, first: Sample) -> None:
+    def __init__(self, first: Edge | Statement) -> None:
         """Create an empty log for the child of a sample."""
-        self.child = first.child
-        self.newest, self.parent = first, first.parent or ""
+        self.child, self.parent = first.child, first.parent or ""
         self.parents: dict[str, int] = {}  # in the order in which they were first named
         self.topics: dict[str, int] = {}  # number of samples by topic, if the topic is known
-        self.changes: list[Sample] = []
-        self.backward: list[Sample] = []
-        self.count = 0
+        self.changes = self.backward = self.count = 0
         self.is_static = False
         self.first_ns: int | None = None
         self.last_ns: int | None = None
@@ -73,21 +68,19 @@ class EdgeLog(Generic[Sample]):
         self._under = array("q")  # the number of the parent
         self._poses = array("d")  # seven numbers per sample
 
-    def add(self, seen: Sample, received_ns: int | None = None) -> None:
+    def add(self, seen: Edge | Statement, received_ns: int | None = None) -> None:
         """Add one sample; without a stamp the frame is static."""
         parent, stamp_ns = seen.parent or "", seen.stamp_ns
-        if parent != self.parent:
-            self.changes.append(seen)
+        self.changes += parent != self.parent
         self.count += 1
-        self.newest, self.parent = seen, parent
+        self.parent = parent
         under = self.parents.setdefault(parent, len(self.parents))
         if stamp_ns is None:
             self.is_static = True
             return
         if received_ns is not None:
             self.delays_ns.append(received_ns - stamp_ns)
-        if self.last_ns is not None and stamp_ns < self.last_ns:
-            self.backward.append(seen)
+        self.backward += self.last_ns is not None and stamp_ns < self.last_ns
         self.first_ns = stamp_ns if self.first_ns is None else min(self.first_ns, stamp_ns)
         self.last_ns = stamp_ns if self.last_ns is None else max(self.last_ns, stamp_ns)
         self._stamps.append(stamp_ns)
@@ -160,7 +153,7 @@ def _median(values: list[float]) -> float:
     return sorted(values)[len(values) // 2] if values else 0.0
 
 
-def chain(logs: dict[str, EdgeLog[Edge]], target: str, source: str) -> FramePath:
+def chain(logs: dict[str, EdgeLog], target: str, source: str) -> FramePath:
     """Return the path between two frames by their newest parents.
 
     Raises UnknownFrame, NotConnected.
@@ -184,7 +177,7 @@ def monitor(
     def report(error: FormatError) -> None:
         (clashing if error.rule == "two-topics" else stop)(error)
 
-    logs: dict[str, EdgeLog[Edge]] = {}
+    logs: dict[str, EdgeLog] = {}
     for file in files:
         for edge in file.edges(report, normalize=normalize):
             if edge.parent is not None:
@@ -204,7 +197,7 @@ def monitor(
     return [*map(edge_entry, between), chain_entry(path.frames, between)]
 
 
-def edge_entry(log: EdgeLog[Edge]) -> dict[str, Any]:
+def edge_entry(log: EdgeLog) -> dict[str, Any]:
     """Describe an edge; unknown or inapplicable values are None."""
     longest = max(log.steps, key=lambda step: step.pause_ns, default=None)
     delays = log.delays_ns
@@ -229,9 +222,9 @@ def edge_entry(log: EdgeLog[Edge]) -> dict[str, Any]:
         "speed_max": max(speeds, default=None),
         "gaps": len(log.gaps()) if log.steps else None,
         "jumps": len(log.jumps()),
-        "backward": len(log.backward),
+        "backward": log.backward,
         "parents": ", ".join(log.parents),
-        "parent_changes": len(log.changes),
+        "parent_changes": log.changes,
         "topics": ", ".join(f"{topic} ({count})" for topic, count in log.topics.items()),
         "overlap": None,
     }
@@ -244,7 +237,7 @@ OF_CHAIN: dict[str, Callable[..., Any]] = {
 }  # fmt: skip
 
 
-def chain_entry(path: Sequence[str], logs: Sequence[EdgeLog[Edge]]) -> dict[str, Any]:
+def chain_entry(path: Sequence[str], logs: Sequence[EdgeLog]) -> dict[str, Any]:
     """Describe the edges of a path together: their common interval, and their worst values."""
     spans = [log.span for log in logs if log.moves]
     first, last = (max(begin for begin, _ in spans), min(end for _, end in spans)) if spans else (None, None)

@@ -261,13 +261,18 @@ def _statements(
     refuse_unknown_joints(files)
 
 
-class Child(EdgeLog[Statement]):
-    """All data of one child frame, and the first samples that violate a rule."""
+class Child(EdgeLog):
+    """All data of one child frame, and the samples that violate a rule.
+
+    newest: the last one; moved: those under another parent than the one before; late: those after a later stamp
+    """
 
     def __init__(self, first: Statement, number: int) -> None:
         """Start before the first edge or sample; `number` counts all that were read."""
         super().__init__(first)
-        self.first = first
+        self.first = self.newest = first
+        self.moved: list[Statement] = []
+        self.late: list[Statement] = []
         self.since = (number, first)  # the first with the newest parent
         self.static: Statement | None = None
         self.stamps: dict[int, tuple[int, int]] = {}  # stamp -> hash of the sample, its line
@@ -284,10 +289,14 @@ class Child(EdgeLog[Statement]):
             known = self.stamps.setdefault(seen.stamp_ns, fresh)
             if known is not fresh:
                 (self.again if known[0] == fresh[0] else self.clashes).append(seen)
+            if self.last_ns is not None and seen.stamp_ns < self.last_ns:
+                self.late.append(seen)
         if seen.parent != self.newest.parent:
             self.since = (number, seen)
+            self.moved.append(seen)
         elif seen.components != self.newest.components:
             self.other_pose = self.other_pose or seen
+        self.newest = seen
         self.add(seen)
 
 
@@ -331,8 +340,8 @@ def _child(child: Child) -> Iterator[Finding]:
     elif moves:
         yield from _moving(child, frame)
         yield from _steps(child)
-    elif child.changes:
-        second = child.changes[0]
+    elif child.moved:
+        second = child.moved[0]
         yield second.broken(topology.two_parents(first.child, first.parent, second.parent, (_at(first), _at(second))))
     elif other := child.other_pose:
         yield other.broken(topology.two_poses(first.child, first.parent), f": {_at(first)} and {_at(other)}")
@@ -340,7 +349,7 @@ def _child(child: Child) -> Iterator[Finding]:
 
 def _moving(child: Child, frame: str) -> Iterator[Finding]:
     """Apply the rules about a moving frame: changes of parent, by pick-and-place or by two publishers, and stamps."""
-    if changes := child.changes:
+    if changes := child.moved:
         parents = " -> ".join(shown(each.parent) for each in (child.first, *changes[:3]))
         if len(changes) < FLICKER:
             yield changes[0].finding("reparented", f"{frame} changes its parent: {parents}")
@@ -354,10 +363,10 @@ def _moving(child: Child, frame: str) -> Iterator[Finding]:
         stamp_ns = first.stamp_ns or 0
         places = f"{format_stamp(stamp_ns)}: lines {child.stamps[stamp_ns][1]} and {first.line}"
         yield first.finding("repeated-stamp", f"{frame} has two poses at {places}{_more(child.clashes)}")
-    if child.backward:
-        first = child.backward[0]
+    if child.late:
+        first = child.late[0]
         message = f"{frame}: {format_stamp(first.stamp_ns or 0)} comes after a later stamp"
-        yield first.finding("backward", message + _more(child.backward))
+        yield first.finding("backward", message + _more(child.late))
 
 
 def _steps(child: Child) -> Iterator[Finding]:

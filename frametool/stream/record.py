@@ -116,7 +116,7 @@ class Record(NamedTuple):
     stamp_ns: int | None = None
 
 
-def find_records(document: Any, request: Request, reading: Reading, path: Path = ()) -> Iterator[Record]:
+def find_records(document: Any, request: Request, reading: Reading, path: Path) -> Iterator[Record]:
     """Yield the records of a document in order; `path` leads to it and begins all paths.
 
     Raises Misfit, with the path, for a document without records and for a record that cannot be read.
