@@ -15,14 +15,13 @@ import os
 import re
 from bisect import bisect_left
 from functools import partial
-from graphlib import CycleError, TopologicalSorter
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from frametool.documents.source import InputFile, Source
 from frametool.errors import BadAnswer, FormatError, ValueInvalid, alternatives, did_you_mean, listing, shown, warn
 from frametool.formats.detect import detect
-from frametool.formats.robots.model import TURNING, Joint, JointValue, Link, followed, read_value
+from frametool.formats.robots.model import TURNING, Joint, JointValue, Link, followed, leaders_first, read_value
 from frametool.formats.rows.csv import split_line
 from frametool.formats.table import FORMATS, readers
 from frametool.formats.trees.tree_reader import read_time
@@ -181,33 +180,19 @@ class JointState:
 
         Returns the names of those that no value determines.
         """
-        leaders: dict[str, list[str]] = {name: [] for name in self.joints}  # one, or none
-        for name, joint in self.joints.items():
-            mimic = joint.mimic
-            if name in self.series or mimic is None or mimic.joint in self._fixed:
-                continue
-            leader = self.joints.get(mimic.joint)
-            if leader is None or leader.posed:
-                which = "no joint" if leader is None else leader.kind
-                problem = f"joint {shown(name)} mimics {shown(mimic.joint)}, which is {which}"
-                raise FormatError(problem, source=self._file, line=joint.line)
-            leaders[name].append(mimic.joint)
-        try:
-            order = [*TopologicalSorter(leaders).static_order()]
-        except CycleError as error:
-            circle = error.args[1]
-            problem = f"joints mimic each other in a circle: {' -> '.join(map(shown, reversed(circle[-8:])))}"
-            raise FormatError(problem, source=self._file, line=self.joints[circle[0]].line) from None
-        known = set(self.series)
-        for name in order:
-            if name in self.series:
-                continue
+        known = set(self.named)
+        for name, leader in leaders_first(self.joints, self.joints, self.named, self._file).items():
             joint = self.joints[name]
-            self.series[name] = {None: joint.start}
-            for leading in leaders[name]:
-                self.series[name] = {at: followed(joint, value) for at, value in self.series[leading].items()}
-                if leading in known:
+            if leader and not self.joints[leader].posed:
+                self.series[name] = {at: followed(joint, value) for at, value in self.series[leader].items()}
+                if leader in known:
                     known.add(name)
+            elif name not in self.named:
+                if joint.mimic and joint.mimic.joint not in self._fixed:
+                    which = self.joints[leader].kind if leader else "no joint"
+                    problem = f"joint {shown(name)} mimics {shown(joint.mimic.joint)}, which is {which}"
+                    raise FormatError(problem, source=self._file, line=joint.line)
+                self.series[name] = {None: joint.start}
         return [name for name in self.joints if name not in known]
 
     def _tell_limits(self) -> None:

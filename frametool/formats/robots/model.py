@@ -198,6 +198,28 @@ def followed(joint: Joint, leader: Value) -> Value:
     return JointValue(leader.plain * multiplier + offset)
 
 
+def leaders_first(
+    names: Iterable[str], joints: Mapping[str, Joint], valued: Collection[str] = (), file: str = ""
+) -> dict[str, str]:
+    """Return joints and those that they mimic, leaders first: each with its leader, "" for none and if it has a value.
+
+    Raises FormatError, in a file, for joints that mimic each other in a circle.
+    """
+    order: dict[str, str] = {}
+    for first in names:
+        line, name = dict[str, str](), first
+        while name and name not in order:
+            if name in line:
+                circle = " -> ".join(map(shown, [*[*line][[*line].index(name) :][:7], name]))
+                problem = f"joints mimic each other in a circle: {circle}"
+                raise FormatError(problem, source=file, line=joints[name].line)
+            mimic = None if name in valued else joints[name].mimic
+            line[name] = mimic.joint if mimic and mimic.joint in joints else ""
+            name = line[name]
+        order |= reversed(line.items())
+    return order
+
+
 def read_value(joint: Joint, value: Any, source: Source, *, normalize: bool = False) -> Value:
     """Read the value of a joint: a number, text with or without a unit, a mapping with a pose within its freedom.
 
@@ -362,33 +384,20 @@ class Chain:
         self._joints = joints
         self._down, self._up = ([links[child] for child in edges] for edges in (path.to_target, path.to_source))
         self._between = [joint.name for link in (*self._down, *self._up) for joint in link.joints]
-        self.needs = self._deciding(())
+        self.needs = tuple(self.missing(()))
 
     def uses(self, joint: str) -> bool:
         """Return True if a joint moves anything on the path, by itself or through joints that mimic it."""
-        return any(joint in self._followed(name, ()) for name in self._between)
+        return joint in leaders_first(self._between, self._joints)
 
     def missing(self, valued: Collection[str]) -> list[str]:
         """Return the joints without a value, neither set nor by mimicking."""
-        return [name for name in self._deciding(valued) if name not in valued]
-
-    def _deciding(self, valued: Collection[str]) -> tuple[str, ...]:
-        """Return the joints that are needed: those with a value, and those that mimic no other."""
-        return tuple(dict.fromkeys(self._followed(name, valued)[-1] for name in self._between))
-
-    def _followed(self, name: str, valued: Collection[str]) -> list[str]:
-        """Return a joint and those it mimics, up to one that has a value or mimics none."""
-        line = [name]
-        while line[-1] not in valued:
-            mimic = self._joints[line[-1]].mimic
-            if mimic is None or mimic.joint not in self._joints:
-                break
-            line.append(mimic.joint)
-        return line
+        order = leaders_first(self._between, self._joints, valued)
+        return [name for name, leader in order.items() if not leader and name not in valued]
 
     def run(self, values: Values) -> Components:
         """Return tx, ty, tz, x, y, z, w: floats if all values are, else arrays, computed block by block."""
-        used = {name: values[name] for name in self._deciding(values) if name in values}
+        used = {name: values[name] for name in leaders_first(self._between, self._joints, values) if name in values}
         plain = {name: value for name, value in used.items() if isinstance(value, JointValue)}
         numbers = tuple(value.number for value in plain.values())
         if single(numbers):
@@ -403,12 +412,11 @@ class Chain:
 
     def pose(self, values: Values, xp: Namespace) -> Rigid:
         """Return base_from_tip for values of the needed joints: all floats, or arrays of one block."""
-        known: dict[str, Value] = {}
-        for name in self._between:  # set, mimicked, or at rest
-            *followers, leader = self._followed(name, values)
-            known[name] = values[leader] if leader in values else self._joints[leader].start
-            for each in reversed(followers):
-                known[name] = followed(self._joints[each], known[name])
+        known = dict(values)
+        for name, leader in leaders_first(self._between, self._joints, values).items():
+            if name not in known:
+                joint = self._joints[name]
+                known[name] = followed(joint, known[leader]) if leader else joint.start
         top_from_base, top_from_tip = (
             reduce(rigid.go_on, (link.pose([known[joint.name] for joint in link.joints], xp) for link in links))
             if links else rigid.IDENTITY
