@@ -225,7 +225,8 @@ def run_columns(
     if other is not None:  # it has its columns even where there are no rows
         other.of_columns(*rows.in_other_format(columns, file.nothing()))
     elif not request.gathered:
-        writer = file.rewriter(columns, style, drops=request.on_error == SKIP or request.operation.of == VELOCITIES)
+        drops = request.on_error == SKIP or request.operation.of == VELOCITIES
+        writer = file.rewriter(columns, None if drops else file.count, style)
     for batch in file.batches():
         text: Any = b""
         if other is not None:
@@ -314,7 +315,7 @@ class MessageColumns(RecordFile):
 
     vectors = NORMALS
 
-    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
+    def rewriter(self, columns: Sequence[OutColumn], count: int | None, style: Style) -> ColumnWriter:
         """Refuse: messages are written in other formats."""
         raise NotImplementedError
 

@@ -50,7 +50,7 @@ def open_columns(file):
     assert file.stream.read(len(MARK)) == MARK
     opened = npy.open_columns(file)
     rewriter = opened.rewriter
-    opened.rewriter = lambda *columns, **drops: marked(rewriter(*columns, **drops))
+    opened.rewriter = lambda *columns: marked(rewriter(*columns))
     return opened
 
 def create(columns, count, style):

@@ -23,10 +23,8 @@ from frametool.documents.source import InputFile, Verbatim
 from frametool.documents.writers import dump_json
 from frametool.errors import FileProblem, ValueInvalid, alternatives, shown, warn
 from frametool.formats.rows import column_file
-from frametool.frames.stamps import SUFFIXES
 from frametool.geometry import arrays, quaternion, rigid
 from frametool.geometry.transform import Transform
-from frametool.text.parse import nanoseconds_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -80,27 +78,28 @@ def nulls_of(column: Any) -> Flags | None:
     return nulls
 
 
-def stamps_of(column: Any, name: str) -> tuple[Ints, Flags | None, Ints]:
-    """Read times as nanoseconds: timestamps (UTC if they have no zone), integer nanoseconds, or float seconds.
+def stamps_of(column: Any, name: str, in_ns: int) -> tuple[Ints, Flags | None, dict[int, str]]:
+    """Read times as nanoseconds: timestamps (UTC if they have no zone), integers, or float seconds.
 
-    Returns the times (0 for null), the null mask (None: none), and the rows of numbers that are not a time.
+    in_ns: as in `column_file.stamps_in`, of integers
+    Returns the times (0 for null), the null mask (None: none), and why numbers are not a time, by their rows.
     Raises ValueInvalid for another type.
     """
     pa = require_pyarrow("an Arrow column")
     whole = in_one(column)
     nulls = nulls_of(whole)
-    if is_floating(whole.type):
-        stamps, bad = nanoseconds_of(whole.to_numpy(zero_copy_only=False).astype(np.float64))
-        return stamps, nulls, np.flatnonzero(bad if nulls is None else bad & ~nulls)
-    is_timestamp = pa.types.is_timestamp(whole.type)
-    if not is_timestamp and not pa.types.is_integer(whole.type):
+    if pa.types.is_timestamp(whole.type):
+        try:
+            whole, in_ns = whole.cast(pa.timestamp("ns", whole.type.tz)).cast(pa.int64()), 1
+        except pa.ArrowInvalid:
+            raise ValueInvalid(f"column {shown(name)}: a stamp is beyond 64 bits of nanoseconds") from None
+    elif kind_of(whole.type) is None:
         wanted = "a timestamp, integer nanoseconds, or float seconds"
         raise ValueInvalid(f"column {shown(name)} is {whole.type}; stamps are {wanted}")
-    try:
-        counts = (whole.cast(pa.timestamp("ns", whole.type.tz)) if is_timestamp else whole).cast(pa.int64())
-    except pa.ArrowInvalid:
-        raise ValueInvalid(f"column {shown(name)}: a stamp is beyond 64 bits of nanoseconds") from None
-    return counts.fill_null(0).to_numpy(zero_copy_only=False), nulls, np.zeros(0, np.int64)
+    numbers = (whole if is_floating(whole.type) else whole.fill_null(0)).to_numpy(zero_copy_only=False)
+    stamps, bad, reason = column_file.stamps_in(numbers, in_ns)
+    rows = np.flatnonzero(bad if nulls is None else bad & ~nulls).tolist()
+    return stamps, nulls, {row: f"{whole[row].as_py()} is {reason}" for row in rows}
 
 
 class ArrowBatch(column_file.Batch):
@@ -122,18 +121,7 @@ class ArrowBatch(column_file.Batch):
 
     def stamps(self, place: int, *, in_ns: int) -> tuple[Ints, dict[int, str]]:
         """Return a column as nanoseconds, and why rows have none: timestamps, integers by name, float seconds."""
-        column, name = self.rows.column(place), self.rows.schema.names[place]
-        if in_ns and is_floating(column.type):
-            raise ValueInvalid(f"column {shown(name)} is {column.type}; {SUFFIXES[in_ns]} are integers or timestamps")
-        stamps, nulls, bad = stamps_of(column, name)
-        kind = kind_of(column.type)
-        if kind is not None and kind.kind in column_file.WHOLE:
-            numbers, (stamps, beyond) = stamps, column_file.whole_stamps(stamps, in_ns)
-            if beyond.any():
-                remedy = "are these some? then call the column stamp_ns, or let it be a timestamp"
-                seconds = numbers[int(np.argmax(beyond))]
-                raise ValueInvalid(f"column {shown(name)}: {seconds} s is beyond 64 bits of nanoseconds; {remedy}")
-        reasons = {row: f"{column[row].as_py()} is not a time in seconds" for row in bad.tolist()}
+        stamps, nulls, reasons = stamps_of(self.rows.column(place), self.rows.schema.names[place], in_ns)
         return stamps, reasons | dict.fromkeys([] if nulls is None else np.flatnonzero(nulls).tolist(), NO_TIME)
 
     def texts(self, place: int) -> list[str]:
@@ -250,9 +238,8 @@ class ArrowFile(column_file.ColumnFile):
                 yield ArrowBatch(rows, int(share * rows.num_rows), ends_group=left <= 0)
                 del rows  # before the next are read
 
-    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> GroupWriter:
+    def rewriter(self, columns: Sequence[OutColumn], _count: int | None, style: Style) -> GroupWriter:
         """Return a writer with the same schema and compression; the output may be the other Arrow format."""
-        del drops
         fmt = style.format if style.format in BEGINNINGS.values() else self.format
         how: dict[str, Any] = {}  # arguments of pyarrow's writer
         if fmt == self.format == "arrow":
@@ -496,10 +483,9 @@ def _mover(
     if time_column is None:
         return tree.lookup(target, source)
     column = data.column(_place_of(time_column, data.schema.names))
-    stamps, missing, bad = stamps_of(column, time_column)
-    if len(bad):
-        seconds = column[int(bad[0])].as_py()
-        raise ValueInvalid(f"{time_column}[{bad[0]}]: {seconds} is not a time in seconds; integers are nanoseconds")
+    stamps, missing, bad = stamps_of(column, time_column, int(not is_floating(column.type)))
+    for row, reason in bad.items():
+        raise ValueInvalid(f"{time_column}[{row}]: {reason}; integers are nanoseconds")
     needed = np.True_ if nulls is None else ~nulls
     if missing is not None and (lost := missing & needed).any():
         row = int(np.argmax(lost))

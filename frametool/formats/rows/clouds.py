@@ -23,12 +23,14 @@ from __future__ import annotations
 
 import re
 from functools import partial
+from io import BytesIO
 from itertools import chain, takewhile
 from math import log
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from frametool.documents.source import InputFile
 from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.formats.rows import column_file
 from frametool.geometry.rigid import EXACT, SCALED
@@ -42,7 +44,6 @@ from frametool.text.write import float_spans, rounded_to_single
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
-    from frametool.documents.source import InputFile
     from frametool.errors import FormatError
     from frametool.formats.rows.column_file import Batch, Kind, Made, OutColumn
     from frametool.geometry.types import Components
@@ -121,7 +122,7 @@ class CloudFile(column_file.RecordFile):
         """Yield the rest of the file after the points."""
         yield self.behind
 
-    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> column_file.CountedWriter:
+    def rewriter(self, columns: Sequence[OutColumn], count: int | None, style: Style) -> column_file.CountedWriter:
         """Return a writer for a cloud of the same format."""
         encode: column_file.Encode = partial(encode_text, columns, style)
         own, new = columns[: self.width], columns[self.width :]
@@ -130,8 +131,7 @@ class CloudFile(column_file.RecordFile):
             encode = partial(column_file.encode_records, columns, kind)
         elif not same_columns(own, self.width) or any(column.passed is not None for column in new):
             raise ValueInvalid("columns of an ascii cloud stay as they are; -f csv writes others")
-        head, count = partial(self.header, columns), None if drops else self.count
-        return column_file.CountedWriter(encode, head, count, self.rest)
+        return column_file.CountedWriter(encode, partial(self.header, columns), count, self.rest)
 
 
 def same_columns(columns: Sequence[OutColumn], width: int) -> bool:
@@ -442,7 +442,7 @@ class PlyFile(CloudFile):
             end = b"\r\n" if lines[0].endswith(b"\r\n") else b"\n"
             own = list(takewhile(lambda line: line.split()[:1] in OWN_LINES, lines[self.own_line :]))
             others = [line for line in own if line.split()[:1] != [b"property"]]
-            made = [_property_line(column) + end for column in columns]
+            made = [f"property {_type_of(column)} {column.name}".encode() + end for column in columns]
             text = b"".join([*lines[: self.own_line], *made, *others, *lines[self.own_line + len(own) :]])
         return text + self.before
 
@@ -452,19 +452,10 @@ def _type_of(column: OutColumn) -> str:
     return type_in("ply", NEW_NAMES if column.passed is None else NAMES, column)
 
 
-def _property_line(column: OutColumn) -> bytes:
-    return f"property {_type_of(column)} {column.name}".encode()
-
-
-def create(columns: Sequence[OutColumn], count: int | None, _style: Style) -> column_file.CountedWriter:
-    """Return a writer for new points, with numbers of their own types."""
-    record = column_file.record_of(f"<{TYPES[_type_of(column)]}" for column in columns)
-    lines = b"".join(_property_line(column) + b"\n" for column in columns)
-
-    def head(vertices: int) -> bytes:
-        return b"ply\nformat binary_little_endian 1.0\nelement vertex %d\n%send_header\n" % (vertices, lines)
-
-    return column_file.CountedWriter(partial(column_file.encode_records, columns, record), head, count)
+def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> column_file.CountedWriter:
+    """Return a writer for new points, with numbers of their own types: an empty file gets other columns."""
+    empty = b"ply\nformat binary_little_endian 1.0\nelement vertex 0\nend_header\n"
+    return PlyFile(InputFile("ply", BytesIO(empty))).rewriter(columns, count, style)
 
 
 open_columns, misfit = PlyFile, partial(misfit_of, NEW_NAMES)

@@ -101,34 +101,31 @@ class Batch(Protocol):
             return self.column(place).astype(np.float64), None
 
     def stamps(self, place: int, *, in_ns: int) -> tuple[Ints, dict[int, str]]:
-        """Return a column as nanoseconds, and why rows have none; in_ns: as in `whole_stamps`.
-
-        A float of seconds has the value of its shortest decimal text, as in a table of text.
-        """
-        numbers = self.column(place)
-        if numbers.dtype.kind in WHOLE:
-            stamps, bad = whole_stamps(numbers, in_ns)
-        elif in_ns:
-            raise ValueInvalid(f"{SUFFIXES[in_ns]} are integers, found {numbers.dtype}")
-        else:
-            stamps, bad = nanoseconds_of(numbers.astype(np.float64))
-        return stamps, dict.fromkeys(np.flatnonzero(bad).tolist(), "not a time in seconds")
+        """Return a column as nanoseconds, and why rows have none; in_ns: as in `stamps_in`."""
+        stamps, bad, reason = stamps_in(self.column(place), in_ns)
+        return stamps, dict.fromkeys(np.flatnonzero(bad).tolist(), reason)
 
     def texts(self, place: int) -> Sequence[str]:
         """Return a column as texts, "" for missing ones."""
         return [str(plain_value(value)) for value in self.column(place).tolist()]
 
 
-def whole_stamps(numbers: NDArray[Any], in_ns: int) -> tuple[Ints, Flags]:
-    """Return integers as nanoseconds, and the mask of those beyond 64 bits.
+def stamps_in(numbers: NDArray[Any], in_ns: int) -> tuple[Ints, Flags, str]:
+    """Return numbers as nanoseconds, the mask of those that are no times, and why.
 
-    in_ns: nanoseconds per unit; 0 for seconds, or what the size of the first implies
+    in_ns: nanoseconds per unit, of integers alone; 0 for seconds, or what the size of the first integer implies.
+    A float of seconds has the value of its shortest decimal text, as in a table of text.
     """
+    if numbers.dtype.kind not in WHOLE:
+        if in_ns:
+            raise ValueInvalid(f"{SUFFIXES[in_ns]} are integers, found {numbers.dtype}")
+        return *nanoseconds_of(numbers.astype(np.float64)), "not a time in seconds"
     first = int(next(iter(numbers[numbers != 0]), 0))
     each = in_ns or nanoseconds_each(first)
     if not in_ns:
         tell_size(first, each)
-    return numbers.astype(np.int64) * each, abs(numbers) > np.iinfo(np.int64).max // each
+    reason = "beyond 64 bits of nanoseconds; are these some? then call the column stamp_ns"
+    return numbers.astype(np.int64) * each, abs(numbers) > np.iinfo(np.int64).max // each, reason
 
 
 class ColumnWriter(Protocol):
@@ -151,6 +148,7 @@ class ColumnFile(Protocol):
     kinds: the types of their numbers; None for texts and everything else
     vectors: columns of vectors that are rotated with the points, such as normals
     gaps: a number that is not finite means a missing point; otherwise its row is bad
+    count: the number of rows, if the file states it
     """
 
     names: tuple[str, ...] | None
@@ -158,6 +156,7 @@ class ColumnFile(Protocol):
     kinds: Sequence[Kind | None]
     vectors: tuple[tuple[str, ...], ...] = ()
     gaps: bool
+    count: int | None = None
 
     def moved_by(self, pose: Components | None) -> None:
         """Transform data about all points by the pose that transforms all of them, before any is read.
@@ -173,10 +172,10 @@ class ColumnFile(Protocol):
         """Return an empty batch."""
         return StructuredBatch(np.zeros(0, record_of(kind or "U1" for kind in self.kinds)))
 
-    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
+    def rewriter(self, columns: Sequence[OutColumn], count: int | None, style: Style) -> ColumnWriter:
         """Return a writer for a file of the same format, with everything outside of the columns unchanged.
 
-        drops: rows may be omitted, so that their number is not known before the end.
+        count: the number of rows; None if it is known only at the end
         """
 
 
@@ -234,6 +233,7 @@ class RecordFile(ColumnFile):
     """A file whose rows are records, one field per column."""
 
     gaps = True
+    count: int
 
     def __init__(self, file: InputFile, names: Iterable[str] | None, record: Kind, count: int) -> None:
         """Store the names of the columns, the type of a row as a record, and the number of rows."""
@@ -433,18 +433,17 @@ class BinCloud(RecordFile):
             done += batch.size
             yield batch
 
-    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
+    def rewriter(self, columns: Sequence[OutColumn], count: int | None, style: Style) -> ColumnWriter:
         """Return a writer for a cloud of either format."""
-        del drops
-        return _bin_writer(columns, style.format)
+        return create(columns, count, style)
 
 
-def _bin_writer(columns: Sequence[OutColumn], fmt: str) -> CountedWriter:
+def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> CountedWriter:
     """Return a writer for points without a header, which warns about columns left out and about rounding to float32.
 
     Raises ValueInvalid if a column is missing, or a number too large.
     """
-    names, off = FORMATS[fmt].rows.columns, 0.0
+    fmt, names, off = style.format, FORMATS[style.format].rows.columns, 0.0
     at_input = [column.name for column in columns if column.kind is not None]
     if missing := [name for name in names if name not in at_input]:
         raise ValueInvalid(f"{fmt} holds {' '.join(names)}; there is no {listing(missing)}")
@@ -476,11 +475,6 @@ def _bin_writer(columns: Sequence[OutColumn], fmt: str) -> CountedWriter:
         return ()
 
     return CountedWriter(encode, lambda _: b"", 0, behind)
-
-
-def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> CountedWriter:
-    """Return a writer for new points."""
-    return _bin_writer(columns, style.format)
 
 
 open_columns = BinCloud

@@ -141,9 +141,8 @@ class LasFile(column_file.ColumnFile):
                 raise self.file.error(f"the file ends after {done} of {count} points")
             yield LasBatch(points, self.names)
 
-    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> LasWriter:
+    def rewriter(self, columns: Sequence[OutColumn], _count: int | None, style: Style) -> LasWriter:
         """Return a writer for a file of the same kind."""
-        del drops  # the library counts
         if [column.name for column in columns] != list(self.names):
             raise ValueInvalid("the dimensions of las stay as they are; -f npy or csv writes others")
         packed = self.header.are_points_compressed if style.format not in ("las", LAZ) else style.format == LAZ

@@ -81,11 +81,9 @@ class NpyFile(column_file.RecordFile):
             rows = np.ascontiguousarray(array[first : first + column_file.MOST_ROWS]).reshape(-1, self.width)
             yield column_file.StructuredBatch(rows.view(self.record)[:, 0])
 
-    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
+    def rewriter(self, columns: Sequence[OutColumn], count: int | None, _style: Style) -> ColumnWriter:
         """Return a writer for an array of the same kind, row after row."""
-        del style
-        shape = self.shape[1:] if self.names is None else None
-        return _writer(columns, self.record, None if drops else self.count, shape)
+        return _writer(columns, self.record, count, self.shape[1:] if self.names is None else None)
 
 
 def _writer(

@@ -23,11 +23,13 @@ import re
 import struct
 from collections import Counter
 from functools import partial
+from io import BytesIO
 from itertools import accumulate
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from frametool.documents.source import InputFile
 from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.formats.rows import column_file
 from frametool.formats.rows.clouds import CloudFile, count_in, head_lines, misfit_of, same_columns, type_in
@@ -37,7 +39,6 @@ from frametool.text.numbers import parse_number
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from frametool.documents.source import InputFile
     from frametool.errors import FormatError
     from frametool.formats.rows.column_file import Batch, Kind, OutColumn
     from frametool.geometry.types import Components, Rigid
@@ -48,6 +49,10 @@ TYPES = {"F": (4, 8), "I": (1, 2, 4, 8), "U": (1, 2, 4, 8)}
 CODES = {f"{letter.lower()}{size}": (size, letter) for letter, sizes in TYPES.items() for size in sizes}
 CODES |= {"f2": (4, "F"), "b1": (1, "U")}  # numpy's types, and the PCD types that hold their values
 PADDING = "_"
+EMPTY = (
+    b"# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS _\nSIZE 1\nTYPE U\nCOUNT 1\n"
+    b"WIDTH 0\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 0\nDATA binary\n"
+)
 _EACH = ("FIELDS", "SIZE", "TYPE", "COUNT")
 _KEYS = ("VERSION", "COLUMNS", *_EACH, "WIDTH", "HEIGHT", "VIEWPOINT", "POINTS", "DATA")
 _WIDEST = 1 << 16  # values of one point
@@ -83,11 +88,6 @@ def layout_of(fields: Sequence[PcdField]) -> tuple[list[str], list[int], Kind]:
     })  # fmt: skip
     names = [field.name if field.values == 1 else f"{field.name}_{place}" for _, field, place in used]
     return names, [at for at, _, _ in used], record
-
-
-def _words_of(fields: Sequence[PcdField]) -> dict[str, str]:
-    """Return the values of a header that describe its fields."""
-    return {key: " ".join(str(field[at]) for field in fields) for at, key in enumerate(_EACH)}
 
 
 def viewpoint_words(pose: Rigid) -> str:
@@ -151,9 +151,11 @@ class PcdFile(CloudFile):
     text: the header byte for byte, including its last line end
     words: the values of each key; lines: the number of its line
     sensor: the seven numbers of VIEWPOINT; None if there are none.  viewpoint: their words, once they are transformed
+    grid: what WIDTH and HEIGHT become where the number of points changes; None for a single row
     """
 
     viewpoint = ""
+    grid: tuple[int, int] | None = None
     sensor: tuple[float, ...] | None = None
 
     def __init__(self, file: InputFile) -> None:
@@ -286,9 +288,13 @@ class PcdFile(CloudFile):
             yield column_file.StructuredBatch(rows[first : first + step])
 
     def _fields_of(self, columns: Sequence[OutColumn]) -> tuple[PcdField, ...]:
-        """Return the fields of an output: those of the input with new ones after them, or one for each column."""
+        """Return the fields of an output: those of the input with new ones after them, or one for each column.
+
+        Raises ValueInvalid for what PCD cannot hold.
+        """
         known = self.fields if same_columns(columns[: self.width], self.width) else ()
-        return (*known, *map(_new_field, columns[self.width * bool(known) :]))
+        new = columns[self.width * bool(known) :]
+        return (*known, *(PcdField(column.name, *type_in("pcd", CODES, column, PADDING), 1) for column in new))
 
     def record_with(self, columns: Sequence[OutColumn]) -> Kind:
         """Return the type of a point with other columns."""
@@ -302,9 +308,10 @@ class PcdFile(CloudFile):
             warn(f"{self.file.name}: binary_compressed is written as binary")
             words["DATA"] = "binary"
         if fields != self.fields:
-            words |= _words_of(fields)
+            words |= {key: " ".join(str(field[at]) for field in fields) for at, key in enumerate(_EACH)}
         if count != self.count:
-            words |= {"WIDTH": str(count), "HEIGHT": "1", "POINTS": str(count)}
+            width, height = self.grid or (count, 1)
+            words |= {"WIDTH": f"{width}", "HEIGHT": f"{height}", "POINTS": f"{count}"}
         lines = self.text.split(b"\n")
         for key in words.keys() & self.lines.keys():
             at = self.lines[key] - 1
@@ -313,31 +320,17 @@ class PcdFile(CloudFile):
         return b"\n".join(lines)
 
 
-def _new_field(column: OutColumn) -> PcdField:
-    """Return the field of a column; raises ValueInvalid for what PCD cannot hold."""
-    return PcdField(column.name, *type_in("pcd", CODES, column, PADDING), 1)
-
-
 def create(
-    columns: Sequence[OutColumn], count: int | None, _style: Style, *, grid: tuple[int, int] | None = None,
+    columns: Sequence[OutColumn], count: int | None, style: Style, *, grid: tuple[int, int] | None = None,
     sensor: Rigid | None = None,
 ) -> column_file.CountedWriter:  # fmt: skip
-    """Return a writer for new points, with numbers of their own types.
+    """Return a writer for new points, with numbers of their own types: an empty file gets other fields.
 
     grid: the number of points per row, and of rows; sensor: its pose among the points
     """
-    fields = [_new_field(column) for column in columns]
-
-    def head(points: int) -> bytes:
-        width, height = grid or (points, 1)
-        viewpoint = viewpoint_words(sensor) if sensor else "0 0 0 1 0 0 0"
-        words: dict[str, object] = {**_words_of(fields), "WIDTH": width, "HEIGHT": height, "VIEWPOINT": viewpoint}
-        words |= {"POINTS": points, "DATA": "binary"}
-        lines = "".join(f"{key} {each}\n" for key, each in words.items())
-        return f"# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n{lines}".encode()
-
-    encode = partial(column_file.encode_records, columns, layout_of(fields)[2])
-    return column_file.CountedWriter(encode, head, count)
+    file = PcdFile(InputFile("pcd", BytesIO(EMPTY)))
+    file.fields, file.grid, file.viewpoint = (), grid, viewpoint_words(sensor) if sensor else ""
+    return file.rewriter(columns, count, style)
 
 
 open_columns, misfit = PcdFile, partial(misfit_of, CODES, taken=PADDING)
