@@ -36,7 +36,7 @@ from frametool.formats.table import CHOICES, FORMATS, readers
 from frametool.frames import topology
 from frametool.frames.lookups import FrameTree
 from frametool.geometry.representations import EARTH_FRAMES
-from frametool.grammar.edges import Answers, Diagnostics, Edge, EdgeColumns, Options, Samples, Topics, stop
+from frametool.grammar.edges import Answers, Diagnostics, Edge, EdgeColumns, Options, Topics, stop
 from frametool.grammar.readers import NAME_KEYS, PARENT_COLUMNS, alike, more_like_it
 
 TYPE_CHECKING = False
@@ -119,7 +119,7 @@ class FrameFile(InputFile):
 
     def pieces(
         self, report: Report = stop, *, tell: bool = True, normalize: bool = False
-    ) -> Iterator[Edge | Samples | EdgeColumns]:
+    ) -> Iterator[Edge | EdgeColumns]:
         """Yield edges, one by one or in bulk, in the order of the file.
 
         report: receives errors, and reading continues after them if possible; without it the first one is raised.
@@ -273,20 +273,21 @@ class TreeBuilder:
         if buffer.insert_components(parent, child, components, stamp_ns) and stamp_ns is not None:
             self._replaced.append((parent, child, place))
 
-    def add_samples(self, file: FrameFile, piece: Samples | EdgeColumns) -> None:
-        """Add samples, frame by frame, if their order is known to be correct, else one by one."""
-        if isinstance(piece, Samples):
-            found, known = {(piece.parent, piece.child): piece}, True
+    def add_columns(self, file: FrameFile, piece: EdgeColumns) -> None:
+        """Add edges, frame by frame, if their order is known to be correct, else one by one."""
+        pairs = [*zip(piece.parents, piece.children, strict=True)]
+        found: dict[tuple[str, str], Any] = {pair: [] for pair in pairs}
+        # the order of new edges matters for cycles
+        known = len(found) == 1 or all(self._goes_on(*pair) for pair in found)
+        if len(found) == 1:
+            found[pairs[0]] = piece[2:5]
         else:
-            pairs = [*zip(piece.parents, piece.children, strict=True)]
-            rows: dict[tuple[str, str], list[tuple[int, Rigid, int]]] = {pair: [] for pair in pairs}
             for pair, row in zip(pairs, zip(*piece[2:5], strict=True), strict=True):
-                rows[pair].append(row)
-            found = {pair: Samples(*pair, *zip(*each, strict=True)) for pair, each in rows.items()}
-            known = all(self._goes_on(*pair) for pair in found)  # the order of new edges matters for cycles
+                found[pair].append(row)
+            found = {pair: tuple(zip(*each, strict=True)) for pair, each in found.items()}
         known = known and all(self.one_name(name) == name for pair in found for name in pair)
-        whole = {pair: each for pair, each in found.items() if known and self._takes_whole(each)}
-        for (parent, child), (_, _, stamps_ns, components, lines) in whole.items():
+        whole = {pair: each for pair, each in found.items() if known and self._takes_whole(*pair, each[0])}
+        for (parent, child), (stamps_ns, components, lines) in whole.items():
             place = EdgePlace(file, Edge(parent, child, components[0], stamps_ns[0], lines[0]))
             try:
                 self._moving().insert_many(parent, child, stamps_ns, components)
@@ -297,10 +298,10 @@ class TreeBuilder:
             self._moves.add(child)
         if len(whole) == len(found):
             return
-        later = islice(piece.stamps_ns, 1, None)
-        if isinstance(piece, Samples) and piece.child not in self._late and any(map(gt, piece.stamps_ns, later)):
-            self._late.add(piece.child)
-            warn(f"{file.name}: stamps of {shown(piece.child)} are out of order; sorted")
+        for (_, child), (stamps_ns, *_) in found.items() if piece.is_ordered else ():
+            if child not in self._late and any(map(gt, stamps_ns, islice(stamps_ns, 1, None))):
+                self._late.add(child)
+                warn(f"{file.name}: stamps of {shown(child)} are out of order; sorted")
         for edge in piece.edges():
             if (edge.parent, edge.child) not in whole:
                 self.add(EdgePlace(file, edge))
@@ -310,17 +311,16 @@ class TreeBuilder:
         track = None if self.buffer is None or child not in self._moves else self.buffer.track(child)
         return track is not None and not track.is_static and track.parent == parent
 
-    def _takes_whole(self, samples: Samples) -> bool:
+    def _takes_whole(self, parent: str, child: str, stamps_ns: Sequence[Any]) -> bool:
         """Return True if samples are all later than known ones: of a new frame, or one moving in the same parent."""
-        if self.rules.keep_ns is not None or len(samples.stamps_ns) < 2 or samples.child in self.covariances:
+        if self.rules.keep_ns is not None or len(stamps_ns) < 2 or stamps_ns[0] is None or child in self.covariances:
             return False
-        track = None if self.buffer is None else self.buffer.track(samples.child)
+        track = None if self.buffer is None else self.buffer.track(child)
         if track is None:
-            follows = samples.child not in self.first
+            follows = child not in self.first
         else:
-            goes_on = self._goes_on(samples.parent, samples.child)
-            follows = goes_on and track.last_ns < samples.stamps_ns[0]  # type: ignore[union-attr]
-        return follows and all(map(lt, samples.stamps_ns, islice(samples.stamps_ns, 1, None)))
+            follows = self._goes_on(parent, child) and track.last_ns < stamps_ns[0]  # type: ignore[union-attr]
+        return follows and all(map(lt, stamps_ns, islice(stamps_ns, 1, None)))
 
     def _moving(self) -> TransformBuffer:
         """Return the buffer; at the first stamp it receives the static edges."""
@@ -450,7 +450,7 @@ def load_sources(
                     if isinstance(piece, Edge):
                         builder.add(EdgePlace(file, piece))
                     else:
-                        builder.add_samples(file, piece)
+                        builder.add_columns(file, piece)
                 if piece is None:
                     raise file.error("no frames in it")
             refuse_unknown_joints(files)

@@ -42,49 +42,35 @@ class Edge(NamedTuple):
     covariance: Components | None = None
 
 
-class Samples(NamedTuple):
-    """Many poses of one moving frame, in one piece, equivalent to as many edges.
-
-    stamps_ns, components, lines: of each pose, in the order of the file
-    """
-
-    parent: str
-    child: str
-    stamps_ns: Sequence[int]
-    components: Sequence[Rigid]
-    lines: Sequence[int]
-
-    def edges(self) -> Iterator[Edge]:
-        """Yield the poses as edges."""
-        rows = zip(self.components, self.stamps_ns, self.lines, strict=True)
-        return (Edge(self.parent, self.child, *row) for row in rows)
-
-
 class EdgeColumns(NamedTuple):
-    """Edges of several moving frames, column by column, in the order of the file."""
+    """Edges, column by column, in the order of the file: all of frames that move, or all static.
+
+    is_ordered: their stamps are expected to be in order, as those of a trajectory; they are not in a recording
+    """
 
     parents: Sequence[str]
     children: Sequence[str]
-    stamps_ns: Sequence[int]
+    stamps_ns: Sequence[int | None]
     components: Sequence[Rigid]
     lines: Sequence[int]
     topics: Iterable[str] = ()
     received_ns: Iterable[int | None] = ()
+    is_ordered: bool = False
 
     def edges(self) -> Iterator[Edge]:
         """Yield the rows as edges."""
-        parents, children, stamps_ns, components, lines, topics, received_ns = self
+        parents, children, stamps_ns, components, lines, topics, received_ns, _ = self
         return map(
             Edge, parents, children, components, stamps_ns, lines, received_ns or repeat(None), repeat(()),
             topics or repeat(""),
         )  # fmt: skip
 
 
-def at_other_times(piece: Edge | Samples | EdgeColumns, offset_ns: int) -> Edge | Samples | EdgeColumns:
+def at_other_times(piece: Edge | EdgeColumns, offset_ns: int) -> Edge | EdgeColumns:
     """Return a piece of a file with an offset added to its stamps."""
     if isinstance(piece, Edge):
         return piece if piece.stamp_ns is None else piece._replace(stamp_ns=piece.stamp_ns + offset_ns)
-    return piece._replace(stamps_ns=[stamp + offset_ns for stamp in piece.stamps_ns])
+    return piece._replace(stamps_ns=[None if stamp is None else stamp + offset_ns for stamp in piece.stamps_ns])
 
 
 def stop(error: FormatError) -> None:

@@ -21,10 +21,9 @@ import numpy as np
 
 from frametool.errors import FormatError, Unanswered, ValueInvalid, first_of, listing, shown
 from frametool.frames.stamps import BILLION
-from frametool.grammar.edges import Diagnostics, Edge, EdgeColumns, Options
 from frametool.recordings.read import Channel, MessageTypes, Recorded, RecordingReader, opened_recording
 from frametool.ros.message_stream import edge_columns, unit_components
-from frametool.ros.messages import PATH, POSES, STAMPS, body_of, on_topic, stamp_problem
+from frametool.ros.messages import PATH, POSES, STAMPS, body_of, stamp_problem
 from frametool.text.lines import Pieces
 from frametool.text.spans import MARGIN, Spans, framed, join
 from frametool.text.write import float_spans
@@ -36,6 +35,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
+    from frametool.grammar.edges import Diagnostics, EdgeColumns, Options
 
 
 CLOUD, POSE_ARRAY = "sensor_msgs/msg/PointCloud2", "geometry_msgs/msg/PoseArray"
@@ -405,7 +405,7 @@ def numbers_of(moved: Any, turned: Any) -> Rigid:
     return moved.x, moved.y, moved.z, turned.x, turned.y, turned.z, turned.w
 
 
-def read(file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
+def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
     """Yield the transforms of a bag in the order of the recording.
 
     An edge's line is the number of its message among those with transforms.
@@ -433,18 +433,16 @@ def _channels(reader: RecordingReader, options: Options) -> list[Channel]:
     return reader.on_topics(TYPES | POSES, chosen) if chosen else with_frames
 
 
-def recorded_edges(
-    reader: RecordingReader, channels: Sequence[Channel], options: Options
-) -> Iterator[Edge | EdgeColumns]:
+def recorded_edges(reader: RecordingReader, channels: Sequence[Channel], options: Options) -> Iterator[EdgeColumns]:
     """Yield the edges of the messages on some channels; raises FormatError if there are none, or one is broken."""
     number = 0
     for stretch in reader.blocks(channels):
         for is_static, part in groupby(stretch, lambda each: each.channel.is_static):
             messages = [*part]
             found = zip(_contents(reader, messages, number, options), messages, strict=True)
-            rows = [(each, at, sent) for at, (some, sent) in enumerate(found, number + 1) for each in some]
-            columns = None if is_static or not rows else _columns(rows, options)
-            yield from [columns] if columns else (_edge(*row, reader.path, options) for row in rows)
+            if rows := [(each, at, sent) for at, (some, sent) in enumerate(found, number + 1) for each in some]:
+                columns = _columns(rows, reader.path, options)
+                yield columns._replace(stamps_ns=[None] * len(rows)) if is_static else columns
             number += len(messages)
     if not number:
         raise FormatError(f"no messages on {', '.join(each.topic for each in channels)}", source=reader.path)
@@ -480,39 +478,42 @@ def _transforms(reader: RecordingReader, message: Recorded, number: int, options
     return [RawTransform.of(each, body_of(channel.topic, options.answers)) for each in parts]
 
 
-def _columns(rows: Sequence[tuple[RawTransform, int, Recorded]], options: Options) -> EdgeColumns | None:
-    """Return the edges of many messages at once; None, and no warnings about numbers, if one of them is refused."""
+def _columns(rows: Sequence[tuple[RawTransform, int, Recorded]], path: str, options: Options) -> EdgeColumns:
+    """Return the edges of many messages at once; raises FormatError for the first one that is invalid.
+
+    rows: transforms, each with the number of its message among those with transforms
+    """
     transforms, lines, sent = zip(*rows, strict=True)
     *names, numbers, stamps = zip(*transforms, strict=True)
     bare = {name: options.tally.names.bare(name) for name in dict.fromkeys(chain(*names))}
     parents, children = ([*map(bare.__getitem__, each)] for each in names)
     topics = [each.channel.topic for each in sent]
-    if not all(options.topics.agrees(*each) for each in dict.fromkeys(zip(topics, children, strict=True))):
-        return None
     found = edge_columns(
         (parents, children), zip(*stamps, strict=True), numbers, lines, options.tally, normalize=options.normalize,
         topics=topics, received_ns=[each.log_ns for each in sent],
     )  # fmt: skip
-    if found:
-        options.topics.counts.update(Counter(topics) + Counter(options.topics.counts))
+    if found is None:
+        raise next(filter(None, (_problem(said, number, bare, path, options) for said, number, _ in rows)))
+    options.topics.counts.update(Counter(topics) + Counter(options.topics.counts))
+    pairs = [*zip(topics, children, strict=True)]
+    for pair in dict.fromkeys(pairs):
+        if problem := options.topics.conflict(*pair):
+            line = lines[pairs.index(pair)]
+            options.report(FormatError(problem, source=path, line=line, column=1, rule="two-topics"))
     return found
 
 
-def _edge(said: RawTransform, number: int, message: Recorded, path: str, options: Options) -> Edge:
-    """Return the edge in a message; raises FormatError for an invalid one.
-
-    number: of the message among those with transforms
-    """
-    tally, topic = options.tally, message.channel.topic
-    options.topics.takes(topic)
-    parent, child = tally.names.bare(said.parent), tally.names.bare(said.child)
-    problem = stamp_problem(*said.stamp, STAMPS[0]) if parent and child else ValueInvalid("an empty frame name")
+def _problem(
+    said: RawTransform, number: int, bare: dict[str, str], path: str, options: Options
+) -> FormatError | None:  # fmt: skip
+    """Return the error for an invalid transform in a message; bare: its names without a leading `/`."""
+    parent, child = bare[said.parent], bare[said.child]
     try:
-        components = unit_components(said.numbers, number, tally, options.normalize)
+        problem = stamp_problem(*said.stamp, STAMPS[0]) if parent and child else ValueInvalid("an empty frame name")
+        unit_components(said.numbers, number, options.tally, options.normalize)
     except ValueInvalid as error:
         problem = problem or error
-    if problem:
-        what = f"message {number}: {shown(parent)} -> {shown(child)}: {problem}"
-        raise FormatError(what, source=path, rule=problem.rule)
-    stamp_ns = said.stamp[0] * BILLION + said.stamp[1]
-    return on_topic(Edge(parent, child, components, stamp_ns, number, message.log_ns, topic=topic), path, options)
+    if problem is None:
+        return None
+    what = f"message {number}: {shown(parent)} -> {shown(child)}: {problem}"
+    return FormatError(what, source=path, rule=problem.rule)

@@ -24,7 +24,6 @@ or of euroc, nanoseconds, x y z, qw qx qy qz, and what else it has:
 from __future__ import annotations
 
 from importlib import import_module
-from itertools import groupby
 from typing import TYPE_CHECKING, BinaryIO, TypeAlias, cast
 
 import numpy as np
@@ -35,7 +34,7 @@ from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, describe,
 from frametool.formats.table import FORMATS, Rows, is_recording, is_trajectory
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Answers, Diagnostics, Edge, Options, Samples, Topics, stop
+from frametool.grammar.edges import Answers, Diagnostics, EdgeColumns, Options, Topics, stop
 from frametool.grammar.readers import EARTH_FRAMES
 from frametool.grammar.result import Style
 from frametool.stream.evaluate import Plan, Run, State
@@ -278,7 +277,7 @@ class FormatConverter:
 # --- tables as frames ---
 
 
-def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
+def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
     """Yield the rows of a table as poses of one frame, or of those that its columns name.
 
     Raises or reports FormatError with the line of a row that is no pose.
@@ -310,7 +309,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
         }
         for fault in [*(each._replace(line=line + each.line) for each in outcome.faults), *nameless.values()]:
             options.report(BadRow(fault, fault.reason, source=file.name))
-        yield from _pieces(block, line, fmt, options)
+        yield _edges(block, line, fmt, options)
         line, count = line + outcome.lines, count + len(block.numbers)
     if len(named) < 2:
         describe(options, fmt, count)
@@ -320,23 +319,18 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
         options.tally.rough += [1] * converter.rows.mended
 
 
-def _pieces(block: RowPoses, line: int, fmt: Rows, options: Options) -> Iterator[Edge | Samples]:
-    """Yield the poses of a block: as samples of one frame after the other, or as edges that are static."""
+def _edges(block: RowPoses, line: int, fmt: Rows, options: Options) -> EdgeColumns:
+    """Return the poses of a block, of frames that move where they have stamps."""
     columns: Components = tuple(block.numbers.T)
     if len(columns) == len("xyzw"):
         columns = (*[columns[0] * 0.0] * 3, *columns)
-    times = None if block.stamps_ns is None else block.stamps_ns.tolist()
-    poses = list(zip(*(column.tolist() for column in columns), strict=True))
-    lines = (block.lines + line).tolist()
-    world, body = options.answers.names(*fmt.frames)
-    parents = [name or world for name in block.for_each(block.parents)]
-    names = [name or body for name in block.for_each(block.names)]
-    bare = options.tally.names.bare
-    for (parent, name), group in groupby(range(len(poses)), key=lambda at: (bare(parents[at]), bare(names[at]))):
-        some = list(group)
-        part = slice(some[0], some[-1] + 1)
-        if times is not None:
-            yield Samples(parent, name, times[part], poses[part], lines[part])
-        else:
-            yield from (Edge(parent, name, poses[at], None, lines[at]) for at in some)
+    poses = [*zip(*(column.tolist() for column in columns), strict=True)]
+    stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
+    bare, usual = options.tally.names.bare, options.answers.names(*fmt.frames)
+    parents, names = (
+        [bare(name or other) for name in block.for_each(each)]
+        for each, other in zip((block.parents, block.names), usual, strict=True)
+    )
     options.tally.axes |= dict.fromkeys(names, options.answers.camera_axes or fmt.axes)
+    lines = (block.lines + line).tolist()
+    return EdgeColumns(parents, names, stamps or [None] * len(poses), poses, lines, is_ordered=stamps is not None)

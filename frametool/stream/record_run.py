@@ -451,8 +451,7 @@ def edges_of_copy(
     """Yield the edges of a recording as its copy has them: some are replaced, and others are added."""
     children = {edge.child for edge in more}
     found = recorded_edges(reader, channels, options) if channels else ()
-    edges = (edge for piece in found for edge in ((piece,) if isinstance(piece, Edge) else piece.edges()))
-    yield from (edge for edge in edges if edge.child not in children)
+    yield from (edge for piece in found for edge in piece.edges() if edge.child not in children)
     yield from more
 
 

@@ -41,7 +41,7 @@ from frametool.formats.table import FORMATS, Rows
 from frametool.frames.stamps import BILLION, format_stamp, parse_stamp, whole_stamp
 from frametool.geometry import euler, floats, quaternion, rigid
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Options, Samples
+from frametool.grammar.edges import EdgeColumns, Options
 from frametool.grammar.readers import Misfit, Path, as_mapping, kind, read_numbers, within
 from frametool.text.numbers import parse_number
 
@@ -223,14 +223,14 @@ def form_of(file: InputFile, options: Options) -> Rows:
     return EDGES if options.answers.edges else FORMATS[file.format].rows
 
 
-def read(file: InputFile, options: Options) -> Iterator[Samples]:
-    """Yield the poses of a file as samples of one frame; assumptions are reported with the file's name."""
+def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
+    """Yield the poses of a file, of one frame; assumptions are reported with the file's name."""
     spec = FORMATS[file.format].rows
     parent, child = options.answers.names(*spec.frames)
     for block in blocks(file, options):
-        columns = [part.tolist() for part in block.poses]
-        places = [row.line for row in block.rows]
-        yield Samples(parent, child, block.stamps_ns.tolist(), list(zip(*columns, strict=True)), places)
+        poses = [*zip(*(part.tolist() for part in block.poses), strict=True)]
+        worlds, bodies, lines = [parent] * len(poses), [child] * len(poses), [row.line for row in block.rows]
+        yield EdgeColumns(worlds, bodies, block.stamps_ns.tolist(), poses, lines, is_ordered=True)
     options.tally.axes[child] = options.answers.camera_axes or spec.axes
 
 
