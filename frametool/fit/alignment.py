@@ -1,4 +1,4 @@
-"""Pairing of trajectories, clock offsets, and alignment by a transform and a scale.
+"""Pairing of trajectories, clock offsets, alignment by a transform and a scale, and errors.
 
 Poses are paired at common stamps, or with the nearest ones.  Clocks: t_ref = t_est + offset.
 point_in_ref = scale * ref_from_est.apply(point_in_est): p' = c R p + t, R' = R R_i.
@@ -7,17 +7,18 @@ point_in_ref = scale * ref_from_est.apply(point_in_est): p' = c R p + t, R' = R 
 from __future__ import annotations
 
 from math import atan2, isfinite, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from frametool.errors import ValueInvalid
 from frametool.fit.least_squares import align_vectors, length, require_near, solve_normal
 from frametool.frames.stamps import BILLION
+from frametool.frames.trajectory import way
 from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from frametool.fit.comparison import Delta
     from frametool.frames.trajectory import Trajectory
@@ -335,9 +336,8 @@ def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit
     part = 0.5 * (before - after) / bend if bend < 0 and min(before, after) > -1 else 0.0
     score, middle, rival = np.fft.fftshift(score), size // 2, None
     near = score >= AS_GOOD * here
-    valleys = np.flatnonzero(~near)
-    edge = np.searchsorted(valleys, (at + middle) % size)
-    near[valleys[edge - 1] if edge else 0 : valleys[edge] if edge < len(valleys) else size] = False  # the best peak
+    peaks = np.cumsum(~near)  # the number of each: between two valleys it is the same
+    near &= peaks != peaks[(at + middle) % size]
     if near.any() and here > 0:  # another one is as good
         rival = round(float((np.argmax(np.where(near, score, -np.inf)) - middle) * step), DIGITS)
     return ClockOffset(round(float((lags[at] + part) * step), DIGITS), float(here), rival)
@@ -435,3 +435,129 @@ def stamps_every(each: Trajectory, delta: Delta) -> Array:
     gaps = each.stamps_ns[after] - each.stamps_ns[after - 1]
     stamps: Array = each.stamps_ns[after - 1] + np.rint(part * gaps).astype(np.int64)
     return stamps
+
+
+# --- errors ---
+
+CHORD = 0.1  # metres of path before and after a pose that define its direction
+ROUNDING = 1e-9  # of a delta
+X = np.array([1.0, 0.0, 0.0])
+
+
+def statistics(values: Array | None) -> Any:
+    """Return the statistics of numbers, if any: std is the population's (n), p95 the linear percentile."""
+    if values is None:
+        return None
+    sse = float((values**2).sum())
+    return {
+        "rmse": sqrt(sse / len(values)), "mean": float(values.mean()), "median": float(np.median(values)),
+        "std": float(values.std()), "min": float(values.min()), "max": float(values.max()), "sse": sse,
+        "p95": float(np.percentile(values, 95)),
+    }  # fmt: skip
+
+
+class AbsoluteErrors(NamedTuple):
+    """Absolute errors, one per pair: the distance and, signed, its parts along, across and above the path, metres.
+
+    rad: the angle of inv(ref) est, None without rotations of both
+    """
+
+    m: Array
+    rad: Array | None
+    along: Array
+    across: Array
+    up: Array
+
+
+def absolute_errors(ref: Trajectory, est: Trajectory, up: Array) -> AbsoluteErrors:
+    """Compare an aligned estimate with its reference pose by pose."""
+    path = way(ref.xyz)
+    behind = (np.searchsorted(path, path - CHORD, "right") - 1).clip(0)
+    ahead = np.searchsorted(path, path + CHORD).clip(0, len(path) - 1)
+    chord = ref.xyz[ahead] - ref.xyz[behind]
+    size = length(chord)
+    moving = np.flatnonzero(size > 0.0)
+    along = np.tile(X, (len(path), 1))
+    if len(moving):
+        last = moving[(np.searchsorted(moving, np.arange(len(path)), "right") - 1).clip(0)]
+        along = chord[last] / size[last, None]
+    above = up - (along @ up)[:, None] * along  # normal to the path; if up is parallel to it, x is made so
+    parallel = length(above) < ROUNDING
+    above[parallel] = X - along[parallel, :1] * along[parallel]
+    above /= length(above)[:, None]
+    gap, turned = est.xyz - ref.xyz, (ref.rotation, est.rotation)
+    rad = None if turned[0] is None or turned[1] is None else turned[0].distance(turned[1])
+    return AbsoluteErrors(length(gap), rad, *((gap * axis).sum(-1) for axis in (along, np.cross(above, along), above)))
+
+
+class RelativeErrors(NamedTuple):
+    """Relative errors from pose `start` to pose `end`: of translation and angle, and of the distance covered.
+
+    m and rad are None without rotations of both.
+    """
+
+    start: Indices
+    end: Indices
+    m: Array | None
+    rad: Array | None
+    distance: Array
+
+
+def relative_errors(ref: Trajectory, est: Trajectory, start: Indices, end: Indices) -> RelativeErrors:
+    """Compare relative poses: E = inv(inv(ref_i) ref_j) inv(est_i) est_j."""
+    covered = [length(each.xyz[end] - each.xyz[start]) for each in (ref, est)]
+    distance = np.abs(covered[1] - covered[0])
+    if ref.xyzw is None or est.xyzw is None:
+        return RelativeErrors(start, end, None, None, distance)
+    steps = [each.poses[start].relative(each.poses[end]) for each in (ref, est)]
+    error = steps[0].relative(steps[1])
+    return RelativeErrors(start, end, length(error.xyz), error.rotation.angle(), distance)
+
+
+def chained(along: Array, delta: float) -> tuple[Indices, Indices]:
+    """Return pairs (i, j), each from the end of the previous one: j is the first that is delta further along."""
+    following = np.searchsorted(along, along + delta * (1 - ROUNDING)).tolist()
+    found = [0]
+    while (after := following[found[-1]]) < len(along):
+        found.append(after)
+    chain = np.array(found)
+    return chain[:-1], chain[1:]
+
+
+def all_pairs(along: Array, delta: float, tolerance: float) -> tuple[Indices, Indices]:
+    """Return for each i the j whose distance from there is the nearest to delta, within a share of it."""
+    wanted = along + delta
+    after = np.searchsorted(along, wanted).clip(1, len(along) - 1)
+    end = np.where(wanted - along[after - 1] <= along[after] - wanted, after - 1, after)
+    start = np.arange(len(along))
+    fits = (np.abs(along[end] - wanted) <= tolerance * delta) & (end > start)
+    return start[fits], end[fits]
+
+
+class SegmentErrors(NamedTuple):
+    """Errors over path segments of some lengths: the ends and length of each, and its errors per metre."""
+
+    start: Indices
+    end: Indices
+    length: Array
+    share: Array
+    rad_per_m: Array
+
+
+def segment_errors(ref: Trajectory, est: Trajectory, lengths: Sequence[float], step: int) -> SegmentErrors | None:
+    """Compare path segments from every n-th pair, as the KITTI benchmark does; None without rotations.
+
+    Source: Geiger, Lenz, Urtasun 2012, and its devkit: up to the first pose that is more than the length further.
+    """
+    if not lengths or ref.xyzw is None or est.xyzw is None:
+        return None
+    path, firsts = way(ref.xyz), np.arange(0, ref.size, step)
+    found: list[tuple[Any, ...]] = []
+    for metres in lengths:  # one by one, which needs an eighth of the memory
+        ends = np.searchsorted(path, path[firsts] + metres, "right")
+        there = ends < ref.size
+        start, end, *errors, _ = relative_errors(ref, est, firsts[there], ends[there])
+        found.append((start, end, np.full(len(start), metres), *(np.asarray(each) / metres for each in errors)))
+    columns = [*map(np.concatenate, zip(*found, strict=True))]
+    order = np.argsort(columns[0], kind="stable")  # those from one pose together
+    return SegmentErrors(*(column[order] for column in columns))

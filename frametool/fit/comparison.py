@@ -1,37 +1,33 @@
-"""Compare a trajectory with a reference: pairing, clock offset, mounting, alignment, and errors."""
+"""Compare a trajectory with a reference: settings, hints, numbers as a mapping and as rows, and limits on them.
+
+Limits are for continuous integration: `ate>5cm,rpe:10m>1%,paired<90%`.
+"""
 
 from __future__ import annotations
 
+import operator
 import re
-from math import radians, sqrt
+from math import degrees, radians, sqrt
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import ValueInvalid, shown
+from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.fit import alignment
-from frametool.fit.alignment import ALIGNMENTS, Fit, Pairs, Unaligned, clock_offset, fitted, lever_arm, principal_axes
+from frametool.fit.alignment import ALIGNMENTS, SCALED, Fit, Pairs, Unaligned, fitted, statistics
 from frametool.fit.least_squares import require_near
-from frametool.fit.numbers import (
-    ROUNDING,
-    absolute_errors,
-    all_pairs,
-    chained,
-    numbers,
-    relative_errors,
-    segment_errors,
-)
 from frametool.frames.stamps import format_stamp
 from frametool.frames.trajectory import Trajectory, way
-from frametool.geometry import earth
+from frametool.geometry import arrays, earth
+from frametool.geometry.floats import half_sincos
 from frametool.geometry.place import ENU, Origin
 from frametool.geometry.representations import EARTH_FRAMES
 from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.fit.numbers import AbsoluteErrors, RelativeErrors, SegmentErrors
+    from frametool.fit.alignment import AbsoluteErrors, RelativeErrors, SegmentErrors
     from frametool.geometry.types import Array
 
 AUTO = "auto"
@@ -215,7 +211,7 @@ def compared(
         first = pairs.at(slice(int(np.count_nonzero(is_first))))
     fit = fitted(fitting.align, first.ref, first.est, up, names, tied=fitting.tie_first)
     moved = fit.moved(pairs.est)
-    ate = absolute_errors(pairs.ref, moved, up)
+    ate = alignment.absolute_errors(pairs.ref, moved, up)
     if fitting.mount is None and not reporting.evo:
         _warn_of_bodies(pairs.ref, moved, fitting, hints)
     by_alignment: dict[str, float | None] = {}
@@ -227,14 +223,14 @@ def compared(
             by_alignment[kind] = None
     noise = by_alignment["sim3"]  # what is not significant is not, even for a fit with a scale
     if fitting.align in ("se3", "sim3") and noise is not None:
-        long, second, _ = principal_axes(first.ref.xyz)
+        long, second, _ = alignment.principal_axes(first.ref.xyz)
         if second < min(NEAR_A_LINE * noise, SLENDER * long):
             hints.append("positions lie nearly on a line: the turn about it rests on noise")
     walked = pairs.ref if reporting.pairs_from == "reference" else moved
     return Comparison(
         names, settings, ref, est, pairs, moved, fit, by_alignment, ate,
         list(_relative(pairs.ref, moved, walked, reporting, hints)),
-        segment_errors(pairs.ref, moved, reporting.segments, reporting.segment_step), hints,
+        alignment.segment_errors(pairs.ref, moved, reporting.segments, reporting.segment_step), hints,
     )  # fmt: skip
 
 
@@ -262,9 +258,7 @@ def _on_the_ground(
     return found[0], found[1]
 
 
-def _paired(
-    ref: Trajectory, est: Trajectory, settings: Settings, names: tuple[str, str], hints: list[str]
-) -> Pairs:
+def _paired(ref: Trajectory, est: Trajectory, settings: Settings, names: tuple[str, str], hints: list[str]) -> Pairs:
     """Return the pairs, with the offset of the clocks, and with its score if it was estimated."""
     pairing, is_nearest = settings.pairing, settings.pairing.match == "nearest"
     if ref.stamps_ns is None or est.stamps_ns is None:
@@ -275,9 +269,9 @@ def _paired(
         return alignment.paired(ref, est)
     offset_ns, score = 0, None
     if pairing.offset == AUTO:
-        kind = "sim3" if settings.fitting.align in alignment.SCALED else "se3"
+        kind = "sim3" if settings.fitting.align in SCALED else "se3"
         by_turning = settings.fitting.mount == AUTO
-        found = clock_offset(ref, est, limit_s=pairing.offset_limit_s, kind=kind, by_turning=by_turning)
+        found = alignment.clock_offset(ref, est, limit_s=pairing.offset_limit_s, kind=kind, by_turning=by_turning)
         if found.score < CLEAR:
             raise ValueInvalid(f"no clear clock offset (score {found.score:.2f}); give one: --offset T")
         offset_ns, score = round(found.seconds * 1e9), found.score
@@ -314,7 +308,7 @@ def _warn_of_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]
     span = max(ref.stamps_ns[-1], est.stamps_ns[-1]) - min(ref.stamps_ns[0], est.stamps_ns[0])
     if span > MOST_TRIED * min(intervals) / 2:
         return
-    found = clock_offset(ref, est)
+    found = alignment.clock_offset(ref, est)
     if abs(found.seconds) * 1e9 > max(intervals) / 2 and found.score > SURE:
         side = "behind" if found.seconds > 0 else "ahead"
         by = f"{abs(found.seconds):.3f} s {side} (score {found.score:.3f})"
@@ -348,7 +342,7 @@ def _mounted(pairs: Pairs, fitting: Fitting) -> Pairs:
         raise ValueInvalid("a mount needs rotations of the estimate")
     if isinstance(mount, str):  # the lever arm from the fit, and a rotation common to all pairs
         up, shared = np.array(fitting.up), None
-        arm = lever_arm(fitting.align, ref, est, up)
+        arm = alignment.lever_arm(fitting.align, ref, est, up)
         shifted = est.with_poses(est.poses @ Transform(Rotation.identity(), arm))
         placed = fitted(fitting.align, ref, shifted, up).moved(shifted)
         if ref.rotation is not None and placed.rotation is not None:
@@ -393,15 +387,212 @@ def _relative(
         along = delta.along(walked)
         if along is None:
             why = "there are no rotations" if delta.unit == "deg" else "there are no stamps"
-        elif along[-1] + delta.amount * (1 - ROUNDING) == along[-1]:
+        elif along[-1] + delta.amount * (1 - alignment.ROUNDING) == along[-1]:
             why = f"the delta is lost in rounding: the path is {along[-1]:g} {delta.unit} long"
             if reporting.deltas:
                 raise ValueInvalid(f"rpe {delta}: {why}")
         else:
-            of_all = reporting.all_pairs
-            ends = all_pairs(along, delta.amount, reporting.tolerance) if of_all else chained(along, delta.amount)
+            ends = alignment.chained(along, delta.amount)
+            if reporting.all_pairs:
+                ends = alignment.all_pairs(along, delta.amount, reporting.tolerance)
             why = "" if len(ends[0]) else "no two poses are so far apart"
         if not why:
-            yield delta, relative_errors(ref, est, *ends)
+            yield delta, alignment.relative_errors(ref, est, *ends)
         elif reporting.deltas:
             hints.append(f"rpe {delta} is left out: {why}")
+
+
+# --- reports and limits ---
+
+
+SQRT8 = 8**0.5
+
+
+def numbers(found: Comparison) -> dict[str, Any]:
+    """Return every setting and number of a comparison; inapplicable ones are None."""
+    pairs, ate, (_, fitting, reporting) = found.pairs, found.ate, found.settings
+    stamps, (parent, name) = pairs.ref.stamps_ns, worlds(found)
+    scale = {"scale": found.fit.scale} if fitting.align in SCALED else {}  # only if one was estimated
+    relative = []
+    for delta, errors in found.relative:
+        summed = _errors(errors.m, errors.rad, evo=reporting.evo)
+        share = 100 * summed["m"]["rmse"] / delta.amount if summed["m"] and delta.unit == "m" else None
+        counted = {"delta": str(delta), "pairs": len(errors.start)}
+        relative.append(counted | summed | {"percent": share, "distance_m": statistics(errors.distance)})
+    return {
+        "ref": found.names[0],
+        "est": found.names[1],
+        "settings": _settings(found),
+        "poses": {
+            "ref": found.ref.size, "est": found.est.size, "possible": pairs.possible, "paired": pairs.ref.size,
+            "shared": pairs.shared,
+        },
+        "ref_duration_s": None if stamps is None else int(np.ptp(found.ref.stamps_ns)) / 1e9,
+        "duration_s": None if stamps is None else int(stamps[-1] - stamps[0]) / 1e9,
+        "path_m": {"ref": float(way(pairs.ref.xyz)[-1]), "est": float(way(found.moved.xyz)[-1])},
+        "offset_s": pairs.offset_ns / 1e9,
+        "offset_score": pairs.offset_score,
+        "transform": {"name": name, "parent": parent, **_pose(found.fit.transform), **scale},
+        "ate_by_alignment": found.ate_by_alignment,
+        "ate": {
+            **_errors(ate.m, ate.rad, evo=reporting.evo), "along_m": statistics(ate.along),
+            "across_m": statistics(ate.across), "up_m": statistics(ate.up), "end_m": float(ate.m[-1]),
+        },
+        "rpe": relative,
+        "kitti": _kitti(found),
+        "hints": found.hints,
+    }  # fmt: skip
+
+
+def worlds(found: Comparison) -> tuple[str, str]:
+    """Return the names of the worlds of reference and estimate; equal ones become `ref` and `est`."""
+    ref, est = found.pairs.ref.world, found.pairs.est.world
+    return ("ref", "est") if ref == est else (ref, est)
+
+
+def _pose(pose: Transform) -> dict[str, Any]:
+    return {"xyz": pose.xyz.tolist(), "quaternion": dict(zip("xyzw", pose.xyzw.tolist(), strict=True))}
+
+
+def _settings(found: Comparison) -> dict[str, Any]:
+    (pairing, fitting, reporting), pairs = found.settings, found.pairs
+    is_nearest = pairing.match == "nearest"
+    has_stamps = pairs.ref.stamps_ns is not None
+    limits = ("+" * limit[0] + f"{limit[1] / 1e9:.9f}" if limit else None for limit in (pairing.start, pairing.stop))
+    return {
+        "match": pairing.match if has_stamps else "number", "interpolated": pairs.interpolated,
+        "max_gap_s": pairs.max_gap_s, "max_diff_s": pairing.max_diff_ns / 1e9 if is_nearest and has_stamps else None,
+        "min_match": pairing.min_match,
+        "offset": pairing.offset if pairing.offset == "auto" else pairs.offset_ns / 1e9, "align": fitting.align,
+        "align_first": fitting.align_first and str(fitting.align_first), "tie_first": fitting.tie_first,
+        "mount": None if pairs.mount is None else _pose(pairs.mount), "up": list(fitting.up),
+        "delta": [str(delta) for delta, _ in found.relative], "all_pairs": reporting.all_pairs,
+        "tolerance": reporting.tolerance if reporting.all_pairs else None, "pairs_from": reporting.pairs_from,
+        "segments_m": list(reporting.segments), "segment_step": reporting.segment_step,
+        **dict(zip(("start_s", "end_s"), limits, strict=True)), "as": "evo" if reporting.evo else None,
+    }  # fmt: skip
+
+
+def _errors(m: Array | None, rad: Array | None, *, evo: bool) -> dict[str, Any]:
+    """Return the statistics of distances and angles, and as evo does the norm of R - I and of the whole matrix."""
+    found = {"m": statistics(m), "deg": statistics(None if rad is None else np.degrees(rad))}
+    if evo and m is not None and rad is not None:
+        rot = SQRT8 * half_sincos(rad, arrays)[0]
+        found |= {"rot": statistics(rot), "full": statistics(np.sqrt(m * m + rot * rot))}
+    return found
+
+
+def _kitti(found: Comparison) -> dict[str, Any] | None:
+    segments = found.segments
+    if segments is None or not len(segments.start):
+        return None
+
+    def mean(chosen: Any) -> dict[str, Any]:
+        return {
+            "segments": int(np.count_nonzero(chosen)),
+            "percent": 100 * float(segments.share[chosen].mean()),
+            "deg_per_m": degrees(float(segments.rad_per_m[chosen].mean())),
+        }
+
+    lengths = [
+        {"length_m": length, **mean(chosen)}
+        for length in found.settings.reporting.segments
+        if (chosen := segments.length == length).any()
+    ]
+    return {**mean(np.ones(len(segments.start), bool)), "lengths": lengths}
+
+
+def rows(found: Comparison, which: str = "ate") -> Iterator[dict[str, Any]]:
+    """Yield one row per pair (`ate`), two poses of a delta (`rpe`) or path segment (`kitti`)."""
+    ref, est, ate, segments = found.pairs.ref, found.moved, found.ate, found.segments
+    counted: Any = np.arange(ref.size) if ref.stamps_ns is None else ref.stamps_ns
+    tables: list[dict[str, Any]] = []
+    if which == "ate":
+        tables = [{
+            "stamp_ns": counted, **dict(zip(("ref_x", "ref_y", "ref_z"), ref.xyz.T, strict=True)),
+            **dict(zip("xyz", est.xyz.T, strict=True)), "path_m": way(ref.xyz), "ate_m": ate.m,
+            "ate_deg": None if ate.rad is None else np.degrees(ate.rad),
+            "along_m": ate.along, "across_m": ate.across, "up_m": ate.up,
+        }]  # fmt: skip
+    elif which == "rpe":
+        tables = [{
+            "stamp_ns": counted[errors.start], "end_ns": counted[errors.end],
+            "delta": [str(delta)] * len(errors.start), "m": errors.m,
+            "deg": None if errors.rad is None else np.degrees(errors.rad), "distance_m": errors.distance,
+        } for delta, errors in found.relative]  # fmt: skip
+    elif segments is not None:
+        tables = [{
+            "stamp_ns": counted[segments.start], "end_ns": counted[segments.end], "length_m": segments.length,
+            "percent": 100 * segments.share, "deg_per_m": np.degrees(segments.rad_per_m),
+        }]  # fmt: skip
+    for columns in tables:
+        absent = [None] * len(columns["stamp_ns"])
+        cells = [absent if column is None else np.asarray(column).tolist() for column in columns.values()]
+        yield from (dict(zip(columns, row, strict=True)) for row in zip(*cells, strict=True))
+
+
+SHORT = {
+    "ate": "ate.m.rmse", "max": "ate.m.max", "deg": "ate.deg.rmse", "along": "ate.along_m.rmse",
+    "across": "ate.across_m.rmse", "up": "ate.up_m.rmse", "kitti": "kitti.percent", "scale": "transform.scale",
+    "paired": "poses.paired", "offset": "offset_s",
+}  # fmt: skip
+UNITS = {"": 1.0, "m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "deg": 1.0, "rad": 57.29577951308232, "s": 1.0,
+         "ms": 0.001, "%": 1.0}  # fmt: skip
+SIGNS: dict[str, Callable[..., bool]] = {">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt}
+_LIMIT = r"([\w:.]+?)\s*(>=|<=|>|<)\s*([-+]?(?:\d++\.?\d*+|\.\d++)(?:e[-+]?\d+)?)\s*([a-z]*|%)"
+
+
+class Limit(NamedTuple):
+    """A number by its name or its path in the JSON, and its limit."""
+
+    text: str
+    name: str
+    sign: str
+    bound: float
+    unit: str
+
+    def passed(self, found: dict[str, Any]) -> float | None:
+        """Return the number of a comparison if it exceeds the limit, else None.
+
+        Raises ValueInvalid if there is no such number.
+        """
+        kind, _, delta = self.name.partition(":")
+        if kind == "rpe" and delta:
+            row = next((row for row in found["rpe"] if row["delta"] == delta), None)
+            value = number_at(row, {"%": "percent", "deg": "deg.rmse", "rad": "deg.rmse"}.get(self.unit, "m.rmse"))
+        else:
+            value = number_at(found, SHORT.get(self.name, self.name))
+            if self.name == "paired" and self.unit == "%" and value is not None:
+                value = 100.0 * value / max(found["poses"]["possible"], 1)
+        if not isinstance(value, int | float):
+            raise ValueInvalid(f"{self.text}: {found['est']} has no such number; -f json shows those there are")
+        return float(value) if SIGNS[self.sign](value, self.bound) else None
+
+
+def parse_limits(text: str) -> list[Limit]:
+    """Parse limits separated by commas: a name or path, > >= < or <=, a number with its unit.
+
+    Bare numbers are metres, degrees, poses, and percent of KITTI.  Raises ValueInvalid.
+    """
+    found = []
+    for part in filter(None, map(str.strip, text.split(","))):
+        match = re.fullmatch(_LIMIT, part)
+        if match is None or match[4] not in UNITS:
+            raise ValueInvalid(f"{shown(part)} is not a limit; write a name, > or <, and a bound: ate>5cm, paired<90%")
+        name = match[1]
+        if "." not in name and not name.startswith("rpe:") and name not in SHORT:
+            raise ValueInvalid(f"no number is called {shown(name)}{alternatives(name, [*SHORT, 'rpe:10m'], 'numbers')}")
+        found.append(Limit(part, name, match[2], float(match[3]) * UNITS[match[4]], match[4]))
+    if not found:
+        raise ValueInvalid("no limit; write one as ate>5cm")
+    return found
+
+
+def number_at(value: Any, path: str) -> Any:
+    """Follow a path of keys and indices into a mapping; None if it ends."""
+    for step in path.split("."):
+        try:
+            value = value[int(step) if isinstance(value, list) else step]
+        except (KeyError, IndexError, TypeError, ValueError):
+            return None
+    return value

@@ -135,7 +135,7 @@ def inverse_left_jacobian(rotvecs: Array) -> Array:
 def batch_of(argument: Any, name: str) -> Transform:
     """Return transforms (n,), a sequence of single ones, or matrices (n, 4, 4) as transforms.
 
-    Raises ValueInvalid with the shape.
+    Raises ValueInvalid with the shape, and for what is too far away.
     """
     if not isinstance(argument, Transform) and len(argument) and all(isinstance(each, Transform) for each in argument):
         if many := next((each.shape for each in argument if each.shape), ()):
@@ -145,9 +145,10 @@ def batch_of(argument: Any, name: str) -> Transform:
         matrices = np.asarray(argument)
         if matrices.ndim != 3 or matrices.shape[1:] != (4, 4):
             raise ValueInvalid(f"{name}: expected matrices of shape (n, 4, 4), got {matrices.shape}")
-        return Transform.from_matrix(matrices)
+        argument = Transform.from_matrix(matrices)
     if len(argument.shape) != 1:
         raise ValueInvalid(f"{name}: expected transforms of shape (n,), got {argument.shape}")
+    require_near(argument.xyz, name)
     return argument
 
 

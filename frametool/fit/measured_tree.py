@@ -309,13 +309,10 @@ def solve_tree(
     try:
         with np.errstate(over="raise", invalid="raise"):
             problem = TreeProblem(measurements, bodies)
-            solution = TreeSolution(*TreeFit(problem, problem.fitted(robust=robust)).judged(), bodies, fixed)
+            return TreeSolution(*TreeFit(problem, problem.fitted(robust=robust)).judged(), bodies, fixed)
     except (lsq.NotSettled, FloatingPointError):
         far = max(abs(part) for each in measurements for part in each.components[:3])
         raise ValueInvalid(f"translations (up to {far:.3g} m) or sigmas differ too much in size to be solved") from None
-    for hint in solution.hints:
-        warn(hint)
-    return solution
 
 
 class TreeSolution:
@@ -327,7 +324,6 @@ class TreeSolution:
         the stated sigmas are too small, without changing them
     dof: degrees of freedom of metres and of radians; rms: of the inliers, metres and radians
     tree: all of that as a tree with covariances: frames in the root, or in the frame that they are fixed in
-    hints: warnings about the sigmas
     poses: of all frames in the root; rows: the number of used measurements of each frame
     frame_checked: whether its pose in the root depends only on loops
     """
@@ -344,10 +340,9 @@ class TreeSolution:
         self.sigma_factor = found.noise.factor
         loops = int(found.kept.sum()) - problem.unknown
         self.dof = max(3 * loops, 0)
-        self.hints: list[str] = []
         if found.estimated and found.few_loops and loops < FEW_LOOPS:
             verb = "loop does" if loops == 1 else "loops do"
-            self.hints = [f"{loops} {verb} not tell metres from radians: the sigmas are rough; give sigma"]
+            warn(f"{loops} {verb} not tell metres from radians: the sigmas are rough; give sigma")
         squares = (fit.errors[found.kept] ** 2).reshape(-1, 2, 3).sum((0, 2))
         self.rms: tuple[float, float] = tuple(np.sqrt(squares / found.kept.sum()).tolist())
         self.checked = ~np.isin(np.arange(problem.size), list(fit.alone))

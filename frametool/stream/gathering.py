@@ -88,7 +88,7 @@ def means_of(
     gathered: Gathered, values: list[float] | None, *, robust: bool
 ) -> Iterator[tuple[Result, list[str]]]:
     """Yield the mean of all poses, or of those of each label, with its spread, and a message for each outlier."""
-    from frametool.fit.closed_forms import solve_mean
+    from frametool.fit.calibration import solve_mean
     from frametool.fit.least_squares import length, off_text
     from frametool.grammar.pose import Pose
     from frametool.grammar.result import Result, uncertain

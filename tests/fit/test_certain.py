@@ -11,9 +11,9 @@ from worlds import ring
 
 from frametool.errors import ValueInvalid, overheard
 from frametool.fit.alignment import clock_offset
+from frametool.fit.calibration import solve_hand_eye
 from frametool.fit.comparison import AUTO, EVO, Comparison, Settings, parse_delta
 from frametool.fit.comparison import compared as compare
-from frametool.fit.hand_eye import solve_hand_eye
 from frametool.fit.measured_tree import solve_tree
 from frametool.frames.trajectory import Trajectory
 from frametool.geometry.transform import Rotation, Transform
@@ -45,19 +45,19 @@ def compared(ref: Trajectory, est: Trajectory, **settings: Any) -> Comparison:
 
 @pytest.mark.parametrize(("frames", "more"), [(3, 0), (3, 1), (5, 0), (8, 1), (10, 1), (10, 2), (12, 3)])
 def test_few_loops_are_solved_and_their_noise_is_found_or_said_to_be_rough(frames: int, more: int) -> None:
-    found = solve_tree(ring(frames, more, seed=1))
+    found, said = overheard(solve_tree, ring(frames, more, seed=1))
     assert found.used.all()
     assert found.sigma is not None
     assert all(1 / 3 < each / 1e-3 < 3 for each in found.sigma)
-    assert bool(found.hints) == (frames > 3 or more == 0) or frames + more <= 2 * (frames - 1)
+    assert bool(said) == (frames > 3 or more == 0) or frames + more <= 2 * (frames - 1)
     covariance = found.covariance(found.root, "f2")
     assert covariance is not None
     assert np.sqrt(np.diagonal(covariance)).min() > 1e-4
 
 
 def test_one_loop_does_not_tell_metres_from_radians() -> None:
-    assert solve_tree(ring(5, 0, seed=1)).hints == ["1 loop does not tell metres from radians: the sigmas are rough; give sigma"]
-    assert solve_tree(ring(5, 40, seed=1)).hints == []
+    said = [overheard(solve_tree, ring(5, loops, seed=1))[1] for loops in (0, 40)]
+    assert said == [[("", "1 loop does not tell metres from radians: the sigmas are rough; give sigma")], []]
 
 
 # hand-eye

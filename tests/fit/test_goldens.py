@@ -13,13 +13,18 @@ from frametool.fit.alignment import (
     ALIGNMENTS,
     Pairs,
     Unaligned,
+    absolute_errors,
+    all_pairs,
+    chained,
     clock_offset,
     fitted,
     lever_arm,
     paired,
+    relative_errors,
+    segment_errors,
+    statistics,
 )
 from frametool.fit.comparison import Delta, parse_delta
-from frametool.fit.numbers import absolute_errors, all_pairs, chained, relative_errors, segment_errors, statistics
 from frametool.frames.trajectory import Trajectory, way
 from frametool.geometry.transform import Rotation, Transform
 

@@ -9,7 +9,7 @@ from worlds import ring
 
 from frametool.errors import overheard
 from frametool.fit.alignment import clock_offset
-from frametool.fit.hand_eye import FEWEST, solve_hand_eye
+from frametool.fit.calibration import FEWEST, solve_hand_eye
 from frametool.fit.measured_tree import solve_tree
 from frametool.frames.trajectory import Trajectory
 

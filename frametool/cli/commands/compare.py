@@ -27,8 +27,7 @@ from frametool.text.numbers import parse_lengths, parse_share
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.fit.comparison import Comparison, Delta
-    from frametool.fit.numbers import Limit
+    from frametool.fit.comparison import Comparison, Delta, Limit
     from frametool.frames.trajectory import Trajectory
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -66,7 +65,7 @@ def read_delta(text: str, *units: str) -> Delta:
 
 
 def _read_limits(text: str) -> list[Limit]:
-    from frametool.fit.numbers import parse_limits
+    from frametool.fit.comparison import parse_limits
 
     return parse_limits(text)
 
@@ -165,7 +164,7 @@ def compare_command(inputs: Inputs) -> int:
 
 def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], rows: str | None) -> None:
     """Write rows, a table, or each comparison by itself."""
-    from frametool.fit.numbers import rows as rows_of
+    from frametool.fit.comparison import rows as rows_of
     from frametool.view.comparison_report import write_comparison, write_table
 
     fmt = output.style.format
@@ -206,7 +205,7 @@ def align_command(inputs: Inputs) -> int:
     into = Output(inputs, "poses") if inputs.output else None
     entry = Output(inputs.but(output=None, format_name=None) if into else inputs, "poses")
     (found,), skipped = comparisons(inputs.ref, [inputs.est], inputs)
-    from frametool.fit.numbers import worlds
+    from frametool.fit.comparison import worlds
 
     named = inputs.names or worlds(found)
     whole = found.whole_estimate()._replace(world=found.pairs.ref.world)
