@@ -146,10 +146,11 @@ def batch_of(argument: Any, name: str) -> Transform:
         if matrices.ndim != 3 or matrices.shape[1:] != (4, 4):
             raise ValueInvalid(f"{name}: expected matrices of shape (n, 4, 4), got {matrices.shape}")
         argument = Transform.from_matrix(matrices)
-    if len(argument.shape) != 1:
-        raise ValueInvalid(f"{name}: expected transforms of shape (n,), got {argument.shape}")
-    require_near(argument.xyz, name)
-    return argument
+    poses: Transform = argument
+    if len(poses.shape) != 1:
+        raise ValueInvalid(f"{name}: expected transforms of shape (n,), got {poses.shape}")
+    require_near(poses.xyz, name)
+    return poses
 
 
 def stacked(transforms: Iterable[Transform]) -> Transform:
