@@ -33,7 +33,7 @@ from frametool.grammar.readers import Misfit, Reading, kind, may_be_on_earth, re
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from frametool.calc.functions import RowValues
     from frametool.geometry.place import Earth
@@ -142,7 +142,7 @@ def read_line(text: str) -> Line:
 def evaluate_line(line: Line, scope: Scope) -> Term:
     """Return the value of a parsed line, assign it to its name, if any, and to `ans`; errors point into the line."""
     try:
-        term = _Walk(line.text, scope).term(line.tree)
+        term = _Walk(scope).term(line.tree)
     except FrametoolError as error:
         raise pointed(error, line.text) from None
     if line.name:
@@ -154,16 +154,15 @@ def evaluate_line(line: Line, scope: Scope) -> Term:
 class _Walk:
     """Evaluates the parts of one expression."""
 
-    def __init__(self, text: str, scope: Scope) -> None:
-        self.text = text
+    def __init__(self, scope: Scope) -> None:
         self.scope = scope
 
     def term(self, branch: Branch) -> Term:
-        """Return the value of a part, with its text; an error has the position."""
+        """Return the value of a part; an error has the position."""
         with located(branch.at):
             found: Term = getattr(self, f"_{branch.kind}")(branch)
         self.scope.seen.update((found.type.target, found.type.source))
-        return found._replace(text=self.text[branch.start : branch.end])
+        return found
 
     def _value(self, branch: Branch) -> Term:
         """Return the value of a part that is neither a tree nor a list."""
@@ -230,7 +229,7 @@ class _Walk:
         other = next((item for item in items if item.type.kind != items[0].type.kind), None)
         if other is not None:
             raise CalcError(f"a list holds values of one kind, found {items[0].type.named} and {other.type.named}")
-        return Term(Type(LIST), (), items=items)
+        return Term(Type(LIST), (), items=items, text=branch.value)
 
     def _call(self, branch: Branch) -> Term:
         name = branch.value
@@ -242,47 +241,31 @@ class _Walk:
         return functions.called(name, terms[0].items if terms and terms[0].type.kind == LIST else terms)
 
     def _chain(self, branch: Branch) -> Term:
-        left = self._value(branch.parts[0])
-        for (operator, at), part in zip(branch.value, branch.parts[1:], strict=True):
-            right = self._value(part)
+        left, rights = self._value(branch.parts[0]), iter(branch.parts[1:])
+        for operator, at, frames in branch.value:
             with located(at):
-                left = functions.called(operator, [left, right])
+                if frames:
+                    left = self._framed(left, [*map(self._bare, frames)])
+                else:
+                    left = functions.called(operator, [left, self._value(next(rights))])
         return left
 
-    def _sign(self, branch: Branch) -> Term:
-        below = self._value(branch.parts[0])
-        return functions.called("negate", [below]) if branch.value == "-" else below
+    def _negate(self, branch: Branch) -> Term:
+        return functions.called("negate", [self._value(branch.parts[0])])
 
-    def _power(self, branch: Branch) -> Term:
-        """Raise a number to a power, or scale a pose's screw motion: exp(f log); -1 is the inverse."""
-        base, exponent = map(self._value, branch.parts)
-        known = exponent.parts[0] if exponent.parts and exponent.type == PLAIN_NUMBER else None
-        if base.type.kind == POSE and type(known) is float and abs(known) == 1.0:
-            return base if known == 1.0 else functions.called("inv", [base])
-        return functions.called("^", [base, exponent])
-
-    def _as(self, branch: Branch) -> Term:
-        """Name both frames of a pose."""
-        target, source = map(self._bare, branch.value)
-        term = self._value(branch.parts[0])
+    def _framed(self, term: Term, frames: Sequence[str]) -> Term:
+        """Name both frames of a pose, or the frame of a point, a vector, a twist or angles."""
         type_ = term.type
-        if type_.kind != POSE:
-            raise CalcError(f"only a pose has two frames; found {type_.named}")
+        if type_.kind not in ((POSE,) if len(frames) == 2 else functions.FRAMED):
+            takes = "as names the two frames of a pose, in the one of a point or vector"
+            raise CalcError(f"{takes}; found {type_.named}")
+        target, source = (*frames, type_.source)[:2]
         if not (functions.meet(type_.target, target) and functions.meet(type_.source, source)):
-            raise CalcError(f"this is {type_} already")
+            moved = f"({frame_text(target)}<-{frame_text(type_.target)}) * .."
+            known = f"in {shown(type_.target)} already; to move it: {moved}"
+            raise CalcError(f"this is {f'{type_} already' if type_.kind == POSE else known}")
+        self.scope.seen.update(frames)
         return term._replace(type=type_._replace(target=target, source=source))
-
-    def _in(self, branch: Branch) -> Term:
-        """Name the frame of a point, a vector, a twist or angles."""
-        term, frame = self._value(branch.parts[0]), self._bare(branch.value.strip('"'))
-        type_ = term.type
-        if type_.kind not in functions.FRAMED:
-            hint = "; a pose has two: .. as TARGET<-SOURCE" if type_.kind == POSE else ""
-            raise CalcError(f"in names the frame of a point or vector; found {type_.named}{hint}")
-        if not functions.meet(type_.target, frame):
-            moved = f"({frame_text(frame)}<-{frame_text(type_.target)}) * .."
-            raise CalcError(f"this is in {shown(type_.target)} already; to move it: {moved}")
-        return term._replace(type=type_._replace(target=frame))
 
     def _bare(self, name: str, tree: Frames | None = None) -> str:
         """Remove one leading `/` from a frame's name, as tf2 does, unless a frame has this name.

@@ -169,15 +169,22 @@ def wanted(term: Term) -> Term:
 
 TO_RADIANS = 0.017453292519943295
 # the words of a rule that are no kinds
-FITS: dict[str, Callable[[Type], bool]] = {
-    "placed": lambda type_: type_.kind in (POINT, VECTOR),
-    "free": lambda type_: type_.kind == POINT and type_.target is None,
-    "plain": lambda type_: type_.kind == NUMBER and type_.unit == PLAIN,
-    "scale": lambda type_: type_.kind == NUMBER and type_.unit in (PLAIN, METRE),
-    "angle": lambda type_: type_.kind == NUMBER and type_.unit in (PLAIN, RADIAN),
-    "degrees": lambda type_: type_.degrees,
+FITS: dict[str, Callable[[Term], bool]] = {
+    "placed": lambda term: term.type.kind in (POINT, VECTOR),
+    "free": lambda term: term.type.kind == POINT and term.type.target is None,
+    "plain": lambda term: term.type.kind == NUMBER and term.type.unit == PLAIN,
+    "scale": lambda term: term.type.kind == NUMBER and term.type.unit in (PLAIN, METRE),
+    "angle": lambda term: term.type.kind == NUMBER and term.type.unit in (PLAIN, RADIAN),
+    "degrees": lambda term: term.type.degrees,
+    "1": lambda term: _constant(term) == 1.0,
+    "-1": lambda term: _constant(term) == -1.0,
 }
 UNIT_OF = {"plain": PLAIN, "length": METRE, "angle": RADIAN}  # of results
+
+
+def _constant(term: Term) -> Number | None:
+    """Return a plain number that is the same in all rows."""
+    return term.parts[0] if term.type == PLAIN_NUMBER and term.parts and single(term.parts) else None
 
 
 class Overload(NamedTuple):
@@ -200,9 +207,9 @@ class Overload(NamedTuple):
         types = [term.type for term in terms]
         if not types or len(words) != len(types):
             return None
-        for word, type_ in zip(words, types, strict=True):
+        for word, term in zip(words, terms, strict=True):
             own, _, _ = word.partition(".")
-            if not (FITS[own](type_) if own in FITS else type_.kind == own):
+            if not (FITS[own](term) if own in FITS else term.type.kind == own):
                 return None
         if (known := _unified(sign, words, types)) is None:
             return None
@@ -352,14 +359,6 @@ def _leg(value: Number, xp: Namespace) -> Number:
     return xp.sqrt((1.0 - value) * (1.0 + value))
 
 
-def _arctangent(value: Number, xp: Namespace) -> Components:
-    """Return the angle with a tangent of any size."""
-    steep = abs(value) > 1.0
-    small = xp.where(steep, 1.0 / xp.where(steep, value, 1.0), value)
-    angle = xp.doubled_arctan(small / (1.0 + xp.sqrt(1.0 + small * small)))
-    return (xp.where(steep, xp.copysign(floats.RIGHT_ANGLE, value) - angle, angle),)
-
-
 # --- checks ---
 
 
@@ -404,6 +403,8 @@ OPERATORS: dict[str, tuple[str, Sequence[Overload]]] = {
         Overload(rule, _PLUS) for rule in (*SUMS, "vector.a point.a -> point.a", "free free -> point")]),
     "-": ("subtract {} and {}", [Overload(rule, _MINUS) for rule in (*SUMS, "point.a point.a -> vector.a")]),
     "^": ("raise {} to {}: a power is that of a pose or a plain number, an exponent a plain number", [
+        Overload("pose.ab 1 -> pose.ab", lambda *numbers: numbers[:7]),
+        Overload("pose.ab -1 -> pose.ba", lambda *numbers: rigid.inverse(*numbers[:7])),
         Overload("pose.ab plain -> pose.a", _part_of_motion),
         Overload("plain plain -> plain", _power, _no_power),
     ]),
@@ -472,7 +473,8 @@ FUNCTIONS: dict[str, tuple[str, Sequence[Overload]]] = {
         floats.bearing(value, _leg(value, xp), 1.0, xp),), _within("asin", -1.0, 1.0, "-1 .. 1"))]),
     "acos": ("a plain number", [Overload("plain -> angle", lambda value, xp: (
         floats.bearing(_leg(value, xp), value, 1.0, xp),), _within("acos", -1.0, 1.0, "-1 .. 1"))]),
-    "atan": ("a plain number", [Overload("plain -> angle", _arctangent)]),
+    "atan": ("a plain number", [Overload("plain -> angle", lambda value, xp: (
+        floats.bearing(value, 1.0, quaternion.magnitude(value, 1.0, 0.0, xp), xp),))]),
     "sqrt": ("a plain number", [
         Overload("plain -> plain", lambda value, xp: (xp.sqrt(value),), _within(
             "sqrt", 0.0, inf, "what is not negative"))]),

@@ -32,7 +32,9 @@ UNITS: dict[str, tuple[float, float, str]] = {
     "rad": (1.0, 1.0, RADIAN), "deg": (1.0, 1.0, RADIAN),
     "s": (1.0, 1.0, SECOND), "ms": (1.0, 1e3, SECOND), "us": (1.0, 1e6, SECOND), "ns": (1.0, 1e9, SECOND),
 }  # fmt: skip
-JOINING = (("+", "-"), ("*", "/"))  # operators, loosest first
+# how tightly operators and the words for frames bind the value before them; signs bind it after them
+LOOSEST, SIGN, FRAMES = 0, 2, 4
+BINDING = {"+": LOOSEST, "-": LOOSEST, "*": 1, "/": 1, "^": 3, "as": FRAMES, "in": FRAMES}
 _FRAME = r'(?:"[^"\n]*+"|/?+[^\W\d](?:[\w/:.]|-(?!-*+[<>]))*+)'
 _TOKEN = re.compile(rf"""(?x)
     (?P<lookup>(?P<target>{_FRAME})\s*+<-\s*+(?P<source>{_FRAME}))
@@ -121,18 +123,23 @@ def frame_text(name: str | None) -> str:
 class Branch(NamedTuple):
     """A node of the syntax tree of an expression.
 
-    kind: number, lookup, name, column, call, pose, list, chain, sign, power, as, in
+    kind: number, lookup, name, column, call, pose, list, chain, negate
     at: the position for messages about it
-    start, end: the range of its text, without enclosing brackets
     value: its data apart from its parts, by kind; parts: its children in order
     """
 
     kind: str
     at: int
-    start: int
-    end: int
     value: Any = None
     parts: tuple[Branch, ...] = ()
+
+
+class Link(NamedTuple):
+    """An operator of a chain, or `as` or `in` with the frames that they name, and its position."""
+
+    operator: str
+    at: int
+    frames: tuple[str, ...] = ()
 
 
 class Line(NamedTuple):
@@ -183,6 +190,7 @@ class _Parser:
     """Parses the tokens of one expression; counts nested levels."""
 
     def __init__(self, text: str) -> None:
+        self.text = text
         self.tokens = tokens_of(text)
         self.index = 0
         self.depth = 0
@@ -208,7 +216,7 @@ class _Parser:
 
     def whole(self) -> Branch:
         """Parse the whole text."""
-        tree = self.sum()
+        tree = self.value()
         if self.next.kind != "end":
             raise CalcError(f"unexpected {shown(self.next.text)}{self._hint()}", self.next.start)
         return tree
@@ -220,92 +228,69 @@ class _Parser:
             return f"; write a unit directly after its number: {before.text}{token.text}"
         return ""
 
-    def _deeper(self, at: int) -> None:
+    def deeper(self, at: int, least: int = LOOSEST) -> Branch:
+        """Parse a value one level further in."""
         self.depth += 1
         if self.depth > DEEPEST:
             raise CalcError(f"nested deeper than {DEEPEST} levels", at)
-
-    def sum(self, level: int = 0) -> Branch:
-        """Parse products joined by + and -; at the next level, factors joined by * and /."""
-        if level == len(JOINING):
-            return self.factor()
-        parts, joined = [self.sum(level + 1)], []
-        while self.has(*JOINING[level]):
-            token = self.take()
-            joined.append((token.text, token.start))
-            parts.append(self.sum(level + 1))
-        if not joined:
-            return parts[0]
-        return Branch("chain", joined[0][1], parts[0].start, parts[-1].end, tuple(joined), tuple(parts))
-
-    def factor(self) -> Branch:
-        """Parse signs and their operand."""
-        if not self.has("-", "+"):
-            return self.power()
-        token = self.take()
-        self._deeper(token.start)
-        below = self.factor()
+        found = self.value(least)
         self.depth -= 1
-        return Branch("sign", token.start, token.start, below.end, token.text, (below,))
+        return found
 
-    def power(self) -> Branch:
-        """Parse a value and its exponent."""
-        base = self.named()
-        if not self.has("^"):
-            return base
-        token = self.take()
-        self._deeper(token.start)
-        exponent = self.factor()
-        self.depth -= 1
-        return Branch("power", token.start, base.start, exponent.end, None, (base, exponent))
-
-    def named(self) -> Branch:
-        """Parse a value and the frames of `as` or `in`."""
-        branch, before = self.atom(), self.depth
-        while self.next.kind == "name" and self.next.text in ("as", "in"):
-            word = self.take()
-            self._deeper(word.start)
+    def value(self, least: int = LOOSEST) -> Branch:
+        """Parse a value, and the operators behind it that bind at least so tightly, as one chain from left to right."""
+        if self.has("-", "+"):
+            sign = self.take()
+            first = self.deeper(sign.start, SIGN)
+            first = Branch("negate", sign.start, None, (first,)) if sign.text == "-" else first
+        else:
+            first = self.atom()
+        links, parts = list[Link](), [first]
+        while self.next.kind in ("op", "name") and (binds := BINDING.get(self.next.text, -1)) >= least:
             token = self.take()
-            if word.text == "as" and token.kind != "lookup":
-                raise CalcError("as names both frames: .. as TARGET<-SOURCE", token.start)
-            if word.text == "in" and token.kind != "frame":
-                raise CalcError("in names one frame: .. in FRAME", token.start)
-            value = token.frames or token.text
-            branch = Branch(word.text, word.start, branch.start, token.end, value, (branch,))
-        self.depth = before
-        return branch
+            frames: tuple[str, ...] = ()
+            if binds == FRAMES:
+                named = self.take()
+                if named.kind != ("lookup" if token.text == "as" else "frame"):
+                    both = "as names both frames: .. as TARGET<-SOURCE"
+                    raise CalcError(both if token.text == "as" else "in names one frame: .. in FRAME", named.start)
+                frames = named.frames or (named.text.strip('"'),)
+            else:  # 2^3^2 is 2^9
+                right = self.deeper(token.start, SIGN) if token.text == "^" else self.value(binds + 1)
+                parts.append(right)
+            links.append(Link(token.text, token.start, frames))
+        return Branch("chain", links[0].at, tuple(links), tuple(parts)) if links else first
 
     def atom(self) -> Branch:
         """Parse one value."""
         token = self.take()
-        kind, text, start, end = token[:4]
+        kind, text, start = token[:3]
         if kind == "op" and text == "(":
-            self._deeper(start)
-            inside = self.sum()
+            inside = self.deeper(start)
             self.expect(")")
-            self.depth -= 1
             return inside
         if kind == "op" and text == "[":
             parts, end = self._items("]", start)
-            return Branch("list", start, start, end, None, parts)
+            return Branch("list", start, self.text[start:end], parts)
         if kind == "number":
-            return Branch(kind, start, start, end, (text, token.unit))
+            return Branch(kind, start, (text, token.unit))
         if kind == "lookup":
-            return self._lookup(token, start, "")
+            return self._lookup(token, "")
         if kind == "name" and self.has("("):
             self.take()
-            parts, end = self._items(")", start)
-            return Branch("call", start, start, end, text, parts)
+            return Branch("call", start, text, self._items(")", start)[0])
         if kind == "name" and self.has("["):  # a look-up in a named tree
             self.take()
             asked = self.take()
             if asked.kind != "lookup":
                 raise CalcError(f"expected a look-up like {text}[TARGET<-SOURCE]", asked.start)
-            return self._lookup(asked, start, text)._replace(end=self.expect("]").end)
+            found = self._lookup(asked, text)
+            self.expect("]")
+            return found
         if kind == "column":
-            return Branch(kind, start, start, end, text.partition(".")[2].strip().strip('"'))
+            return Branch(kind, start, text.partition(".")[2].strip().strip('"'))
         if kind == "pose" or (kind == "name" and text not in ("as", "in")):
-            return Branch(kind, start, start, end, text)
+            return Branch(kind, start, text)
         if kind == "end":
             raise CalcError("something is missing here", start)
         hint = "; a frame is asked for as TARGET<-SOURCE" if kind == "text" else ""
@@ -313,35 +298,32 @@ class _Parser:
 
     def _items(self, close: str, start: int) -> tuple[tuple[Branch, ...], int]:
         """Parse values separated by commas up to a bracket; return them and the end."""
-        self._deeper(start)
         items = []
         if not self.has(close):
-            items.append(self.sum())
+            items.append(self.deeper(start))
             while self.has(","):
                 self.take()
-                items.append(self.sum())
-        end = self.expect(close).end
-        self.depth -= 1
-        return tuple(items), end
+                items.append(self.deeper(start))
+        return tuple(items), self.expect(close).end
 
-    def _lookup(self, token: Token, start: int, tree: str) -> Branch:
+    def _lookup(self, token: Token, tree: str) -> Branch:
         """Parse the time of a look-up as nanoseconds, never through a float, or as one of the words."""
-        branch = Branch("lookup", token.start, start, token.end, (token.frames, tree, None))
-        if not self.has("@"):
-            return branch
-        self.take()
-        sign = self.take().text if self.has("-", "+") else ""
-        time = self.take()
-        if time.kind == "name" and time.text in ("latest", "row") and not sign:
-            return branch._replace(end=time.end, value=(token.frames, tree, time.text))
-        if time.kind != "number" or not time.unit:
-            found = "" if time.kind == "end" else f", found {shown(time.text)}"
-            expected = "expected a time with its unit, 2.5s or 2500000000ns, or latest or row"
-            raise CalcError(f"{expected}{found}", time.start)
-        from frametool.frames.stamps import parse_time
+        when: int | str | None = None
+        if self.has("@"):
+            self.take()
+            sign = self.take().text if self.has("-", "+") else ""
+            time = self.take()
+            if time.kind == "name" and time.text in ("latest", "row") and not sign:
+                when = time.text
+            elif time.kind == "number" and time.unit:
+                from frametool.frames.stamps import parse_time
 
-        try:
-            when = parse_time(f"{sign}{time.text}{time.unit}")
-        except ValueInvalid as error:
-            raise CalcError(str(error), time.start) from None
-        return branch._replace(end=time.end, value=(token.frames, tree, when))
+                try:
+                    when = parse_time(f"{sign}{time.text}{time.unit}")
+                except ValueInvalid as error:
+                    raise CalcError(str(error), time.start) from None
+            else:
+                found = "" if time.kind == "end" else f", found {shown(time.text)}"
+                expected = "expected a time with its unit, 2.5s or 2500000000ns, or latest or row"
+                raise CalcError(f"{expected}{found}", time.start)
+        return Branch("lookup", token.start, (token.frames, tree, when))
