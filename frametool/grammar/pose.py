@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components, Rigid
     from frametool.grammar.readers import Path, Quaternion, Vector
 
-    Written = tuple[Notation, list[float], bool, Sequence[Path]]
     Spelled = tuple[Notation, Sequence[Any], Sequence[Path]]  # notation, one text per component, the path of each
 
 # names of other tools (OpenCV, COLMAP) for a position in metres and a rotation, and the key of the grammar; "" if the
@@ -118,6 +117,22 @@ class Pose(NamedTuple):
         return Transform.of(*self.components)
 
 
+class WrittenRotation(NamedTuple):
+    """A rotation with the numbers that it was written with.
+
+    position: of a matrix that is a whole pose
+    numbers: one per component of the notation, or of the whole pose; degrees: the unit of angles
+    places: the path of each number below the key; () if none of them may be replaced
+    """
+
+    position: Vector | None
+    rotation: Quaternion
+    notation: Notation
+    numbers: Sequence[float]
+    degrees: bool
+    places: Sequence[Path] = ()
+
+
 def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] = ()) -> Pose:
     """Read one pose; `also` lists further keys, which the caller reads.
 
@@ -156,7 +171,7 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
             elif key in LISTED_WORDS and not is_rotation(key, value):
                 raise Misfit(f"expected the numbers of {'a position' if key in POSITION_WORDS else 'a rotation'}")
             elif key in ROTATION_KEYS or key == readers.AXES_KEY:
-                moved, turned = read_rotation(key, value, reading)
+                moved, turned = read_rotation(key, value, reading)[:2]
                 rotation = turned if rotation is None else agreeing_rotation(rotation, turned)
                 if moved is not None and position is not None:
                     raise Misfit("a 4x4 matrix is the whole pose; remove xyz, or write the 3x3 rotation")
@@ -256,11 +271,11 @@ def pose_of_numbers(texts: Sequence[str], default: Notation | None, reading: Rea
     if whole and len(texts) == _ROWS_OF_A_POSE:
         return read_pose(matrix_pose([list(texts)], rep, stated=default is not None) or {}, reading)
     if whole and len(texts) == len(whole.columns):
-        return Pose(*_read_checked(rep, texts, readers.INDICES, reading)[:2])
+        return Pose(*read_spelled(rep, texts, readers.INDICES, reading)[:2])
     if len(texts) not in rep.counts:
         raise ValueInvalid(f"{rep.counted}; found {len(texts)}")
     x, y, z = map(parse_length, texts[:-size] or ("0", "0", "0"))
-    rotation = _read_checked(rep, texts[-size:], readers.INDICES, reading)[1]
+    rotation = read_spelled(rep, texts[-size:], readers.INDICES, reading).rotation
     return Pose((x, y, z) if len(texts) > size else None, rotation)
 
 
@@ -349,35 +364,19 @@ def own_key(key: str, value: Any) -> str:
     return "quaternion"
 
 
-def read_rotation(key: str, value: Any, reading: Reading) -> tuple[Vector | None, Quaternion]:
-    """Read the value of a rotation key as x, y, z, w; a 4x4 matrix also has a position.
+def read_rotation(key: str, value: Any, reading: Reading, *, check: bool = True) -> WrittenRotation:
+    """Read the value of a rotation key; of several notations that agree the first, without places.
 
-    Raises Misfit or ValueInvalid: wrong shape, not a number, not a rotation, or several that do not agree.
-    """
-    return read_written(key, value, reading)[:2]
-
-
-def read_written(
-    key: str, value: Any, reading: Reading, *, check: bool = True
-) -> tuple[Vector | None, Quaternion, Written]:
-    """Read a rotation as `read_rotation` does, and return it also as it is written; of several that agree the first.
-
-    That is its notation, a number per component, whether angles are in degrees, and the path of each number below the
-    key; no paths if none of the numbers may be replaced.
     check: False for the multiple of a matrix, whose rotation is then none
+    Raises Misfit or ValueInvalid: wrong shape, not a number, not a rotation, or several that do not agree.
     """
     several = type(value) is list and key != readers.AXES_KEY and ROTATION_KEYS[key].representation.axes == NAMED_AXES
     if several and value and all(type(each) is dict for each in value):  # Euler angles about different axes
-        read = [within((index,), read_written, key, each, reading) for index, each in enumerate(value)]
-        for _, turned, _ in read[1:]:
-            agreeing_rotation(read[0][1], turned)
-        return None, read[0][1], (*read[0][2][:3], ())
-    notation, texts, places = _shape_of(key, value)
-    if check:
-        position, rotation, numbers, degrees = _read_checked(notation, texts, places, reading)
-    else:
-        position, rotation, (numbers, degrees) = None, IDENTITY, read_components(notation, texts, places, reading)
-    return position, rotation, (notation, numbers, degrees, places)
+        first, *others = [within((index,), read_rotation, key, each, reading) for index, each in enumerate(value)]
+        for other in others:
+            agreeing_rotation(first.rotation, other.rotation)
+        return first._replace(places=())  # type: ignore[no-any-return]
+    return read_spelled(*_shape_of(key, value), reading, check=check)
 
 
 def agreeing_rotation(first: Quaternion, second: Quaternion) -> Quaternion:
@@ -421,40 +420,30 @@ def _without_order(key: str, notation: Notation, value: Any) -> Misfit:
 
 
 def read_spelled(
-    notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading
-) -> tuple[Vector | None, Quaternion]:
+    notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading, *, check: bool = True
+) -> WrittenRotation:
     """Read one text per component: a rotation, or the numbers of a whole pose; the rotation is checked."""
-    return _read_checked(notation, texts, places, reading)[:2]
-
-
-def _read_checked(
-    notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading
-) -> tuple[Vector | None, Quaternion, list[float], bool]:
-    """Read a position and a checked rotation as `read_spelled` does; return its numbers and their unit too.
-
-    The numbers are those of the texts, those of a whole pose too; the unit is True for degrees.
-    """
     numbers, degrees = read_components(notation, texts, places, reading)
     own, row, whole = numbers, notation.representation, notation.representation.whole
-    position: Vector | None = None
-    if whole is not None and len(numbers) == len(whole.columns):
+    position, rotation = None, IDENTITY
+    if check and whole is not None and len(numbers) == len(whole.columns):
         end = len(numbers) - len(whole.tail)
         if tuple(numbers[end:]) != whole.tail:
-            found = " ".join(f"{number:g}" for number in numbers[end:])
-            tail = " ".join(f"{number:g}" for number in whole.tail)
+            found, tail = (" ".join(f"{number:g}" for number in each) for each in (numbers[end:], whole.tail))
             raise NotARotation(f"the last row of a 4x4 pose is {tail}, found {found}", rule="denormalized")
         position, own = whole.split(numbers)
-    if row.complaint is None:
-        return position, notation.to_quaternion(tuple(own), floats, degrees=degrees), numbers, degrees
-    try:
-        rotation, warnings = overheard(
-            notation.checked_quaternion, own, floats, degrees=degrees, normalize=reading.normalize
-        )
-    except ValueInvalid as error:
-        raise NotARotation(str(error), rule=error.rule) from None
-    for rule, message in warnings:
-        reading.note(message, rule=rule)
-    return position, rotation, numbers, degrees
+    if check and row.complaint is None:
+        rotation = notation.to_quaternion(tuple(own), floats, degrees=degrees)
+    elif check:
+        try:
+            rotation, warnings = overheard(
+                notation.checked_quaternion, own, floats, degrees=degrees, normalize=reading.normalize
+            )
+        except ValueInvalid as error:
+            raise NotARotation(str(error), rule=error.rule) from None
+        for rule, message in warnings:
+            reading.note(message, rule=rule)
+    return WrittenRotation(position, rotation, notation, numbers, degrees, places)
 
 
 def read_components(

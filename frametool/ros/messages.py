@@ -252,7 +252,7 @@ def read_rigid(mapping: dict[str, Any], keys: tuple[str, str], reading: Reading)
         if key not in mapping:
             raise Misfit(f"missing {key}")
     x, y, z = within(keys[:1], read_numbers, mapping[keys[0]], ("x", "y", "z"))
-    _, rotation = within(keys[1:], read_rotation, "quaternion", mapping[keys[1]], reading)
+    rotation = within(keys[1:], read_rotation, "quaternion", mapping[keys[1]], reading).rotation
     return (x, y, z), rotation
 
 

@@ -162,7 +162,7 @@ def read_flags(flags: dict[str, str], reading: Reading) -> Pose:
     flags = {"qw": "1", **flags}  # the tool's default, also with other components: refused below unless they are 0
     x, y, z = (read_number(flags.get(name, "0")) for name in XYZ)
     key, names = ("rpy", RPY) if angles else ("quaternion", QUATERNION)
-    _, turned = read_spelled(ROTATION_KEYS[key], [flags.get(name, "0") for name in names], INDICES, reading)
+    turned = read_spelled(ROTATION_KEYS[key], [flags.get(name, "0") for name in names], INDICES, reading).rotation
     parent, child = (flags[name] for name in FRAMES)
     if parent == child:
         error = own_parent(child)

@@ -34,7 +34,7 @@ from frametool.grammar.pose import (
     is_rotation,
     read_angle_unit,
     read_pose,
-    read_written,
+    read_rotation,
     unknown_keys,
 )
 from frametool.grammar.readers import EARTH_FRAMES, NAME_KEYS, PARENT_KEYS, STAMP_KEYS, Misfit, Reading, kind, within
@@ -690,7 +690,7 @@ def _with_rotation(
     row = ROTATION_KEYS.get(key)
     is_multiple = request.operation.multiples and row is not None and row.representation.whole is not None
     quiet = Reading(reading.source, degrees=reading.degrees) if is_multiple else reading
-    *_, (notation, values, degrees, places) = within(below, read_written, key, value, quiet, check=not is_multiple)
+    _, _, notation, values, degrees, places = within(below, read_rotation, key, value, quiet, check=not is_multiple)
     joined = notation.representation.whole
     whole = joined is not None and len(values) == len(joined.columns)
     if whole and record.shape.unit is not None:

@@ -52,7 +52,7 @@ def read_quaternion(element: Element, texts: Sequence[str], options: Options, at
     """Read x, y, z, w of an element by the rules of the grammar; warnings are recorded.  Raises FormatError."""
     reading = Reading(element.file.source, normalize=options.normalize)
     try:
-        _, rotation = read_spelled(notation("xyzw"), texts, INDICES, reading)
+        rotation = read_spelled(notation("xyzw"), texts, INDICES, reading).rotation
     except ValueInvalid as error:
         raise element.error(str(error), attribute, rule=error.rule) from None
     options.tally.note_all(reading.notes, element.line)

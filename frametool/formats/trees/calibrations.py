@@ -378,7 +378,7 @@ def _read_kitti(file: InputFile, options: Options) -> Iterator[Edge]:
         reading = Reading(file.source, normalize=options.normalize)
         try:
             words = [text for at, text in enumerate(texts) if len(texts) == 9 or at % 4 < 3]
-            _, rotation = read_spelled(MATRIX, words, [()] * 9, reading)
+            rotation = read_spelled(MATRIX, words, [()] * 9, reading).rotation
         except ValueInvalid as error:
             raise line_error(file, line, 1, f"{turn}: {error}") from None
         for note in reading.notes:
@@ -483,7 +483,7 @@ def _kalibr_pose(text: str, head: re.Match[str], reading: Reading) -> Rigid:
         words = re.findall(r"[^\s\[\],]+", rows[1]) if rows else []
         if len(words) != 16:
             raise Misfit(f"expected a 4 x 4 matrix below it, found {f'{len(words)} numbers' if words else 'none'}")
-        position, rotation = read_spelled(MATRIX, words, INDICES, reading)
+        position, rotation = read_spelled(MATRIX, words, INDICES, reading)[:2]
         return *(position or (0.0, 0.0, 0.0)), *rotation
     turn, shift = (re.compile(_VECTOR.format(name)).match(text, head.end()) for name in "qt")
     if turn is None or shift is None:
@@ -491,7 +491,7 @@ def _kalibr_pose(text: str, head: re.Match[str], reading: Reading) -> Rigid:
     if len(words := turn[1].split()) != 4:
         raise Misfit(f"q: expected 4 numbers, found {len(words)}")
     x, y, z = read_numbers(shift[1].split(), XYZ)
-    _, rotation = read_spelled(notation("xyzw"), words, INDICES, reading)
+    rotation = read_spelled(notation("xyzw"), words, INDICES, reading).rotation
     return x, y, z, *quaternion.conjugate(*rotation)
 
 

@@ -432,7 +432,7 @@ class Matrices:
             raise Misfit(f"{bare(key)}: there is no camera before {bare(block.name)}", path, key=True)
         last = ["0", "0", "0", "1"][len(whole.texts) - 12 :]
         texts, places = [*whole.texts, *last], [*whole.places, *[()] * len(last)]
-        position, rotation = within(path, read_spelled, MATRIX, texts, places, self.reading)
+        position, rotation = within(path, read_spelled, MATRIX, texts, places, self.reading)[:2]
         return Stated(*meaning[:3], (*(position or IDENTITY[:3]), *rotation), path, chained=key == "T_cn_cnm1")
 
     def _named(self, block: MatrixBlock, path: Path) -> Meaning | None:
