@@ -89,13 +89,13 @@ class StaticTransform:
 class MovingTrack:
     """Samples in order of time, as three parallel lists, and the prepared interpolation after some of them.
 
-    `late` holds samples that arrived out of order, as (stamp, parent, components), until the next query, so that
-    one sort inserts many.
+    `late` holds samples that arrived out of order, (parent, components) by stamp, until the next query, so that one sort
+    inserts many.
     """
 
     __slots__ = (
-        "begin", "child", "first_ns", "known", "last_ns", "late", "parent", "parents", "samples", "segments", "stamps",
-        "table", "varies",
+        "begin", "child", "first_ns", "last_ns", "late", "parent", "parents", "samples", "segments", "stamps", "table",
+        "varies",
     )  # fmt: skip
     is_static: Literal[False] = False
 
@@ -106,11 +106,10 @@ class MovingTrack:
         self.stamps, self.parents = [stamp_ns], [parent]
         self.samples = [components]  # or Packed, which behaves like such a list
         self.begin = 0  # the index of the oldest sample: those before it were dropped, or are room for older ones
-        self.late: list[tuple[int, str, Rigid]] = []
+        self.late: dict[int, tuple[str, Rigid]] = {}
         self.segments: dict[int, Way] = {}  # by the stamp at which they begin
         self.first_ns = self.last_ns = stamp_ns
         self.parent = parent  # the newest
-        self.known: set[int] | None = None  # all stamps, from the first late sample on
         self.table: Any = None  # the samples as arrays, for many lookups at once
 
     @property
@@ -148,17 +147,13 @@ class MovingTrack:
         self.samples.extend(components)
         self.last_ns = self.stamps[-1]
         self.table = None
-        if self.known is not None:
-            self.known.update(stamps_ns)
 
     def add(self, stamp_ns: int, parent: str, components: Rigid) -> None:
         """Add a sample at a new stamp."""
         self.table = None
-        if self.known is not None:
-            self.known.add(stamp_ns)
         if stamp_ns < self.last_ns:
             self.varies = self.varies or parent != self.parent
-            self.late.append((stamp_ns, parent, components))
+            self.late[stamp_ns] = parent, components
             self.first_ns = min(self.first_ns, stamp_ns)
             return
         if parent != self.parent:
@@ -169,15 +164,10 @@ class MovingTrack:
         self.last_ns = stamp_ns
 
     def has(self, stamp_ns: int) -> bool:
-        """Return True if there is a sample at a stamp.
-
-        The stamps are kept in a set from the first late one on: inserting the late samples here would cost more.
-        """
+        """Return True if there is a sample at a stamp; late samples stay where they are, which costs less."""
         if stamp_ns > self.last_ns:
             return False
-        if self.known is None:
-            self.known = {stamp for stamp, _, _ in self.walk()}
-        return stamp_ns in self.known
+        return stamp_ns in self.late or self.stamps[bisect_left(self.stamps, stamp_ns, self.begin)] == stamp_ns
 
     def _unpack(self) -> None:
         """Convert the samples to a list, which can be changed."""
@@ -190,27 +180,25 @@ class MovingTrack:
             return
         self._unpack()
         columns: tuple[list[Any], ...] = self.stamps, self.parents, self.samples
-        if len(self.late) > FEW:
-            rows = [*islice(zip(*columns, strict=True), self.begin, None), *self.late]
+        late = [(stamp_ns, *sample) for stamp_ns, sample in self.late.items()]
+        if len(late) > FEW:
+            rows = [*islice(zip(*columns, strict=True), self.begin, None), *late]
             rows.sort(key=itemgetter(0))
             self.stamps[:], self.parents[:], self.samples[:] = zip(*rows, strict=True)
             self.begin = 0
             self.segments.clear()
         else:
-            for late in self.late:
-                at = bisect_right(self.stamps, late[0], self.begin)
+            for sample in late:
+                at = bisect_right(self.stamps, sample[0], self.begin)
                 self.segments.pop(self.stamps[at - 1], None)
-                if at > self.begin:
-                    for column, part in zip(columns, late, strict=True):
-                        column.insert(at, part)
-                    continue
-                if not self.begin:  # before the oldest there is room, doubled when it is used up, so that this is fast
-                    self.begin = len(self.stamps)
+                if not at:  # before the oldest there is room, doubled when it is used up, so that this is fast
+                    self.begin = at = len(self.stamps)
                     for column in columns:
-                        column[:0] = column[:1] * self.begin
-                self.begin -= 1
-                for column, part in zip(columns, late, strict=True):
-                    column[self.begin] = part
+                        column[:0] = column[:1] * at
+                before = at - (at == self.begin)  # in the room's last place, or between two others
+                for column, part in zip(columns, sample, strict=True):
+                    column[before:at] = [part]
+                self.begin -= at - before
         self.late.clear()
 
     def _place(self, at_ns: int) -> int:
@@ -249,8 +237,6 @@ class MovingTrack:
         self.table = None
         for dropped in self.stamps[gone]:
             self.segments.pop(dropped, None)
-        if self.known is not None:
-            self.known.difference_update(self.stamps[gone])
         if self.varies and len({*self.parents[gone], self.parents[self.begin]}) > 1:
             self.varies = any(True for _ in self.changes())
         if 2 * self.begin > len(self.stamps):
