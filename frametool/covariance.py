@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import ValueInvalid
 from frametool.geometry import rigid, uncertainty, validation
 
 if TYPE_CHECKING:
@@ -44,7 +43,8 @@ def invert(a: Transform, cov_a: Covariance) -> Any:
 
 def point(a: Transform, cov_a: Covariance, p: Numbers, cov_p: Covariance = None) -> Any:
     """Return the 3 x 3 covariance of a.apply(p), from those of a and of the point."""
-    pose, at, own = _placed(a, cov_a), validation.columns(p, 3, "point"), _entries(cov_p, uncertainty.POINT)
+    pose, at = _placed(a, cov_a), validation.columns(p, 3, "point")
+    own = uncertainty.taken(cov_p, uncertainty.POINT, many=True)
     end = len(pose)
 
     def kernel(*parts: Any) -> Components | None:
@@ -57,7 +57,7 @@ def point(a: Transform, cov_a: Covariance, p: Numbers, cov_p: Covariance = None)
 
 def _placed(a: Transform, covariance: Covariance) -> Components:
     """Return a transform followed by its covariance, if it has one."""
-    return (*a.components, *_entries(covariance, uncertainty.POSE))
+    return (*a.components, *uncertainty.taken(covariance, many=True))
 
 
 def _found(kernel: Callable[..., Components | None], size: int, parts: Components) -> Any:
@@ -76,27 +76,3 @@ def _found(kernel: Callable[..., Components | None], size: int, parts: Component
         widest = np.linalg.eigvalsh(found[..., 3:, 3:])[..., -1].argmax()
         uncertainty.warn_if_wide([found.reshape(-1, size)[widest].tolist()])
     return found
-
-
-def _entries(value: Covariance, size: int) -> Components:
-    """Return the checked entries of a covariance, or columns of those of many; None for None."""
-    if value is None:
-        return ()
-    side = round(size**0.5)
-    import numpy as np
-
-    try:
-        rows = np.asarray(value, np.float64)
-    except (TypeError, ValueError):
-        return uncertainty.taken(value, size)  # raises: it says what is wrong
-    if rows.ndim < 3:
-        return uncertainty.taken(value, size)
-    if rows.shape[-2:] != (side, side):
-        raise ValueInvalid(f"covariances: expected shape (..., {side}, {side}), got {rows.shape}")
-    flat = rows.reshape(-1, size)
-    for row in sorted({*np.flatnonzero(~np.isfinite(flat).all(1)).tolist(), *uncertainty.problems(flat)})[:1]:
-        try:
-            uncertainty.taken(flat[row], size)
-        except ValueInvalid as error:
-            raise ValueInvalid(f"row {row}: {error}") from None
-    return tuple(rows[..., i, j] for i in range(side) for j in range(side))

@@ -410,7 +410,7 @@ class FrameTree(Frames):
         """
         parent, child = self.resolve_name(parent), self.resolve_name(child)
         known, found = self._tracks.get(child), taken(covariance)
-        if known is not None and known.parent == parent and self.covariances.get(child) != found:
+        if known is not None and known.parent == parent and self.covariances.get(child, ()) != found:
             raise topology.two_covariances(parent, child, self.covariances.get(child), found)
         self.add_components(parent, child, transform.components)
         if found:
@@ -486,10 +486,10 @@ def checked_rate(rate_hz: float) -> float:
     return rate_hz
 
 
-def taken(covariance: Any) -> Components | None:
-    """Return the checked entries of a covariance; None for None."""
+def taken(covariance: Any) -> Components:
+    """Return the checked entries of a covariance; () for None."""
     if covariance is None:
-        return None
+        return ()
     from frametool.geometry import uncertainty
 
     return uncertainty.taken(covariance)

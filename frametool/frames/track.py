@@ -89,8 +89,8 @@ class StaticTransform:
 class MovingTrack:
     """Samples in order of time, as three parallel lists, and the prepared interpolation after some of them.
 
-    `late` holds samples that arrived out of order, (parent, components) by stamp, until the next query, so that one sort
-    inserts many.
+    `late` holds samples that arrived out of order, (parent, components) by stamp, until the next query, so that one
+    sort inserts many.
     """
 
     __slots__ = (

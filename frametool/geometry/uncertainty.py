@@ -121,24 +121,35 @@ def symmetric(entries: Entries) -> Components:
 # --- checks: is it a covariance, and is it small enough for the first order? ---
 
 
-def taken(numbers: Any, size: int = POSE) -> Components:
-    """Check a covariance passed from Python, numbers or rows of them, and return its entries."""
+def taken(numbers: Any, size: int = POSE, *, many: bool = False) -> Components:
+    """Check a covariance passed from Python, numbers or rows of them, and return its entries; () for None.
+
+    many: arrays (.., side, side) are allowed too, and give columns
+    """
+    if numbers is None:
+        return ()
     import numpy as np
 
     side = round(size**0.5)
     try:
         array = np.asarray(numbers, np.float64)
     except (TypeError, ValueError):
-        array = np.empty((0, 0))
-    if array.ndim == 0 or array.shape[1:] not in ((), (1,), (side,)):
+        array = np.empty(())
+    many = many and array.ndim > 2
+    if many and array.shape[-2:] != (side, side):
+        raise ValueInvalid(f"covariances: expected shape (..., {side}, {side}), got {array.shape}")
+    if array.ndim == 0 or not (many or array.shape[1:] in ((), (1,), (side,))):
         raise ValueInvalid(f"covariance must be {size} numbers or {side} rows of {side}")
-    if array.size != size:
+    if not many and array.size != size:
         raise ValueInvalid(wrong_count(array.size, (size,)))
-    entries = tuple(array.ravel().tolist())
-    if bad := [entry for entry in entries if not -INFINITE < entry < INFINITE]:
-        raise ValueInvalid(f"covariance has {bad[0]} in it; every number must be finite")
-    check(entries)
-    return entries
+    rows = array.reshape(-1, size)
+    wrong = problems(rows)
+    for row, column in np.argwhere(~np.isfinite(rows)).tolist()[::-1]:
+        wrong[row] = f"covariance has {rows[row, column]} in it; every number must be finite"
+    for row in sorted(wrong)[:1]:
+        raise ValueInvalid(f"row {row}: {wrong[row]}" if many else wrong[row])
+    columns = rows.T.reshape(size, *array.shape[:-2]) if many else rows[0].tolist()
+    return tuple(columns)
 
 
 def wrong_count(count: int, sizes: Sequence[int]) -> str:
