@@ -250,16 +250,16 @@ def overheard(
 
 def did_you_mean(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str:
     """Return `; did you mean 'x'?` for the nearest known name, or nothing."""
-    near = _closest(name, list(known), 1, cutoff)
+    near = nearest(name, known, cutoff=cutoff)
     return f"; did you mean {shown(near[0])}?" if near else ""
 
 
-def _closest(name: str, known: list[str], count: int, cutoff: float) -> list[str]:
-    """Return the most similar names, the best first."""
+def nearest(name: str, known: Iterable[str], *, cutoff: float = 0.6, behind: float = 0.2) -> list[str]:
+    """Return the most similar known names, the best first, and those not far behind it; empty if there is none."""
     from bisect import bisect
-    from difflib import get_close_matches
+    from difflib import SequenceMatcher, get_close_matches
 
-    name = name[:LONGEST_NAME]
+    name, known = name[:LONGEST_NAME], list(known)
     if len(known) > MOST_COMPARED:  # of many those next to it in alphabetical order, read forwards and backwards
         near: dict[str, None] = {}
         for step in (1, -1):
@@ -267,17 +267,9 @@ def _closest(name: str, known: list[str], count: int, cutoff: float) -> list[str
             at = bisect(texts, name[::step])
             near |= dict.fromkeys(each[::step] for each in texts[max(at - NEIGHBOURS, 0) : at + NEIGHBOURS])
         known = [*near]
-    return get_close_matches(name, known, n=count, cutoff=cutoff)
-
-
-def nearest(name: str, known: Iterable[str]) -> list[str]:
-    """Return the nearest known names: the best, and those nearly as near; empty if there is none."""
-    from difflib import SequenceMatcher
-
-    ratios = {each: SequenceMatcher(None, each, name[:LONGEST_NAME]).ratio() for each in known}
-    best = max(ratios.values(), default=0.0)
-    near = [(ratio, each) for each, ratio in ratios.items() if ratio >= max(0.6, best - 0.2)]
-    return [each for _, each in sorted(near, reverse=True)]
+    found = get_close_matches(name, known, n=NEAREST, cutoff=cutoff)
+    ratios = [SequenceMatcher(None, each, name).ratio() for each in found]
+    return [each for each, ratio in zip(found, ratios, strict=True) if ratio >= ratios[0] - behind]
 
 
 def any_near(name: str, known: Iterable[str], otherwise: str) -> str:
@@ -297,7 +289,7 @@ def listing(names: Iterable[str], most: int = 20, *, near: str = "") -> str:
     from heapq import nsmallest
 
     everything = list(names)
-    first = _closest(near, everything, min(most, NEAREST), 0.5) if near and len(everything) > most + 1 else []
+    first = nearest(near, everything, cutoff=0.5, behind=1.0) if near and len(everything) > most + 1 else []
     rest = nsmallest(most + 1, (each for each in everything if each not in first) if first else everything)
     return first_of([*first, *rest], most, quote=bare, count=len(everything))
 
