@@ -195,9 +195,14 @@ def has_record(begin: bytes) -> bool:
 
 
 def read_text(path: str | PathLike[str], stream: BinaryIO | None = None) -> str:
-    """Read a file, or standard input for `-`, as text; `stream` is an opened stream.
+    """Read a file as text; otherwise as `read_bytes`.  Raises FormatError when it is not text, too."""
+    return decode(read_bytes(path, stream), "stdin" if str(path) == "-" else str(path))
 
-    Raises FileProblem when it cannot be read, FormatError when it is not text or too long.
+
+def read_bytes(path: str | PathLike[str], stream: BinaryIO | None = None) -> bytes:
+    """Read a file, or standard input for `-`; `stream` is an opened stream.
+
+    Raises FileProblem when it cannot be read, FormatError when it is too long.
     """
     name = "stdin" if str(path) == "-" else str(path)
     stream = stream or opened(path)
@@ -210,7 +215,7 @@ def read_text(path: str | PathLike[str], stream: BinaryIO | None = None) -> str:
             stream.close()
     if len(data) > sizes.MOST_CHARACTERS:
         raise FormatError(f"longer than {sizes.MOST_CHARACTERS} bytes, the most in one file; split it", source=name)
-    return decode(data, name)
+    return data
 
 
 def decode(data: bytes, name: str) -> str:

@@ -10,9 +10,8 @@ import re
 from typing import TYPE_CHECKING
 from xml.parsers import expat
 
-from frametool import sizes
-from frametool.documents.source import InputFile, Source, line_of, not_text, pointer
-from frametool.errors import FileProblem, FormatError, bare, shown
+from frametool.documents.source import InputFile, Source, line_of, not_text, pointer, read_bytes
+from frametool.errors import FormatError, NamedTuple, bare, shown
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
@@ -25,25 +24,18 @@ _BLOCK = 1 << 16
 _OTHER_ENTITY = re.compile(rb"&(?!(?:amp|lt|gt|quot|apos|#[0-9]+|#x[0-9a-fA-F]+);)[^\s;&]++;")
 
 
-class XmlFile:
-    """The bytes of an XML file, and errors that point into it."""
+class XmlFile(NamedTuple):
+    """The name and the bytes of an XML file, and errors that point into it."""
 
-    def __init__(self, file: InputFile) -> None:
-        """Read the bytes; raises FileProblem, and FormatError if they are too many."""
-        self.name, self.source = file.name, Source(file.name, "")
-        try:
-            self.data = file.stream.read(sizes.MOST_CHARACTERS + 1)
-        except OSError as error:
-            raise FileProblem(f"{self.name}: {(error.strerror or str(error)).lower()}") from None
-        if len(self.data) > sizes.MOST_CHARACTERS:
-            raise FormatError(f"longer than {sizes.MOST_CHARACTERS} bytes, the most in one file", source=self.name)
+    source: Source
+    data: bytes
 
     def at(self, line: int, column: int, message: str, *, rule: str = "") -> FormatError:
         """Return the error for a place."""
         # lines as expat counts them, the same as in editors
         text = self.data.decode("utf-8", "replace").split("\n")[line - 1 : line] or [""]
         snippet = pointer(line_of(text[0], 1), column)
-        return FormatError(message, source=self.name, line=line, column=column, snippet=snippet, rule=rule)
+        return FormatError(message, source=self.source.name, line=line, column=column, snippet=snippet, rule=rule)
 
 
 _ENDS_EARLY = 3  # expat's code for "no element found", also used for truncated text
@@ -125,7 +117,7 @@ def read_xml(file: InputFile, root: str = "", fmt: str = "") -> Element:
     root: its tag, if there is only one; fmt: the format's name, for a file with another root
     Raises FormatError if it is not XML, and for declarations of entities.
     """
-    xml = XmlFile(file)
+    xml = XmlFile(Source(file.name, ""), read_bytes(file.path, file.stream))
     top = Element(xml, "", {}, (0, 0, 0))  # above the root
     opened = [top]
     texts: list[list[str]] = [[]]
@@ -164,7 +156,7 @@ def read_xml(file: InputFile, root: str = "", fmt: str = "") -> Element:
         parser.Parse(xml.data, True)  # noqa: FBT003 - expat's only way to say that this is all
     except expat.ExpatError as error:
         if what := not_text(xml.data):
-            raise FormatError(what, source=xml.name, line=1, column=1) from None
+            raise FormatError(what, source=file.name, line=1, column=1) from None
         problem = "it ends too early" if error.code == _ENDS_EARLY else expat.ErrorString(error.code)
         raise xml.at(error.lineno, error.offset + 1, f"not XML: {problem}") from None
     except (LookupError, ValueError) as error:  # of Python's codecs

@@ -381,7 +381,7 @@ class SdfTree:
         answers = self.options.answers  # joints may be named with their scopes
         values = {self.names.get(name, name): value for name, value in answers.joints.items()}
         options = self.options._replace(answers=answers._replace(joints=values))
-        return JointState(moving, options, self.top.holder.file.name, fixed=fixed).edges(links)
+        return JointState(moving, options, self.top.holder.file.source.name, fixed=fixed).edges(links)
 
     def _link(self, frame: SdfFrame) -> Link:
         """Return the connection of a frame: through its joint, if there is one."""
