@@ -13,7 +13,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from frametool import sizes
-from frametool.documents.source import END, LEAF, LIST, MAP, Source, error_at, places_of, repeated_key, too_much
+from frametool.documents.source import END, LEAF, LIST, MAP, Source, error_at, levels, places_of, repeated_key, too_much
 from frametool.errors import FormatError, NamedTuple
 from frametool.text.numbers import odd_characters
 
@@ -279,30 +279,15 @@ def strict_json(source: Source) -> list[Any]:
     at = re.match(_WHOLE, text).end() if "\\u" in text else len(text)  # type: ignore[union-attr]
     if at < len(text):
         raise error_at(source, at, f"{text[at : at + 6]} is half a character; its other half is missing")
-    if not _settle(values, text):
-        raise _too_deep(source)
-    return values
-
-
-def _settle(values: list[Any], text: str) -> bool:
-    """Convert booleans to text, level by level; return True if there are at most sizes.DEEPEST levels."""
     has_words = "true" in text or "false" in text
-    level: list[Any] = [values]
-    for _ in range(sizes.DEEPEST + 1):
-        if has_words:
-            for outer in level:
-                pairs = outer.items() if type(outer) is dict else enumerate(outer)
-                for key in [key for key, value in pairs if value is True or value is False]:
-                    outer[key] = "true" if outer[key] else "false"
-        level = [
-            inner
-            for outer in level
-            for inner in (outer.values() if type(outer) is dict else outer)
-            if type(inner) is dict or type(inner) is list
-        ]
-        if not level:
-            return True
-    return False
+    for depth, level in enumerate(levels(values)):
+        if depth > sizes.DEEPEST:
+            raise _too_deep(source)
+        for outer in level if has_words else ():
+            pairs = outer.items() if type(outer) is dict else enumerate(outer)
+            for key in [key for key, value in pairs if value is True or value is False]:
+                outer[key] = "true" if outer[key] else "false"
+    return values
 
 
 def json_events(text: str) -> Iterator[Event]:

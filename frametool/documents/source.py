@@ -358,6 +358,19 @@ def paused_collector() -> Iterator[None]:
             gc.enable()
 
 
+def levels(value: Any) -> Iterator[list[Any]]:
+    """Yield the lists and maps in a list level by level, itself first; those of one may change before the next."""
+    level = [value]
+    while level:
+        yield level
+        level = [
+            inner
+            for outer in level
+            for inner in (outer.values() if type(outer) is dict else outer)
+            if type(inner) is dict or type(inner) is list
+        ]
+
+
 def repeated_key(source: Source, events: Iterable[Event]) -> FormatError:
     """Return the error for the first key that its map has twice, or that is empty."""
     opened: list[dict[str, int] | None] = [None]  # the keys of a map; None for a list

@@ -320,6 +320,8 @@ class _Builder:
 
     def _repeat(self, event: AliasEvent, current: object, key: object) -> Value:
         """Return a copy of an alias's value, within the budget."""
+        from frametool.documents.source import levels
+
         name = str(event.anchor)
         if key is None:
             raise self._error(event, f"alias *{name} cannot be a key")
@@ -332,9 +334,9 @@ class _Builder:
         if self.aliases < 0:
             raise self._error(event, f"more than {MOST_ALIASES} aliases")
         root: list[Value] = [value]
-        level: list[Any] = [root]  # copied level by level, so that no depth can exhaust the stack
-        for _ in range(sizes.DEEPEST + 1 - len(self.open)):
-            below = []
+        for depth, level in enumerate(levels(root)):  # so that no depth can exhaust the stack
+            if depth > sizes.DEEPEST - len(self.open):
+                raise self._error(event, too_much(sizes.DEEPEST))
             for container in level:
                 self.copies -= len(container)
                 if self.copies < 0:
@@ -342,11 +344,7 @@ class _Builder:
                 for at, inner in list(container.items() if type(container) is dict else enumerate(container)):
                     if type(inner) is dict or type(inner) is list:
                         container[at] = inner.copy()
-                        below.append(container[at])
-            if not below:
-                return root[0]
-            level = below
-        raise self._error(event, too_much(sizes.DEEPEST))
+        return root[0]
 
     def _error(self, event: Any, message: str) -> FormatError:
         """Return the error for the place where an event begins."""
