@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import Any, Self
 
-    from frametool.geometry.types import Array, Components, Numbers, Quaternion, Rigid
+    from frametool.geometry.types import Array, Components, Kernel, Numbers, Quaternion, Rigid
 
 NEAR = 1e-9  # rad: the default of `is_close`, three digits above the rounding of long chains
 NEAR_BY = 1e-9  # metres: the same for translations
@@ -41,6 +41,7 @@ class Batched:
     __slots__ = ("_components",)
     __array_ufunc__ = None  # an array times a value is refused, not tried element by element
     _components: Components
+    _compose: Kernel
 
     @classmethod
     def of(cls, *components: Any) -> Self:
@@ -78,6 +79,26 @@ class Batched:
         """Iterate over the first axis."""
         return (self[index] for index in range(len(self)))
 
+    def __matmul__(self, other: Self) -> Self:
+        """Compose: a_from_b @ b_from_c is a_from_c."""
+        kind, ours = type(self), self._components
+        if type(other) is not kind:
+            return NotImplemented
+        theirs = other._components
+        if type(ours[-1]) is type(theirs[-1]) is float:
+            product = _new(kind)
+            product._components = kind._compose(*ours, *theirs)
+            return product
+        return self.of(*validation.run(kind._compose, len(ours), (*ours, *theirs), functions=False))
+
+    def __repr__(self) -> str:
+        """Show one item's numbers, or the shape of many."""
+        name, shown = type(self).__name__, [repr(part) for part in self._components if not self.shape]
+        if not shown:
+            return f"<{name} of shape {self.shape}>"
+        turn = ", ".join(shown[-4:])
+        return f"{name}.from_parts(xyz=[{', '.join(shown[:3])}], xyzw=[{turn}])" if shown[4:] else f"{name}([{turn}])"
+
     _repr_html_ = in_notebook
 
 
@@ -95,6 +116,7 @@ class Rotation(Batched):
 
     __slots__ = ()
     _components: Quaternion
+    _compose = staticmethod(quaternion.compose)
 
     def __init__(self, xyzw: Numbers) -> None:
         """Create from quaternions x, y, z, w of shape (..., 4), as `from_quaternion`."""
@@ -179,16 +201,6 @@ class Rotation(Batched):
         return cls.from_columns("rpy", validation.columns(rpy, 3, "rpy"), "rpy")
 
     @classmethod
-    def from_mrp(cls, parameters: Numbers) -> Rotation:
-        """Create from modified Rodrigues parameters, axis times tan(angle/4), of shape (..., 3)."""
-        return cls.from_columns("mrp", validation.columns(parameters, 3, "mrp"), "mrp")
-
-    @classmethod
-    def from_six_d(cls, columns: Numbers) -> Rotation:
-        """Create from the first two matrix columns, one after another, of shape (..., 6); they are orthonormalised."""
-        return cls.from_columns("six_d", validation.columns(columns, 6, "six_d"), "six_d")
-
-    @classmethod
     def between(cls, start: Numbers, end: Numbers) -> Rotation:
         """Return the shortest rotation from one direction, shape (..., 3), to another; lengths do not matter.
 
@@ -205,29 +217,30 @@ class Rotation(Batched):
             return cls.of(*rep.checked_quaternion(inputs, floats, normalize=normalize))
         return cls.of(*validation.require_rotations(rep, inputs, name, normalize=normalize))
 
-    def _as(self, spec: str, out: Array | None, inner: tuple[int, ...] = ()) -> Array:
-        """Return rows of the columns of a notation, in shape `inner` if set, in `out` if passed."""
-        rep = _notation(spec)
-        return validation.rows(rep.from_quaternion, inner or (len(rep.columns),), self._components, out=out)
+    def as_notation(self, name: str, *, out: Array | None = None) -> Array:
+        """Return the numbers of a representation, as `from_notation` takes them."""
+        rep = _notation(name)
+        inner = (3, 3) if name == "matrix" else (len(rep.columns),)
+        return validation.rows(rep.from_quaternion, inner, self._components, out=out)
 
     def as_quaternion(self, *, out: Array | None = None) -> Array:
         """Return x, y, z, w of shape (..., 4), unit, with w >= 0 (w == 0: first non-zero of x, y, z positive)."""
-        return self._as("xyzw", out)
+        return self.as_notation("xyzw", out=out)
 
     def as_matrix(self, *, out: Array | None = None) -> Array:
         """Return matrices of shape (..., 3, 3); their columns are the rotated axes."""
-        return self._as("matrix", out, (3, 3))
+        return self.as_notation("matrix", out=out)
 
     def as_rotvec(self, *, out: Array | None = None) -> Array:
         """Return rotation vectors of shape (..., 3), radians, of length 0 to pi."""
-        return self._as("rotvec", out)
+        return self.as_notation("rotvec", out=out)
 
     def as_axis_angle(self, *, out: Array | None = None) -> tuple[Array, Any]:
         """Return unit axes of shape (..., 3) and angles in [0, pi] of shape (...); the identity has the axis x.
 
         `out`, of shape (..., 4), receives axis and angle in one row; the returned arrays are views of it.
         """
-        four = self._as("axis_angle", out)
+        four = self.as_notation("axis_angle", out=out)
         return four[..., :3], four[..., 3] if four.ndim > 1 else float(four[3])
 
     def as_euler(self, axes: str, *, out: Array | None = None) -> Array:
@@ -236,35 +249,16 @@ class Rotation(Batched):
         The middle one is in [-pi/2, pi/2], or in [0, pi] if first and third axis are the same; at gimbal lock
         (see `gimbal_lock`) the third is 0.
         """
-        return self._as(f"euler:{axes}", out)
+        return self.as_notation(f"euler:{axes}", out=out)
 
     def as_rpy(self, *, out: Array | None = None) -> Array:
         """Return roll, pitch, yaw in radians about the fixed axes x, y, z, of shape (..., 3)."""
-        return self._as("rpy", out)
-
-    def as_mrp(self, *, out: Array | None = None) -> Array:
-        """Return modified Rodrigues parameters of shape (..., 3), of length 0 to 1."""
-        return self._as("mrp", out)
-
-    def as_six_d(self, *, out: Array | None = None) -> Array:
-        """Return the first two matrix columns, one after another, of shape (..., 6)."""
-        return self._as("six_d", out)
+        return self.as_notation("rpy", out=out)
 
     def gimbal_lock(self, axes: str) -> Any:
         """Return True for each element whose angles in a convention are at gimbal lock, to 1 eps."""
         locked = euler.locked(*self._components, checked_axes(axes))
         return bool(locked) if validation.single(self._components) else locked
-
-    def __matmul__(self, other: Rotation) -> Rotation:
-        """Compose: a_from_b @ b_from_c is a_from_c."""
-        if type(other) is not Rotation:
-            return NotImplemented
-        ours, theirs = self._components, other._components
-        if type(ours[3]) is type(theirs[3]) is float:
-            product = _new(Rotation)
-            product._components = quaternion.compose(*ours, *theirs)
-            return product
-        return self.of(*validation.run(quaternion.compose, 4, (*ours, *theirs), functions=False))
 
     def inverse(self) -> Rotation:
         """Return the inverse rotation."""
@@ -307,12 +301,6 @@ class Rotation(Batched):
         found = validation.mean_quaternion(tuple(part.reshape(-1) for part in self._components), mass)
         return Rotation.of(*found).canonical()
 
-    def __repr__(self) -> str:
-        """Show one rotation's quaternion, or the shape of many."""
-        if self.shape:
-            return f"<Rotation of shape {self.shape}>"
-        return f"Rotation([{', '.join(map(repr, self._components))}])"
-
 
 class Transform(Batched):
     """One rigid transform, or an array of them of any shape; immutable.
@@ -325,6 +313,7 @@ class Transform(Batched):
 
     __slots__ = ()
     _components: Rigid
+    _compose = staticmethod(rigid.compose)
 
     def __init__(self, rotation: Rotation, translation: Numbers) -> None:
         """Create from a rotation and a translation of shape (..., 3) in metres; batch shapes broadcast."""
@@ -433,17 +422,6 @@ class Transform(Batched):
         """Return the twists (vx, vy, vz, wx, wy, wz), shape (..., 6), whose `exp` this is; angles up to pi."""
         return validation.rows(rigid.log, (6,), self._components, out=out)
 
-    def __matmul__(self, other: Transform) -> Transform:
-        """Compose: a_from_b @ b_from_c is a_from_c."""
-        if type(other) is not Transform:
-            return NotImplemented
-        ours, theirs = self._components, other._components
-        if type(ours[6]) is type(theirs[6]) is float:
-            product = _new(Transform)
-            product._components = rigid.compose(*ours, *theirs)
-            return product
-        return self.of(*validation.run(rigid.compose, 7, (*ours, *theirs), functions=False))
-
     def inverse(self) -> Transform:
         """Return b_from_a of a_from_b."""
         return self.of(*validation.run(rigid.inverse, 7, self._components, functions=False))
@@ -503,10 +481,3 @@ class Transform(Batched):
         mass = validation.masses(weights, self.shape)
         shift = (float((part * mass).sum() / mass.sum()) for part in self._components[:3])
         return Transform.of(*shift, *self.rotation.mean(weights).components)
-
-    def __repr__(self) -> str:
-        """Show one transform's numbers, or the shape of many."""
-        if self.shape:
-            return f"<Transform of shape {self.shape}>"
-        shown = [repr(part) for part in self._components]
-        return f"Transform.from_parts(xyz=[{', '.join(shown[:3])}], xyzw=[{', '.join(shown[3:])}])"

@@ -31,15 +31,16 @@ def own_ways(kind: type[Rotation | Transform]) -> dict[str, tuple[Way, int]]:
     for name, method in inspect.getmembers(kind, inspect.isfunction):
         if name.startswith(("as_", "apply")) or name == "log":
             first = list(inspect.signature(method).parameters)[1]
-            if first == "axes":
-                ways |= {f"{name} {axes}": (partial(_with_axes, method, axes), 0) for axes in ("rzyx", "szxz")}
+            if first in ("axes", "name"):
+                named = ("rzyx", "szxz") if first == "axes" else ("mrp", "six_d")
+                ways |= {f"{name} {each}": (partial(_named, method, each), 0) for each in named}
             else:
                 ways[name] = method, WIDTHS.get(first, 0)
     return ways
 
 
-def _with_axes(method: Way, axes: str, value: Any, **options: Any) -> Any:
-    return method(value, axes, **options)
+def _named(method: Way, name: str, value: Any, **options: Any) -> Any:
+    return method(value, name, **options)
 
 
 WAYS = {

@@ -28,8 +28,8 @@ WAYS: dict[str, tuple[Callable[[Rotation], Any], Callable[[Any], Rotation]]] = {
     "axis_angle": (Rotation.as_axis_angle, lambda both: Rotation.from_axis_angle(*both)),
     "euler": (lambda rotation: rotation.as_euler("rzxz"), lambda angles: Rotation.from_euler("rzxz", angles)),
     "rpy": (Rotation.as_rpy, Rotation.from_rpy),
-    "mrp": (Rotation.as_mrp, Rotation.from_mrp),
-    "six_d": (Rotation.as_six_d, Rotation.from_six_d),
+    "mrp": (lambda rotation: rotation.as_notation("mrp"), lambda three: Rotation.from_notation("mrp", three)),
+    "six_d": (lambda rotation: rotation.as_notation("six_d"), lambda six: Rotation.from_notation("six_d", six)),
 }
 each_way = pytest.mark.parametrize("way", WAYS)
 SHAPES = [(), (1,), (5,), (2, 3), (0,), (2, 0)]
@@ -189,8 +189,8 @@ def test_the_sign_that_leaves_is_canonical() -> None:
         (lambda: Rotation.from_axis_angle([[1, 0, 0], [0, 0, 0]], 1.0), r"axis\[1\]: axis 0 0 0 has no direction"),
         (lambda: Rotation.from_euler("rzyx", [[0.0] * 3, [1.0, math.inf, 3.0]]), r"angles\[1\]: euler 1 inf 3 is not finite"),
         (lambda: Rotation.from_euler("zyx", [1, 2, 3]), r"unknown Euler axes 'zyx'; did you mean"),
-        (lambda: Rotation.from_six_d([1, 0, 0, 2, 0, 0]), r"parallel"),
-        (lambda: Rotation.from_mrp([math.nan, 0, 0]), r"mrp: nan 0 0 is not finite"),
+        (lambda: Rotation.from_notation("six_d", [1, 0, 0, 2, 0, 0]), r"parallel"),
+        (lambda: Rotation.from_notation("mrp", [math.nan, 0, 0]), r"mrp: nan 0 0 is not finite"),
         (lambda: Rotation.between([0, 0, 0], [1, 0, 0]), r"no direction"),
         (lambda: Rotation.identity().apply([[0.0] * 3, [1.0, 2.0, math.nan]]), r"vectors\[1\]: 1 2 nan is not finite"),
         (lambda: batch((2,)).apply([[0.0] * 3, [1.0, 2.0, math.nan]]), r"vectors\[1\]: 1 2 nan is not finite"),
