@@ -329,7 +329,7 @@ class InputFile:
     @cached_property
     def text(self) -> str:
         """Return the whole text."""
-        return read_text(self.path, self.stream)
+        return decode(read_bytes(self.path, self.stream), self.name)
 
     @property
     def source(self) -> Source:
