@@ -6,7 +6,8 @@ stands between them, and how one is written.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections import defaultdict
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from frametool.documents.document import Aliased, Node, parse_documents, parse_nodes
 from frametool.documents.source import Source, Verbatim, decode
@@ -18,7 +19,7 @@ from frametool.grammar.readers import AXES_KEY, EARTH_FRAMES, PLACE_KEYS
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream import row_layout
 from frametool.stream.faults import Fault
-from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ, Name, outermost
+from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ, outermost
 from frametool.stream.record_values import Answer, Entry, RecordText, json_documents, written
 from frametool.stream.row_layout import POSE, SIX, Const, IfLocked, In, Out, Piece, Renamed, Word, count_of, number_text
 from frametool.text.lines import with_edits
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
     from frametool.stream.request import Request
     from frametool.stream.splitter import Part
+
+Pieces: TypeAlias = tuple[Piece, ...]
 
 MARK = "\0"
 SAMPLE = (0.5, 0.5, 0.5, 0.5)
@@ -41,7 +44,7 @@ class Edit(NamedTuple):
 
     start: int
     end: int
-    pieces: tuple[Piece, ...]
+    pieces: Pieces
 
 
 def numbers_in(node: Node) -> Iterator[Node]:
@@ -57,7 +60,10 @@ def numbers_in(node: Node) -> Iterator[Node]:
 
 
 class Splicer:
-    """The edits of one record; `first` is the index of its first number among all results of the text."""
+    """What the members of one record become; `first` is the index of its first number among all results of the text.
+
+    ahead, behind: what is written around a member, by its key; dropped: the members that go
+    """
 
     def __init__(self, root: Node, entry: Entry, request: Request, *, json: bool, first: int) -> None:
         """Find the record's mapping and its numbers among the nodes of the text."""
@@ -68,49 +74,49 @@ class Splicer:
         self.node = root.at(outermost(record.path) if request.operation.only_adds else record.path)
         self.members: dict[str, tuple[Node, Node]] = self.node.value if type(self.node.value) is dict else {}
         self.flow = json or self.node.flow or not self.members
-        inner = [*self.members.values()] or [(self.node, self.node)]
-        self.first_key, self.end = inner[0][0], inner[-1][1].end
-        self.between = ", " if self.flow else "\n" + " " * self.first_key.column  # what parts two members
+        self.head, self.tail = next(iter(self.members), ""), next(reversed(self.members), "")
+        self.between = ", " if self.flow else "\n" + " " * self.members[self.head][0].column  # what parts two members
         self.edits: list[Edit] = []
+        self.ahead, self.behind = defaultdict[str, list[Pieces]](list), defaultdict[str, list[Pieces]](list)
         self.dropped: set[str] = set()
         self.slots: list[Node | None] = [None if path is None else root.at(path) for path in record.numbers]
 
     def run(self) -> list[Edit]:
         """Return the edits, in no order."""
-        shape, target = self.record.shape, self.target
+        shape, unit = self.record.shape, self.target.unit
+        # a bare list stays one if the result has its numbers and no others
+        stays = bool(self.members) or ((unit is None or shape.unit is not None) and not self.request.extras(shape))
         if self.request.operation.only_adds:
-            self._add(self._extras(0))
-            return self.edits
-        stays = self.kind == shape.kind
-        if not self.members:  # a bare list, which stays one if the result has its numbers and no others
-            has_place = target.unit is None or shape.unit is not None
-            if stays and self._same_rotation() and has_place and not self.request.extras(shape):
-                self._numbers(range(len(self.slots)), 0)
-            else:
-                self._anew()
-            return self.edits
-        self._names()
-        if not stays:
-            self._anew()
-            return self.edits
-        # the numbers of a result are written where those of the record are, or its members anew
-        if target.scaled:
-            self.dropped.update(self.record.keys.covariances)  # the matrix says the scale
-        elif not shape.rewritten:
-            extras = len(self.request.extras(shape))
-            self._numbers(range(shape.own_size, shape.own_size + sum(shape.covariance)), target.size + extras)
-        if shape.kind in SIX:
-            self._numbers(range(6), 0)
-            return self.edits
-        self._position()
-        if shape.kind in row_layout.TURNED:
-            self._rotation()
-            self.dropped.update({*STALE, "inverse", *self.record.keys.others} - set(self.record.keys.flat))
+            self.behind[self.tail] += self._extras(0)
         else:
-            self.dropped.update(self.record.keys.others)
-            self._add(self._extras(target.size))
-        self._leave_out()
-        return self.edits
+            if self.members:
+                self._names()
+            if self.kind != shape.kind or not stays or not (self.members or self._same_rotation()):
+                self._anew()
+            elif self.members:
+                self._in_place()
+            else:
+                self._numbers(range(len(self.slots)), 0)
+        return [*self.edits, *self._put_together()]
+
+    def _put_together(self) -> Iterator[Edit]:
+        """Yield what writes members, or leaves them out, with what parts them from their neighbours."""
+        gap, members = Const(self.between.encode()), list(self.members.values())
+        if not members and (parts := self.behind[""]):
+            yield Edit(self.node.start, self.node.end, (Const(b"{"), *_joined(parts, gap), Const(b"}")))
+        follows = False  # whether a member comes before
+        for at, (key, (key_node, value)) in enumerate(self.members.items()):
+            parts = self.behind[key]
+            yield from (Edit(key_node.start, key_node.start, (*part, gap)) for part in self.ahead[key])
+            if key not in self.dropped:
+                yield from (Edit(value.end, value.end, (gap, *part)) for part in parts)
+            elif parts:
+                yield Edit(key_node.start, value.end, _joined(parts, gap))
+            elif follows:
+                yield Edit(members[at - 1][1].end, value.end, ())
+            else:
+                yield Edit(key_node.start, members[at + 1][0].start if at + 1 < len(members) else value.end, ())
+            follows = follows or bool(parts) or key not in self.dropped
 
     def _same_rotation(self) -> bool:
         """Return True if the rotation is written as it was read, number by number."""
@@ -126,27 +132,60 @@ class Splicer:
                 inside = node.start + bool(node.quote), node.end - bool(node.quote)
                 self.edits.append(Edit(*inside, (Out(out, out + 1, b""),)))
 
-    def _position(self) -> None:
-        """Write the position where it is, or as a member of its own; a whole matrix takes it in."""
-        record, target, shape = self.record, self.target, self.record.shape
+    def _in_place(self) -> None:
+        """Write the numbers of a result where those of the record are, or its members anew."""
+        target, shape, keys = self.target, self.record.shape, self.record.keys
+        if target.scaled:
+            self.dropped.update(keys.covariances)  # the matrix says the scale
+        elif not shape.rewritten:
+            extras = len(self.request.extras(shape))
+            self._numbers(range(shape.own_size, shape.own_size + sum(shape.covariance)), target.size + extras)
+        if shape.kind in SIX:
+            self._numbers(range(6), 0)
+            return
         kind = "xyz" if shape.kind == POSE else shape.kind
-        members, there = (record.keys.position,) if record.keys.position else record.keys.members, shape.position_size
-        if record.keys.position in (row_layout.POINT, row_layout.VECTOR) and record.keys.position != kind:
-            node = self.members[record.keys.position][0]
+        members, there = (keys.position,) if keys.position else keys.members, shape.position_size
+        if keys.position in (row_layout.POINT, row_layout.VECTOR) and keys.position != kind:
+            node = self.members[keys.position][0]
             text = f'"{kind}"' if self.json else kind
             self.edits.append(Edit(node.start, node.end, (Const(text.encode()),)))
         if shape.unit is None:
             if target.unit is not None:
-                self._lead(self._place("xyz"), record.keys.rotation)
-        elif target.unit is None:
+                self.ahead[keys.rotation or self.head].append(self._place("xyz"))
+        elif target.unit is None:  # a whole matrix takes it in
             self.dropped.update(members)
         elif None in self.slots[:there] or (there < 3 and not target.absent) or target.place != shape.place:
-            self._replace(members[0], self._place(record.keys.position or kind))
-            self.dropped.update(members[1:])
+            self.behind[members[0]].append(self._place(keys.position or kind))
+            self.dropped.update(members)
         elif not self.request.keeps_position or shape.inverse:  # else it keeps its text
             self._numbers(range(there), 0)
+        at, made = "", list[Pieces]()
+        if shape.kind in row_layout.TURNED:
+            self.dropped.update({*STALE, "inverse", *keys.others}.difference(keys.flat))
+            slots = range(there, shape.own_size)
+            at = keys.rotation
+            if self._same_rotation() and None not in [self.slots[slot] for slot in slots]:
+                self._numbers(slots, self._rotation_at)
+            else:
+                made = self._rotation()
+                if at:
+                    self.dropped.update({"angles", at, *keys.flat})
+                elif made and target.unit is None:
+                    at = next(iter(members), "")  # the place of the position, which it takes in
+            at = at or keys.position
+        else:
+            self.dropped.update(keys.others)
+        self.behind[at or self.tail] += made + self._extras(target.size)
 
-    def _place(self, key: str) -> tuple[Piece, ...]:
+    def _anew(self) -> None:
+        """Write all members of a result in place of a bare list, or of what said what a record was."""
+        target, keys = self.target, self.record.keys
+        position = [self._place("xyz" if self.kind == POSE else self.kind)] if target.unit is not None else []
+        self.behind[self.tail] += [*position, *self._rotation(), *self._extras(target.size)]
+        self.dropped |= {keys.position, keys.rotation, *keys.others, *keys.members, *keys.flat}
+        self.dropped |= {*STALE, "inverse", "angles"}
+
+    def _place(self, key: str) -> Pieces:
         """Write the position as a member, or as those of a place, with the axes of its rotation."""
         place = self.target.place
         if place is None:
@@ -163,115 +202,92 @@ class Splicer:
             for piece in self._member(entry, 0)
         )  # fmt: skip
 
-    def _rotation(self) -> None:
-        """Write the rotation where it is, or its members anew, and behind it what comes with it."""
-        record, shape, target = self.record, self.record.shape, self.target
-        first = count_of(target.unit)
-        first -= sum(place < first for place in target.absent)
-        slots = range(shape.position_size, shape.own_size)
-        key = record.keys.rotation
-        members = self._members(first)
-        if self._same_rotation() and None not in [self.slots[slot] for slot in slots]:
-            self._numbers(slots, first)
-            members = []
-        elif key:
-            self._replace(key, members.pop(0) if members else ())
-            self.dropped.update({"angles", *record.keys.flat} - {key})
-        elif members and target.unit is None and (record.keys.position or record.keys.members):
-            key = record.keys.position or record.keys.members[0]  # in the place of the position, which it takes in
-            self._replace(key, members.pop(0))
-            self.dropped.discard(key)
-        self._add(members + self._extras(target.size), key or record.keys.position)
+    @property
+    def _rotation_at(self) -> int:
+        """Count the numbers of the result before those of its rotation."""
+        size = count_of(self.target.unit)
+        return size - sum(place < size for place in self.target.absent)
 
-    def _members(self, first: int) -> list[tuple[Piece, ...]]:
-        """Return one member for each key of a notation, and the flag of a lock."""
+    def _rotation(self) -> list[Pieces]:
+        """Write the rotation in all its notations, and the flag of a lock; nothing where there is none."""
         notations = self.target.notations
         degrees = any(degrees for notation, degrees in notations if notation.degrees is None)  # what bare angles are
         style = Style("json", tuple(notation for notation, _ in notations), degrees=degrees)
-        position = SAMPLE[:3] if self.target.whole else None
-        members = []
-        for key, value in Result(Pose(position, SAMPLE)).mapping(style).items():
-            if key not in ("gimbal_lock", "xyz"):
-                members.append(self._member({key: value}, first))
-                first += sum(isinstance(piece, Out) for piece in members[-1])
+        entry = Result(Pose(SAMPLE[:3] if self.target.whole else None, SAMPLE)).mapping(style)
+        entry.pop("gimbal_lock", None)
+        made = self._member(entry, self._rotation_at)
         if any(notation.euler_axes for notation, _ in notations):
-            flag = self._member({"gimbal_lock": True}, 0)
-            members.append(tuple(IfLocked(piece.text) for piece in flag if isinstance(piece, Const)))
-        return members
+            flag = [Const(self.between.encode()), *self._member({"gimbal_lock": True}, 0)]
+            made += tuple(IfLocked(piece.text) for piece in flag if isinstance(piece, Const))
+        return [made] if made else []
 
-    def _extras(self, first: int) -> list[tuple[Piece, ...]]:
+    def _extras(self, first: int) -> list[Pieces]:
         """Return what comes with a result as members; one of the record that gives way to such a one is replaced."""
         said, prefix = self.request.operation.shown, self.request.results.prefix
-        members = []
         if said is None:
             names = [prefix + name for name in self.request.extras(self.record.shape)]
-            for key, sample in with_entries(dict.fromkeys(names, 0.5)).items():
-                members.append(self._member({key: sample}, first))
-                first += len(sample) if isinstance(sample, list) else 1
-        for name, value in said.members.items() if said else ():
-            key, member = prefix + name, self._shown(prefix + name, value)
-            if said and said.replaces and key in self.members:
-                self._replace(key, member)
+            return [self._member(with_entries(dict.fromkeys(names, 0.5)), first)] if names else []
+        members = []
+        for name, value in said.members.items():
+            key = prefix + name
+            member = self._member({key: value if isinstance(value, str) else 0.5}, 0)
+            if isinstance(value, Word):
+                member = *member[:-1], value._replace(number=self.first + value.number)
+            elif not isinstance(value, str):
+                member = *member[:-1], *self._listed(value)
+            if said.replaces and key in self.members:
+                self.behind[key].append(member)
+                self.dropped.add(key)
             else:
                 members.append(member)
         return members
 
-    def _shown(self, key: str, value: str | Word | tuple[int, ...]) -> tuple[Piece, ...]:
-        """Return a text, a word, or a list of numbers as a member."""
-        if isinstance(value, str):
-            return self._member({key: value}, 0)
-        begin = self._member({key: 0.5}, 0)[:-1]
-        if isinstance(value, Word):
-            return (*begin, value._replace(number=self.first + value.number))
+    def _listed(self, places: Sequence[int]) -> Iterator[Piece]:
+        """Yield the numbers of a list, or the one alone; null where they are none."""
         precision = self.request.results.precision
         fmt, exponent = "" if precision is None else f"z.{precision}f", b"e" if self.json else b".0e"
-        opens, closes = ("[", "]") if value[1:] else ("", "")
-        return (*begin, *(
-            row_layout.Item(self.first + at, (opens * first, behind, "null" * first, fmt), exponent)
-            for at in value for first, behind in [(at == value[0], closes if at == value[-1] else ", ")]
-        ))  # fmt: skip
+        opens, closes = ("[", "]") if places[1:] else ("", "")
+        for at in places:
+            behind = closes if at == places[-1] else ", "
+            around = opens * (at == places[0]), behind, "null" * (at == places[0]), fmt
+            yield row_layout.Item(self.first + at, around, exponent)
 
     def _names(self) -> None:
-        """Rename the frames as the operation does."""
-        record, place = self.record, self.target.place
-        parent = "parent" if self.kind == POSE else "frame"
+        """Rename the frames as the operation does: where the record says them, or in members of their own."""
+        record, place, kind = self.record, self.target.place, self.record.shape.kind
+        parent, placed = "parent" if self.kind == POSE else "frame", record.keys.placed
         is_place = place is not None and place.name not in EARTH_FRAMES and parent == "frame"
         is_local = is_place or (place is not None and place.origin is not None)
+        said: dict[str, Any] = {}
         if record.parent.text and not record.parent.paths and not is_local:  # a place, which says its frame
-            self._lead(self._member({parent: self.entry.parent}, 0))
-        if record.keys.placed and record.name.text and not record.name.paths:
-            self._lead(self._member({"name": self.entry.name}, 0))
-        if "header" in record.keys.placed and record.stamp_ns is not None:
-            self._lead(self._member({"stamp_ns": Verbatim(str(record.stamp_ns))}, 0))
-        if self.request.rename is None:
-            return
-        if not self.request.rows.poses and {"name", "parent"} & self.members.keys() - {*record.keys.members}:
-            return  # in a row that was no pose they say something else
-        self._name(record.name, self.entry.name, "name")
-        if record.parent.paths or not record.parent.text:
-            self._name(record.parent, self.entry.parent, parent)
-
-    def _name(self, old: Name, new: str | None, key: str) -> None:
-        """Write a frame's name where the record says it, or as a member of its own."""
-        if new == old.text:
-            return
-        if not old.paths and self.record.shape.kind not in SIX:  # a bare Twist or Wrench has no field for it
-            self._lead(self._member({key: new}, 0))
-        for path in old.paths:
-            if new is None and path[:-1] == self.record.path and path[-1] != "child_frame_id":
-                self.dropped.add(str(path[-1]))
-            else:
+            said[parent] = self.entry.parent
+        if placed and record.name.text and not record.name.paths:
+            said["name"] = self.entry.name
+        if "header" in placed and record.stamp_ns is not None:
+            said["stamp_ns"] = Verbatim(str(record.stamp_ns))
+        names = [(record.name, self.entry.name, "name")]
+        names += [(record.parent, self.entry.parent, parent)] if record.parent.paths or not record.parent.text else []
+        # in a row that was no pose they say something else
+        others = not self.request.rows.poses and {"name", "parent"} & self.members.keys() - {*record.keys.members}
+        for old, new, key in () if self.request.rename is None or others else names:
+            if new == old.text:
+                continue
+            if not old.paths and kind not in SIX:  # a bare Twist or Wrench has no field for it
+                said[key] = new
+            for path in old.paths:
+                if new is None and path[:-1] == record.path and path[-1] != "child_frame_id":
+                    self.dropped.add(str(path[-1]))
+                    continue
                 node = self.root.at(path)
                 text = quoted_name(node, new or "", json=self.json).encode()
                 self.edits.append(Edit(node.start, node.end, (Renamed(node.start, text),)))
+        if said:
+            self.ahead[self.head].append(self._member(said, 0))
 
-    def _member(self, entry: dict[str, Any], first: int) -> tuple[Piece, ...]:
+    def _member(self, entry: dict[str, Any], first: int) -> Pieces:
         """Write members in the record's style, each number a piece."""
-        if self.json:
-
-            text = dump_json(entry, lambda _: MARK)[1:-1]
-        elif self.flow:
-            text = flow(entry, lambda _: MARK)[1:-1]
+        if self.flow:
+            text = (dump_json if self.json else flow)(entry, lambda _: MARK)[1:-1]
         else:
             text = dump_yaml(entry, lambda _: MARK).rstrip("\n").replace("\n", self.between)
         pieces: list[Piece] = []
@@ -279,52 +295,10 @@ class Splicer:
             pieces += [Const(part.encode())] * bool(part) + [Out(number, number + 1, b"")]
         return tuple(pieces[:-1])
 
-    def _lead(self, member: tuple[Piece, ...], key: str = "") -> None:
-        """Write a member in front of one that is there, or of all."""
-        start = (self.members[key][0] if key else self.first_key).start
-        self.edits.append(Edit(start, start, (*member, Const(self.between.encode()))))
 
-    def _add(self, members: Sequence[tuple[Piece, ...]], key: str = "") -> None:
-        """Write members behind one that is there, or behind all."""
-        end = self.members[key][1].end if key else self.end
-        self.edits += [Edit(end, end, self._led(member)) for member in members]
-
-    def _led(self, member: tuple[Piece, ...]) -> tuple[Piece, ...]:
-        """Return a member with what parts it from the one before."""
-        conditional = any(isinstance(piece, IfLocked) for piece in member)
-        return ((IfLocked if conditional else Const)(self.between.encode()), *member)
-
-    def _replace(self, key: str, pieces: tuple[Piece, ...]) -> None:
-        self.edits.append(Edit(self.members[key][0].start, self.members[key][1].end, pieces))
-
-    def _anew(self) -> None:
-        """Write all members of a result in place of a bare list, or of what said what a record was."""
-        target, keys = self.target, self.record.keys
-        position = [self._place("xyz" if self.kind == POSE else self.kind)] if target.unit is not None else []
-        members = [*position, *self._members(count_of(target.unit)), *self._extras(target.size)]
-        self.dropped |= {keys.position, keys.rotation, *keys.others, *keys.members, *keys.flat}
-        self.dropped |= {*STALE, "inverse", "angles"}
-        pieces = [piece for member in members for piece in self._led(member)][1:]
-        if not self.members:
-            self.edits.append(Edit(self.node.start, self.node.end, (Const(b"{"), *pieces, Const(b"}"))))
-        elif self.dropped.issuperset(self.members):
-            self.edits = [Edit(self.first_key.start, self.end, tuple(pieces))]
-        else:
-            self._leave_out()
-            self._add(members)
-
-    def _leave_out(self) -> None:
-        """Leave members out, with what parts them from their neighbours."""
-        members = list(self.members.items())
-        follows = False  # whether a member that stays comes before
-        for index, (key, (key_node, value)) in enumerate(members):
-            if key not in self.dropped:
-                follows = True
-            elif follows:
-                self.edits.append(Edit(members[index - 1][1][1].end, value.end, ()))
-            else:
-                end = members[index + 1][1][0].start if index + 1 < len(members) else value.end
-                self.edits.append(Edit(key_node.start, end, ()))
+def _joined(parts: Sequence[Pieces], gap: Const) -> Pieces:
+    """Return members with what parts them."""
+    return tuple(piece for part in parts for piece in (gap, *part))[1:]
 
 
 def quoted_name(node: Node, name: str, *, json: bool) -> str:
