@@ -10,7 +10,7 @@ Arguments, files, streams and messages are read by this one definition; keys tha
 from __future__ import annotations
 
 from functools import partial
-from itertools import chain, islice
+from itertools import chain, islice, product
 from math import nan
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -59,6 +59,9 @@ COVARIANCES = ("covariance", "position_covariance", "orientation_covariance")
 NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS)).difference(LISTED_WORDS)
 KNOWN = frozenset((*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS))
 XYZ = ("x", "y", "z")
+VELOCITIES = frozenset(f"{body}{word}{axis}" for body in ("", "body_") for word in "vw" for axis in XYZ).union(
+    ("velocity", "linear_velocity", "angular_velocity")
+)  # fmt: skip
 MOST_KEYS = 8  # named in a message
 QUATERNION = (*XYZ, "w")
 USED = KNOWN.difference(NAME_KEYS).union(ROTATION_KEYS, (readers.AXES_KEY, "sigma"), COVARIANCES, *PARTS.values())
@@ -126,7 +129,7 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path) 
     for step in reversed(path):
         root = MappingProxyType({step: root})
     search = _search_under if request.rows.columns else _search
-    found = list(search(document, path, request)) if request.rows.poses else []
+    found = list(search(document, path, request, reading)) if request.rows.poses else []
     is_bare = request.rows.poses and not request.operation.takes_points
     if not found and is_bare and type(document) is dict and NOTHING_BUT.issuperset(document):
         reading.here = path
@@ -135,14 +138,14 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path) 
     if not found and formula is not None and not formula.reads_row:
         found = [((*path, *each), "", "") for each in _mappings(document)]
     if not found:
-        raise _nothing_in(document).below(*path)
+        within(path, _refuse, document)
     if request.operation.of == "pair":
         raise Misfit("a record holds one pose; name A or B, or compare it with the one before by --consecutive", path)
     for each in found:
         yield _record(root, *each, request, reading)
 
 
-def _search_under(document: Any, path: Path, request: Request) -> Iterator[Holder]:
+def _search_under(document: Any, path: Path, request: Request, reading: Reading) -> Iterator[Holder]:
     """Search what is under the key `detections.pose`, which --columns names; a list stands for its items."""
     found = [(document, path)]
     for key in request.rows.columns[0].split("."):
@@ -152,7 +155,7 @@ def _search_under(document: Any, path: Path, request: Request) -> Iterator[Holde
             keys = dict.fromkeys(each for item, _ in items for each in item)
             raise Misfit(f"no key {shown(key)} for --columns{alternatives(key, keys, 'keys')}", path)
     for each in found:
-        yield from _search(*each, request)
+        yield from _search(*each, request, reading)
 
 
 def _mappings(document: Any) -> list[Path]:
@@ -162,25 +165,15 @@ def _mappings(document: Any) -> list[Path]:
     return [()] if type(document) is dict else []
 
 
-def _nothing_in(document: Any) -> Misfit:
-    """Build the error for a document in which no record was found."""
+def _refuse(document: Any) -> None:
+    """Stop at a document in which no record was found."""
     if type(document) is not dict:
         if type(document) is list and document:
-            return _bare_numbers(document)
-        return Misfit(f"expected a pose like {{xyz: [x, y, z], rpy_deg: [..]}}, found {kind(document)}")
-    wanted = {*POINT_KEYS, *ROTATION_KEYS} - LISTED_WORDS
-    near = [(key, found) for key in document if key not in POSE_KEYS and (found := did_you_mean(key, wanted))]
-    if near:
-        return _unknown(near)
-    wanted_here = "a point like {point: [x, y, z]} or a pose like {xyz: [..], rpy_deg: [..]}"
-    return Misfit(f"expected {wanted_here}, found the keys {first_of(list(document), MOST_KEYS, quote=shown)}")
-
-
-def _unknown(near: Sequence[tuple[str, str]]) -> Misfit:
-    """Build the error for keys that are nearly known."""
-    named = unknown_keys(near, len(near))
-    choices = ", ".join([*ROTATIONS][:MOST_CHOICES])
-    return Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (near[0][0],), key=True)
+            raise _bare_numbers(document)
+        raise Misfit(f"expected a pose like {{xyz: [x, y, z], rpy_deg: [..]}}, found {kind(document)}")
+    _refuse_typos(document, {*POINT_KEYS, *ROTATION_KEYS})
+    wanted = "a point like {point: [x, y, z]} or a pose like {xyz: [..], rpy_deg: [..]}"
+    raise Misfit(f"expected {wanted}, found the keys {first_of(list(document), MOST_KEYS, quote=shown)}")
 
 
 def _bare_numbers(value: list[Any]) -> Misfit:
@@ -190,15 +183,18 @@ def _bare_numbers(value: list[Any]) -> Misfit:
     return Misfit(f"a bare list of {len(value)} number{'s' * (len(value) != 1)} does not say what it is; write {write}")
 
 
-def _search(value: Any, path: Path, request: Request) -> Iterator[Holder]:
-    """Yield what holds numbers; where frames change, a mapping that does not move whole is refused."""
+def _search(value: Any, path: Path, request: Request, reading: Reading) -> Iterator[Holder]:
+    """Yield what holds numbers; where frames change, a mapping that does not move whole is refused.
+
+    A warning tells of velocities beside what moves, which stay.
+    """
     if type(value) is list:
         is_matrix = len(value) in (3, 4) and all(type(row) is list for row in value)
         if is_matrix or (value and not any(type(item) in (dict, list) for item in value)):
             yield path, "", ""
             return
         for index, item in enumerate(value):
-            yield from _search(item, (*path, index), request)
+            yield from _search(item, (*path, index), request, reading)
     elif type(value) is dict:
         operation = request.operation
         holds: dict[str, str] = {}  # which fields of a known message hold what, and which stay, by the fields it has
@@ -215,21 +211,28 @@ def _search(value: Any, path: Path, request: Request) -> Iterator[Holder]:
             _refuse_several(value, ["the record's own keys"], path)
             found = [(path, "", "")]
         else:
-            found = _search_inside(value, path, request, stays)
+            found = _search_inside(value, path, request, reading, stays)
         if not operation.keeps_frames and (operation.formula is None or operation.formula.reads_row):
             _refuse_half(value, found, path, stays if operation.moves else ())
-        if operation.turns and found and (rates := [key for key in value if readers.is_rate(key)]):
-            what = f"{first_of(rates, 3, quote=shown)} would keep to the old axes; a table turns vx, vy, vz along"
-            raise Misfit(f"{what}; leave them out, or convert to CSV first", (*path, rates[0]), key=True)
+        if found and (operation.turns or (operation.moves and not VELOCITIES.isdisjoint(value))):
+            rates = [key for key in value if key not in holds and readers.is_rate(key)]
+            if rates and operation.turns:
+                what = f"{first_of(rates, 3, quote=shown)} would keep to the old axes; a table turns vx, vy, vz along"
+                raise Misfit(f"{what}; leave them out, or convert to CSV first", (*path, rates[0]), key=True)
+            if rates:
+                stay, reading.here = "stay as they are" if rates[1:] else "stays as it is", path
+                reading.note(f"{first_of(rates, 9)} {stay}: points and poses move", rates[0], rule="stays")
         yield from found
 
 
-def _search_inside(value: dict[str, Any], path: Path, request: Request, stays: Sequence[str]) -> list[Holder]:
+def _search_inside(
+    value: dict[str, Any], path: Path, request: Request, reading: Reading, stays: Sequence[str]
+) -> list[Holder]:
     """Return what the known keys of a message hold."""
     inner = [key for key in INNER if type(value.get(key)) in (dict, list)]
     if request.operation.moves:
         inner += [key for key in LISTS if _is_geometry(key, value.get(key), doubtful=False)]
-    held = {key: [*_search(value[key], (*path, key), request)] for key in inner if key not in stays}
+    held = {key: [*_search(value[key], (*path, key), request, reading)] for key in inner if key not in stays}
     if keys := [key for key, each in held.items() if each]:
         _refuse_several(value, keys, path)
     return [*chain.from_iterable(held.values())]
@@ -384,7 +387,7 @@ def _with_asked(record: Record, root: Any, request: Request) -> Record:
     for name in operation.columns:
         found, number = None, nan
         if not said or value.get(name.partition(".")[0], "") is not None:  # else no pixel
-            found = key_path(root, record.path, name, "a number")
+            found = key_path(root, record.path, (name,), "a number")
             text = value_at(root, found)
             number = within(found, parse_number, text if type(text) is str else "")
         record = record._replace(numbers=(*record.numbers, found), values=(*record.values, number))
@@ -451,7 +454,7 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     if positions and flat and flat.position and not flat.position.absent:
         shown_both = f"{positions[0]} and {flat.position.shown}"
         raise Misfit(f"expected one position, found {shown_both}", (flat.position.names[0],), key=True)
-    _refuse_typos(value, rotations=bool(turned), position=bool(there))
+    _refuse_typos(value, {*([] if turned else ROTATION_KEYS), *([] if there else POSITION_KEYS)})
     key = positions[0] if positions else ""
     operation, rows, sigma = request.operation, request.rows, value.get("sigma")
     # what says how sure its rotation is, is a pose, if only by that
@@ -547,11 +550,11 @@ def _two_vectors(value: dict[str, Any], name: str, path: Path, request: Request)
     return Record(path, Shape(name, None), paths, numbers)
 
 
-def _refuse_typos(value: dict[str, Any], *, rotations: bool, position: bool) -> None:
-    """Stop at a key that is nearly that of a rotation or a position, where no other says it."""
-    if (rotations and position) or KNOWN.issuperset(value):
+def _refuse_typos(value: dict[str, Any], wanted: set[str]) -> None:
+    """Stop at a key that is nearly one of those that would say a rotation or a position."""
+    if not wanted or KNOWN.issuperset(value):
         return
-    wanted = {*([] if rotations else ROTATION_KEYS), *([] if position else POSITION_KEYS)} - LISTED_WORDS
+    wanted -= LISTED_WORDS
     # a number under a letter or two, as px and ry, is no misspelt list of them
     others = (key for key in value if key not in KNOWN and (key[2:] or type(value[key]) is not str))
     near = []
@@ -560,7 +563,9 @@ def _refuse_typos(value: dict[str, Any], *, rotations: bool, position: bool) -> 
         hint = f"; did you mean {shown(word)}?" if word in wanted else did_you_mean(key, wanted, cutoff=0.75)
         near += [(key, hint)] if hint else []
     if near:
-        raise _unknown(near)
+        choices = ", ".join([*ROTATIONS][:MOST_CHOICES])
+        message = f"{unknown_keys(near, len(near))}; a pose has xyz and one rotation: {choices}"
+        raise Misfit(message, (near[0][0],), key=True)
 
 
 # what others call a rotation or a position; as a list or mapping it is no further field of a record
@@ -771,38 +776,32 @@ def value_at(value: Any, path: Path) -> Any:
     return value
 
 
-def key_path(documents: Any, holder: Path, name: str, wanted: str = "a time like 12.5") -> Path:
-    """Find a scalar of a point or pose, its stamp: its own key, else that of a mapping around it; raises Misfit.
+def key_path(documents: Any, holder: Path, names: Sequence[str] = STAMP_KEYS, wanted: str = "a time like 12.5") -> Path:
+    """Find a scalar of a point or pose, by default its stamp: its own key, else that of a mapping around it.
 
-    The name of a joint leads to its position in a JointState.
+    The name of a joint leads to its position in a JointState.  Raises Misfit.
     """
     from frametool.ros import messages
 
     around = [documents]
     for step in holder:
         around.append(around[-1][step])
-    for depth in range(len(holder), 0, -1):
+    for name, depth in product(names, range(len(holder), 0, -1)):
         if (position := messages.position_of(name, around[depth])) is not None:
             return (*holder[:depth], *position)
         steps = name.split(".")
         for keys in ((name,), steps, [int(each) if each.isdecimal() else each for each in steps]):
-            if (found := _below(around[depth], keys)) is not None:
-                if type(found[0]) in (dict, list):
-                    raise Misfit(f"expected {wanted}, found {kind(found[0])}", (*holder[:depth], *keys))
+            if (found := _below(around[depth], keys)) is None:
+                continue
+            if type(found[0]) not in (dict, list):
                 return (*holder[:depth], *keys)
+            if names is not STAMP_KEYS:
+                raise Misfit(f"expected {wanted}, found {kind(found[0])}", (*holder[:depth], *keys))
+    if names is STAMP_KEYS:
+        usual = ", ".join(names)
+        raise Misfit(f"no stamp: neither a header nor {usual}; name its key with --time-column", holder)
     known = [key for each in around[1:] if type(each) is dict for key in each]
-    raise Misfit(f"no key {shown(name)}{did_you_mean(name, known)}", holder)
-
-
-def stamp_keys(documents: Any, holder: Path) -> Path:
-    """Find the key of a record's stamp by the names such keys have; raises Misfit."""
-    for name in STAMP_KEYS:
-        try:
-            return key_path(documents, holder, name)
-        except Misfit:
-            continue
-    usual = ", ".join(STAMP_KEYS)
-    raise Misfit(f"no stamp: neither a header nor {usual}; name its key with --time-column", holder)
+    raise Misfit(f"no key {shown(names[0])}{did_you_mean(names[0], known)}", holder)
 
 
 def _below(value: Any, keys: Sequence[str | int]) -> tuple[Any] | None:

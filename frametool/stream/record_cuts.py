@@ -71,7 +71,7 @@ _WORDS = frozenset(
 )  # fmt: skip
 COVARIANCE = "covariance"  # an entry of one that passes as it is decides nothing
 RESULT_KEYS = DESCRIPTIVE - {"frame"}  # a number under these belongs to a result; null may be another record
-OF_PLACES = ("no-alt", "band-s", "stays", "left-out")  # the rules of notes on places, which rows do not tell
+OF_ALL = ("unnamed", "identity", "no-alt", "band-s", "stays", "left-out")  # rules of notes that hold for all alike
 
 
 class Template:
@@ -93,7 +93,7 @@ class Template:
         self.entries = tuple(known.entries)
         self.json, self.line = known.json, known.line
         every = known.notes_at(0, known.source.first_column)
-        self.notes = [*known.row_notes(), *(each for each in every if each.about in OF_PLACES)]
+        self.notes = [each for each in every if each.about in OF_ALL]
         self._root, self._request = known.root, known.request
         self._named: dict[tuple[int, Names], Names | None] = {}
         number = re.compile(JSON_NUMBER if self.json else YAML_NUMBER)

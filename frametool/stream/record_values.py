@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import islice
 from math import isfinite, isinf
 from typing import TYPE_CHECKING, Any
@@ -34,12 +34,12 @@ from frametool.grammar.readers import Misfit, NotARotation, Path, Reading, in_na
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream import row_layout
 from frametool.stream.faults import ZONES, RowNote
-from frametool.stream.record import STALE, Record, find_records, key_path, pose_of, stamp_keys, value_at
+from frametool.stream.record import STALE, Record, find_records, key_path, pose_of, value_at
 from frametool.stream.request import Request, RowOptions
 from frametool.stream.row_layout import FLAT, LEAVES_PLANE, PARTS, POSE, ROTATION, VECTOR, Target, checked_rotation
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from frametool.geometry.types import Components, Rigid
     from frametool.stream.request import Operation
@@ -77,12 +77,6 @@ class Entry(NamedTuple):
     parent: str | None = None
     name: str | None = None
 
-    @property
-    def lost(self) -> str:
-        """Name a frame that the record names and the result cannot."""
-        is_named = self.parent is not None or self.name is not None
-        return "" if is_named else self.record.parent.text or self.record.name.text or ""
-
 
 class Answer(NamedTuple):
     """What became of a record: the components of its result; has_gaps: numbers of it may be nan."""
@@ -97,14 +91,15 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
     stamp: tuple[Path, ...] = ()
     edge = None
     timed, operation = request.timed, request.operation
+    path_of = partial(key_path, {document.index: document.value}, record.path)
     if timed is not None and timed.name:
-        stamp = _scalar(document, record, timed.name)
+        stamp = (path_of((timed.name,)),)
     elif timed is not None and record.stamps and timed.moves(record.parent.text):
         stamp = record.stamps[:2]
     elif timed is not None and operation.formula is not None and not operation.shown:
-        stamp = _scalar(document, record)
+        stamp = (path_of(),)
     elif (key := request.rows.extra_column) is not None:
-        stamp = (not key and record.stamps[:2]) or _scalar(document, record, key)
+        stamp = (not key and record.stamps[:2]) or (path_of((key,)) if key else path_of(),)
     elif request.pose_from_frame is not None:
         edge = request.pose_from_frame(record.parent.text)
     request = request.for_kind(record.shape.kind)
@@ -118,24 +113,17 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
     return Entry(record, target, edge, stamp, parent, name)
 
 
-def _scalar(document: Document, record: Record, name: str = "") -> tuple[Path]:
-    """Find a scalar of a record or of what is around it, by a name or that of a stamp; raises Misfit."""
-    documents = {document.index: document.value}
-    return (key_path(documents, record.path, name) if name else stamp_keys(documents, record.path),)
+def answer(entry: Entry, values: Mapping[int, Any], request: Request) -> Answer:
+    """Return what becomes of a record; values: of the documents in which its own time is.
 
-
-def answer(entry: Entry, stamp: Sequence[str], request: Request) -> Answer:
-    """Return what becomes of a record.
-
-    stamp: the texts of its own time
     Raises ValueInvalid for what is no rotation, FrametoolError where there is no pose at its time.
     """
     operation, shape, timed = request.operation, entry.record.shape, request.timed
     edge, at_ns = entry.edge, None
-    if stamp and (timed is not None or request.window):
+    if entry.stamp and (timed is not None or request.window):
         from frametool.frames.stamps import read_header_stamp, read_stamp
 
-        key = str(entry.stamp[0][-1])
+        key, stamp = str(entry.stamp[0][-1]), [str(value_at(values, path)) for path in entry.stamp]
         try:
             at_ns = read_header_stamp(*stamp) if stamp[1:] else read_stamp(stamp[0], in_ns=in_nanoseconds(key))
             if timed is not None and (operation.formula is None or operation.shown):
@@ -237,11 +225,6 @@ class RecordText:
         paths = (path for entry in self.entries for path in entry.record.numbers if path is not None)
         return self.text.count("\n", 0, min((self.root.at(path).start for path in paths), default=0))
 
-    def answer(self, entry: Entry) -> Answer:
-        """Return what becomes of a record."""
-        texts = [str(value_at(self.values, path)) for path in entry.stamp] if entry.stamp else ()
-        return answer(entry, texts, self.request)
-
     def answers(self, parts: Sequence[Components] | None = None) -> list[Answer]:
         """Return what becomes of the records but for those whose time is not wanted; raises Outside if none is.
 
@@ -252,18 +235,16 @@ class RecordText:
         found = []
         for entry in self.entries:
             with suppress(Outside):
-                found.append(self.answer(entry))
+                found.append(answer(entry, self.values, self.request))
         if len(found) < len(self.entries) and (not found or not self.request.results.canonical):
             raise Outside("beyond --start or --stop")
         return found
 
-    def row_notes(self) -> Iterator[RowNote]:
-        """Yield warnings that hold for all records that are written alike."""
-        for entry in self.entries:
-            if entry.lost:
-                yield RowNote.of_lost_name(0, entry.lost)
-            if not entry.record.values and entry.record.shape.kind:
-                yield RowNote(0, "identity", "neither position nor rotation: taken as the identity")
+    @property
+    def lost(self) -> str:
+        """Name a frame that a record names and its result cannot."""
+        named = (entry for entry in self.entries if entry.parent is None and entry.name is None)
+        return next((lost for each in named if (lost := each.record.parent.text or each.record.name.text)), "")
 
     def notes_at(self, line: int, column: int, answers: Sequence[Answer] = ()) -> list[RowNote]:
         """Return all warnings about the records, their numbers, and what became of them, each with its place.
@@ -275,9 +256,8 @@ class RecordText:
         for note, at_char in zip(self.notes, places, strict=True):
             at, there = begin.place(*at_char)
             found.append(RowNote(at, note.rule, note.message, str(there)))
-        for each in self.row_notes():
-            if all(each.about != other.about for other in found[: len(self.notes)]):
-                found.append(each._replace(line=line + self.line))
+        if self.lost:
+            found.append(RowNote.of_lost_name(line + self.line, self.lost))
         found.sort()
         for answer in answers:
             if wide := wide_turn(answer, self.request.operation):
@@ -350,14 +330,15 @@ def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
     """
     if request.operation.looks_back:
         raise Misused("rows are compared with those before them in streams; pipe them in as JSON lines, YAML or CSV")
-    known = read_text(source, request.with_results(canonical=True))
-    if lost := next((entry.lost for entry in known.entries if entry.lost), ""):
-        warn(f"{source.name}: frame {shown(lost)} is left out: the frames of the result are not known")
+    request = request.with_results(canonical=True)
+    known = read_text(source, request)
+    if known.lost:
+        warn(f"{source.name}: frame {shown(known.lost)} is left out: the frames of the result are not known")
     answers = []
     for entry in known.entries:
         try:
             with suppress(Outside):
-                answers.append(known.answer(entry))
+                answers.append(answer(entry, known.values, request))
         except ValueInvalid as error:  # what was read well has no result
             misfit = error if isinstance(error, Misfit) else NotARotation(str(error), entry.record.path)
             raise misfit.placed(known.source) from misfit

@@ -277,6 +277,24 @@ def test_velocities_that_stay_are_told_with_their_units_and_whether_they_can_tur
     assert two.err == "frametool: warning: stdin: vx, vy stay as they are: points and poses move\n"
 
 
+@pytest.mark.parametrize("form", ["json", "csv"])
+@pytest.mark.parametrize(
+    ("record", "told"),
+    [
+        ('{"x": 1, "y": 2, "z": 3, "vx": 1, "vy": 2, "vz": 3}', "1:32: vx, vy, vz stay as they are"),
+        ('{"frame": "map", "point": [1, 2, 3], "velocity": [1, 2, 3]}', "1:50: velocity stays as it is"),
+        ('{"pose": {"xyz": [1, 2, 3]}, "wx": 1}', "1:36: wx stays as it is"),
+    ],
+)
+def test_velocities_beside_the_point_or_pose_of_a_record_stay_and_are_told_once(
+    run: Any, record: str, told: str, form: str
+) -> None:
+    few, many = (run("apply", "--transform", "{xyz: [1, 0, 0]}", "-f", form, stdin=f"{record}\n" * count) for count in (2, 50))
+    lines = [line for line in few.err.splitlines() if "frame 'map'" not in line]
+    assert lines == [f"frametool: warning: stdin:{told}: points and poses move"]
+    assert many.err == few.err
+
+
 @pytest.mark.parametrize("keys", ['"vx": 1, "vy": 2, "vz": 3', '"velocity": [1, 2, 3]', '"angular_velocity": [1, 2, 3]'])
 def test_records_do_not_keep_velocities_in_the_old_axes(run: Any, keys: str) -> None:
     line = f'{{"xyz": [1, 2, 3], "xyzw": [0, 0, 0, 1], {keys}}}\n'

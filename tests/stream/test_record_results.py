@@ -162,6 +162,13 @@ def test_a_frame_that_is_left_out_is_told_once(run: Run) -> None:
     assert done.out.count("\n") == 101
 
 
+def test_the_frame_that_a_wrench_loses_is_told_and_is_not_in_its_result(run: Run) -> None:
+    line = '{"frame": "lidar", "force": [1, 2, 3], "torque": [0, 0, 1]}\n'
+    done = run("apply", "--transform", "{xyz: [1, 0, 0]}", stdin=line)
+    assert done.out == '{"force": [1.0, 2.0, 3.0], "torque": [0.0, -3.0, 3.0]}\n'
+    assert "frame 'lidar' is left out" in done.err
+
+
 def test_a_broken_record_whose_key_is_a_mapping_is_null(run: Run) -> None:
     done = run("convert", "-f", "csv", "--on-error", "null", stdin='{"xyz": [1, 2, 3], "xyzw": [0, 0, 0, 1]}\n{"a": nan , {"b": 1}: 2}\n')
     assert (done.status, done.out) == (3, "x,y,z,qx,qy,qz,qw\n1.0,2.0,3.0,0.0,0.0,0.0,1.0\n,,,,,,\n")

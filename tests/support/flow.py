@@ -125,7 +125,7 @@ class Moving:
 
     def by(self, edge: Rigid) -> Sequence[float]:
         """Return the numbers behind an edge."""
-        made = answer(Entry(self.record, self.request.target(self.record.shape), edge), (), self.request)
+        made = answer(Entry(self.record, self.request.target(self.record.shape), edge), {}, self.request)
         assert made is not None
         return made.parts
 
