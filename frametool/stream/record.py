@@ -186,7 +186,7 @@ def _bare_numbers(value: list[Any]) -> Misfit:
 def _search(value: Any, path: Path, request: Request, reading: Reading) -> Iterator[Holder]:
     """Yield what holds numbers; where frames change, a mapping that does not move whole is refused.
 
-    A warning tells of velocities beside what moves, which stay.
+    A warning names the velocities that stay where a point or pose moves.
     """
     if type(value) is list:
         is_matrix = len(value) in (3, 4) and all(type(row) is list for row in value)

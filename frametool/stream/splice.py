@@ -209,7 +209,7 @@ class Splicer:
         return size - sum(place < size for place in self.target.absent)
 
     def _rotation(self) -> list[Pieces]:
-        """Write the rotation in all its notations, and the flag of a lock; nothing where there is none."""
+        """Write the rotation in all its notations, and the flag of a lock; nothing without a rotation."""
         notations = self.target.notations
         degrees = any(degrees for notation, degrees in notations if notation.degrees is None)  # what bare angles are
         style = Style("json", tuple(notation for notation, _ in notations), degrees=degrees)
@@ -243,7 +243,7 @@ class Splicer:
         return members
 
     def _listed(self, places: Sequence[int]) -> Iterator[Piece]:
-        """Yield the numbers of a list, or the one alone; null where they are none."""
+        """Yield the numbers of a list, or the one alone; null instead of nan."""
         precision = self.request.results.precision
         fmt, exponent = "" if precision is None else f"z.{precision}f", b"e" if self.json else b".0e"
         opens, closes = ("[", "]") if places[1:] else ("", "")
