@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 
 from frametool.documents.source import InputFile
-from frametool.errors import ValueInvalid, listing, shown, warn
+from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
 from frametool.formats.rows import column_file
 from frametool.geometry.rigid import EXACT, SCALED
 from frametool.grammar.readers import NORMALS
@@ -44,7 +44,6 @@ from frametool.text.write import float_spans, rounded_to_single
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
-    from frametool.errors import FormatError
     from frametool.formats.rows.column_file import Batch, Kind, Made, OutColumn
     from frametool.geometry.types import Components
     from frametool.grammar.result import Style

@@ -24,7 +24,7 @@ from decimal import Decimal
 from functools import partial
 from shutil import copyfileobj
 from tempfile import TemporaryFile
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, Protocol, TypeAlias
 from weakref import finalize
 
 import numpy as np
@@ -37,7 +37,6 @@ from frametool.text.parse import nanoseconds_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
-    from typing import BinaryIO
 
     from numpy.typing import NDArray
 

@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.documents.source import InputFile
-from frametool.errors import ValueInvalid, listing, shown, warn
+from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
 from frametool.formats.rows import column_file
 from frametool.formats.rows.clouds import CloudFile, count_in, head_lines, misfit_of, same_columns, type_in
 from frametool.geometry import floats, quaternion, rigid
@@ -39,7 +39,6 @@ from frametool.text.numbers import parse_number
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from frametool.errors import FormatError
     from frametool.formats.rows.column_file import Batch, Kind, OutColumn
     from frametool.geometry.types import Components, Rigid
     from frametool.grammar.result import Style

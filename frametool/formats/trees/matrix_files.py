@@ -25,18 +25,18 @@ import re
 from math import degrees
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.documents.source import TAG
+from frametool.documents.source import TAG, InputFile
 from frametool.documents.writers import flow, quoted
 from frametool.documents.xml import Element, read_xml
 from frametool.errors import FormatError, ValueInvalid, bare, first_of, listing, shown, warn
 from frametool.formats.table import DIRECTIONS
 from frametool.formats.trees.tree_reader import document_edges, dotted, named, remember
 from frametool.frames import topology
-from frametool.frames.lookups import FrameTree
+from frametool.frames.lookups import Frames, FrameTree
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import notation
 from frametool.geometry.rigid import IDENTITY
-from frametool.grammar.edges import Edge
+from frametool.grammar.edges import Answers, Edge, Options
 from frametool.grammar.pose import AGREEMENT, read_spelled
 from frametool.grammar.readers import Misfit, Path, Reading, Unclear, answerable, as_mapping, kind, read_number, within
 from frametool.grammar.result import Style, rows_of, static_edges
@@ -44,10 +44,7 @@ from frametool.grammar.result import Style, rows_of, static_edges
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-    from frametool.documents.source import InputFile
-    from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Answers, Options
 
 # pattern of the key, target, source; <a> and <b> are names in it, {..} are named by the file or the user:
 # {me} the block of the key, {before} the camera before it, {imu} {body} the common reference frame
