@@ -41,9 +41,8 @@ class Format(NamedTuple):
         intrinsics too
     writes: what is written in it, by `write_poses` (also a `trajectory`: the poses of one frame over time),
         `write_points` (also for a `report`), `write_tree` of `writer`; as `arrays` by its `create`, with
-        columns of `texts` if it has them; if all poses are written alike, `ROWS` of `writer` (a RowForm, or one for
-        each format) replaces `write_poses`; as messages of a `recording`, whose trees are written by `tree_pieces` of
-        `writer`
+        columns of `texts` if it has them; if all poses are written alike, a RowForm in `ROWS` of `writer` replaces
+        `write_poses`; as messages of a `recording`, whose trees are written by `tree_pieces` of `writer`
     magic: how it begins, as (kind, what); `frametool.formats.detect` defines the kinds
     conventions: the meaning of its numbers (frames, units, order)
     required_options: the options for what it does not specify

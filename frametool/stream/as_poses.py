@@ -30,7 +30,7 @@ import numpy as np
 
 from frametool.documents.source import InputFile, not_text
 from frametool.errors import FormatError, Misused, ValueInvalid, warn
-from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, describe, rows_of
+from frametool.formats.rows.pose_rows import IMAGE, NUMBER, ROWS, StampFile, describe
 from frametool.formats.table import FORMATS, Rows, is_recording, is_trajectory
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
@@ -75,7 +75,7 @@ def writer_for(style: Style, kind: str = POSE, extras: Sequence[str] = (), *, pl
         from frametool.stream.recording_writer import RecordingWriter
 
         return RecordingWriter(style, kind, extras, placed=placed)
-    text = TextWriter if rows_of(style.format) else SingleWriter
+    text = TextWriter if style.format in ROWS else SingleWriter
     return (RowsWriter if style.format in LEARNED else text)(style, kind, extras, placed=placed)
 
 
@@ -187,9 +187,8 @@ class FormatConverter:
 
     def _held(self, stamps_ns: Ints | None, fmt: Rows) -> Ints | None:
         """Return stamps, unless they only count and the other format has no place for them: they are not lost then."""
-        counts = bool(fmt.counted) and not self.answers.stamps
-        holds = getattr(rows_of(self.style.format), "holds", ("stamps",))
-        return None if counts and (is_recording(self.style.format) or "stamps" not in holds) else stamps_ns
+        counts, other = bool(fmt.counted) and not self.answers.stamps, self.style.format
+        return None if counts and (is_recording(other) or FORMATS[other].rows.counted) else stamps_ns
 
     def _columns(self, stream: ByteStream) -> Iterator[Step]:
         """Yield the rows of columns of numbers; those that stand for no point have no place in a text."""

@@ -21,7 +21,7 @@ from frametool.documents.writers import quoted as quoted_in_yaml
 from frametool.errors import ValueInvalid, listing, warn
 from frametool.formats.rows import pose_rows
 from frametool.formats.rows.csv import cell, cells_of, quoted, row
-from frametool.formats.rows.pose_rows import IMAGE, MOST_NAMED, NUMBER, RowForm, image_name, is_turned, rows_of, turned
+from frametool.formats.rows.pose_rows import IMAGE, MOST_NAMED, NUMBER, ROWS, image_name, is_turned, turned
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import arrays, floats, quaternion, rigid
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from frametool.stream.record_values import Value
 
 LEARNED = ("csv", "json", "yaml")
-LOSABLE = {"frames": "names of frames", "stamps": "stamps"}
+LOSABLE = ("names of frames", "stamps")
 
 
 class PoseWriter:
@@ -134,14 +134,14 @@ class TextWriter(SingleWriter):
         super().__init__(style, kind, extras, placed=placed)
         if any(each.spec != "quaternion" for each in style.notations):
             raise ValueInvalid(f"{style.format} writes rotations in its own way; leave --to out")
-        self.fixed = rows_of(style.format) or RowForm(())
+        self.fixed = ROWS[style.format]
         self.made_up: dict[str, None] = {}
         self.count = 0
 
     def end(self) -> Iterator[bytes]:
         """Yield what comes behind the last pose, and warn in one line of what was left out or made up."""
-        left = [words for words in LOSABLE.values() if words in self.dropped]
-        if others := self.dropped.keys() - {*LOSABLE.values()}:
+        left = [words for words in LOSABLE if words in self.dropped]
+        if others := self.dropped.keys() - {*LOSABLE}:
             left.append(listing(others, MOST_NAMED))
         said = [f"{', '.join(left)} left out"] if left else []
         said += [*filter(None, [self.fixed.constants]), *self.made_up]
@@ -164,11 +164,11 @@ class TextWriter(SingleWriter):
         refuse_scale_in(self.style.format, (*self.extras, *block.extras))
         fmt, images, size = self.fixed, block.extras.get(IMAGE), len(block.numbers)
         before, self.count = self.count, self.count + size
-        there = {"frames": any(block.parents) or any(block.names)}
-        there["stamps"] = block.stamps_ns is not None and NUMBER not in block.extras
-        self.dropped |= {LOSABLE[what]: None for what in there if there[what] and what not in fmt.holds}
+        counted, has_stamps = FORMATS[self.style.format].rows.counted, block.stamps_ns is not None
+        left = any(block.parents) or any(block.names), counted and has_stamps and NUMBER not in block.extras
+        self.dropped |= {words: None for words, is_left in zip(LOSABLE, left, strict=True) if is_left}
         self.dropped |= dict.fromkeys(name for name in (*self.extras, *block.extras) if name not in (IMAGE, NUMBER))
-        if "stamps" in fmt.holds and block.stamps_ns is None:
+        if not (counted or has_stamps):
             self.made_up["without stamps, poses are numbered in seconds: 0, 1, 2 .."] = None
         if IMAGE in fmt.row and images is None:
             self.made_up["pictures are named by their stamps"] = None

@@ -14,7 +14,7 @@ import yaml
 from frametool.errors import FormatError
 from frametool.formats.detect import UNSUPPORTED, by_sign, detect, of_folder
 from frametool.formats.load import load
-from frametool.formats.rows.pose_rows import RowForm, rows_of
+from frametool.formats.rows.pose_rows import ROWS
 from frametool.formats.table import FORMATS, Format, by_suffix, readers, writers
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def test_a_row_names_modules_that_do_what_it_says(name: str) -> None:
         functions |= dict.fromkeys(("poses", "points", "texts"), "create")
     for what in row.writes:
         module = import_module(row.writer)
-        by_rows = functions[what] == "write_poses" and isinstance(rows_of(name), RowForm)
+        by_rows = functions[what] == "write_poses" and name in ROWS
         assert by_rows or hasattr(module, functions[what])
     assert "arrays" not in row.reads or hasattr(import_module(row.reader), "open_columns")
     assert "tree" not in row.reads or hasattr(import_module(row.reader), "read")

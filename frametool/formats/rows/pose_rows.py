@@ -30,7 +30,6 @@ z backward.  Matrices of three rows occur (Nerfstudio), and `applied_transform`,
 from __future__ import annotations
 
 import re
-from importlib import import_module
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Any
 
@@ -72,7 +71,6 @@ class RowForm(NamedTuple):
         `first`), `image` (the name of its image, else its seconds)
     numbers: from tx, ty, tz, x, y, z, w to the numbers in the order of the file
     head, between, tail: text before the first pose, between two, and after the last
-    holds: which of `frames`, `stamps` are written; other columns are not
     constants: what else is written for readers of the format, for a note
     """
 
@@ -82,7 +80,6 @@ class RowForm(NamedTuple):
     between: bytes = b""
     tail: bytes = b""
     first: int = 0
-    holds: tuple[str, ...] = ("stamps",)
     constants: str = ""
 
 
@@ -122,26 +119,20 @@ ROWS = {
         ("nanoseconds", b",", Numbers(7, b","), b"\n"), lambda tx, ty, tz, x, y, z, w: (tx, ty, tz, w, x, y, z),
         head=",".join(FORMATS["euroc"].rows.columns[:8]).encode() + b"\n",
     ),
-    "kitti": RowForm((Numbers(12), b"\n"), rows_of_matrix, holds=()),
+    "kitti": RowForm((Numbers(12), b"\n"), rows_of_matrix),
     "colmap": RowForm(
         ("number", b" ", Numbers(7), b" 1 ", IMAGE, b"\n\n"), lambda tx, ty, tz, x, y, z, w: (w, x, y, z, tx, ty, tz),
         head=b"# Image list with two lines of data per image:\n"
         b"#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n#   POINTS2D[] as (X, Y, POINT3D_ID)\n",
-        first=1, holds=(), constants="every camera is number 1, without points",
+        first=1, constants="every camera is number 1, without points",
     ),
     "nerf": RowForm(
         (b'    {"file_path": "', IMAGE, b'", "transform_matrix": [[', Numbers(4, b", "), *_ROW, *_ROW,
          b"], [0.0, 0.0, 0.0, 1.0]]}"),
-        rows_of_matrix, head=b'{\n  "frames": [\n', between=b",\n", tail=b"\n  ]\n}\n", holds=(),
+        rows_of_matrix, head=b'{\n  "frames": [\n', between=b",\n", tail=b"\n  ]\n}\n",
     ),
-    "g2o": RowForm((b"VERTEX_SE3:QUAT ", "number", b" ", Numbers(7), b"\n"), holds=()),
+    "g2o": RowForm((b"VERTEX_SE3:QUAT ", "number", b" ", Numbers(7), b"\n")),
 }  # fmt: skip
-
-
-def rows_of(spec: str) -> RowForm | None:
-    """Return how all poses are written in a format; None if each result has a text of its own."""
-    found = getattr(import_module(FORMATS[spec].writer), "ROWS", None)
-    return found[spec] if isinstance(found, dict) else found
 
 
 # --- what is common to files of poses of one body ---
