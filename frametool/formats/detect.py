@@ -279,7 +279,7 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
         if what.startswith("not text but") and FORMATS[fmt].reader != BAG:
             raise _no_text(what, name)
         return fmt
-    if fmt := unsupported_by_suffix(name):
+    if fmt := by_suffix(name, (*UNSUPPORTED,), UNSUPPORTED):
         raise not_read(fmt, name)
     if what and not head.startswith(UTF16):
         raise _no_text(what, name)
@@ -509,14 +509,8 @@ UNSUPPORTED = {
 }
 
 
-def unsupported_by_suffix(path: str) -> str | None:
-    """Return the unsupported format with the suffix of a file, if any."""
-    suffix = os.path.splitext(path)[1].lower()
-    return next((name for name, row in UNSUPPORTED.items() if suffix in row.suffixes), None)
-
-
 def refuse_suffix(path: str) -> None:
     """Raise ValueInvalid for an output file whose suffix belongs to a format that was written before 0.2.0."""
-    name = unsupported_by_suffix(path)
+    name = by_suffix(path, (*UNSUPPORTED,), UNSUPPORTED)
     if name and UNSUPPORTED[name].was_written:
         raise ValueInvalid(f"{path}: {UNSUPPORTED[name]}")

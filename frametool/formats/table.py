@@ -443,10 +443,10 @@ def by_name(path: str | None, names: tuple[str, ...]) -> str | None:
     return by_whole or next((name for name in names if last.lower().endswith(f".{name}")), None)
 
 
-def by_suffix(path: str | None, names: tuple[str, ...]) -> str | None:
-    """Return which of several formats has the suffix of a file, if any."""
+def by_suffix(path: str | None, names: tuple[str, ...], table: dict[str, Any] = FORMATS) -> str | None:
+    """Return which of several formats of a table has the suffix of a file, if any."""
     suffix = os.path.splitext(path or "")[1].lower()
-    return next((name for name in names if suffix in FORMATS[name].suffixes), None)
+    return next((name for name in names if suffix in table[name].suffixes), None)
 
 
 def format_entry(name: str) -> dict[str, Any]:

@@ -30,7 +30,7 @@ import numpy as np
 
 from frametool.documents.source import InputFile, not_text
 from frametool.errors import FormatError, Misused, ValueInvalid, warn
-from frametool.formats.rows.pose_rows import IMAGE, NUMBER, ROWS, StampFile, describe
+from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, describe, rows_of
 from frametool.formats.table import FORMATS, Rows, is_recording, is_trajectory
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
@@ -75,7 +75,7 @@ def writer_for(style: Style, kind: str = POSE, extras: Sequence[str] = (), *, pl
         from frametool.stream.recording_writer import RecordingWriter
 
         return RecordingWriter(style, kind, extras, placed=placed)
-    text = TextWriter if style.format in ROWS else SingleWriter
+    text = TextWriter if rows_of(style.format) else SingleWriter
     return (RowsWriter if style.format in LEARNED else text)(style, kind, extras, placed=placed)
 
 

@@ -21,7 +21,7 @@ from frametool.documents.writers import quoted as quoted_in_yaml
 from frametool.errors import ValueInvalid, listing, warn
 from frametool.formats.rows import pose_rows
 from frametool.formats.rows.csv import cell, cells_of, quoted, row
-from frametool.formats.rows.pose_rows import IMAGE, MOST_NAMED, NUMBER, ROWS, image_name, is_turned, turned
+from frametool.formats.rows.pose_rows import IMAGE, MOST_NAMED, NUMBER, RowForm, image_name, is_turned, rows_of, turned
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import arrays, floats, quaternion, rigid
@@ -134,7 +134,7 @@ class TextWriter(SingleWriter):
         super().__init__(style, kind, extras, placed=placed)
         if any(each.spec != "quaternion" for each in style.notations):
             raise ValueInvalid(f"{style.format} writes rotations in its own way; leave --to out")
-        self.fixed = ROWS[style.format]
+        self.fixed = rows_of(style.format) or RowForm(())
         self.made_up: dict[str, None] = {}
         self.count = 0
 

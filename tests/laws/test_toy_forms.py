@@ -28,10 +28,11 @@ from importlib import import_module
 from frametool import FORMATS
 
 rows = import_module(FORMATS["tum"].writer)
-ROWS = rows.RowForm((rows.Numbers(7, b"|"), b"|", "seconds", b"\\n"), lambda x, y, z, *turn: (turn[3], *turn[:3], x, y, z))
+ROW = rows.RowForm((rows.Numbers(7, b"|"), b"|", "seconds", b"\\n"), lambda x, y, z, *turn: (turn[3], *turn[:3], x, y, z))
+ROWS = {"bars": ROW}
 
 def write_poses(results, style):
-    return rows.write_rows(ROWS, results, style)
+    return rows.write_rows(ROW, results, style)
 '''
 DOUBLES = '''
 """Doubles: a mark, then an array of numpy."""

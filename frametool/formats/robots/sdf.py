@@ -202,21 +202,15 @@ class SdfTree:
                     if holder.tag == "model":
                         scopes.append(frame)
                     for sensor in holder.all("sensor") if holder.tag == "link" else ():
-                        self.sensors.append(SdfFrame("sensor", self._name(sensor), frame, sensor))
+                        self.sensors.append(SdfFrame("sensor", sensor.required("name"), frame, sensor))
 
     def note(self, holder: Element, message: str) -> None:
         """Record a warning about an element."""
         self.options.tally.note_each(message, holder.line)
 
-    def _name(self, holder: Element) -> str:
-        name = holder.attribute("name")
-        if not name:
-            raise holder.error(f"<{holder.tag}> has no name")
-        return name
-
     def _named(self, holder: Element, scope: SdfFrame) -> SdfFrame:
         """Register one element under its name."""
-        frame = SdfFrame(holder.tag, self._name(holder), scope, holder)
+        frame = SdfFrame(holder.tag, holder.required("name"), scope, holder)
         if frame.local in (WORLD, INSIDE):
             raise holder.error(f"the name {shown(frame.local)} is reserved", "name")
         known = self.all.get(frame.name)

@@ -30,6 +30,7 @@ z backward.  Matrices of three rows occur (Nerfstudio), and `applied_transform`,
 from __future__ import annotations
 
 import re
+from importlib import import_module
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Any
 
@@ -133,6 +134,12 @@ ROWS = {
     ),
     "g2o": RowForm((b"VERTEX_SE3:QUAT ", "number", b" ", Numbers(7), b"\n")),
 }  # fmt: skip
+
+
+def rows_of(spec: str) -> RowForm | None:
+    """Return how all poses are written in a format; None if each result has a text of its own."""
+    known: dict[str, RowForm] = getattr(import_module(FORMATS[spec].writer), "ROWS", {})
+    return known.get(spec)
 
 
 # --- what is common to files of poses of one body ---
