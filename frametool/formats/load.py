@@ -51,8 +51,6 @@ if TYPE_CHECKING:
     from frametool.grammar.edges import Report
 
 
-OWN = ("yaml", "json")
-
 
 class FrameFile(InputFile):
     """A file of frames and its format."""
@@ -136,7 +134,7 @@ class FrameFile(InputFile):
             yield from found
         finally:
             self.close()
-        if self.format in OWN and re.search(r"""\bcamera["']?:""", self.text):
+        if "records" in FORMATS[self.format].reads and re.search(r"""\bcamera["']?:""", self.text):
             from frametool.formats.cameras import cameras_of
 
             self.cameras = {name: make() for name, make in cameras_of(self).items()}
@@ -214,7 +212,6 @@ class TreeBuilder:
         self.buffer: TransformBuffer | None = None
         self.first: dict[str, tuple[str, Rigid, EdgePlace]] = {}  # child -> its first definition
         self._replaced: list[tuple[str, str, EdgePlace]] = []  # samples that replaced another one at the same stamp
-        self._stamps: dict[str, int] = {}  # child -> its only stamp, while it has no other
         self._moves: set[str] = set()
         self._late: set[str] = set()  # children with a warning that their samples go back in time
         self.covariances: dict[str, Components] = {}  # child -> the covariance of its edge
@@ -268,7 +265,7 @@ class TreeBuilder:
         if track is not None and settled and (track.parent, track.components) == (parent, components):
             return
         self.first.setdefault(child, (parent, components, place))
-        if stamp_ns is not None and self._stamps.setdefault(child, stamp_ns) != stamp_ns:
+        if stamp_ns is not None and self.first[child][2].edge.stamp_ns != stamp_ns:
             self._moves.add(child)
         if buffer.insert_components(parent, child, components, stamp_ns) and stamp_ns is not None:
             self._replaced.append((parent, child, place))
@@ -294,7 +291,6 @@ class TreeBuilder:
             except BadTopology as error:
                 raise self._placed(error, parent, child, place) from None
             self.first.setdefault(child, (parent, components[0], place))
-            self._stamps.setdefault(child, stamps_ns[0])
             self._moves.add(child)
         if len(whole) == len(found):
             return

@@ -179,11 +179,8 @@ class PcdFile(CloudFile):
         if missing:
             raise self._problem("DATA", f"the header has no {', '.join(missing)}")
         self.fields = self._read_fields()
-        counts = {}
-        for key in [key for key in ("WIDTH", "HEIGHT", "POINTS") if key in self.words]:
-            if len(words := self.words[key]) != 1:
-                raise self._problem(key, f"{key} has {len(words)} values, expected 1")
-            counts[key] = count_in(words[0], f"{key} {shown(words[0])}", file, self.lines[key])
+        said = {key: " ".join(self.words[key]) for key in ("WIDTH", "HEIGHT", "POINTS") if key in self.words}
+        counts = {key: count_in(text, f"{key} {shown(text)}", file, self.lines[key]) for key, text in said.items()}
         if {"WIDTH", "HEIGHT"} <= counts.keys():
             points = counts["WIDTH"] * counts["HEIGHT"]
             if counts.setdefault("POINTS", points) != points:
@@ -226,10 +223,10 @@ class PcdFile(CloudFile):
                 raise self._problem("FIELDS", f"field {shown(name)} appears twice")
         for name, size, letter, values in zip(names, *others.values(), strict=True):
             of, kind = f" of field {shown(name)}", letter.upper()
-            if kind not in TYPES:
-                raise self._problem("TYPE", f"TYPE {shown(kind)}{of} is not known; known: F, I, U")
-            if size not in (known := [*map(str, TYPES[kind])]):
-                raise self._problem("SIZE", f"SIZE {shown(size)}{of}: TYPE {kind} has {', '.join(known)}")
+            if size not in map(str, TYPES.get(kind, ())):
+                known = "; ".join(f"{each} with {', '.join(map(str, sizes))}" for each, sizes in TYPES.items())
+                found = f"TYPE {shown(kind)} with SIZE {shown(size)}{of}"
+                raise self._problem("SIZE" if kind in TYPES else "TYPE", f"{found} is not known; known: {known}")
             count = count_in(values, f"COUNT {shown(values)}{of}", self.file, self.lines.get("COUNT", 0))
             fields.append(PcdField(name, int(size), kind, count))
         if sum(field.values for field in fields) > _WIDEST:
