@@ -13,17 +13,16 @@ quat_xyzw is added, which URDF 1.0 tools ignore.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
-from frametool.documents.source import InputFile, paused_collector
 from frametool.documents.xml import Element, read_xml
-from frametool.errors import BadTopology, FormatError, ValueInvalid, alternatives, bare, first_of, listing, shown
+from frametool.errors import FormatError, ValueInvalid, alternatives, bare, first_of, listing, shown
 from frametool.formats.detect import UNSUPPORTED
-from frametool.formats.load import FrameFile, refuse_unknown_joints
+from frametool.formats.load import FrameFile, load_sources
 from frametool.formats.robots.joints import JointState
 from frametool.formats.robots.model import Joint, Link, Mimic, Robot, Solid, read_quaternion, solids_of
 from frametool.formats.table import FORMATS
-from frametool.frames.topology import two_parents
 from frametool.geometry import euler, floats
 from frametool.geometry.quaternion import unit_vector
 from frametool.geometry.representations import notation
@@ -36,6 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
     from os import PathLike
 
+    from frametool.documents.source import InputFile
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
 
@@ -43,9 +43,11 @@ KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 _XACRO = f"xacro, not yet URDF; {UNSUPPORTED['xacro'].remedy}"
 
 
-def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the edges of a robot, with joint values from options, default 0."""
-    frames, links, posture = describe(file, options)
+def read(file: InputFile, options: Options, found: list[Any] | None = None) -> Iterator[Edge]:
+    """Yield the edges of a robot, with joint values from options, default 0; `found` receives its description."""
+    frames, links, posture = described = describe(file, options)
+    if found is not None:
+        found += described
     for frame in _roots(frames, links):
         yield Edge(None, frame, IDENTITY, line=frames[frame])
     yield from posture.edges(links)
@@ -64,10 +66,8 @@ def describe(file: InputFile, options: Options) -> tuple[dict[str, int], list[Li
     """
     root = read_xml(file, "robot", "URDF")
     for element in (root, *root.children, *(inner for outer in root.children for inner in outer.children)):
-        if element.tag.startswith("xacro:"):
-            raise element.error(f"<{bare(element.tag)}> is {_XACRO}")
-        for name, value in element.attributes.items():
-            if "${" in value or "$(" in value:
+        for name, value in {"": f"<{element.tag}>", **element.attributes}.items():
+            if "${" in value or "$(" in value or value.startswith("<xacro:"):
                 raise element.error(f"{shown(value)} is {_XACRO}", name)
     frames: dict[str, int] = {}
     joints: dict[str, tuple[Link, Element]] = {}
@@ -187,21 +187,11 @@ def robot_of(file: FrameFile) -> tuple[Robot, JointState]:
     if file.format != "urdf":
         file.close()
         raise file.error(f"expected a URDF robot, found {FORMATS[file.format].summary}")
-    options = Options(file.tally, file.topics, answers=file.answers)
-    try:
-        with paused_collector():
-            frames, described, posture = describe(file, options)
-    finally:
-        file.close()
-    refuse_unknown_joints([file])
-    links: dict[str, Link] = {}
-    for link in described:
-        if link.child in links:
-            error = two_parents(link.child, str(links[link.child].parent), str(link.parent))
-            raise BadTopology(error.message, source=file.name, line=link.line, rule=error.rule)
-        links[link.child] = link
-    file.tell()
-    return Robot(file.name, links, frames), posture
+    found: list[Any] = []
+    file.reader = partial(read, found=found)
+    load_sources([file])
+    frames, links, posture = found
+    return Robot(file.name, {link.child: link for link in links}, frames), posture
 
 
 _ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\t": "&#9;", "\n": "&#10;", "\r": "&#13;"}
