@@ -326,17 +326,17 @@ class Stream:
 
     def _columns(self, stream: Any, fmt: str, request: Request) -> Generator[Outcome]:
         """Write columns of numbers in the format they came in, or in another that holds such."""
-        from frametool.stream.column_stream import run_columns
+        from frametool.stream.column_stream import OtherColumns, run_columns
 
-        output, into = self.output, None
+        output = self.output
         if output.path is None and request.gathered is None and sys.stdout.isatty():
             raise click.UsageError(f"{fmt} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
         columns = open_columns(InputFile(self.path or "-", stream), fmt)
-        if output.chosen and request.gathered is None and FORMATS[output.chosen].writer != FORMATS[fmt].reader:
-            into = import_module(FORMATS[output.chosen].writer)
         style = output.style.changed(format=output.chosen or fmt)
         request = request.with_results(by_default=not output.notations)
-        return run_columns(columns, request, style, source=self.name, into=into)
+        if output.chosen and request.gathered is None and FORMATS[output.chosen].writer != FORMATS[fmt].reader:
+            return OtherColumns([(columns, request, self.name)], style).outcomes()
+        return run_columns(columns, request, style, source=self.name)
 
     def _run_pasted(self, source: Source, request: Request) -> int:
         """Write the results of a text that was pasted."""

@@ -9,7 +9,7 @@ from importlib import import_module
 from io import BytesIO
 from itertools import chain
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,12 +22,12 @@ from frametool.grammar.readers import NORMALS, in_nanoseconds
 from frametool.stream.array_writer import DOUBLE, ColumnsWriter
 from frametool.stream.faults import SKIP, STOP, Fault, Outcome, RowNote
 from frametool.stream.request import VELOCITIES, Operation, Request
-from frametool.stream.rows import Block, RowPoses, coded_texts, objects, taken
+from frametool.stream.rows import Block, RowPoses, coded_texts, is_typed, objects, taken
 from frametool.stream.table import PlannedRows, Table
 from frametool.stream.table_plan import Fixed, Kept, Named, New, quoted
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator, Sequence
+    from collections.abc import Generator, Sequence
 
     from frametool.formats.rows.column_file import Batch, ColumnWriter, Kind
     from frametool.geometry.types import Rigid
@@ -35,14 +35,6 @@ if TYPE_CHECKING:
     from frametool.recordings.messages import PointCloud
     from frametool.stream.evaluate import Run
     from frametool.text.spans import Flags, Floats, Ints
-
-
-class RowResults(NamedTuple):
-    """What became of a batch: the rows (n,) that are written, and their numbers (n, k), nan if absent."""
-
-    run: Run
-    rows: Ints
-    numbers: Floats
 
 
 class ColumnRows(PlannedRows):
@@ -109,7 +101,7 @@ class ColumnRows(PlannedRows):
             raise Misused(f"{whole}; --keep puts it beside, -f csv writes text", source=self.source)
         return kind
 
-    def of_batch(self, batch: Batch) -> RowResults:
+    def of_batch(self, batch: Batch) -> tuple[Run, Ints, Floats]:
         """Return the results of a batch, and leave what is wrong with other rows in `faults`."""
         values, absent, bad = self._read(batch)
         every = self.request.operation.formula is not None or self.request.gathered is not None
@@ -137,7 +129,7 @@ class ColumnRows(PlannedRows):
         if self.request.on_error == STOP and run.reasons:
             stay = rows < min(run.reasons)
             rows, numbers = rows[stay], numbers[stay]
-        return RowResults(run, rows, numbers)
+        return run, rows, numbers
 
     def outcome(self, batch: Batch, text: bytes = b"") -> Outcome:
         """Return what is written of the last batch, and what is said of it."""
@@ -195,8 +187,8 @@ class ColumnRows(PlannedRows):
 
     def in_other_format(self, columns: Sequence[OutColumn], batch: Batch) -> tuple[int, dict[str, Made]]:
         """Return how many results a batch has, and their columns by name, for a file of another format."""
-        results = self.of_batch(batch)
-        new, found = iter(made_of(columns, self, results)), {}
+        run, rows, numbers = self.of_batch(batch)
+        new, found = iter(self.made(columns, run, rows, numbers)), {}
         for column in columns:
             place = column.passed
             if place is None:
@@ -204,54 +196,68 @@ class ColumnRows(PlannedRows):
                 made = made if isinstance(made.values, np.ndarray) else Made(objects(made.values))
             elif column.kind is not None and column.kind.kind in FLOATS:
                 values, nulls = batch.numbers(place)
-                made = Made(values.astype(column.kind)[results.rows], None if nulls is None else nulls[results.rows])
+                made = Made(values.astype(column.kind)[rows], None if nulls is None else nulls[rows])
             else:
-                made = Made(taken(batch.column(place), results.rows))
+                made = Made(taken(batch.column(place), rows))
             found[column.name] = made
-        return len(results.numbers), found
+        return len(numbers), found
+
+    def made(self, columns: Sequence[OutColumn], run: Run, rows: Ints, numbers: Floats) -> list[Made]:
+        """Return what is in the columns that are made, in their order."""
+        made = []
+        for column, target in zip(columns, self.layout.columns, strict=True):
+            if isinstance(target, New) and target.words:
+                codes = np.nan_to_num(numbers[:, target.number]).tolist()
+                made.append(Made([target.words[int(code)] for code in codes]))
+            elif isinstance(target, New):
+                with np.errstate(invalid="ignore"):
+                    values = numbers[:, target.number].astype(column.kind or DOUBLE)
+                made.append(Made(values, not_finite(values)))
+            elif isinstance(target, Named):
+                texts = [text or "" for text in run.block.names.texts(target.role, rows)]
+                made.append(Made(texts * (len(rows) if len(texts) == 1 else 1)))
+            elif isinstance(target, Fixed):
+                made.append(Made([target.word] * len(numbers)))
+        return made
 
 
-def run_columns(
-    file: ColumnFile, request: Request, style: Style, *, source: str, into: Any = None
-) -> Generator[Outcome]:
-    """Yield what becomes of a file's batches in a file of the same format, or in that of a module, `into`."""
+def run_columns(file: ColumnFile, request: Request, style: Style, *, source: str) -> Generator[Outcome]:
+    """Yield what becomes of a file's batches in a file of the same format."""
     rows = ColumnRows(file, request, source)
-    columns = rows.out_columns(named=into is not None)
+    columns = rows.out_columns()
     move_along(file, request)
-    if not request.gathered:
-        _say_rounded([rows], f"{source}: ")
     writer: ColumnWriter | None = None
-    other = None if into is None else ColumnsWriter(style, into)
-    if other is not None:  # it has its columns even where there are no rows
-        other.of_columns(*rows.in_other_format(columns, file.nothing()))
-    elif not request.gathered:
+    if not request.gathered:
+        _say_rounded([rows])
         drops = request.on_error == SKIP or request.operation.of == VELOCITIES
         writer = file.rewriter(columns, None if drops else file.count, style)
     for batch in file.batches():
         text: Any = b""
-        if other is not None:
-            text = other.of_columns(*rows.in_other_format(columns, batch))
-        else:
-            results = rows.of_batch(batch)
-            if writer is not None:
-                chosen = None if len(results.rows) == batch.size else results.rows
-                text = writer.of_rows(batch, chosen, made_of(columns, rows, results))
+        run, chosen, numbers = rows.of_batch(batch)
+        if writer is not None:
+            made = rows.made(columns, run, chosen, numbers)
+            text = writer.of_rows(batch, None if len(chosen) == batch.size else chosen, made)
         yield rows.outcome(batch, text)
-    if (last := other or writer) is not None:
-        yield from map(Outcome, last.end())
+    if writer is not None:
+        yield from map(Outcome, writer.end())
 
 
-class MergedClouds:
-    """Several files of columns, each moved by its own pose, as one file of a format: the columns that all of them have.
+class OtherColumns:
+    """Files of columns, each moved by its own pose, as one file of a format: the columns that all of them have.
 
     Numbers of one column get the type that holds those of all files.
     """
 
-    def __init__(self, files: Sequence[tuple[ColumnFile, Request, str]], style: Style) -> None:
-        """Plan the rows of files, each with what is done with it and its name; raises as `run_columns`."""
+    def __init__(
+        self, files: Sequence[tuple[ColumnFile, Request, str]], style: Style, module: Any = None
+    ) -> None:  # fmt: skip
+        """Plan the rows of files, each with what is done with it and its name; raises as `ColumnRows`.
+
+        module: as for `ColumnsWriter`
+        """
         self.parts = [(file, ColumnRows(file, request, source)) for file, request, source in files]
         every = [{column.name: column for column in rows.out_columns(named=True)} for _, rows in self.parts]
-        self.writer = ColumnsWriter(style)
+        self.writer = ColumnsWriter(style, module)
         self.kinds: dict[str, Kind | None] = {}
         for name in every[0]:
             if all(name in columns for columns in every):
@@ -264,21 +270,23 @@ class MergedClouds:
         for file, request, _ in files:
             move_along(file, request)
 
-    def outcomes(self, at: int) -> Iterator[Outcome]:
-        """Yield what becomes of the batches of one file."""
+    def outcomes(self, at: int = 0) -> Generator[Outcome]:
+        """Yield what becomes of the batches of one file, and of the last one what comes behind them."""
         file, rows = self.parts[at]
         columns = rows.out_columns(named=True)
         for batch in chain([file.nothing()], file.batches()):  # which names the columns even where there are no rows
             size, made = rows.in_other_format(columns, batch)
-            typed = {
-                name: made[name] if kind is None else made[name]._replace(values=made[name].values.astype(kind))
-                for name, kind in self.kinds.items()
-            }
-            yield rows.outcome(batch, self.writer.of_columns(size, typed))
+            for name, kind in self.kinds.items():
+                if kind is not None and is_typed(values := made[name].values):  # whole numbers with gaps are objects
+                    made[name] = made[name]._replace(values=values.astype(kind, copy=False))
+            yield rows.outcome(batch, self.writer.of_columns(size, {name: made[name] for name in self.kinds}))
+        if rows is self.parts[-1][1]:
+            yield from map(Outcome, self.writer.end())
 
 
-def _say_rounded(every: Sequence[ColumnRows], begin: str = "") -> None:
+def _say_rounded(every: Sequence[ColumnRows]) -> None:
     """Warn of columns of fewer digits than results are computed with."""
+    begin = f"{every[0].source}: " if len(every) == 1 else ""
     if kinds := sorted({kind.name for rows in every for kind in rows.narrow.values()}):
         warn(f"{begin}{', '.join(kinds)} columns are computed as float64 and rounded once")
 
@@ -291,42 +299,14 @@ def move_along(file: ColumnFile, request: Request) -> None:
         file.moved_by(None if by_row else operation.left)
 
 
-def made_of(columns: Sequence[OutColumn], rows: ColumnRows, results: RowResults) -> list[Made]:
-    """Return what is in the columns that are made, in their order."""
-    made = []
-    for column, target in zip(columns, rows.layout.columns, strict=True):
-        if isinstance(target, New) and target.words:
-            codes = np.nan_to_num(results.numbers[:, target.number]).tolist()
-            made.append(Made([target.words[int(code)] for code in codes]))
-        elif isinstance(target, New):
-            with np.errstate(invalid="ignore"):
-                values = results.numbers[:, target.number].astype(column.kind or DOUBLE)
-            made.append(Made(values, not_finite(values)))
-        elif isinstance(target, Named):
-            texts = [text or "" for text in results.run.block.names.texts(target.role, results.rows)]
-            made.append(Made(texts * (len(results.rows) if len(texts) == 1 else 1)))
-        elif isinstance(target, Fixed):
-            made.append(Made([target.word] * len(results.numbers)))
-    return made
-
-
-class MessageColumns(RecordFile):
-    """The points of a message as a file of columns."""
-
-    vectors = NORMALS
-
-    def rewriter(self, columns: Sequence[OutColumn], count: int | None, style: Style) -> ColumnWriter:
-        """Refuse: messages are written in other formats."""
-        raise NotImplementedError
-
-
-def moved_cloud(cloud: PointCloud, pose: Rigid, style: Style, source: str) -> Iterator[Outcome]:
-    """Yield what a cloud becomes when a pose moves it, in the format of a style."""
+def moved_cloud(cloud: PointCloud, pose: Rigid, style: Style, source: str) -> Generator[Outcome]:
+    """Return what a cloud becomes when a pose moves it, in the format of a style."""
     module: Any = import_module(FORMATS[style.format].writer)
     kept = {"grid": (cloud.width, cloud.height), "sensor": pose} if module is pcd else {}  # it has room for them
     create = lambda columns, _count, style: module.create(columns, len(cloud.rows), style, **kept)  # noqa: E731
     into = SimpleNamespace(**{**vars(module), "create": create})
     request = Request(Operation(left=pose, moves=True))
     stored = InputFile(source, BytesIO(cloud.rows.tobytes()))
-    file = MessageColumns(stored, cloud.names, cloud.rows.dtype, len(cloud.rows))
-    yield from run_columns(file, request, style, source=source, into=into)
+    file = RecordFile(stored, cloud.names, cloud.rows.dtype, len(cloud.rows))  # type: ignore[abstract]
+    file.vectors = NORMALS
+    return OtherColumns([(file, request, source)], style, into).outcomes()

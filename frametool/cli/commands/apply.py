@@ -136,7 +136,7 @@ class SeveralClouds:
     def run(self, way: Way) -> int:
         """Move all and write them as one; return the exit status."""
         from frametool.formats.detect import detect
-        from frametool.stream.column_stream import MergedClouds
+        from frametool.stream.column_stream import OtherColumns
 
         count, frames, output, on_error = len(self.paths), self.frames, self.task.output, self.task.inputs.on_error
         is_open = way.has_source == bool(frames) or len(frames) not in (0, count)
@@ -152,14 +152,12 @@ class SeveralClouds:
                     raise FormatError(f"{FORMATS[fmt].summary}, no cloud; {hint}", source=path)
                 operation = Operation(left=way.from_frame(frame or None, None), moves=True)
                 planned.append((streaming.open_columns(file, fmt), Request(operation, on_error=on_error), path))
-            merged = MergedClouds(planned, output.style)
+            merged = OtherColumns(planned, output.style)
             status = 0
             with writing(output.path, force=output.force) as write:
                 for at, path in enumerate(self.paths):
                     policy = self.task.policy(path, "row")
                     status = max(status, run(merged.outcomes(at), write, policy, lambda _rows, _size: None))
-                for piece in merged.writer.end():
-                    write(piece)
         froms = f", from {', '.join(frames)}" if frames else ""
         self.task.inputs.note(f"{count} clouds{way.into} as one{froms}; metres")
         return status
