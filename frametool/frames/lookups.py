@@ -10,6 +10,7 @@ from contextlib import suppress
 from functools import partial, reduce
 from itertools import chain, repeat
 from math import ceil, floor
+from operator import methodcaller
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -210,24 +211,20 @@ class Frames:
         from frametool.geometry.uncertainty import warn_if_wide
 
         at_ns = self.latest(target, source) if at_ns is None else at_ns
+        self.lookup_components(target, source, at_ns)  # raises if there are no data
         found = self.carried(target, source, at_ns)
         edges = (self.covariances.get(track.child, ()) for track in self.way(target, source, at_ns))
         warn_if_wide([found, *edges])
         return [*found]
 
-    def carried(self, target: str, source: str, at_ns: int | None) -> Components:
-        """Return `covariance` at a time (None if nothing moves), without a warning about large rotations."""
-        self.lookup_components(target, source, at_ns)  # raises if there are no data
-        time_ns = whole_stamp(at_ns or 0)
-        return self.covariance_along(target, source, at_ns, lambda track: track.at(time_ns))
-
-    def covariance_along(
-        self, target: str, source: str, at_ns: int | None, sample: Callable[[Track], Rigid | None]
+    def carried(
+        self, target: str, source: str, at_ns: int | None, sample: Callable[[Track], Rigid | None] | None = None
     ) -> Components:
-        """Return the entries of `covariance` for the poses that `sample` finds, floats or columns; zeros for no edge.
+        """Return the entries of `covariance` at a time (None if nothing moves) that has data; zeros for no edge.
 
-        at_ns: a time at which this path is valid
+        sample: finds the poses of the edges, floats or columns, instead of those at that time
         """
+        sample = sample or methodcaller("at", whole_stamp(at_ns or 0))
         path = self.between(target, source, at_ns)
         if path.edges and self.covariances.keys().isdisjoint(path.edges):
             raise ValueInvalid(f"no edge between {bare(target)} and {bare(source)} has a sigma or a covariance")

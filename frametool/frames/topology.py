@@ -165,10 +165,17 @@ def static_and_moving(child: str, details: str = " is both static and moving") -
 
 
 def cycle(frames: list[str]) -> BadTopology:
-    """Return the error for a cycle, parents to the left: `a <- b <- a`; shortened in the middle if it is long."""
-    if len(frames) > MOST_SHOWN + 1:
-        frames = [*frames[: MOST_SHOWN // 2], f"({len(frames) - MOST_SHOWN} more)", *frames[-MOST_SHOWN // 2 :]]
-    return BadTopology(f"frames form a cycle: {' <- '.join(map(bare, reversed(frames)))}", rule="cycle")
+    """Return the error for a cycle, parents to the left: `a <- b <- a`."""
+    return BadTopology(f"frames form a cycle: {_arrows(frames[::-1])}", rule="cycle")
+
+
+def _arrows(frames: Sequence[str]) -> str:
+    """Return frames with arrows between them, shortened in the middle if they are many."""
+    names = list(map(bare, frames))
+    half = MOST_SHOWN // 2
+    if len(names) > MOST_SHOWN + 1:
+        names[half:-half] = [f"({len(names) - MOST_SHOWN} more)"]
+    return " <- ".join(names)
 
 
 class Snapshot:
@@ -333,12 +340,9 @@ def no_data(target: str, source: str, at_ns: int, path: Sequence[str], edges: Se
         when = f"ends at {format_stamp(end)} before {begun} begins at {format_stamp(begin)}"
         whole = f"; {ended} {when}: they never overlap"
     clocks = "; that is years: one of the clocks counts from 1970, the other does not" if short >= OTHER_CLOCK else ""
-    frames = list(map(bare, path))
-    if len(frames) > 13:
-        frames = [*frames[:6], f"({len(frames) - 12} more)", *frames[-6:]]
     message = (
         f"no data for {bare(parent)} -> {bare(worst.child)} at {format_stamp(at_ns)}; {cover} ({off}), "
-        f"on the path {' <- '.join(frames)}{whole}{clocks}"
+        f"on the path {_arrows(path)}{whole}{clocks}"
     )
     return (TooEarly if is_early else TooLate)(
         message, parent=parent, child=worst.child, at_ns=at_ns, first_ns=first, last_ns=last, short_ns=short,

@@ -13,7 +13,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid, shown
 from frametool.geometry import arrays, quaternion, rigid
-from frametool.geometry.transform import Rotation, Transform
+from frametool.geometry.transform import Rotation, Transform, in_notebook
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -46,9 +46,7 @@ class Trajectory(NamedTuple):
 
     def _repr_html_(self) -> str | None:
         """Show it in a notebook as a terminal does."""
-        import frametool
-
-        return frametool.html_of(self)
+        return in_notebook(self)
 
     @property
     def size(self) -> int:
@@ -188,7 +186,7 @@ def carried_many(frames: Frames, target: str, source: str, at_ns: Any, poses: Ri
     for rows in np.split(order, np.searchsorted(times[order], frames.changes())):
         for start, stop in arrays.blocks(rows.size):
             at = times[rows[start:stop]]
-            entries = frames.covariance_along(target, source, int(at[0]), methodcaller("at_many", at))
+            entries = frames.carried(target, source, int(at[0]), methodcaller("at_many", at))
             for column, entry in enumerate(entries):
                 found[rows[start:stop], column] = entry
     return found

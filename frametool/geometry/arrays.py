@@ -139,7 +139,7 @@ def doubled_arctan(tangent: Array) -> Array:
     """Return 2 atan(t), |t| <= 1, at most 1 eps off; exactly pi/2 for t = 1."""
     squared = tangent * tangent
     rest = floats.polynomial(squared, floats.ARC_ABOVE)
-    rest /= floats.monic_polynomial(squared, floats.ARC_BELOW)
+    rest /= floats.polynomial(squared, floats.ARC_BELOW)
     rest *= squared
     rest *= tangent
     rest = tangent - rest
@@ -253,16 +253,12 @@ def blocks(size: int) -> Iterator[tuple[int, int]]:
         yield start, min(start + BLOCK, size)
 
 
-def require_fitting(out: object, shape: tuple[int, ...]) -> None:
+def require_fitting(out: Any, shape: tuple[int, ...]) -> None:
     """Raise ValueInvalid unless `out` is a writable numpy array of float64 of this shape."""
-    if not isinstance(out, np.ndarray):
-        found = f"a {type(out).__name__}"
-    elif out.dtype != np.float64:
-        found = f"one of {out.dtype}"
-    elif out.shape != shape:
-        found = f"shape {out.shape}"
-    elif not out.flags.writeable:
-        found = "a read-only one"
-    else:
+    is_array = isinstance(out, np.ndarray)
+    if is_array and out.dtype == np.float64 and out.shape == shape and out.flags.writeable:
         return
+    found = f"a {type(out).__name__}"
+    if is_array:
+        found = f"{out.dtype} of shape {out.shape}" + ", read-only" * (not out.flags.writeable)
     raise ValueInvalid(f"out: expected a writable float64 array of shape {shape}, got {found}")

@@ -29,13 +29,14 @@ SINE = (
     -0.16666666666666666, 0.008333333333330948, -0.0001984126983675857,
     2.755731610255057e-06, -2.5051131844614108e-08, 1.5918129266803394e-10,
 )  # fmt: skip
-# (1 - atan(t)/t)/t^2 as a quotient in t^2, 0 <= t <= 1, the divisor monic, so that one product is saved: relative
-# error of the angle 2^-55
+# (1 - atan(t)/t)/t^2 as a quotient in t^2, 0 <= t <= 1, the divisor monic, which saves floats a product:
+# relative error of the angle 2^-55
 ARC_ABOVE = (
     404.44958201411697, 905.3726290655958, 709.2810809323058, 230.9790943899718, 28.6344514670043, 0.9024525862982413,
 )  # fmt: skip
 ARC_BELOW = (
     1213.3487460423516, 3444.127134821938, 3674.312918256491, 1825.9201295139483, 423.8789826719409, 39.96465648522898,
+    1.0,
 )  # fmt: skip
 # pi/2 in two parts, the first of 33 bits (fdlibm): its products with whole numbers below 2^20 are exact
 QUARTER_TURN, QUARTER_TURN_REST = 1.57079632673412561417, 6.07710050650619224932e-11
@@ -122,19 +123,8 @@ def bearing(y: N, x: N, radius: N, xp: Functions[N]) -> N:
 
 def polynomial(x: N, coefficients: Sequence[float]) -> N:
     """Evaluate a polynomial by Horner's rule, arrays in a new array; lowest coefficient first."""
-    return horner(x * coefficients[-1], x, coefficients[:-1])
-
-
-def monic_polynomial(x: N, coefficients: tuple[float, ...]) -> N:
-    """Evaluate a polynomial whose highest coefficient is 1 and is not passed."""
-    value = x + coefficients[-1]
-    value *= x
-    return horner(value, x, coefficients[:-1])
-
-
-def horner(value: N, x: N, coefficients: Sequence[float]) -> N:
-    """Add the lower coefficients to the highest term, one power of x after another, in place."""
-    for coefficient in coefficients[:0:-1]:
+    value = x * coefficients[-1]
+    for coefficient in coefficients[-2:0:-1]:
         value += coefficient
         value *= x
     value += coefficients[0]
@@ -153,7 +143,7 @@ def reduced_exactly(x: float) -> tuple[float, float]:
 
 S1, S2, S3, S4, S5, S6 = SINE
 A1, A2, A3, A4, A5, A6 = ARC_ABOVE
-B1, B2, B3, B4, B5, B6 = ARC_BELOW
+B1, B2, B3, B4, B5, B6, _ = ARC_BELOW
 maximum, minimum = max, min
 some = mask = bool
 least = float

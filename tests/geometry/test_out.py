@@ -117,12 +117,13 @@ def test_out_must_fit(way: str) -> None:
     fixed = np.zeros(shape)
     fixed.flags.writeable = False
     wanted = f"out: expected a writable float64 array of shape {shape}, got "
+    readonly = f"float64 of shape {shape}, read-only"
     for out, found in (
-        (np.zeros(shape, np.float32), "one of float32"), (np.zeros(shape, int), "one of int64"),
-        (np.zeros(shape, ">f8"), "one of >f8"), (np.zeros(shape, object), "one of object"),
-        (np.zeros((*shape, 1)), f"shape {(*shape, 1)}"), (np.zeros(shape[1:]), f"shape {shape[1:]}"),
-        (np.zeros((13, *shape[1:])), f"shape {(13, *shape[1:])}"), (fixed, "a read-only one"),
-        ([[0.0] * 4] * 12, "a list"), (1.0, "a float"), (np.broadcast_to(0.0, shape), "a read-only one"),
+        (np.zeros(shape, np.float32), f"float32 of shape {shape}"), (np.zeros(shape, int), f"int64 of shape {shape}"),
+        (np.zeros(shape, ">f8"), f">f8 of shape {shape}"), (np.zeros(shape, object), f"object of shape {shape}"),
+        (np.zeros((*shape, 1)), f"float64 of shape {(*shape, 1)}"), (np.zeros(shape[1:]), f"float64 of shape {shape[1:]}"),
+        (np.zeros((13, *shape[1:])), f"float64 of shape {(13, *shape[1:])}"), (fixed, readonly),
+        ([[0.0] * 4] * 12, "a list"), (1.0, "a float"), (np.broadcast_to(0.0, shape), readonly),
     ):  # fmt: skip
         with pytest.raises(FrametoolError) as caught:
             act(*vectors, out=out)
