@@ -73,12 +73,17 @@ def with_covariances(
             record = record._replace(begins=(*record.begins, paths[0]))
             continue
         within(below, covariance.check, numbers)
-        record = record._replace(
-            shape=record.shape._replace(covariance=(*record.shape.covariance, len(numbers))),
-            numbers=record.numbers + paths, values=(*record.values, *numbers), begins=(*record.begins, paths[0]),
-            keys=record.keys._replace(covariances=(*record.keys.covariances, key)),
-        )  # fmt: skip
+        record = _with_numbers(record._replace(begins=(*record.begins, paths[0])), key, paths, numbers)
     return record
+
+
+def _with_numbers(record: Record, key: str, paths: Sequence[Path | None], numbers: Sequence[float]) -> Record:
+    """Add numbers that come last: a covariance, or a scale."""
+    return record._replace(
+        shape=record.shape._replace(covariance=(*record.shape.covariance, len(numbers))),
+        numbers=(*record.numbers, *paths), values=(*record.values, *numbers),
+        keys=record.keys._replace(covariances=(*record.keys.covariances, key)),
+    )  # fmt: skip
 
 
 def _entries(value: Any, sizes: Sequence[int]) -> list[tuple[Path, float]]:
@@ -122,11 +127,9 @@ def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Readi
     if size < len(entries) and any(entries[18:]):
         raise Misfit("a point does not turn; its sigma has xyz alone", (*path, covariance.SIGMA))
     entries = entries if size == len(entries) else covariance.of_position(entries)
-    return record._replace(
-        shape=record.shape._replace(covariance=(size,), rewritten=True), numbers=(*record.numbers, *[None] * size),
-        values=(*record.values, *entries),
-        keys=record.keys._replace(others=(*record.keys.others, *(flat or (covariance.SIGMA,)))),
-    )  # fmt: skip
+    keys = record.keys._replace(others=(*record.keys.others, *(flat or (covariance.SIGMA,))))
+    record = record._replace(shape=record.shape._replace(rewritten=True), keys=keys)
+    return _with_numbers(record, covariance.SIGMA, [None] * size, entries)
 
 
 def with_scale(record: Record, value: Any, around: Path, request: Request) -> Record:
@@ -137,11 +140,7 @@ def with_scale(record: Record, value: Any, around: Path, request: Request) -> Re
     scale = within(around, covariance.read_scale, value)
     if record.shape.covariance and request.operation.of != "arguments":
         raise NotARotation(NOT_BOTH, (*around, SCALE), key=True)
-    return record._replace(
-        shape=record.shape._replace(covariance=(*record.shape.covariance, 1)),
-        numbers=(*record.numbers, (*around, SCALE)),
-        values=(*record.values, scale), keys=record.keys._replace(covariances=(*record.keys.covariances, SCALE)),
-    )  # fmt: skip
+    return _with_numbers(record, SCALE, [(*around, SCALE)], [scale])
 
 
 def covariance_columns(

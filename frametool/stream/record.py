@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.grammar.readers import Path
-    from frametool.stream.header import Columns, PoseColumns
+    from frametool.stream.header import PoseColumns
     from frametool.stream.request import Request
 
     Holder = tuple[Path, str, str]  # of the numbers of a record; of a message its field, and the kind of that
@@ -446,7 +446,7 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     if flat and flat.position and flat.position.kind:
         if not request.operation.moves:
             raise Misfit(f"a {flat.position.kind} cannot be taken for a pose; apply moves it")
-        return _with_members(Record(path, Shape(flat.position.kind, None)), value, flat.position)
+        return _with_flat(Record(path, Shape(flat.position.kind, None)), value, flat, reading, request)
     turned, there = rotations or (flat and flat.rotation), positions or (flat and flat.position)
     # the grammar of poses allows that several say the same thing twice
     if len(positions) > 1 and not (turned and POSITION_KEYS.keys() >= {*positions}):
@@ -467,12 +467,10 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     record = Record(path, Shape(key if stays else _kind(key, turns, request), None), keys=RecordKeys(key))
     if positions:
         record = _with_position(record, value[key], POINT_KEYS[key], partial="header" not in value)
-    elif flat and flat.position:
-        record = _with_members(record, value, flat.position)
     reading.degrees = read_angle_unit(value["angles"]) if "angles" in value else rows.degrees
-    if flat and flat.rotation:
-        record = _with_flat_rotation(record, value, flat, flat.rotation, reading, request)
-    elif rotations:
+    if flat:
+        record = _with_flat(record, value, flat, reading, request)
+    if rotations:
         record = _with_rotation(value[rotations[0]], rotations[0], record, (rotations[0],), reading, request)
     if len(rotations) > 1 or len(positions) > 1:
         keys = (*rotations, *(positions if len(positions) > 1 else ()))
@@ -609,23 +607,25 @@ def _flat_pose(value: dict[str, Any], rotations: list[str]) -> PoseColumns | Non
     return found if found.position or found.rotation else None
 
 
-def _with_members(record: Record, value: dict[str, Any], columns: Columns) -> Record:
-    """Add a position whose numbers are members of the record itself."""
-    values = tuple(_number(value, name, None, metres=columns.unit == 1.0) for name in columns.names)
-    paths = tuple((*record.path, name) for name in columns.names)
-    shape = record.shape._replace(unit=columns.unit, absent=columns.absent)
-    return record._replace(shape=shape, numbers=paths, values=values, keys=RecordKeys(members=columns.names))
-
-
-def _with_flat_rotation(
-    record: Record, value: dict[str, Any], flat: PoseColumns, rotation: Columns, reading: Reading, request: Request
+def _with_flat(
+    record: Record, value: dict[str, Any], flat: PoseColumns, reading: Reading, request: Request
 ) -> Record:
-    """Add a rotation whose numbers are members of the record itself."""
+    """Add the numbers that are members of the record itself: those of a position, unless it has one, and a rotation."""
     from frametool.stream.header import Columns, row_shape
 
-    names = rotation.names
+    position, rotation = flat
     if record.keys.position:
         flat = flat._replace(position=Columns((), (), unit=record.shape.unit))
+    elif position is not None:
+        record = record._replace(
+            shape=record.shape._replace(unit=position.unit, absent=position.absent),
+            numbers=tuple((*record.path, name) for name in position.names),
+            values=tuple(_number(value, name, None, metres=position.unit == 1.0) for name in position.names),
+            keys=RecordKeys(members=position.names),
+        )
+    if rotation is None:
+        return record
+    names = rotation.names
     shape = row_shape(flat, request.with_rows(degrees=reading.degrees, kind=POSE))
     paths, values = ((), ()) if shape.whole else (record.numbers, record.values)
     numbers = [_number(value, name, shape.in_degrees(at)) for at, name in enumerate(names, len(values))]

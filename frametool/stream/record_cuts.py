@@ -22,10 +22,10 @@ from frametool.stream.evaluate import Plan
 from frametool.stream.faults import NULL, SKIP, Fault
 from frametool.stream.record import KEYS_REMEDY, POINT_KEYS
 from frametool.stream.row_layout import POSE, Const, In, Renamed
-from frametool.stream.rows import Block, read_extra
+from frametool.stream.rows import Block, chosen, numbered, read_extra, spans_of
 from frametool.stream.splice import OURS, column_in, quoted_name, stretches_of
 from frametool.stream.splitter import DOCUMENTS, LINES, Part, Splitter
-from frametool.text.spans import MARGIN, Bytes, Ints, Spans, framed, without_quotes
+from frametool.text.spans import MARGIN, Bytes, Ints, Spans, without_quotes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -449,14 +449,11 @@ def block_of(cut: Cut, data: Bytes, text: bytes, request: Request) -> Block:
     frames = [[parent for parent, _ in each] for each in named]
     renamed = (piece for piece in template.pieces if isinstance(piece, Renamed))
     parts += [_as_renamed(template, piece, named, rows) for piece in renamed]
+    # those that are not written as plain numbers are the template's own
+    numbers: Any = np.tile([value for record, *_ in template.entries for value in record.values], (rows, 1))
     if template.regular:
         columns = list(template.numbers)
         numbers = Spans(data, np.ascontiguousarray(starts[:, columns]), np.ascontiguousarray(ends[:, columns]))
-    else:  # those that are not written as plain numbers are the template's own
-        texts = [repr(value).encode() for record, *_ in template.entries for value in record.values]
-        lengths = np.array([len(each) for each in texts], np.int64)
-        first = np.cumsum(lengths + 1) - lengths - 1 + MARGIN
-        numbers = Spans(framed(b" ".join(texts)), np.tile(first, (rows, 1)), np.tile(first + lengths, (rows, 1)))
     places = cut.starts[:, -1]
     return Block(numbers, parts, places, line_of, stamps=stamps, bad=bad, place_of=place_of, frames=frames)
 
@@ -487,14 +484,10 @@ def names_of(cut: Cut, at: int, text: bytes) -> list[Names]:
 def _as_renamed(template: Template, piece: Renamed, frames: Sequence[Sequence[Names]], rows: int) -> Spans:
     """Return the names of frames as results have them."""
     at, role, node = template.renamed[piece.at]
-    texts = {}
-    for each in {*frames[at]}:
-        named = template.named(at, each) or (None, None)
-        texts[each] = quoted_name(node, named[role] or "", json=template.json).encode()
-    stops = dict(zip(texts, accumulate(map(len, texts.values())), strict=True))
-    ends = np.array([stops[each] for each in frames[at]], np.int64) + MARGIN
-    starts = ends - np.array([len(texts[each]) for each in frames[at]], np.int64)
-    return Spans(framed(b"".join(texts.values())), np.resize(starts, rows), np.resize(ends, rows))
+    known, codes = numbered(frames[at])
+    named = [(template.named(at, each) or (None, None))[role] or "" for each in known]
+    texts = [quoted_name(node, name, json=template.json).encode() for name in named]
+    return chosen(spans_of(texts), np.resize(codes, rows))
 
 
 def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:

@@ -368,13 +368,23 @@ def unit_of(record: Record, document: Any) -> Path:
 
 
 def values_of_unit(node: Node, unit: Path, answers: list[Answer], request: Request, style: Style) -> Iterator[Value]:
-    """Yield what one document or item becomes: a pose, or a mapping, for each record in it."""
-    # several things at one place are one message, as an Imu
-    if request.operation.moves and len({each.entry.record.path for each in answers}) < len(answers):
-        yield _of_several(node, unit, answers, request)
+    """Yield what one document or item becomes: a pose, or a mapping, for each record in it.
+
+    Several things at one place are one message, as an Imu: a mapping without levels, a key for each of their numbers.
+    """
+    if not request.operation.moves or len({each.entry.record.path for each in answers}) == len(answers):
+        yield from (_result(node, unit, each, request, style.format) for each in answers)
         return
+    last = answers[-1].entry  # of the first, an orientation, nothing may be known: then it stays
+    found = {"frame": last.parent} | _header_stamp(last.record) | _rest(node, unit, last.record)
     for each in answers:
-        yield _result(node, unit, each, request, style.format)
+        record, numbers = each.entry.record, written(each)[: each.entry.target.size]
+        field = record.keys.position or record.keys.rotation
+        if numbers:
+            found.pop(field, None)
+        found |= {f"{field}_{axis}": number for axis, number in zip("xyzw", numbers, strict=False)}
+        found |= _extras(each, request)
+    yield found
 
 
 def _header_stamp(record: Record) -> dict[str, int]:
@@ -491,20 +501,6 @@ def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
             if not is_used and key not in rest:
                 rest[key] = plain(value)
     return rest
-
-
-def _of_several(node: Node, unit: Path, answers: list[Answer], request: Request) -> dict[str, Any]:
-    """Return a message of several things as a mapping without levels, a key for each of their numbers."""
-    last = answers[-1].entry  # of the first, an orientation, nothing may be known: then it stays
-    found = {"frame": last.parent} | _header_stamp(last.record) | _rest(node, unit, last.record)
-    for each in answers:
-        record, numbers = each.entry.record, written(each)[: each.entry.target.size]
-        field = record.keys.position or record.keys.rotation
-        if numbers:
-            found.pop(field, None)
-        found |= {f"{field}_{axis}": number for axis, number in zip("xyzw", numbers, strict=False)}
-        found |= _extras(each, request)
-    return found
 
 
 def _extras(made: Answer, request: Request) -> dict[str, Any]:

@@ -188,19 +188,12 @@ class Splicer:
     def _place(self, key: str) -> Pieces:
         """Write the position as a member, or as those of a place, with the axes of its rotation."""
         place = self.target.place
-        if place is None:
-            return self._member({key: list(SAMPLE[:3])}, 0)
-        entry = place.entry(place.sample)
-        if place.name in EARTH_FRAMES:
+        entry: dict[str, Any] = {key: list(SAMPLE[:3])} if place is None else place.entry(place.sample)
+        if place is not None and place.name in EARTH_FRAMES:
             entry = {key: entry.pop(place.name)} | entry
-        elif self.target.notations:
+        elif place is not None and self.target.notations:
             entry |= {AXES_KEY: place.axes}
-        words = {self.first + at: each for at, each in place.words.items()}
-        return tuple(
-            Word(piece.first, words[piece.first], b'"' * self.json)
-            if isinstance(piece, Out) and piece.first in words else piece
-            for piece in self._member(entry, 0)
-        )  # fmt: skip
+        return self._member(entry, 0)
 
     @property
     def _rotation_at(self) -> int:
@@ -290,9 +283,12 @@ class Splicer:
             text = (dump_json if self.json else flow)(entry, lambda _: MARK)[1:-1]
         else:
             text = dump_yaml(entry, lambda _: MARK).rstrip("\n").replace("\n", self.between)
+        words = {} if self.target.place is None else self.target.place.words
         pieces: list[Piece] = []
-        for number, part in enumerate(text.split(MARK), self.first + first):
-            pieces += [Const(part.encode())] * bool(part) + [Out(number, number + 1, b"")]
+        for at, part in enumerate(text.split(MARK), first):
+            number = self.first + at
+            made = Word(number, words[at], b'"' * self.json) if at in words else Out(number, number + 1, b"")
+            pieces += [Const(part.encode()), made] if part else [made]
         return tuple(pieces[:-1])
 
 
