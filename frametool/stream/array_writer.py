@@ -66,11 +66,6 @@ class ColumnsWriter:
         self.left_out: dict[str, str] = {}
         self.writer: ColumnWriter | None = None
 
-    @property
-    def begun(self) -> bool:
-        """Return True if any block came."""
-        return self.writer is not None or bool(self.waiting)
-
     def of_columns(self, size: int, made: Mapping[str, Made]) -> bytes:
         """Return what is written of a block of so many rows, perhaps nothing yet."""
         self.waiting.append((size, made))
@@ -208,6 +203,7 @@ class ArrayWriter(PoseWriter):
         self.file = ColumnsWriter(style)
         self.names = [*self.target.position_columns, *self.target.names]
         self.names = [*(six_names(kind) if kind in SIX else self.names), *extras]
+        self.file.of_columns(0, {name: Made(np.empty(0)) for name in self.names})  # what a file without rows has
 
     def of_block(self, block: RowPoses) -> bytes:
         """Return what is written of a block; numbers are metres and x y z w, nan in rows without a result."""
@@ -219,8 +215,6 @@ class ArrayWriter(PoseWriter):
 
     def end(self) -> Iterator[bytes]:
         """Yield what comes behind the last block."""
-        if not self.file.begun:
-            self.file.of_columns(0, {name: Made(np.empty(0)) for name in self.names})
         return self.file.end()
 
     def _made(self, block: RowPoses) -> dict[str, Made]:

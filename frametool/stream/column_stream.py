@@ -20,7 +20,7 @@ from frametool.formats.rows.column_file import FLOATS, ColumnFile, Made, OutColu
 from frametool.formats.table import FORMATS
 from frametool.grammar.readers import NORMALS, in_nanoseconds
 from frametool.stream.array_writer import DOUBLE, ColumnsWriter
-from frametool.stream.faults import SKIP, STOP, Fault, Outcome, RowNote
+from frametool.stream.faults import SKIP, STOP, Outcome
 from frametool.stream.request import VELOCITIES, Operation, Request
 from frametool.stream.rows import Block, RowPoses, coded_texts, is_typed, objects, taken
 from frametool.stream.table import PlannedRows, Table
@@ -38,10 +38,9 @@ if TYPE_CHECKING:
 
 
 class ColumnRows(PlannedRows):
-    """Turn the rows of one batch after the other into results; the bad ones are listed in `faults`.
+    """Turn the rows of one batch after the other into results; run: what became of the last one."""
 
-    faults, notes: of the last batch, rows from 0
-    """
+    run: Run
 
     def __init__(self, file: ColumnFile, request: Request, source: str) -> None:
         """Plan the rows; raises FormatError or Misused as for a table of the same columns."""
@@ -57,8 +56,6 @@ class ColumnRows(PlannedRows):
         for at, place in enumerate(self.layout.places):
             if file.kinds[place] is None and at not in self.plan.words:
                 raise Misused(f"column {table.name(place)} holds no numbers", source=source)
-        self.faults: list[Fault] = []
-        self.notes: list[RowNote] = []
         self.narrow: dict[int, Kind] = {}  # numbers that are rounded to fewer digits than they are computed with
         for column in () if request.results.all_numbers else self.layout.columns:  # all of them are written as doubles
             if isinstance(column, New) and not column.words:
@@ -101,8 +98,8 @@ class ColumnRows(PlannedRows):
             raise Misused(f"{whole}; --keep puts it beside, -f csv writes text", source=self.source)
         return kind
 
-    def of_batch(self, batch: Batch) -> tuple[Run, Ints, Floats]:
-        """Return the results of a batch, and leave what is wrong with other rows in `faults`."""
+    def of_batch(self, batch: Batch) -> tuple[Ints, Floats]:
+        """Return the rows (n,) of a batch that are written, and their numbers (n, k), nan if absent."""
         values, absent, bad = self._read(batch)
         every = self.request.operation.formula is not None or self.request.gathered is not None
         shapes = zip(absent, self.plan.shapes, strict=False)
@@ -114,12 +111,10 @@ class ColumnRows(PlannedRows):
             values, (), np.arange(batch.size), int, names=names, stamps=stamps, bad={**late, **strays, **bad},
             gone=gone, frames=[frames],
         )  # fmt: skip
-        run = self.ran(block)
+        self.run = run = self.ran(block)
         for number, kind in self.narrow.items():
             with np.errstate(over="ignore"):  # bad rows, no infinities
                 run.refuse(~np.isfinite(run.results[:, number].astype(kind)), f"the result is too large for {kind}")
-        self.faults = run.faults()
-        self.notes = run.notes
         first, targets = 0, self.plan.targets
         for flags, target in zip(absent, targets, strict=False):
             last = first + target.size if len(targets) > 1 else None
@@ -129,17 +124,17 @@ class ColumnRows(PlannedRows):
         if self.request.on_error == STOP and run.reasons:
             stay = rows < min(run.reasons)
             rows, numbers = rows[stay], numbers[stay]
-        return run, rows, numbers
+        return rows, numbers
 
     def outcome(self, batch: Batch, text: bytes = b"") -> Outcome:
         """Return what is written of the last batch, and what is said of it."""
         mended, self.mended = self.mended, 0
-        return Outcome(text, self.faults, batch.size, batch.size, mended, self.notes, batch.bytes_read)
+        return Outcome(text, self.run.faults(), batch.size, batch.size, mended, self.run.notes, batch.bytes_read)
 
     def poses(self, batch: Batch) -> RowPoses:
         """Return the results of a batch for another format, with what else its rows hold."""
-        run, rows, numbers = self.of_batch(batch)
-        return self.poses_of(run, rows, numbers, batch.column, rows)
+        rows, numbers = self.of_batch(batch)
+        return self.poses_of(self.run, rows, numbers, batch.column, rows)
 
     def _read(self, batch: Batch) -> tuple[Floats, Flags, dict[int, tuple[str, str]]]:
         """Return our numbers (n, c); for each shape which rows have none, which count as 0; and rows that are bad."""
@@ -187,8 +182,8 @@ class ColumnRows(PlannedRows):
 
     def in_other_format(self, columns: Sequence[OutColumn], batch: Batch) -> tuple[int, dict[str, Made]]:
         """Return how many results a batch has, and their columns by name, for a file of another format."""
-        run, rows, numbers = self.of_batch(batch)
-        new, found = iter(self.made(columns, run, rows, numbers)), {}
+        rows, numbers = self.of_batch(batch)
+        new, found = iter(self.made(columns, rows, numbers)), {}
         for column in columns:
             place = column.passed
             if place is None:
@@ -202,7 +197,7 @@ class ColumnRows(PlannedRows):
             found[column.name] = made
         return len(numbers), found
 
-    def made(self, columns: Sequence[OutColumn], run: Run, rows: Ints, numbers: Floats) -> list[Made]:
+    def made(self, columns: Sequence[OutColumn], rows: Ints, numbers: Floats) -> list[Made]:
         """Return what is in the columns that are made, in their order."""
         made = []
         for column, target in zip(columns, self.layout.columns, strict=True):
@@ -214,7 +209,7 @@ class ColumnRows(PlannedRows):
                     values = numbers[:, target.number].astype(column.kind or DOUBLE)
                 made.append(Made(values, not_finite(values)))
             elif isinstance(target, Named):
-                texts = [text or "" for text in run.block.names.texts(target.role, rows)]
+                texts = [text or "" for text in self.run.block.names.texts(target.role, rows)]
                 made.append(Made(texts * (len(rows) if len(texts) == 1 else 1)))
             elif isinstance(target, Fixed):
                 made.append(Made([target.word] * len(numbers)))
@@ -233,10 +228,10 @@ def run_columns(file: ColumnFile, request: Request, style: Style, *, source: str
         writer = file.rewriter(columns, None if drops else file.count, style)
     for batch in file.batches():
         text: Any = b""
-        run, chosen, numbers = rows.of_batch(batch)
+        chosen, numbers = rows.of_batch(batch)
         if writer is not None:
-            made = rows.made(columns, run, chosen, numbers)
-            text = writer.of_rows(batch, None if len(chosen) == batch.size else chosen, made)
+            some = None if len(chosen) == batch.size else chosen
+            text = writer.of_rows(batch, some, rows.made(columns, chosen, numbers))
         yield rows.outcome(batch, text)
     if writer is not None:
         yield from map(Outcome, writer.end())

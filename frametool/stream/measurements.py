@@ -160,10 +160,7 @@ def _problem(row: MeasuredRow, first: dict[tuple[str, str], MeasuredRow]) -> str
         return f"{shown(child)} is measured from itself"
     sigmas = covariance[::7] if covariance is not None else (1.0,)
     if not all(sigmas):
-        halves = [name for name, half in (("xyz", sigmas[:3]), ("rpy", sigmas[3:])) if not any(half)]
-        if len(halves) == 1:
-            return f"sigma of one half only, none of {halves[0]}: give both; what is exact goes into --fix"
-        return f"sigma of {AXES[sigmas.index(0.0)]} is 0; what is exact goes into --fix"
+        return f"sigma of {AXES[sigmas.index(0.0)]} is 0: give xyz and rpy; what is exact goes into --fix"
     if row.stamp_ns is not None:
         before = first.setdefault((parent, child), row)
         if before.stamp_ns != row.stamp_ns and before.measurement.components != components:

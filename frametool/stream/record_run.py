@@ -344,22 +344,6 @@ class RecordRun:
             remedy = f"--topic {first_of(movable, MOST_NAMED, gap='|')}" if movable else f"none of them is {MOVES}"
             raise errors.Misused(f"--into moves the messages of topics that are named; {remedy}", source=self.path)
 
-    def _moved(self, mover: MessageMover, channel: Channel, data: bytes) -> bytes | None:
-        """Return a message in the other frame; one that cannot be moved is an error, or left out."""
-        number = self.moved[channel.topic] = self.moved.get(channel.topic, 0) + 1
-        try:
-            new = mover.moved(channel, data)
-        except (errors.LookupFailed, ValueInvalid) as error:
-            stamp = "" if mover.header is None else f", stamp {format_stamp(mover.header[1])}"
-            reason = f"on {channel.topic}{stamp}: {error}"
-            if self.request.bad.on_error == STOP:
-                error.args = (f"{self.path}: message {number}: {reason}",)
-                raise
-            self.request.bad.take([Fault(number, "", reason)])
-            return None
-        self.unmoved += new is data
-        return new
-
     def _messages(self, advance: Advance) -> Iterator[Recorded]:
         """Yield all messages."""
         size = 0
@@ -420,9 +404,20 @@ class RecordRun:
                 if any(edge for edge, _ in named):
                     self.rewritten += 1
                     data = types.write(channel, found)
-            new = self._moved(self.mover, channel, data) if self.mover and channel in self.named else data
-            if new is not None:
-                yield message._replace(data=new)
+            if self.mover and channel in self.named:
+                number = self.moved[channel.topic] = self.moved.get(channel.topic, 0) + 1
+                try:
+                    data = self.mover.moved(channel, data)
+                except (errors.LookupFailed, ValueInvalid) as error:
+                    stamp = "" if self.mover.header is None else f", stamp {format_stamp(self.mover.header[1])}"
+                    reason = f"on {channel.topic}{stamp}: {error}"
+                    if self.request.bad.on_error == STOP:
+                        error.args = (f"{self.path}: message {number}: {reason}",)
+                        raise
+                    self.request.bad.take([Fault(number, "", reason)])
+                    continue
+                self.unmoved += data is message.data
+            yield message._replace(data=data)
 
     def summary(self) -> Iterator[str]:
         """Yield a sentence for each thing that was done or not needed."""

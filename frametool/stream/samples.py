@@ -24,7 +24,7 @@ from frametool.formats.trees.tree_reader import MOST_KEYS
 from frametool.frames.trajectory import BODY, WORLD, Trajectory
 from frametool.geometry.transform import Transform
 from frametool.grammar.pose import COVARIANCE_KEYS, Pose, inverted
-from frametool.grammar.readers import Misfit, Path, Reading, as_mapping, kind, tell, within
+from frametool.grammar.readers import Misfit, Path, Reading, as_mapping, tell, within
 from frametool.grammar.result import Result
 from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows
@@ -91,15 +91,11 @@ def read_samples(
     found: dict[Path, tuple[str, Pose, Pose]] = {}
     for document in parse_documents(source.text, source.name):
         value, at = document.value, tuple[Any, ...]((document.index,))
-        is_one = type(value) is dict and not PARTNERS.keys().isdisjoint(value)
-        if type(value) is dict and "samples" in value and not is_one:
+        if type(value) is dict and "samples" in value:
             value, at = value["samples"], (*at, "samples")
-        if not is_one and type(value) is not list:
-            held = f"the keys {first_of([*value], MOST_KEYS, quote=shown)}" if type(value) is dict else kind(value)
-            what = f"expected samples {LIKE}, found {held}; two files of poses are GRIPPER TARGET"
-            raise Misfit(what, at).placed(source)
+        is_list = type(value) is list
         try:
-            for path, sample in [(at, value)] if is_one else [((*at, row), each) for row, each in enumerate(value)]:
+            for path, sample in [((*at, row), each) for row, each in enumerate(value)] if is_list else [(at, value)]:
                 found[path] = _sample(sample, path, reading, eye_to_hand=eye_to_hand)
         except Misfit as misfit:
             raise misfit.placed(source) from None
@@ -190,7 +186,7 @@ def _sample(value: Any, path: Path, reading: Reading, *, eye_to_hand: bool) -> t
     first = next((key for key in PARTNERS if key in sample), None)
     if first is None:
         found = first_of([*sample], MOST_KEYS, quote=shown)
-        raise Misfit(f"no sample; expected {LIKE}, found the keys {found}", path)
+        raise Misfit(f"no sample; expected {LIKE}, found the keys {found}; two files are GRIPPER TARGET", path)
     second = next((key for key in PARTNERS[first] if key in sample), None)
     if second is None:
         raise Misfit(f"missing {PARTNERS[first][0]} beside {first}", path)

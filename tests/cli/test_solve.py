@@ -243,7 +243,7 @@ BAD: tuple[tuple[str, dict[str, str], int, str], ...] = (
     ("m.yaml", {"m.yaml": ROW.format("xyz: [1, 0]")}, 1, "m.yaml:2:32: expected 3 numbers (x y z), found 2"),
     ("m.yaml", {"m.yaml": ROW.format("xyz: [1, 0, 0]").replace("child: b", "child: a")}, 1, "m.yaml:2: 'a' is measured from itself"),
     ("m.yaml", {"m.yaml": ROW.format("xyz: [1, 0, 0], sigma: {xyz: 0, rpy: 0.1}")}, 1, "--fix"),
-    ("m.yaml", {"m.yaml": ROW.format("xyz: [1, 0, 0], sigma: {xyz: 0.1}")}, 1, "m.yaml:2: sigma of one half only"),
+    ("m.yaml", {"m.yaml": ROW.format("xyz: [1, 0, 0], sigma: {xyz: 0.1}")}, 1, "m.yaml:2: sigma of roll is 0"),
     ("m.yaml", {"m.yaml": ROW.format("xyz: [1, 0, 0], scale: 2")}, 1, "scale: a similarity, not a pose"),
     ("m.yaml", {"m.yaml": ROW.format("quaternion: {x: 0, y: 0, z: 0, w: 2}")}, 1, "normalize it with --normalize"),
     ("m.yaml", {"m.yaml": MOVES}, 1, "m.yaml:2:38: a frame that moves is not solved for"),

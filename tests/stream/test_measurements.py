@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 SIGMAS = [0.01, 0.01, 0.02, 0.003, 0.003, 0.004]
 DIAGONAL = [SIGMAS[i] ** 2 if i == j else 0.0 for i in range(6) for j in range(6)]
 LIKE = "a measurement is {parent: .., child: .., xyz: [..], rpy_deg: [..]}"
-ONE_HALF = "give both; what is exact goes into --fix"
+EXACT = "give xyz and rpy; what is exact goes into --fix"
 
 
 @pytest.fixture
@@ -145,10 +145,10 @@ REFUSED = {
     "\n- {parent: a, child: a, xyz: [1, 2, 3]}": "m.yaml:2: 'a' is measured from itself",
     "[{parent: b, child: a, name: c, xyz: [1, 2, 3]}]": "m.yaml:1:21: child says 'a' and name says 'c'; keep one",
     "[{parent: b, child: [a], xyz: [1, 2, 3]}]": "m.yaml:1:21: child must be a frame's name, found a list",
-    "[{parent: b, child: a, xyz: [1, 2, 3], sigma: {xyz: 0.1}}]": f"m.yaml:1: sigma of one half only, none of rpy: {ONE_HALF}",
-    "[{parent: b, child: a, xyz: [1, 2, 3], sigma: {rpy: 0.1}}]": f"m.yaml:1: sigma of one half only, none of xyz: {ONE_HALF}",
-    "[{parent: b, child: a, xyz: [1, 2, 3], sigma: {xyz: [1, 0, 1], rpy: 1}}]": "m.yaml:1: sigma of y is 0; what is exact goes into --fix",
-    "[{parent: b, child: a, xyz: [1, 2, 3], sigma: {xyz: 0, rpy: 0}}]": "m.yaml:1: sigma of x is 0; what is exact goes into --fix",
+    "[{parent: b, child: a, xyz: [1, 2, 3], sigma: {xyz: 0.1}}]": f"m.yaml:1: sigma of roll is 0: {EXACT}",
+    "[{parent: b, child: a, xyz: [1, 2, 3], sigma: {rpy: 0.1}}]": f"m.yaml:1: sigma of x is 0: {EXACT}",
+    "[{parent: b, child: a, xyz: [1, 2, 3], sigma: {xyz: [1, 0, 1], rpy: 1}}]": f"m.yaml:1: sigma of y is 0: {EXACT}",
+    "[{parent: b, child: a, xyz: [1, 2, 3], sigma: {xyz: 0, rpy: 0}}]": f"m.yaml:1: sigma of x is 0: {EXACT}",
     f"[{{parent: b, child: a, {SIGMA}, {COVARIANCE}, xyz: [1, 2, 3]}}]": "m.yaml:1:24: sigma and covariance in one entry; keep one",
     "[{parent: b, child: a, xyz: [1, 2, 3], scale: 2}]": "m.yaml:1:47: scale: a similarity, not a pose; apply --transform, compose and invert take it",
     "[{parent: b, child: a, xyz: [1, 2, 3], sigmas: {xyz: 1}}]": "m.yaml:1:40: unknown key 'sigmas'; did you mean 'sigma'?",
@@ -194,7 +194,7 @@ def test_rows_of_tables_are_refused_with_their_line(read: Read, rows: str) -> No
 @pytest.mark.parametrize(
     ("columns", "row", "message"),
     [
-        ("sigma_xyz", "0.1", f"m.csv:2: sigma of one half only, none of rpy: {ONE_HALF}"),
+        ("sigma_xyz", "0.1", f"m.csv:2: sigma of roll is 0: {EXACT}"),
         ("sigma_xyz,sigma_rpy", "-0.1,0.1", "m.csv:2:sigma_xyz: sigma is negative: -0.1"),
         ("sigma_xyz,sigma_x", "0.1,0.1", "m.csv:1: column 'sigma_x': the sigma of x is there already; keep one"),
         ("name", "d", "m.csv:2: child says 'b' and name says 'd'; keep one"),
