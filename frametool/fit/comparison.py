@@ -182,8 +182,39 @@ class Comparison(NamedTuple):
         return self.fit.moved(est if mount is None else est.with_poses(est.poses @ mount))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return every setting and number, as `frametool compare -f json` prints them."""
-        return numbers(self)
+        """Return every setting and number, as `frametool compare -f json` prints them; inapplicable ones are None."""
+        pairs, ate, (_, fitting, reporting) = self.pairs, self.ate, self.settings
+        stamps, (parent, name) = pairs.ref.stamps_ns, worlds(self)
+        scale = {"scale": self.fit.scale} if fitting.align in SCALED else {}  # only if one was estimated
+        relative = []
+        for delta, errors in self.relative:
+            summed = _errors(errors.m, errors.rad, evo=reporting.evo)
+            share = 100 * summed["m"]["rmse"] / delta.amount if summed["m"] and delta.unit == "m" else None
+            counted = {"delta": str(delta), "pairs": len(errors.start)}
+            relative.append(counted | summed | {"percent": share, "distance_m": statistics(errors.distance)})
+        return {
+            "ref": self.names[0],
+            "est": self.names[1],
+            "settings": _settings(self),
+            "poses": {
+                "ref": self.ref.size, "est": self.est.size, "possible": pairs.possible, "paired": pairs.ref.size,
+                "shared": pairs.shared,
+            },
+            "ref_duration_s": None if stamps is None else int(np.ptp(self.ref.stamps_ns)) / 1e9,
+            "duration_s": None if stamps is None else int(stamps[-1] - stamps[0]) / 1e9,
+            "path_m": {"ref": float(way(pairs.ref.xyz)[-1]), "est": float(way(self.moved.xyz)[-1])},
+            "offset_s": pairs.offset_ns / 1e9,
+            "offset_score": pairs.offset_score,
+            "transform": {"name": name, "parent": parent, **_pose(self.fit.transform), **scale},
+            "ate_by_alignment": self.ate_by_alignment,
+            "ate": {
+                **_errors(ate.m, ate.rad, evo=reporting.evo), "along_m": statistics(ate.along),
+                "across_m": statistics(ate.across), "up_m": statistics(ate.up), "end_m": float(ate.m[-1]),
+            },
+            "rpe": relative,
+            "kitti": _kitti(self),
+            "hints": self.hints,
+        }  # fmt: skip
 
 
 def compared(
@@ -406,42 +437,6 @@ def _relative(
 
 
 SQRT8 = 8**0.5
-
-
-def numbers(found: Comparison) -> dict[str, Any]:
-    """Return every setting and number of a comparison; inapplicable ones are None."""
-    pairs, ate, (_, fitting, reporting) = found.pairs, found.ate, found.settings
-    stamps, (parent, name) = pairs.ref.stamps_ns, worlds(found)
-    scale = {"scale": found.fit.scale} if fitting.align in SCALED else {}  # only if one was estimated
-    relative = []
-    for delta, errors in found.relative:
-        summed = _errors(errors.m, errors.rad, evo=reporting.evo)
-        share = 100 * summed["m"]["rmse"] / delta.amount if summed["m"] and delta.unit == "m" else None
-        counted = {"delta": str(delta), "pairs": len(errors.start)}
-        relative.append(counted | summed | {"percent": share, "distance_m": statistics(errors.distance)})
-    return {
-        "ref": found.names[0],
-        "est": found.names[1],
-        "settings": _settings(found),
-        "poses": {
-            "ref": found.ref.size, "est": found.est.size, "possible": pairs.possible, "paired": pairs.ref.size,
-            "shared": pairs.shared,
-        },
-        "ref_duration_s": None if stamps is None else int(np.ptp(found.ref.stamps_ns)) / 1e9,
-        "duration_s": None if stamps is None else int(stamps[-1] - stamps[0]) / 1e9,
-        "path_m": {"ref": float(way(pairs.ref.xyz)[-1]), "est": float(way(found.moved.xyz)[-1])},
-        "offset_s": pairs.offset_ns / 1e9,
-        "offset_score": pairs.offset_score,
-        "transform": {"name": name, "parent": parent, **_pose(found.fit.transform), **scale},
-        "ate_by_alignment": found.ate_by_alignment,
-        "ate": {
-            **_errors(ate.m, ate.rad, evo=reporting.evo), "along_m": statistics(ate.along),
-            "across_m": statistics(ate.across), "up_m": statistics(ate.up), "end_m": float(ate.m[-1]),
-        },
-        "rpe": relative,
-        "kitti": _kitti(found),
-        "hints": found.hints,
-    }  # fmt: skip
 
 
 def worlds(found: Comparison) -> tuple[str, str]:

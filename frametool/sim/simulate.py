@@ -16,7 +16,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from heapq import heapify, heappop, heapreplace
+from contextlib import suppress
+from heapq import merge
 from itertools import count
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -45,7 +46,6 @@ if TYPE_CHECKING:
 
 WORLD = "world"
 CACHE_NS = 10 * BILLION  # tf's own default
-TICKS, CARROTS, LEADERS, CONTROLLERS = range(4)  # the order of processes that are due at the same time
 
 
 CARROT_NS = BILLION // 10  # between two broadcasts of a carrot
@@ -178,33 +178,22 @@ def simulate(scene: Scene) -> Iterator[SimulationStep]:
     Pure and deterministic: simulated time, no sleep, the same scene gives the same steps. Memory does not grow.
     Raises ValueInvalid for an impossible scene.
     """
-    simulation = Simulation(scene)
-    processes = [(TICKS, simulation.ticks())]
-    carrots = {(follow.leader, follow.target) for follow in scene.followers.values() if follow.target != "leader"}
-    processes += ((CARROTS, _carrot(simulation, leader, target)) for leader, target in sorted(carrots))
-    for name, _, driver in scene.turtles:
-        if isinstance(driver, Follow):
-            if driver.leader == name:
-                raise ValueInvalid(f"{name} cannot follow itself")
-            processes.append((CONTROLLERS, _controller(simulation, name, driver)))
-        elif driver is not None:
-            processes.append((LEADERS, _leader(simulation, name, driver)))
-    begun = ((next(process, None), rank, process) for rank, process in processes)
-    queue = [(due_ns, rank, order, each) for order, (due_ns, rank, each) in enumerate(begun) if due_ns is not None]
-    heapify(queue)
-    while queue and (scene.duration_ns is None or queue[0][0] <= scene.duration_ns):
-        step = simulation.step = SimulationStep(queue[0][0])
-        while queue and queue[0][0] == step.t_ns:
-            _, rank, order, process = queue[0]
-            try:
-                due_ns = next(process, None)
-            except EndOfRun:
+    simulation, followers = Simulation(scene), scene.followers
+    carrots = sorted({(each.leader, each.target) for each in followers.values() if each.target != "leader"})
+    leaders = ((name, make) for name, _, make in scene.turtles if not (make is None or isinstance(make, Follow)))
+    due = merge(  # the first of processes that are due at the same time comes first
+        simulation.ticks(), *(_carrot(simulation, *each) for each in carrots),
+        *(_leader(simulation, *each) for each in leaders),
+        *(_controller(simulation, *each) for each in followers.items()),
+    )  # fmt: skip
+    with suppress(EndOfRun):
+        for due_ns in due:  # resumes the process that was due before
+            if due_ns != simulation.step.t_ns:
+                yield simulation.step
+                simulation.step = SimulationStep(due_ns)
+            if scene.duration_ns is not None and due_ns > scene.duration_ns:
                 return
-            if due_ns is None:
-                heappop(queue)
-            else:
-                heapreplace(queue, (due_ns, rank, order, process))
-        yield step
+        yield simulation.step
 
 
 def _carrot(simulation: Simulation, turtle: str, target: str) -> Process:
@@ -242,6 +231,8 @@ def _controller(simulation: Simulation, name: str, follow: Follow) -> Process:
 
     If the lookup fails it skips the cycle and logs the reason once, until the next success.
     """
+    if follow.leader == name:
+        raise ValueInvalid(f"{name} cannot follow itself")
     frame, failing = frame_of(follow.leader, follow.target), ""
     for number in count():
         yield follow.controller.due_ns(number)

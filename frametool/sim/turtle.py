@@ -405,10 +405,8 @@ class FollowController:
 
 def _checked(name: str, value: float, least: float = -math.inf, most: float = math.inf) -> float:
     """Return a number if it is finite and within its bounds."""
-    if not math.isfinite(value):
-        raise ValueInvalid(f"{name} must be finite, found {value}")
-    if not least <= value <= most:
-        bounds = f"{least:g} or more" if most == math.inf else f"{least:g} .. {most:g} Hz"
+    if not (math.isfinite(value) and least <= value <= most):
+        bounds = f"{least:g} .. {most:g} Hz" if most < math.inf else f"finite{', 0 or more' * (least == 0.0)}"
         raise ValueInvalid(f"{name} must be {bounds}, found {value:g}")
     return float(value)
 
