@@ -359,10 +359,8 @@ def step_writer(
                 case "csv":
                     yield row(cells.values(), style)
                 case _:
-                    texts = {}  # rounded for display; zero has no sign
-                    for name, cell in cells.items():
-                        text = "-" if cell is None else printable(str(cell))
-                        texts[name] = f"{round(cell, digits) + 0.0:.{digits}f}" if isinstance(cell, float) else text
+                    texts = {name: f"{cell:z.{digits}f}" if isinstance(cell, float) else printable(str(cell or "-"))
+                             for name, cell in cells.items()}  # fmt: skip
                     yield _aligned(texts | {"t": f"{cells['t']:.3f}"})
 
     return write

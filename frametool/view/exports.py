@@ -126,7 +126,7 @@ def run_picture(scene: Scene) -> tuple[Callable[[SimulationStep], None], Callabl
     It draws the world with trails and the turtles at the end, and charts if there are followers.
     """
     strokes: list[Stroke] = []
-    current: dict[str, Stroke] = {}
+    current: dict[str, Stroke] = {}  # the last one of each turtle
     turtles: dict[str, TurtleState] = {}
     # of each follower, for each control step: seconds, metres, m/s, rad/s
     curves: dict[str, list[tuple[float, ...]]] = {name: [] for name in scene.followers}
@@ -142,13 +142,11 @@ def run_picture(scene: Scene) -> tuple[Callable[[SimulationStep], None], Callabl
                 current.clear()
             turtles = step.states
             for name, (x, y, _) in turtles.items():
-                pen = step.pens[name]
-                _, before, points = current.get(name, (name, None, []))
-                if before != pen:
+                _, pen, points = current.get(name, (name, None, []))
+                if pen != step.pens[name]:
                     points = points[-1:]
-                    current[name] = name, pen, points
-                    if not pen.off:
-                        strokes.append(current[name])
+                    current[name] = name, step.pens[name], points
+                    strokes.append(current[name])
                 if not points or math.dist(points[-1], (x, y)) > 0.05:  # metres: two pixels
                     points.append((x, y))
         for command in step.commands:
@@ -161,7 +159,7 @@ def run_picture(scene: Scene) -> tuple[Callable[[SimulationStep], None], Callabl
     def picture() -> Picture:
         colours = colours_of({*turtles, *curves})
         shapes = [box(MARGIN, MARGIN, WINDOW, WINDOW, f"#{bytes(BACKGROUND).hex()}")]
-        for turtle, (*colour, width, _), way in strokes:
+        for turtle, (*colour, width, _), way in (each for each in strokes if not each[1].off):
             shapes.append(line([place(*point) for point in way], f"#{bytes(colour).hex()}", width, title=turtle))
         for name, (*position, theta) in turtles.items():
             x, y = place(*position)
@@ -356,29 +354,27 @@ def run_page() -> tuple[Callable[[SimulationStep], None], Callable[[], str]]:
     return watch, lambda: write_page(FrameScene(buffer), title="turtles", file="tf.yaml", eye=EYES["top"])
 
 
-SLIDER_KEYS = ("name", "kind", "axis", "anchor", "rest", "lower", "upper", "mimic")
+SLIDER_KEYS = ("name", "kind", "axis", "anchor", "rest", "lower", "upper")
 
 
 def joint_sliders(scene: FrameScene) -> dict[str, list[dict[str, Any]]]:
     """Return the revolute and prismatic joints with a constant value, and the links that they move, for the page."""
-    sliders: list[dict[str, Any]] = []
+    driven: list[tuple[Any, Any]] = []  # joints and their values
     moved: list[dict[str, Any]] = []
-    places: dict[str, int] = {}
     for values, links, _ in scene.tree.robots:
         for link in links:
-            known: list[Any] = [values.get(joint.name) for joint in link.joints]
-            if {*map(type, known)} != {JointValue} or link.child not in scene.index:
-                continue
-            numbers = [*range(len(sliders), len(sliders) + len(known))]
-            own = {key: getattr(link, key) for key in ("origin", "after", "inverted")}
-            moved.append({"frame": scene.index[link.child], "joints": numbers} | own)
-            for joint, value, number in zip(link.joints, known, numbers, strict=True):
-                places[joint.name] = number
-                sliders.append({"value": float(value.plain)} | {key: getattr(joint, key) for key in SLIDER_KEYS})
-    for slider in sliders:
-        mimic = slider.pop("mimic")
-        if mimic is not None and mimic.joint in places:
-            slider["mimic"] = [places[mimic.joint], mimic.multiplier, mimic.offset]
+            known = [values.get(joint.name) for joint in link.joints]
+            if {*map(type, known)} == {JointValue} and link.child in scene.index:
+                numbers = [*range(len(driven), len(driven) + len(known))]
+                own = {key: getattr(link, key) for key in ("origin", "after", "inverted")}
+                moved.append({"frame": scene.index[link.child], "joints": numbers} | own)
+                driven += zip(link.joints, known, strict=True)
+    places = {joint.name: number for number, (joint, _) in enumerate(driven)}
+    sliders: list[dict[str, Any]] = []
+    for joint, value in driven:
+        sliders.append({"value": float(value.plain)} | {key: getattr(joint, key) for key in SLIDER_KEYS})
+        if (mimic := joint.mimic) is not None and mimic.joint in places:
+            sliders[-1]["mimic"] = [places[mimic.joint], mimic.multiplier, mimic.offset]
     return {"joints": sliders, "links": moved}
 
 

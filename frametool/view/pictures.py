@@ -197,8 +197,7 @@ def write_html(
     policy = f"default-src 'none'; img-src data:; {allowed}base-uri 'none'; form-action 'none'"
     held = ((name, text.translate(HARMLESS)) for name, text in (data or {}).items())
     scripts = "".join(f'<script type="application/json" id="{name}">{text}</script>' for name, text in held)
-    if script:
-        texts["script"] = f'<script type="module">{texts["script"]}</script>'
+    texts["script"] = f'<script type="module">{texts["script"]}</script>' * bool(script)
     return filled("shell.html", policy=policy, title=_text(title), body=body, data=scripts, **texts)
 
 

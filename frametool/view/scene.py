@@ -260,9 +260,7 @@ class Projection:
     view: the directions right, up and toward the eye
     """
 
-    def __init__(
-        self, scene: FrameScene, size: Size, eye: Eye = EYES["slanted"], *, most: bool = False
-    ) -> None:
+    def __init__(self, scene: FrameScene, size: Size, eye: Eye = EYES["slanted"], *, most: bool = False) -> None:
         """Fit the scene into the picture; most: leave out a few frames that are far from the others."""
         self.scene, self.size = scene, size
         sa, ca, se, ce = (function(angle) for angle in eye for function in (math.sin, math.cos))
