@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from frametool.fit.tree_problem import Fitted
+    from frametool.fit.measured_tree import Fitted
     from frametool.geometry.types import Array
 
     Mask: TypeAlias = NDArray[np.bool_]
@@ -194,9 +194,9 @@ class Settled(NamedTuple, Generic[Model]):
 
     model: Model
     kept: Mask
-    residuals: Array
-    sigmas: Array
-    u: Array
+    residuals: Array = np.ones(0)
+    sigmas: Array = np.ones(0)
+    u: Array = np.ones(0)
 
 
 def settled(
@@ -223,8 +223,7 @@ def settled(
 
     if robust:
         model, kept = first_inliers(model, by_medians, rough)
-    nothing = np.ones(0)
-    return reselected(Settled(model, kept, nothing, nothing, nothing), fitted, robust=robust)
+    return reselected(Settled(model, kept), fitted, robust=robust)
 
 
 def first_inliers(

@@ -32,7 +32,7 @@ from frametool.formats.detect import detect
 from frametool.formats.rows.csv import split_line
 from frametool.frames.stamps import BILLION, FURTHEST_NS, format_stamp, parse_time
 from frametool.grammar.readers import Misfit, Path, as_mapping, kind, read_numbers, within
-from frametool.ros.messages import is_noise
+from frametool.ros.messages import without_noise
 from frametool.sim import turtle as drivers
 from frametool.sim.turtle import CENTRE, KEYS, LEADERS, SERVICES, TARGETS, FollowController, Twist, built_in, scripted
 from frametool.text.numbers import parse_number, read_number_or_angle
@@ -291,11 +291,8 @@ def _pieces(lines: Iterable[str]) -> Iterator[tuple[Piece, bool]]:
     """
     is_table: bool | None = None
     held: list[str] = []
-    number = 0
     for number, line in enumerate(lines, 1):
-        text = line.rstrip("\r\n")
-        if is_noise(text):
-            text = "---" if text.endswith("---") else ""
+        text = without_noise(line.rstrip("\r\n"))
         if not held and (not text.strip() or text.startswith(("#", "..."))):
             continue
         if is_table is None:

@@ -281,16 +281,14 @@ def progress_bar(
             return
         with suppress(OSError):
             if bar is None:
-                from rich import progress
+                from rich.progress import Progress, TextColumn
 
-                text = f"{{task.fields[rows]}} {counted}  {{task.fields[rate]}} {counted}/s"
-                columns: list[Any] = [progress.TextColumn(text)]
-                if total:
-                    columns += [progress.BarColumn(), progress.TaskProgressColumn(), progress.TimeRemainingColumn()]
-                bar = progress.Progress(*columns, console=coloured_console(stderr=True), transient=True)
+                columns = [] if total else [TextColumn("{task.description}")]  # by default with a bar
+                bar = Progress(*columns, console=coloured_console(stderr=True), transient=True)
                 bar.start()
-                bar.add_task("", total=total, rows="0", rate="")
-            bar.update(bar.task_ids[0], completed=size, rows=f"{rows:,}", rate=f"{rows / seconds:,.0f}")
+                bar.add_task("", total=total)
+            text = f"{rows:,} {counted}  {rows / seconds:,.0f} {counted}/s"
+            bar.update(bar.task_ids[0], completed=size, description=text)
 
     try:
         yield advance
