@@ -18,19 +18,10 @@ from os import PathLike
 from types import MappingProxyType
 from typing import Any, BinaryIO
 
+from frametool import errors
 from frametool.documents.document import format_error, locate_many
 from frametool.documents.source import InputFile, Source, paused_collector
-from frametool.errors import (
-    BadAnswer,
-    BadTopology,
-    FileProblem,
-    FormatError,
-    NamedTuple,
-    ValueInvalid,
-    alternatives,
-    shown,
-    warn,
-)
+from frametool.errors import BadTopology, FileProblem, FormatError, NamedTuple, ValueInvalid, alternatives, shown, warn
 from frametool.formats.detect import Beginning, detect, of_folder
 from frametool.formats.table import CHOICES, FORMATS, readers
 from frametool.frames import topology
@@ -44,7 +35,6 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from frametool.errors import Finding
     from frametool.frames.buffer import TransformBuffer
     from frametool.geometry.camera import Camera
     from frametool.geometry.types import Components, Rigid
@@ -149,7 +139,7 @@ class FrameFile(InputFile):
 
     def tell(self) -> None:
         """Emit the warnings about the file, once it was read."""
-        found: dict[str | Finding, list[Finding]] = {}
+        found: dict[str | errors.Finding, list[errors.Finding]] = {}
         for finding in self.tally.findings():
             found.setdefault(finding if finding.rule == "odd" else alike(finding), []).append(finding)
         for first, *others in found.values():
@@ -179,7 +169,7 @@ def refuse_unknown_joints(files: Sequence[FrameFile]) -> None:
     robots = [file.tally for file in files if file.tally.robot is not None]
     if asked and not robots:
         option = "--joint" if asked[0].joints else "--joints"
-        raise BadAnswer(f"{option}: there are no joints in {', '.join(file.name for file in files)}")
+        raise errors.BadAnswer(f"{option}: there are no joints in {', '.join(file.name for file in files)}")
     for name, error in robots[0].unknown_joints.items() if robots else ():
         if all(name in robot.unknown_joints for robot in robots):
             raise error
