@@ -464,20 +464,14 @@ UNSUPPORTED = {
         "expand the robot's URDF with it: xacro ur.urdf.xacro kinematics_params:=FILE ..",
         (("yaml key", "kinematics"),),
     ),
-    "camera_info": Unsupported(
-        "camera_info, the intrinsics of a camera",
-        "there is no pose in it; its frame is in the tree of the robot: frametool project TREE FRAME --camera FILE",
-        (("yaml key", "projection_matrix|distortion_model"), ("line", r"\[image\]$")),
-    ),
-    "intrinsics": Unsupported(
-        "cameras of Kalibr that were calibrated alone",
-        "there is no pose in it; it would be under T_cam_imu or T_cn_cnm1 (project --camera FILE reads it)",
-        (("yaml inner", r"distortion_coeffs|cam_overlaps"),),
-    ),
     "cameras": Unsupported(
-        "cameras.txt of COLMAP, the intrinsics",
-        "there is no pose in it; those of the cameras are in images.txt (frametool project --camera FILE reads it)",
-        (("text", rf"\A(?:\s*#[^\n]*\n)*\s*\d+ (?:{_COLMAP_MODELS}) \d+ \d+ "),),
+        "the intrinsics of cameras",
+        "there is no pose in it; that is in a tree, under T_cam_imu, in images.txt (project --camera FILE reads it)",
+        (
+            ("yaml key", "projection_matrix|distortion_model"), ("line", r"\[image\]$"),
+            ("yaml inner", r"distortion_coeffs|cam_overlaps"),
+            ("text", rf"\A(?:\s*#[^\n]*\n)*\s*\d+ (?:{_COLMAP_MODELS}) \d+ \d+ "),
+        ),
     ),
     "lio": Unsupported(
         "parameters of FAST-LIO or LIO-SAM",
@@ -489,17 +483,12 @@ UNSUPPORTED = {
         "its origin is the lower left corner of the picture in the map: {xyz: [x, y, 0], rpy: [0, 0, yaw]}",
         (("yaml key", "occupied_thresh"),),
     ),
-    "usd": Unsupported(
-        "a USD scene", "its units and axes differ from file to file; export URDF, or the poses as JSON",
-        (("magic", rb"#usda |PXR-USDC"),), (".usd", ".usda", ".usdc", ".usdz"),
-    ),
-    "gltf": Unsupported(
-        "a glTF scene", "glTF has y up and z forward; export URDF, or the poses as JSON",
-        (("magic", rb"glTF"), ("json path", "asset/version")), (".gltf", ".glb"),
-    ),
-    "unity": Unsupported(
-        "a Unity scene", "Unity is left-handed with y up; export poses as JSON and convert them",
-        (("magic", rb"%YAML 1\.1\r?\n%TAG !u! tag:unity3d"),), (".unity", ".prefab"),
+    "scene": Unsupported(
+        "a scene of USD, glTF or Unity", "units and axes differ from file to file; export URDF, or the poses as JSON",
+        (
+            ("magic", rb"#usda |PXR-USDC|glTF|%YAML 1\.1\r?\n%TAG !u! tag:unity3d"), ("json path", "asset/version"),
+        ),
+        (".usd", ".usda", ".usdc", ".usdz", ".gltf", ".glb", ".unity", ".prefab"),
     ),
     "itk": Unsupported(
         "an ITK or ANTs transform",

@@ -254,11 +254,11 @@ def test_no_array_is_written_to_a_terminal(monkeypatch: pytest.MonkeyPatch, caps
         (b"\x93NUMPY", "the header cannot be read: EOF"),
         (npy(POINTS)[:60], "the header cannot be read: EOF"),
         (npy(POINTS)[:-1], "the file ends after 49 of 50 rows"),
-        (npy(np.array(1.0)), "it holds a single value; wanted are rows: an array n x 3, or one with fields"),
-        (npy(POINTS + 1j), "it holds complex128; wanted are numbers, or fields"),
+        (npy(np.array(1.0)), "it holds float64 in the shape (); wanted are rows of plain numbers, n x 3, or a row of records"),
+        (npy(POINTS + 1j), "it holds complex128 in the shape (50, 3); wanted are rows of plain numbers"),
         (npy(np.asfortranarray(POINTS))[:-1], "the file ends within its columns, 1 bytes are missing"),
-        (npy(POINTS).replace(b"(50, 3)", b"(-5, 3)"), "the header has the shape (-5, 3)"),
-        (npy(POINTS).replace(b"'<f8'", b"'|O' "), "it holds Python objects, which are never unpickled; save plain numbers"),
+        (npy(POINTS).replace(b"(50, 3)", b"(-5, 3)"), "it holds float64 in the shape (-5, 3)"),
+        (npy(POINTS).replace(b"'<f8'", b"'|O' "), "it holds object in the shape (50, 3); wanted are rows of plain numbers, n x 3, or a row of records; objects are never unpickled"),
     ],
 )  # fmt: skip
 def test_a_damaged_array_is_one_line(use: Use, data: bytes, said: str) -> None:

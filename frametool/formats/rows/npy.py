@@ -50,21 +50,14 @@ class NpyFile(column_file.RecordFile):
             shape, self.by_columns, kind = read(BytesIO(head[len(MAGIC) + 2 :] + file.stream.read(size)), MOST_HEADER)
             if version == UTF8 and kind.names is not None:
                 kind.names = tuple(name.encode("latin-1").decode() for name in kind.names)
-        columns, problem = prod(shape[1:]), ""
-        if min(shape, default=0) < 0:
-            problem = f"the header has the shape {shape}"
-        elif kind.hasobject:
-            problem = "it holds Python objects, which are never unpickled; save plain numbers"
-        elif not shape:
-            problem = "it holds a single value; wanted are rows: an array n x 3, or one with fields"
-        elif kind.names is not None and len(shape) > 1:
-            problem = f"records in {len(shape)} axes; wanted is one row of them"
-        elif kind.names is None and not column_file.is_number(kind):
-            problem = f"it holds {kind}; wanted are numbers, or fields"
-        elif columns > MOST_COLUMNS or columns * kind.itemsize > MOST_BYTES:
-            problem = f"a row of {columns} columns; at most {MOST_COLUMNS} are read, of {MOST_BYTES} bytes"
-        if problem:
-            raise file.error(problem)
+        columns = prod(shape[1:])
+        are_rows = len(shape) == 1 if kind.names is not None else column_file.is_number(kind)
+        if kind.hasobject or min(shape, default=-1) < 0 or not are_rows:
+            wanted = "wanted are rows of plain numbers, n x 3, or a row of records"
+            raise file.error(f"it holds {kind} in the shape {shape}; {wanted}; objects are never unpickled")
+        if columns > MOST_COLUMNS or columns * kind.itemsize > MOST_BYTES:
+            most = f"at most {MOST_COLUMNS} are read, of {MOST_BYTES} bytes"
+            raise file.error(f"a row of {columns} columns; {most}")
         record = kind if kind.names is not None else column_file.record_of([kind] * columns)
         super().__init__(file, kind.names, record, shape[0])
         self.shape: tuple[int, ...] = shape
