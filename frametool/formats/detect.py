@@ -15,8 +15,7 @@ Kinds of signs in the table, the strongest first.  Signs with priority over the 
     entries    a pattern of keys in the maps, or lists of seven numbers, that all outermost keys have, or
                the outermost `transforms` or `extrinsics`; without any key of a message
     line       a pattern of the first line of data, after blank lines, comments and text that tools print
-    leaves     a pattern of the keys with a number as value, with a slash for each enclosing key; one in five
-               may differ, so that a misspelt key gets an error with its place
+    last       a pattern found in the first characters, if nothing above fits
 
 After the suffix, the first match is used:
 
@@ -107,23 +106,6 @@ class Beginning:
         return {found[2] for found in re.finditer(rf"(?m)^(?:[ -]++|[\w./-]+: *(?=\{{))\{{?+ *+{_YAML_KEY}", self.text)}
 
     @cached_property
-    def leaves(self) -> set[str]:
-        """Return the keys of the first YAML map whose values are numbers, with a slash for each enclosing map.
-
-        A list in between is a `[`.
-        """
-        found, inner = set[str](), [("", self.value)] if isinstance(self.value, dict) else []
-        for way, mapping in inner:  # grows during the loop
-            for key, each in mapping.items():
-                if isinstance(each, str) and re.match(r"[-+]?\.?\d", each):
-                    found.add(way + key)
-                elif isinstance(each, dict):
-                    inner.append((f"{way}/", each))
-                elif isinstance(each, list):
-                    inner += [(f"{way}[/", entry) for entry in each if isinstance(entry, dict)]
-        return found
-
-    @cached_property
     def value(self) -> Any:
         """Return the first value of YAML or JSON as plain values, as far as the text is read; None if there is none."""
         from frametool.documents.source import END, LEAF, MAP
@@ -201,7 +183,7 @@ _STRONG: dict[str, Shows] = {
     "text": lambda begin, what: re.search(what, begin.text) is not None,
     "entries": _are_poses,
     "line": lambda begin, what: re.match(what, begin.data_line) is not None,
-    "leaves": lambda begin, what: 5 * _count(begin.leaves, what) >= 4 * max(1, len(begin.leaves)),
+    "last": lambda begin, what: re.search(what, begin.text) is not None,
 }
 _WEAK: dict[str, Shows] = {
     "begin": lambda begin, what: re.match(what, begin.text) is not None,
@@ -466,7 +448,7 @@ UNSUPPORTED = {
     ),
     "cameras": Unsupported(
         "the intrinsics of cameras",
-        "there is no pose in it; that is in a tree, under T_cam_imu, in images.txt (project --camera FILE reads it)",
+        "there is no pose in it; beside a tree with the frame (robot, T_cam_imu): frametool project TREE FRAME --camera FILE",
         (
             ("yaml key", "projection_matrix|distortion_model"), ("line", r"\[image\]$"),
             ("yaml inner", r"distortion_coeffs|cam_overlaps"),

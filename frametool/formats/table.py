@@ -140,6 +140,10 @@ _KITTI = (
     r"(?:P[0-3]|Tr\w*|R0_rect|R_rect|R):?(?:[ \t]+[^\s:]+){5})"
 )
 
+_KEY = r"""(?:\s|\{|#[^\n]*\n)*+["']?(?:%s)["']?:[ \t]*+"""
+_TWO_KEYS = "(?m)^" + 2 * (_KEY % r"[\w./-]+")
+_POSE_IN_TWO = rf"{_TWO_KEYS}(?:{_KEY % 'x|y|z|roll|pitch|yaw'}{NUMBER}[ ,]*){{3}}"
+
 _EUROC = (
     "#timestamp [ns]", "p_RS_R_x [m]", "p_RS_R_y [m]", "p_RS_R_z [m]", "q_RS_w []", "q_RS_x []", "q_RS_y []",
     "q_RS_z []", "v_RS_R_x [m s^-1]", "v_RS_R_y [m s^-1]", "v_RS_R_z [m s^-1]", "b_w_RS_S_x [rad s^-1]",
@@ -285,7 +289,7 @@ FORMATS = {
     ),
     "autoware": _tree(
         "Autoware sensor calibration", "frametool.formats.trees.calibrations",
-        magic=(("leaves", "//(?:x|y|z|roll|pitch|yaw)"),),
+        magic=(("last", _POSE_IN_TWO),),
         conventions="parent<-child, metres, radians, roll pitch yaw about fixed axes",
     ),
     "named": _tree(
