@@ -448,7 +448,7 @@ UNSUPPORTED = {
     ),
     "cameras": Unsupported(
         "the intrinsics of cameras",
-        "there is no pose in it; beside a tree with the frame (robot, T_cam_imu): frametool project TREE FRAME --camera FILE",
+        "there is no pose in it; with a tree that has its frame: frametool project TREE FRAME --camera FILE",
         (
             ("yaml key", "projection_matrix|distortion_model"), ("line", r"\[image\]$"),
             ("yaml inner", r"distortion_coeffs|cam_overlaps"),
