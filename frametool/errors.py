@@ -116,11 +116,7 @@ class FormatError(FrametoolError, ValueError):
         """Store the place with the message; `snippet` is the source line with a caret below it."""
         super().__init__(message)
         self.rule = rule or self.rule
-        self.message = message
-        self.source = source
-        self.line = line
-        self.column = column
-        self.snippet = snippet
+        self.message, self.source, self.line, self.column, self.snippet = message, source, line, column, snippet
 
     def __str__(self) -> str:
         """Return `source:line:column: message`, without unknown parts."""

@@ -9,15 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy import fmod, frexp, ldexp, maximum, minimum, sqrt
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats
-
-__all__ = [
-    "canonical_sign", "copysign", "doubled_arctan", "doubled_sincos", "first_nonzero", "fmod", "frexp", "furthest",
-    "ldexp", "least", "mask", "maximum", "minimum", "reduced_exactly", "some", "sqrt", "where",
-]  # fmt: skip
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -27,6 +21,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Array, Components, Condition, Four, Indices, Kernel, Number, Two
 
 BLOCK = 12288  # rows: amortises the cost of numpy calls, and a kernel's temporaries stay in the cache
+fmod, frexp, ldexp, maximum, minimum, sqrt = np.fmod, np.frexp, np.ldexp, np.maximum, np.minimum, np.sqrt
 SIGN_BIT = np.int64(-(2**63))
 np.empty(2**21)  # allocate and free 16 MiB once: glibc then reuses the memory of blocks instead of mapping it again
 

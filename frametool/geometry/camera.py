@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from typing import Any
 
-    from frametool.geometry.transform import Transform
     from frametool.geometry.types import Array, Condition, Functions, N, Number, Numbers, Rigid, Six, Three, Two, Vector
 
     Seen = tuple[N, N, Condition]
@@ -484,11 +483,6 @@ class Camera:
         if len(far) > 1:
             raise ValueInvalid("unproject takes depth or range, not both")
         return validation.stacked(self.points_of(u, v, **far) if far else self.rays_of(u, v))
-
-    def on_plane(self, pixels: Numbers, plane_from_camera: Transform, height: float = 0.0) -> Array:
-        """Return where the rays of pixels (.., 2) meet z = height of a frame: points (.., 3) in it, else NaN."""
-        u, v = validation.columns(pixels, 2, "pixels", or_nan=True)
-        return validation.stacked(self.plane_points_of(u, v, plane_from_camera.components, float(height)))
 
     def undistort(self, pixels: Numbers, into: Camera | None = None) -> Array:
         """Return pixels (.., 2) of the image without distortion, for the same K or for another camera.

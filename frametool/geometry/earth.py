@@ -116,20 +116,11 @@ def eastward(lon: N, xp: Functions[N]) -> N:
     return lon - xp.where(lon > 180.0, 360.0, xp.where(lon <= -180.0, -360.0, 0.0))
 
 
-def ecef_from_enu(lat: N, lon: N, xp: Functions[N]) -> Four[N]:
-    """Return the quaternion of the axes east, north, up at a position; at a pole lon defines them.
-
-    It is a rotation about z by 90 degrees + lon, then about x by 90 degrees - lat, with the right angles written out:
-    exact where lat and lon are multiples of 90.
-    """
-    s1, c1 = half_sincos_deg(lon, xp)
-    s2, c2 = half_sincos_deg(lat, xp)
-    back, ahead, down, up = 0.5 * (c1 - s1), 0.5 * (c1 + s1), c2 - s2, c2 + s2
-    return quaternion.settled(back * down, ahead * down, ahead * up, back * up)
-
-
 def ecef_from_axes(lat: N, lon: N, axes: str, xp: Functions[N], convergence_deg: N | None = None) -> Four[N]:
-    """Return the quaternion of axes at a position, with the canonical sign.
+    """Return the quaternion of axes at a position, with the canonical sign; at a pole lon defines them.
+
+    Those of enu are rotated about z by 90 degrees + lon, then about x by 90 degrees - lat, with the right angles
+    written out: exact where lat and lon are multiples of 90.
 
     axes: one of `AXES`
     convergence_deg: for grid axes, the angle of grid north clockwise of true north
@@ -137,7 +128,10 @@ def ecef_from_axes(lat: N, lon: N, axes: str, xp: Functions[N], convergence_deg:
     if axes == "ecef":
         zero = 0.0 * lat + 0.0
         return zero, zero, zero, zero + 1.0
-    x, y, z, w = ecef_from_enu(lat, lon, xp)
+    s1, c1 = half_sincos_deg(lon, xp)
+    s2, c2 = half_sincos_deg(lat, xp)
+    back, ahead, down, up = 0.5 * (c1 - s1), 0.5 * (c1 + s1), c2 - s2, c2 + s2
+    x, y, z, w = quaternion.settled(back * down, ahead * down, ahead * up, back * up)
     if axes == "ned":  # the product with enu_from_ned
         x, y, z, w = SQRT_HALF * x, SQRT_HALF * y, SQRT_HALF * z, SQRT_HALF * w
         x, y, z, w = quaternion.settled(w - z, w + z, x - y, 0.0 - x - y)

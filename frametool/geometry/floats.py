@@ -8,12 +8,8 @@ come from interpolation at Chebyshev nodes with 60 digits; the tests compare the
 
 from __future__ import annotations
 
-from math import atan2, copysign, cos, fmod, frexp, isfinite, ldexp, nan, pi, sin, sqrt
-
-__all__ = [
-    "canonical_sign", "copysign", "doubled_arctan", "doubled_sincos", "first_nonzero", "fmod", "frexp", "furthest",
-    "ldexp", "least", "mask", "maximum", "minimum", "reduced_exactly", "some", "sqrt", "where",
-]  # fmt: skip
+import math
+from math import atan2, cos, isfinite, nan, pi, sin
 
 TYPE_CHECKING = False
 
@@ -22,6 +18,7 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Condition, Functions, N, Two
 
+copysign, fmod, frexp, ldexp, sqrt = math.copysign, math.fmod, math.frexp, math.ldexp, math.sqrt
 DEGREE, RADIAN = pi / 180.0, 180.0 / pi  # a degree in radians and a radian in degrees
 SQRT_HALF = sqrt(0.5)
 # (sin(y)/y - 1)/y^2 in y^2, |y| <= pi/4: relative error of the sine 2^-56

@@ -367,9 +367,7 @@ class Transform(Batched):
         Raises:
             ValueInvalid: wrong shapes, not finite, or not a rotation; names the first such row.
         """
-        shift = validation.columns(xyz, 3, "xyz")
-        rotation = Rotation.from_quaternion(xyzw, normalize=normalize)
-        return cls.of(*validation.joined(shift, rotation.components, "xyz"))
+        return cls.from_parts(xyz, xyzw=xyzw, normalize=normalize)
 
     @classmethod
     def from_matrix(cls, matrices: Numbers, *, normalize: bool = False) -> Transform:

@@ -133,11 +133,10 @@ class _Found(NamedTuple):
     line_ends: Ints
 
 
-def split_delimited(block: bytes, delimiter: bytes, columns: int, *, comment: bytes = b"") -> Cells:
+def split_delimited(block: bytes, delimiter: bytes, columns: int) -> Cells:
     """Find cells between delimiters; quotes are part of the cell's span, and hide delimiters and line ends.
 
     block: whole lines; the last line end may be missing.
-    A line that begins with `comment`, if set, has no cells.
     """
     data, end = _closed(block)
     hidden = _inside_quotes(data, end, delimiter) if b'"' in block else _NOTHING_HIDDEN
@@ -163,11 +162,14 @@ def split_delimited(block: bytes, delimiter: bytes, columns: int, *, comment: by
     if b"\r" in block:
         last = found.stops - 1
         found.ends[last] -= (data[found.ends[last] - 1] == _RETURN) & (found.ends[last] > found.starts[last])
-    return _select(data, min(end, MARGIN + len(block)), found, columns, comment)
+    return _select(data, min(end, MARGIN + len(block)), found, columns)
 
 
 def split_blank(block: bytes, columns: int, *, comment: bytes = b"#") -> Cells:
-    """Find cells between runs of blanks and tabs, as `split_delimited` does for delimiters."""
+    """Find cells between runs of blanks and tabs, as `split_delimited` does for delimiters.
+
+    A line that begins with `comment`, one character if any, has no cells.
+    """
     data, end = _closed(block)
     text = data[MARGIN - 1 : end]
     gap = (text == _BLANK) | (text == _TAB) | (text == _RETURN) | (text == _NEWLINE)
@@ -270,18 +272,15 @@ def _cell_pattern(delimiter: bytes) -> re.Pattern[bytes]:
     return re.compile(rb"(?:" + quoted + rb"|[^" + mark + rb"\n]*+)(" + mark + rb"|\n|\Z)")
 
 
-def _select(data: Bytes, end: int, found: _Found, columns: int, comment: bytes) -> Cells:
+def _select(data: Bytes, end: int, found: _Found, columns: int, comment: bytes = b"") -> Cells:
     """Select the cells of those lines with the expected number of cells."""
     line_starts = np.concatenate([[MARGIN], found.line_ends[:-1]])[: len(found.line_ends)]
     line_ends = np.minimum(found.line_ends, end)
     counts = np.diff(found.stops, prepend=0)
     if len(found.ends):
         counts[found.ends[found.stops - 1] <= line_starts] = 0
-    if comment:  # it is shorter than the margin
-        is_comment = np.ones(len(line_starts), np.bool_)
-        for offset, character in enumerate(comment):
-            is_comment &= data[line_starts + offset] == character
-        counts[is_comment] = 0
+    if comment:
+        counts[data[line_starts] == comment[0]] = 0
     rows = np.flatnonzero(counts == columns)
     if len(rows) * columns == len(found.starts):
         starts, ends = found.starts.reshape(-1, columns), found.ends.reshape(-1, columns)

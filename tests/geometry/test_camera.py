@@ -100,7 +100,7 @@ def test_golden_points_on_the_ground(name: str) -> None:
     map_from_camera = tree.lookup("map", "camera")
     for pixel, ground, higher in case["ground"]:
         for height, expected in ((0.0, ground), (case["ground_height"], higher)):
-            found = camera.on_plane(pixel, map_from_camera, height)
+            found = camera.plane_points_of(pixel[0], pixel[1], map_from_camera.components, height)
             np.testing.assert_allclose(found, [math.nan] * 3 if expected is None else expected, rtol=1e-11, atol=1e-10)
     for pixel, ray in case["rays_in_map"]:
         np.testing.assert_allclose(map_from_camera.apply_vector(camera.unproject(pixel)), ray, rtol=0, atol=RAY)

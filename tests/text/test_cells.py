@@ -70,7 +70,7 @@ def test_a_line_with_another_number_of_cells_is_named_with_its_count() -> None:
 
 
 def test_a_comment_is_a_line_without_cells() -> None:
-    cells = split_delimited(b"# a,b\n1,2\n", b",", 2, comment=b"#")
+    cells = split_blank(b"# a b\n1 2\n", 2)
     assert (cells.counts.tolist(), texts(cells)) == ([0, 2], [[b"1", b"2"]])
 
 
