@@ -20,11 +20,11 @@ import numpy as np
 from frametool.errors import FormatError, FrametoolError, Misused, NamedTuple, listing
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION, stamp_text
-from frametool.geometry.representations import UPPER_ROWS, notation
+from frametool.geometry.representations import notation
 from frametool.grammar.readers import EARTH_FRAMES, NORMALS, in_nanoseconds, stamp_column, stamp_places
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import STOP, Fault, Outcome, RowNote
-from frametool.stream.header import Columns, PoseColumns, has_pose_column, listed
+from frametool.stream.header import has_pose_column, listed
 from frametool.stream.request import VELOCITIES
 from frametool.stream.row_layout import NORMAL, POSE, RATE, Shape
 from frametool.stream.rows import (
@@ -39,7 +39,7 @@ from frametool.stream.rows import (
     taken,
     written,
 )
-from frametool.stream.table_plan import ADDED, NAMED, Layout, New, plan_table, quoted
+from frametool.stream.table_plan import ADDED, Layout, Named, New, plan_table, quoted
 from frametool.text.lines import read_blocks, whole_lines, with_edits
 from frametool.text.spans import (
     MARGIN,
@@ -77,7 +77,6 @@ class Table(NamedTuple):
     names: of its columns, if it has any; width: how many cells a row has
     head: what comes before the header, or before the first row
     header: the raw text of the header's cells; title: its whole line; line_end: what ends it
-    pose: its columns, where the format says which they are, whatever their names
     """
 
     delimiter: bytes
@@ -87,7 +86,6 @@ class Table(NamedTuple):
     header: tuple[bytes, ...] = ()
     title: bytes = b""
     line_end: bytes = b"\n"
-    pose: PoseColumns | None = None
 
     def split(self, block: bytes) -> Cells:
         """Find the cells of a block."""
@@ -275,36 +273,35 @@ class Naming:
         return Spans(data, starts, np.where(same, cells.ends[:, place] + behind, ends))
 
 
-def as_trajectory(table: Table, fmt: str, request: Request, source: str) -> Table:
+def as_trajectory(table: Table, fmt: str, request: Request, source: str) -> tuple[Table, Request]:
     """Set the columns of a trajectory, unless --from or --columns do; eight numbers without names are TUM.
 
     Raises FormatError for a count of columns that the format does not have.
     """
-    row = FORMATS[fmt].rows
-    if request.rows.given or request.rows.columns:
-        return table
-    if row.widths and table.width not in row.widths and (fmt == "kitti" or not table.names):
-        wanted = " or ".join(map(str, row.widths))
+    row, names, asked = FORMATS[fmt].rows, table.names, request.rows
+    if asked.given or asked.columns:
+        return table, request
+    if row.widths and table.width not in row.widths and (fmt == "kitti" or not names):
+        counts = " or ".join(map(str, row.widths))
         line = table.head.count(b"\n") + 1
-        raise FormatError(f"expected {wanted} numbers a line, found {table.width}", source=source, line=line)
-    if fmt == "kitti":
-        places = tuple(range(len(row.columns)))
-        rows = Columns(places, row.columns, unit=1.0, notation=UPPER_ROWS, degrees=(None,) * 9, whole=True)
-        return table._replace(names=row.columns, pose=PoseColumns(None, rows))
+        raise FormatError(f"expected {counts} numbers a line, found {table.width}", source=source, line=line)
+    if fmt not in ("kitti", "euroc"):
+        tum = FORMATS["tum"].rows.columns
+        columns = row.columns or (tum if table.width == len(tum) else ())
+        return (table if names or not columns else table._replace(names=columns, width=len(columns))), request
+    ours = names = row.columns
     if fmt == "euroc":
-        names = table.names or row.columns[: table.width]
+        names, ours = table.names or names[: table.width], ours[1:8]
         if (at := stamp_column(names)) is not None and not in_nanoseconds(names[at]):
             names = (*names[:at], f"{names[at]} [ns]", *names[at + 1 :])  # whatever the file calls them
-        bare, ours = ([name.split("[")[0].strip() for name in each] for each in (names, row.columns[1:8]))
-        if missing := [name for name in ours if name not in bare]:
-            raise FormatError(f"no column {', '.join(missing)}", source=source, line=1)
-        places = tuple(map(bare.index, ours))
-        called = tuple(names[at] for at in places)
-        turn = Columns(places[3:], called[3:], notation=notation("wxyz"), degrees=(None,) * 4)
-        return table._replace(names=names, pose=PoseColumns(Columns(places[:3], called[:3], unit=1.0), turn))
-    tum = FORMATS["tum"].rows.columns
-    columns = row.columns or (tum if table.width == len(tum) else ())
-    return table if table.names or not columns else table._replace(names=columns, width=len(columns))
+    bare, wanted = ([name.split("[")[0].strip() for name in each] for each in (names, ours))
+    if missing := [name for name in wanted if name not in bare]:
+        raise FormatError(f"no column {', '.join(missing)}", source=source, line=1)
+    if asked.poses == 1:
+        places = [bare.index(name) + 1 for name in wanted]
+        chosen = ",".join(f"{place}-{place}" for place in places)  # ranges, because a column may be called 2
+        request = request.with_rows(given=notation(row.rotation), columns=(chosen,))
+    return table._replace(names=names), request
 
 
 def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming, request: Request) -> Block:
@@ -317,8 +314,9 @@ def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming, requ
         numbers = without_quotes(numbers)
     frames, names, bad = naming.of_rows(len(cells.rows), lambda place: coded(cells.column(place)))
     parts = [
-        naming.spans(cells, begin, names) if kind == NAMED else _stretch(cells, begin, end, kind, until)
-        for begin, end, kind, until in layout.stretches
+        naming.spans(cells, each.role, names) if isinstance(each, Named)
+        else Spans(cells.data, _bounds(cells, each[0]), _bounds(cells, each[1]))
+        for each in layout.stretches
     ]
     times = [place for place in (layout.time, layout.below) if place is not None]
     columns = [without_quotes(cells.column(place)) for place in times]
@@ -346,15 +344,12 @@ def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming, requ
     return Block(numbers, parts, cells.rows, lines, unchanged, broken, names, [stamps], late | bad, frames=[frames])
 
 
-def _stretch(cells: Cells, first: int, last: int, begin: str, end: str) -> Spans:
-    """Return the span from one cell to another in every row, with what is before or after."""
-    if begin == "line":
-        starts = cells.line_starts[cells.rows]
-    else:
-        starts = cells.starts[:, first] if begin == "cell" else cells.ends[:, first - (begin == "gap")]
-    if end == "line":
-        return Spans(cells.data, starts, cells.line_ends[cells.rows])
-    return Spans(cells.data, starts, cells.ends[:, last] if end == "cell" else cells.starts[:, last + 1])
+def _bounds(cells: Cells, at: int) -> Ints:
+    """Return where the rows are at a bound: 0 is the start of the line, 1 that of the first cell, 2 its end, .."""
+    place, is_end = divmod(at - 1, 2)
+    if 0 <= place < cells.starts.shape[1]:
+        return (cells.ends if is_end else cells.starts)[:, place]
+    return (cells.line_ends if at else cells.line_starts)[cells.rows]
 
 
 def run_table(
@@ -475,7 +470,7 @@ class TableRows(PlannedRows):
             raise FormatError("nothing in it", source=source)
         known = request.rows.given or request.rows.given_place
         table, rest = open_table(first, fmt, header=header, source=source, expected=known)
-        super().__init__(as_trajectory(table, fmt, request, source), request, source)
+        super().__init__(*as_trajectory(table, fmt, request, source), source)
         self.texts = chain((rest,) if rest else (), blocks)
         self.taken = len(first) - len(rest)
         self.lines = first.count(b"\n", 0, self.taken)

@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 
     from frametool.stream.table import Table
 
-Stretch: TypeAlias = tuple[int, int, str, str]
-
-
 class Kept(NamedTuple):
     """A column of the input."""
 
@@ -54,10 +51,11 @@ class Named(NamedTuple):
 
 
 PARENT, NAME = 0, 1  # roles of names
-NAMED = "named"  # a stretch that is no text of the input but the name of a role
-
 
 Column: TypeAlias = Kept | New | Fixed | Named
+# what a row has before its first cell is 0, then each cell begins at an odd number and ends at an even one, up to the
+# end of the line; a stretch is what is from one of these to another, or a name that is written
+Stretch: TypeAlias = tuple[int, int] | Named
 ADDED = (New, Fixed)  # no columns of the input
 
 
@@ -68,7 +66,7 @@ class Layout(NamedTuple):
         nanoseconds of stamps whose seconds are whole
     frames: those that name the frame a row is expressed in, for look-ups the two frames
     name: the one that says what a row is the pose of
-    stretches: (first, last column, where it begins, where it ends) of the text that passes
+    stretches: the text that passes, and the names
     """
 
     columns: tuple[Column, ...]
@@ -156,8 +154,6 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
         return []
     if specs and len(specs) != asked.poses:
         raise Misused(f"--columns is given {len(specs)} times, for {asked.poses} poses in a row")
-    if not specs and asked.poses == 1 and table.pose is not None and asked.given is None:
-        return [table.pose]
     if specs or not table.names:
         kinds = (asked.kinds if specs else ()) or (asked.kind,) * max(len(specs), 1)
         specs = specs or (_by_width(width, request, source),)
@@ -404,42 +400,39 @@ def quoted(name: str, delimiter: bytes) -> bytes:
 
 def lay_out(columns: Sequence[Column], width: int, delimiter: bytes) -> tuple[tuple[Piece, ...], tuple[Stretch, ...]]:
     """Make the pieces of a row out of its columns, as few as can be: neighbours that pass are one stretch."""
-    between = delimiter or b" "
+    between, line_end = delimiter or b" ", 2 * width + 1
     pieces: list[Piece] = []
     stretches: list[Stretch] = []
-    groups: list[list[Column]] = []
-    for column in columns:  # columns that follow one another, and numbers that do, go together
-        before = groups[-1][-1] if groups else None
-        goes_on = isinstance(before, Kept) and isinstance(column, Kept) and column.place == before.place + 1
-        if isinstance(before, New) and isinstance(column, New) and not (column.words or before.words):
-            goes_on = column.number == before.number + 1
-        if goes_on:
-            groups[-1].append(column)
-        else:
-            groups.append([column])
-    for at, group in enumerate(groups):
-        first, last = group[0], at == len(groups) - 1
-        follows = not last and not isinstance(groups[at + 1][0], Kept)
-        if isinstance(first, Kept):
-            end = first.place + len(group) - 1
-            ending = "line" if last and end == width - 1 else "gap" if follows and end < width - 1 else "cell"
-            begin = "line" if not at and not first.place else "gap" if at and first.place else "cell"
-            stretches.append((first.place, end, begin, ending))
-            pieces.append(In(len(stretches) - 1))
-            follows = follows and end == width - 1
-        elif isinstance(first, Named):
-            stretches += [(first.place, first.place, "cell", "cell"), (first.role, first.role, NAMED, NAMED)]
-            pieces.append(row_layout.Instead(len(stretches) - 2, len(stretches) - 1))
-        elif isinstance(first, Fixed):
-            pieces.append(Const(first.word.encode()))
-        else:
-            run = row_layout.Out(first.number, first.number + len(group), between)
-            pieces.append(Word(first.number, first.words) if first.words else run)
-        if follows:
+    for at, column in enumerate(columns):
+        before = columns[at - 1] if at else None
+        kept, after = (before if isinstance(before, Kept) else None), columns[at + 1 : at + 2]
+        if isinstance(column, Kept):  # with what parts it from the column before, if there is one
+            begin, is_last = 2 * column.place + (not at and column.place > 0), column.place == width - 1
+            if kept and kept.place == column.place - 1:
+                begin = stretches.pop()[0]
+            else:
+                pieces.append(In(len(stretches)))
+            goes_on = is_last if not after else not (is_last or isinstance(after[0], Kept))
+            stretches.append((begin, 2 * column.place + 2 + goes_on))
+            continue
+        run, words = pieces[-1] if pieces else None, column.words if isinstance(column, New) else ()
+        if isinstance(run, row_layout.Out) and isinstance(column, New) and run.last == column.number and not words:
+            pieces[-1] = run._replace(last=column.number + 1)
+            continue
+        if before and (kept is None or kept.place == width - 1):
             pieces.append(Const(between))
-    if not stretches or stretches[-1][3] != "line":
-        stretches.append((width - 1, width - 1, "end", "line"))
-        pieces.append(In(len(stretches) - 1))
+        if isinstance(column, Named):
+            pieces.append(row_layout.Instead(len(stretches), len(stretches) + 1))
+            stretches += [(2 * column.place + 1, 2 * column.place + 2), column]
+        elif isinstance(column, Fixed):
+            pieces.append(Const(column.word.encode()))
+        elif words:
+            pieces.append(Word(column.number, words))
+        else:
+            pieces.append(row_layout.Out(column.number, column.number + 1, between))
+    if not stretches or stretches[-1][1] != line_end:
+        pieces.append(In(len(stretches)))
+        stretches.append((line_end - 1, line_end))
     return tuple(pieces), tuple(stretches)
 
 
