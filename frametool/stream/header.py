@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 XYZ = ("x", "y", "z")
 POSITIONS = (XYZ, ("tx", "ty", "tz"), ("px", "py", "pz"))
-TURNED = ("rvec_", "qvec_", "quat_", "rot_")  # x, y and z behind these are no position
+TURNED = ("rvec_", "qvec_", "quat_", "rot_", "rotvec_", "axis_", "mrp_", "euler_")  # x, y, z behind these: no position
 TELLING = ("position", "translation", "point", "vector")
 FORCES = ("fx", "fy", "fz")
 LETTERS = {
@@ -168,13 +168,11 @@ def has_pose_column(names: Iterable[str]) -> bool:
 def find_positions(header: Header) -> list[Columns]:
     """Return every three columns that can be a position."""
     named = {(match.prefix, match.suffix) for match in _named_maps(header)}
-    turns = [{*match.places} for row in ROTATIONS.values() for match in header.match(row.columns)]
     found: dict[tuple[int, ...], Columns] = {}
     for base in POSITIONS:
         for match in header.match(base, range(3)):
-            other = (match.prefix, match.suffix) in named or match.prefix.lower().endswith(TURNED)
-            other = other or any(spot[1] in (*ANGLES, "s") for spot in match.spots if spot and spot[1])
-            if not (other or any(each.issuperset(match.places) for each in turns)):
+            is_other = (match.prefix, match.suffix) in named or match.prefix.lower().endswith(TURNED)
+            if not (is_other or any(spot and spot[1] and spot[1] in (*ANGLES, "s") for spot in match.spots)):
                 found.setdefault(match.places, _position(match))
     every = [*found.values()]
     return [each for each in every if any(word in each.prefix.lower() for word in TELLING)] or every
@@ -261,36 +259,33 @@ def find_poses(names: Sequence[str], expected: Notation | None, count: int, sour
     positions, rotations = find_positions(header), find_rotations(header, expected)
     if len(positions) > 1:
         positions = [each for each in positions if each.names not in NORMALS]
-    if len(positions) <= 1 and len(rotations) <= 1 and count == 1:
-        reason = "" if rotations else _half_rotation(header, expected)
-        if not (positions or rotations or reason):
-            reason = f"no columns of a point or pose among: {listed(names)}; name them with --columns"
-        if reason:
-            raise FormatError(reason, source=source, line=1)
-        return [_joined(header, positions, rotations)]
-    return _several(positions, rotations, count, names, source)
+    reason = "" if rotations or count > 1 or len(positions) > 1 else _half_rotation(header, expected)
+    poses = [] if reason else _paired(header, positions, rotations, count)
+    if len(poses) == count and max(len(positions), len(rotations)) <= count:
+        return sorted(poses, key=lambda pose: pose.places[0])
+    wanted = "one pose" if count == 1 else "two poses"
+    found = "; ".join(each.shown for each in (*positions, *rotations)[:MOST_SHOWN]) or f"none among {listed(names)}"
+    if count == 1 and not (positions or rotations):
+        reason = reason or f"no columns of a point or pose among: {listed(names)}; name them with --columns"
+    reason = reason or f"columns of {wanted} are wanted, found {found}; choose with --columns"
+    raise FormatError(reason, source=source, line=1)
 
 
-def _several(
-    positions: Sequence[Columns], rotations: Sequence[Columns], count: int, names: Sequence[str], source: str
+def _paired(
+    header: Header, positions: Sequence[Columns], rotations: Sequence[Columns], count: int
 ) -> list[PoseColumns]:
-    """Put each rotation with the position that shares most of its affixes; raises FormatError for another count."""
-    poses, left = list[PoseColumns](), list(positions)
+    """Put each rotation with the position that shares most of its affixes, or with the half of one that is there."""
+    taken, poses = {place for each in rotations for place in each.places}, list[PoseColumns]()
+    left = [each for each in positions if taken.isdisjoint(each.places)]
     for rotation in rotations:
         near = max(
             () if rotation.whole else left, default=None,
             key=lambda at: (at.suffix == rotation.suffix, len(commonprefix([at.prefix, rotation.prefix]))),  # noqa: RUF071
         )  # fmt: skip
         left = [each for each in left if each is not near]
-        poses.append(PoseColumns(near, rotation))
-    poses += [PoseColumns(each, None) for each in left]
-    if len(poses) == count and max(len(positions), len(rotations)) <= count:
-        return sorted(poses, key=lambda pose: pose.places[0])
-    wanted = "one pose" if count == 1 else "two poses"
-    candidates = "; ".join(each.shown for each in (*positions, *rotations)[:MOST_SHOWN])
-    found = candidates or f"none among {listed(names)}"
-    reason = f"columns of {wanted} are wanted, found {found}; choose with --columns"
-    raise FormatError(reason, source=source, line=1)
+        half = None if near or rotation.whole else _half_position(header, rotation)
+        poses.append(PoseColumns(near or half, rotation))
+    return poses + [PoseColumns(each, None) for each in left if len(poses) < count]
 
 
 @lru_cache(maxsize=256)  # records of one kind have the same keys
@@ -309,18 +304,7 @@ def plain_pose(names: tuple[str, ...], *, affixed: bool) -> PoseColumns:
     if not rotations and (half := _half_rotation(header, None)):
         reason = half.partition(", or add --")[0]
         raise ValueInvalid(reason.replace("choose with --columns", "leave it out").replace("columns", "keys"))
-    return _joined(full if affixed else header, positions, rotations)
-
-
-def _joined(header: Header, positions: Sequence[Columns], rotations: Sequence[Columns]) -> PoseColumns:
-    """Put the one position and the one rotation together, or the half of a position that a rotation has."""
-    rotation = rotations[0] if rotations else None
-    if rotation is None or rotation.whole:
-        return PoseColumns(positions[0] if positions and rotation is None else None, rotation)
-    for each in positions:
-        if not {*rotation.places}.intersection(each.places):
-            return PoseColumns(each, rotation)
-    return PoseColumns(_half_position(header, rotation), rotation)
+    return next(iter(_paired(full if affixed else header, positions, rotations, 1)), PoseColumns(None, None))
 
 
 def _half_position(header: Header, rotation: Columns) -> Columns | None:

@@ -26,9 +26,9 @@ from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import arrays, floats, quaternion, rigid
 from frametool.geometry.representations import notation
-from frametool.grammar.pose import SCALE, Pose
+from frametool.grammar.pose import SCALE
 from frametool.grammar.readers import EARTH_FRAMES
-from frametool.grammar.result import Result, Style, with_entries
+from frametool.grammar.result import Result, Style
 from frametool.stream.record_results import BlockResults, Documents, csv_rows
 from frametool.stream.row_layout import AS_READ, POSE, SIX, Const, In, Out, Piece, Target
 from frametool.stream.rows import (
@@ -40,7 +40,6 @@ from frametool.stream.rows import (
     objects,
     plain_cells,
     spans_of,
-    spelled,
     text_of,
     texts_of,
     values_of,
@@ -262,27 +261,19 @@ class RowsWriter(PoseWriter):
         size, place = {POSE: 7, **dict.fromkeys(SIX, 6)}.get(self.kind, 3), self.target.place
         # nothing near the Earth's centre has a latitude
         own = (*((1.0 if place is None else 1e6) * part for part in NUMBERS[:3]), *NUMBERS[3:size])
-        more = {name: MORE_NUMBERS + at for at, name in enumerate(self.extras)}
-        numbers = [*self.target.written(own, floats), *more.values()]
+        more = [MORE_NUMBERS + at for at in range(len(self.extras))]
+        numbers = [*self.target.written(own, floats), *more]
         columns = {repr(number): at for at, number in enumerate(numbers) if type(number) is float}
-        name, parent = (
-            each[0] if len(each) == 1 else mark for mark, each in ((NAME, block.names), (PARENT, block.parents))
-        )
-        extras: dict[str, Any] = dict(more) if self.style.format == "csv" else with_entries(dict(more))
-        if block.stamps_ns is not None:
-            extras["stamp_ns"] = STAMP_NS
-        extras |= {name: Verbatim(leaf_mark(at)) for at, name in enumerate(block.extras)}
-        if self.kind == POSE:
-            pose = Pose.of(own, name, parent)
-            return Marked(Result(pose if self.placed else pose._replace(position=None), extras), columns, len(numbers))
-        value: dict[str, Any] = {} if name is None else {"name": name}
-        if place is None:
-            value |= ({} if parent is None else {"frame": parent}) | spelled(self.kind, own)
-        else:
-            from frametool.grammar.place import point_entry
-
-            value |= point_entry(EARTH_FRAMES[0], own, place)
-        return Marked(value | extras, columns, len(numbers))
+        parent = PARENT if place is None or self.kind == POSE else EARTH_FRAMES[0]
+        one = block._replace(
+            numbers=np.array([[*own[0 if self.placed else 3 :], *more]]), read=None,
+            stamps_ns=None if block.stamps_ns is None else np.array([STAMP_NS]),
+            parents=block.parents if len(block.parents) == 1 else [parent],
+            names=block.names if len(block.names) == 1 else [NAME],
+            extras={name: objects([Verbatim(leaf_mark(at))]) for at, name in enumerate(block.extras)},
+        )  # fmt: skip
+        (value,) = values_of(one, self.kind, self.extras, place, placed=self.placed)
+        return Marked(value, columns, len(numbers))
 
 
 def refuse_infinite(values: Floats) -> None:
