@@ -457,10 +457,8 @@ class Run:
 
     def faults(self) -> list[Fault]:
         """Return what is wrong, line by line."""
-        found = [*map(itemgetter(1), self.block.broken)]
-        for row, (column, reason) in self.reasons.items():
-            found.append(Fault.of(self.block.line_of(row), column, reason))
-        return sorted(found)
+        found = [Fault(self.block.line_of(row), *why) for row, why in self.reasons.items()]
+        return sorted([*map(itemgetter(1), self.block.broken), *found], key=lambda each: (each.line, each.column))
 
 
 def _checked(shape: Shape, own: Components) -> Components:

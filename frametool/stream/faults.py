@@ -22,28 +22,18 @@ class Fault(NamedTuple):
 
     line: counted as whoever keeps it says
     column: the name or number of the column that is to blame, "" for the whole row
-    reason: why it is bad
+    reason: why it is bad, an error or its message
     final: nothing behind it can be read
-    kind: the name of the failure in machine output
-    short: the reason without the list of what there is, where it has one
+    kind: the name of the failure in machine output, where the reason does not say it
     skipped: the row is left out whatever the rule
     """
 
     line: int
     column: str
-    reason: str
+    reason: str | FrametoolError
     final: bool = False
-    kind: str = "bad_row"
-    short: str = ""
+    kind: str = ""
     skipped: bool = False
-
-    @classmethod
-    def of(cls, line: int, column: str, reason: str | FrametoolError) -> Fault:
-        """Make a fault of an error, or of a reason in words."""
-        if isinstance(reason, str):
-            return cls(line, column, reason)
-        short = reason.short if isinstance(reason, UnknownFrame) else ""
-        return cls(line, column, str(reason), kind=reason.kind, short=short)
 
 
 DEGREES = "degrees"
@@ -92,7 +82,7 @@ class BadRow(FormatError):
     @property
     def kind(self) -> str:
         """Return the name of the failure that made the row bad."""
-        return self.fault.kind
+        return self.fault.kind or getattr(self.fault.reason, "kind", "bad_row")
 
     def details(self) -> dict[str, object]:
         """Return the place, whose column has a name or a number."""
@@ -165,10 +155,10 @@ class BadRows:
         return ROWS_SKIPPED
 
     def _reason(self, fault: Fault) -> str:
-        if fault.short and self._has_listed:
-            return fault.short
-        self._has_listed = self._has_listed or bool(fault.short)
-        return fault.reason
+        if not isinstance(fault.reason, UnknownFrame):
+            return str(fault.reason)
+        known, self._has_listed = self._has_listed, True
+        return fault.reason.short if known else str(fault.reason)
 
 
 class Outcome(NamedTuple):

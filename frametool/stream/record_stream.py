@@ -256,7 +256,7 @@ class RecordBlocks:
             except FormatError as error:
                 made = fault_at(made.source, error)
             except FrametoolError as error:
-                made = Fault.of(line + made.line, getattr(error, "column_name", ""), error)
+                made = Fault(line + made.line, getattr(error, "column_name", ""), error)
             else:
                 found.notes += notes
                 found.mended += [note.rule for note in made.notes].count(ROUNDED) if made.notes else 0
@@ -308,7 +308,7 @@ class RecordBlocks:
                 reason = run.reasons.get(row := alone[at])
                 made = self._read(text, part, line) if reason is None or at < MOST_EXACT else None
                 if made is None or (reason is not None and not isinstance(made, Fault)):
-                    made = Fault.of(run.block.line_of(row), *(reason or ("", "")))
+                    made = Fault(run.block.line_of(row), *(reason or ("", "")))
                 self._alone(text, part, made, line, found, run.parts_of(row) if self.request.in_order else None)
             found.notes += run.notes
             if len(cut.starts):

@@ -392,7 +392,7 @@ def attempt(text: bytes, part: Part, line: int = 0, *, fmt: str, request: Reques
     except FormatError as error:
         return fault_at(source, error)
     except FrametoolError as error:
-        return Fault.of(line, getattr(error, "column_name", ""), error)
+        return Fault(line, getattr(error, "column_name", ""), error)
     return found
 
 

@@ -9,6 +9,7 @@ head once, then block after block.
 
 from __future__ import annotations
 
+import re
 from contextlib import suppress
 from functools import cache
 from itertools import chain
@@ -66,6 +67,7 @@ COUNTER = "frame"  # such a column often counts pictures
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 COMMENT = b"#"
+COMMENTS = re.compile(rb"(?:#[^\r\n]*|\s*(?:[\r\n]|\Z))*+")  # and empty lines
 NEWLINE, QUOTE = b'\n"'
 UNCLOSED = "a quote is opened here and not closed"
 
@@ -127,8 +129,8 @@ def open_table(
     row = FORMATS[fmt].rows
     delimiter = (row.delimiter or "").encode()
     mark = BYTE_ORDER_MARK if block.startswith(BYTE_ORDER_MARK) else b""
-    rest = without_comments(block[len(mark) :])
-    comments = block[len(mark) : len(block) - len(rest)]
+    comments = COMMENTS.match(block, len(mark))[0]  # type: ignore[index]
+    rest = block[len(mark) + len(comments) :]
     end = rest.find(b"\n") + 1 or len(rest)
     if delimiter and b'"' in rest[:end]:  # a quoted cell may hold line ends
         ends = split_delimited(rest, delimiter, 0).line_ends
@@ -151,16 +153,6 @@ def open_table(
     title = line.rstrip(b"\r\n")
     names, line_end = tuple(map(_unquoted, cells)), line[len(title) :] or b"\n"
     return Table(delimiter, names, len(cells), mark + comments, tuple(cells), title, line_end), rest[end:]
-
-
-def without_comments(text: bytes) -> bytes:
-    """Leave out the comments and empty lines at the start of a text."""
-    end = 0
-    for line in text.splitlines(keepends=True):
-        if line.strip() and not line.startswith(COMMENT):
-            break
-        end += len(line)
-    return text[end:]
 
 
 def _named_comment(
@@ -464,7 +456,7 @@ class TableRows(PlannedRows):
         blocks, first = read_blocks(stream, whole=RecordEnds(delimiter) if delimiter else whole_lines), b""
         for block in blocks:  # up to one that holds more than comments
             first += block
-            if without_comments(first.removeprefix(BYTE_ORDER_MARK)):
+            if COMMENTS.fullmatch(first.removeprefix(BYTE_ORDER_MARK)) is None:
                 break
         if not first:
             raise FormatError("nothing in it", source=source)

@@ -99,7 +99,7 @@ class BagOfClouds:
         try:
             pose = way.from_frame(cloud.frame or None, cloud.stamp_ns)
         except FrametoolError as error:
-            bad.take([Fault.of(cloud.number, "", error)])
+            bad.take([Fault(cloud.number, "", error)])
             return 0
         texts = {place: re.sub(r"[/\0]|^\.+", "_", text(cloud)) for place, text in PLACES.items()}  # no other folder
         name = re.sub(r"\{(\w+)\}", lambda found: texts.get(found[1], found[0]), str(self.output.path))

@@ -213,7 +213,7 @@ def calculate_lines(stream: Stream, scope: Scope) -> int:
             except FrametoolError as error:
                 if bad.on_error == STOP:
                     raise
-                bad.take([Fault.of(number, str(error.details().get("column", "")), error)])
+                bad.take([Fault(number, str(error.details().get("column", "")), error)])
 
     stream.output.pieces(value_texts(shown_of(values()), stream.output.style))
     return bad.finish(count)
