@@ -17,6 +17,7 @@ from frametool.documents.source import InputFile
 from frametool.errors import FormatError, Misused, listing, warn
 from frametool.formats.rows import pcd
 from frametool.formats.rows.column_file import FLOATS, ColumnFile, Made, OutColumn, RecordFile, not_finite
+from frametool.formats.rows.csv import quoted
 from frametool.formats.table import FORMATS
 from frametool.grammar.readers import NORMALS, in_nanoseconds
 from frametool.stream.array_writer import DOUBLE, ColumnsWriter
@@ -24,7 +25,7 @@ from frametool.stream.faults import SKIP, STOP, Outcome
 from frametool.stream.request import VELOCITIES, Operation, Request
 from frametool.stream.rows import Block, RowPoses, coded_texts, is_typed, objects, taken
 from frametool.stream.table import PlannedRows, Table
-from frametool.stream.table_plan import Fixed, Kept, Named, New, quoted
+from frametool.stream.table_plan import Fixed, Kept, Named, New
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Sequence
@@ -47,7 +48,7 @@ class ColumnRows(PlannedRows):
         self.file = file
         self.source = source
         names = file.names
-        table = Table(b",", names, file.width, header=tuple(quoted(name, b",") for name in names or ()))
+        table = Table(b",", names, file.width, header=tuple(quoted(name).encode() for name in names or ()))
         try:  # `t` or `time` of a cloud is what its sensor counts, in whatever unit
             super().__init__(table, request, source, file.vectors, stamped=not file.vectors)
         except FormatError as error:

@@ -14,7 +14,7 @@ from frametool.geometry.representations import HEADING, Notation, notation
 from frametool.geometry.rigid import EXACT, SCALED, UNCERTAIN
 from frametool.grammar.pose import SCALE, VELOCITY
 from frametool.stream.faults import STOP
-from frametool.stream.row_layout import MOVERS, POINT, POSE, RATE, SIX, TURNED, VECTOR, Shape, Target, Unit
+from frametool.stream.row_layout import MOVERS, POINT, POSE, RATE, SIX, TURNED, VECTOR, Shape, Target, Unit, Word
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from frametool.geometry.place import Earth, Place
     from frametool.geometry.types import Components, Namespace, Number, Rigid
     from frametool.stream.gathering import Gathered
-    from frametool.stream.row_layout import Word
 
     Rename: TypeAlias = Callable[[str | None, str | None], tuple[str | None, str | None]]
 
@@ -89,13 +88,11 @@ class Shown(NamedTuple):
         from frametool.documents.source import Verbatim
 
         found: dict[str, Any] = {}
-        value: Any
         for key, value in self.members.items():
-            if isinstance(value, str):
-                made: Any = value
-            elif hasattr(value, "text"):
+            made: Any = value
+            if isinstance(value, Word):
                 made = Verbatim(value.text(numbers[value.number]).decode())
-            else:
+            elif not isinstance(value, str):
                 made = [_or_none(numbers[at]) for at in value]
                 made = None if None in made else made if made[1:] else made[0]
             found[prefix + key] = made

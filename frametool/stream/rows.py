@@ -488,16 +488,9 @@ def values_of(
             made.append(named | point_entry(parents[at], own, place, block.spot(at)) | said)
         else:
             named |= {"frame": parents[at]} if parents[at] else {}
-            made.append(named | spelled(kind, own) | said)
+            halves = (None, None) if own is None else (own[:3], own[3:])
+            made.append(named | {kind: dict(zip(PARTS[kind], halves, strict=True)) if kind in PARTS else own} | said)
     return made
-
-
-def spelled(kind: str, numbers: Sequence[float] | None) -> dict[str, Any]:
-    """Return the numbers of a point, vector, twist or wrench under its keys; None in their place if there are none."""
-    if kind not in PARTS:
-        return {kind: numbers if numbers is None else list(numbers)}
-    halves = (None, None) if numbers is None else (list(numbers[:3]), list(numbers[3:]))
-    return {kind: dict(zip(PARTS[kind], halves, strict=True))}
 
 
 def texts_of(cells: Cells) -> list[str]:

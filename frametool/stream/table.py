@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frametool.errors import FormatError, FrametoolError, Misused, NamedTuple, listing
+from frametool.formats.rows.csv import quoted
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION, stamp_text
 from frametool.geometry.representations import notation
@@ -40,7 +41,7 @@ from frametool.stream.rows import (
     taken,
     written,
 )
-from frametool.stream.table_plan import ADDED, Layout, Named, New, plan_table, quoted
+from frametool.stream.table_plan import ADDED, Layout, Named, New, plan_table
 from frametool.text.lines import read_blocks, whole_lines, with_edits
 from frametool.text.spans import (
     MARGIN,
@@ -68,7 +69,7 @@ COUNTER = "frame"  # such a column often counts pictures
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 COMMENT = b"#"
 COMMENTS = re.compile(rb"(?:#[^\r\n]*|\s*(?:[\r\n]|\Z))*+")  # and empty lines
-NEWLINE, QUOTE = b'\n"'
+QUOTE = ord('"')
 UNCLOSED = "a quote is opened here and not closed"
 
 
@@ -100,22 +101,23 @@ class Table(NamedTuple):
         """Return what columns are called: their names, or their numbers from 1."""
         return self.names or tuple(map(str, range(1, self.width + 1)))
 
+    def cell(self, text: str) -> bytes:
+        """Write a cell, in quotes where a reader would split it."""
+        return (quoted(text, self.delimiter.decode()) if self.delimiter else text).encode()
+
     def name(self, place: int) -> str:
         """Name a column for messages."""
         return self.names[place] if self.names else f"column {place + 1}"
 
     def opening(self, layout: Layout) -> bytes:
         """Return what is before the first row of the output: the header as it was where no column changes."""
-        if not self.header:
-            names = [each.name if isinstance(each, ADDED) else self.name(each.place) for each in layout.columns]
-            grown = self.names and len(names) > self.width  # what was known by its count is not any more
-            return self.head + (b"# " + " ".join(names).encode() + self.line_end if grown else b"")
-        cells = [
-            quoted(column.name, self.delimiter) if isinstance(column, ADDED) else self.header[column.place]
-            for column in layout.columns
-        ]
-        title = self.title if cells == list(self.header) else (self.delimiter or b" ").join(cells)
-        return self.head + title + self.line_end
+        own = self.header or [*map(self.cell, self.called)]
+        cells = [self.cell(each.name) if isinstance(each, ADDED) else own[each.place] for each in layout.columns]
+        title = (self.delimiter or b" ").join(cells)
+        if self.header:
+            return self.head + (self.title if cells == [*own] else title) + self.line_end
+        grown = self.names and len(cells) > self.width  # what was known by its count is not any more
+        return self.head + (b"# " + title + self.line_end if grown else b"")
 
 
 def open_table(
@@ -142,8 +144,11 @@ def open_table(
     named = _named_comment(comments, delimiter, len(cells), known) if header and comments else None
     if not cells and not (delimiter and comments):
         raise FormatError("no rows in it", source=source)
-    numeric = [_is_number(_unquoted(cell)) for cell in cells]
-    own = header and not (all(numeric) if delimiter else any(numeric))
+    count = 0  # of numbers
+    for cell in cells:
+        with suppress(ValueError):
+            count += float(_unquoted(cell)) is not None
+    own = header and not (count == len(cells) if delimiter else count)
     if named is not None and not (own and known([*map(_unquoted, cells)])):
         return named._replace(head=mark + named.head), rest
     if not own:
@@ -189,20 +194,12 @@ def _unquoted(cell: bytes) -> str:
     return text[1:-1].replace('""', '"') if len(text) > 1 and text[0] == text[-1] == '"' else text
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
 class Naming:
     """What a run does with the names in a table; remembers the frame of the rows before."""
 
     def __init__(self, table: Table, layout: Layout, request: Request, shape: Shape) -> None:
         """Take from the request what it does to names; shape: what a row is."""
-        self.layout, self.delimiter = layout, table.delimiter
+        self.layout, self.table = layout, table
         self.earth = EARTH_FRAMES[0] if shape.place is not None else None
         self.places = (layout.frames[0] if layout.frames else None, layout.name) if request.rows.poses else (None, None)
         named = self.places[self.places[0] is None]
@@ -218,13 +215,9 @@ class Naming:
 
         column: returns the texts of a column
         """
-        if self.places != (None, None) and size:
-            return self._renamed(size, column)
-        texts = [column(place).each() for place in self.layout.frames] if size else []
-        return [*map("\0".join, zip(*texts, strict=True))] or [self.earth], BlockNames(), {}
-
-    def _renamed(self, size: int, column: Callable[[int], Coded]) -> tuple[Sequence[str | None], BlockNames, Bad]:
-        """Read the names of rows that have columns of them, and rename them."""
+        if self.places == (None, None) or not size:
+            texts = [column(place).each() for place in self.layout.frames] if size else []
+            return [*map("\0".join, zip(*texts, strict=True))] or [self.earth], BlockNames(), {}
         none = Coded([""], np.zeros(size, np.int64))
         parents, names = (none if place is None else column(place) for place in self.places)
         count = len(names.texts)
@@ -254,7 +247,7 @@ class Naming:
     def spans(self, cells: Cells, role: int, names: BlockNames) -> Spans:
         """Write names as cells; one that does not change stays as it is written."""
         place, of_row = self.places[role] or 0, names.of_row
-        new = spans_of([quoted(result[role], self.delimiter) for result in names.results])
+        new = spans_of([self.table.cell(result[role]) for result in names.results])
         starts, ends = new.starts[of_row], new.ends[of_row]
         pairs = zip(names.pairs, names.results, strict=True)
         same = np.array([old[role] == result[role] for old, result in pairs])[of_row]
@@ -313,16 +306,7 @@ def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming, requ
     times = [place for place in (layout.time, layout.below) if place is not None]
     columns = [without_quotes(cells.column(place)) for place in times]
     stamps, late = read_extra(columns, request, table.name(times[0])) if times else (None, {})
-    unchanged, broken = [], []
-
-    @cache
-    def newlines() -> Ints:
-        return np.flatnonzero(cells.data == NEWLINE)
-
-    def lines_before(line: int) -> int:
-        """Count the line ends before a line: more than its index if cells hold line ends."""
-        return int(np.searchsorted(newlines(), cells.line_starts[line]))
-
+    unchanged, broken, before = [], [], cache(cells.lines_before)
     if len(cells.rows) < len(cells.counts):
         named = f" ({' '.join(table.names)})" if table.names and len(table.names) < 12 else ""
         for line in cells.odd_lines().tolist():
@@ -331,9 +315,9 @@ def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming, requ
                 unchanged.append((line, raw))
             else:
                 reason = f"expected {table.width} cells{named}, found {int(cells.counts[line])}"
-                broken.append((line, Fault(lines_before(line), "", reason, skipped=True)))
-    lines = lambda row: lines_before(int(cells.rows[row]))  # noqa: E731
-    return Block(numbers, parts, cells.rows, lines, unchanged, broken, names, [stamps], late | bad, frames=[frames])
+                broken.append((line, Fault(int(before()[line]), "", reason, skipped=True)))
+    line_of = lambda row: int(before()[cells.rows[row]])  # noqa: E731
+    return Block(numbers, parts, cells.rows, line_of, unchanged, broken, names, [stamps], late | bad, frames=[frames])
 
 
 def _bounds(cells: Cells, at: int) -> Ints:

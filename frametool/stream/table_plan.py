@@ -306,15 +306,14 @@ def _columns(
     """
     columns: list[Column] = [Kept(place) for place in range(table.width)]
     operation, asked = request.operation, request.results
-    only_turned = operation.changes_nothing and not operation.moves and asked.place is None
+    only_turned = operation.changes_nothing and asked.place is None
     if only_turned and asked.by_default and not (asked.all_numbers or targets[0].notations or asked.keep):
         return columns
-    ours: dict[int, list[Column]] = {place: [] for pose in poses for place in pose.places}
+    ours = dict.fromkeys(place for pose in poses for place in pose.places)
     adds = request.results.keep or request.operation.only_adds or not ours
-    at: dict[int, list[Column]] = {}
+    at: dict[int, list[Column]] = {place: [] for place in ours}
     for place, role in named.items() if not adds and request.renaming is not None else ():
-        at[place] = [Named(place, role)]
-    at |= ours
+        at.setdefault(place, [Named(place, role)])
     added: list[Column] = []
     first = 0
     for number, target in enumerate(targets):
@@ -388,14 +387,6 @@ def _new_columns(
 
 
 # --- the text of a row ---
-
-
-def quoted(name: str, delimiter: bytes) -> bytes:
-    """Write a cell, in quotes where a reader would split it."""
-    text = name.encode()
-    if delimiter and any(mark in text for mark in (delimiter, b'"', b"\n", b"\r")):
-        return b'"' + text.replace(b'"', b'""') + b'"'
-    return text
 
 
 def lay_out(columns: Sequence[Column], width: int, delimiter: bytes) -> tuple[tuple[Piece, ...], tuple[Stretch, ...]]:

@@ -119,9 +119,9 @@ class Cells(NamedTuple):
         """Return the bytes of one line with its end."""
         return self.data[self.line_starts[index] : self.line_ends[index]].tobytes()
 
-    def lines_before(self, index: int) -> int:
-        """Count the line ends in the block before a line: more than its index if cells contain line ends."""
-        return int(np.count_nonzero(self.data[MARGIN : self.line_starts[index]] == _NEWLINE))
+    def lines_before(self) -> Ints:
+        """Count the line ends in the block before each line: more than its index if cells contain line ends."""
+        return np.searchsorted(np.flatnonzero(self.data == _NEWLINE), self.line_starts)
 
 
 class _Found(NamedTuple):
