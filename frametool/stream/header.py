@@ -141,9 +141,9 @@ class Header:
     def columns(self, spots: Sequence[Spot | None], key: tuple[str, str] = ("", "")) -> Columns:
         """Name the columns that were found for some words under some affixes."""
         places = tuple(spot[0] for spot in spots if spot)
-        names = tuple(self.names[place] for place in places)
-        twice = next((name for name in names if self.count[name] > 1), "")
-        wrong = f"column {twice} appears twice; choose by number with --columns" if twice else ""
+        names = tuple(map(self.names.__getitem__, places))
+        most = max(names, key=self.count.__getitem__)
+        wrong = f"column {most} appears twice; choose by number with --columns" if self.count[most] > 1 else ""
         return Columns(places, names, *self.affixes.get(key, key), wrong=wrong, spots=tuple(spots))
 
     def is_plain(self, match: Columns) -> bool:
@@ -262,7 +262,7 @@ def find_poses(names: Sequence[str], expected: Notation | None, count: int, sour
     reason = "" if rotations or count > 1 or len(positions) > 1 else _half_rotation(header, expected)
     poses = [] if reason else _paired(header, positions, rotations, count)
     if len(poses) == count and max(len(positions), len(rotations)) <= count:
-        return sorted(poses, key=lambda pose: pose.places[0])
+        return sorted(poses, key=lambda pose: pose.places[0]) if count > 1 else poses
     wanted = "one pose" if count == 1 else "two poses"
     found = "; ".join(each.shown for each in (*positions, *rotations)[:MOST_SHOWN]) or f"none among {listed(names)}"
     if count == 1 and not (positions or rotations):
@@ -275,17 +275,18 @@ def _paired(
     header: Header, positions: Sequence[Columns], rotations: Sequence[Columns], count: int
 ) -> list[PoseColumns]:
     """Put each rotation with the position that shares most of its affixes, or with the half of one that is there."""
-    taken, poses = {place for each in rotations for place in each.places}, list[PoseColumns]()
-    left = [each for each in positions if taken.isdisjoint(each.places)]
+    poses, left = list[PoseColumns](), positions
     for rotation in rotations:
+        left = [each for each in left if {*each.places}.isdisjoint(rotation.places)]
         near = max(
             () if rotation.whole else left, default=None,
             key=lambda at: (at.suffix == rotation.suffix, len(commonprefix([at.prefix, rotation.prefix]))),  # noqa: RUF071
         )  # fmt: skip
-        left = [each for each in left if each is not near]
+        if near:
+            left.remove(near)
         half = None if near or rotation.whole else _half_position(header, rotation)
         poses.append(PoseColumns(near or half, rotation))
-    return poses + [PoseColumns(each, None) for each in left if len(poses) < count]
+    return poses if len(poses) == count else [*poses, *(PoseColumns(each, None) for each in left)]
 
 
 @lru_cache(maxsize=256)  # records of one kind have the same keys

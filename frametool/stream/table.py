@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frametool.errors import FormatError, FrametoolError, Misused, NamedTuple, listing
-from frametool.formats.rows.csv import quoted
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION, stamp_text
 from frametool.geometry.representations import notation
@@ -103,7 +102,8 @@ class Table(NamedTuple):
 
     def cell(self, text: str) -> bytes:
         """Write a cell, in quotes where a reader would split it."""
-        return (quoted(text, self.delimiter.decode()) if self.delimiter else text).encode()
+        cell, marks = text.encode(), {*self.delimiter, *b'"\n\r'} if self.delimiter else set[int]()
+        return cell if marks.isdisjoint(cell) else b'"' + cell.replace(b'"', b'""') + b'"'
 
     def name(self, place: int) -> str:
         """Name a column for messages."""
@@ -111,13 +111,13 @@ class Table(NamedTuple):
 
     def opening(self, layout: Layout) -> bytes:
         """Return what is before the first row of the output: the header as it was where no column changes."""
+        grown = self.names and len(layout.columns) > self.width  # what was known by its count is not any more
+        if not (self.header or grown):
+            return self.head
         own = self.header or [*map(self.cell, self.called)]
         cells = [self.cell(each.name) if isinstance(each, ADDED) else own[each.place] for each in layout.columns]
-        title = (self.delimiter or b" ").join(cells)
-        if self.header:
-            return self.head + (self.title if cells == [*own] else title) + self.line_end
-        grown = self.names and len(cells) > self.width  # what was known by its count is not any more
-        return self.head + (b"# " + title + self.line_end if grown else b"")
+        title = self.title if cells == [*self.header] else (self.delimiter or b" ").join(cells)
+        return self.head + b"# " * (not self.header) + title + self.line_end
 
 
 def open_table(
@@ -215,9 +215,13 @@ class Naming:
 
         column: returns the texts of a column
         """
-        if self.places == (None, None) or not size:
-            texts = [column(place).each() for place in self.layout.frames] if size else []
-            return [*map("\0".join, zip(*texts, strict=True))] or [self.earth], BlockNames(), {}
+        if self.places != (None, None) and size:
+            return self._renamed(size, column)
+        texts = [column(place).each() for place in self.layout.frames] if size else []
+        return [*map("\0".join, zip(*texts, strict=True))] or [self.earth], BlockNames(), {}
+
+    def _renamed(self, size: int, column: Callable[[int], Coded]) -> tuple[Sequence[str | None], BlockNames, Bad]:
+        """Read the names of rows that have columns of them, and rename them."""
         none = Coded([""], np.zeros(size, np.int64))
         parents, names = (none if place is None else column(place) for place in self.places)
         count = len(names.texts)

@@ -309,16 +309,15 @@ def _columns(
     only_turned = operation.changes_nothing and asked.place is None
     if only_turned and asked.by_default and not (asked.all_numbers or targets[0].notations or asked.keep):
         return columns
-    ours = dict.fromkeys(place for pose in poses for place in pose.places)
-    adds = request.results.keep or request.operation.only_adds or not ours
-    at: dict[int, list[Column]] = {place: [] for place in ours}
+    at: dict[int, list[Column]] = {place: [] for pose in poses for place in pose.places}
+    adds, ours = request.results.keep or request.operation.only_adds or not at, tuple(at)
     for place, role in named.items() if not adds and request.renaming is not None else ():
         at.setdefault(place, [Named(place, role)])
     added: list[Column] = []
     first = 0
     for number, target in enumerate(targets):
         pose = poses[number] if len(poses) == len(targets) else PoseColumns(None, None)  # of a pair
-        shape, places = shapes[number] if shapes else Shape(POSE), pose.places or tuple(ours)
+        shape, places = shapes[number] if shapes else Shape(POSE), pose.places or ours
         several = len(targets) > 1 and (request.rows.poses > 1 or number > 0)
         first += request.result_size(shapes[number - 1], targets[number - 1]) if number else 0
         notations = [each for each, _ in target.notations]

@@ -45,9 +45,9 @@ def split_line(line: str) -> list[LineCell]:
     return cells
 
 
-def quoted(text: str, delimiter: str = ",") -> str:
+def quoted(text: str) -> str:
     """Write a cell, in quotes if necessary."""
-    is_split = delimiter in text or '"' in text or "\r" in text or "\n" in text
+    is_split = "," in text or '"' in text or "\r" in text or "\n" in text
     return '"' + text.replace('"', '""') + '"' if is_split else text
 
 
