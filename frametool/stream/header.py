@@ -14,7 +14,7 @@ from itertools import product
 from os.path import commonprefix
 from typing import TYPE_CHECKING
 
-from frametool.errors import FormatError, Misused, NamedTuple, ValueInvalid, bare, did_you_mean, listing, shown
+from frametool.errors import FormatError, Misused, NamedTuple, ValueInvalid, alternatives, bare, first_of, shown
 from frametool.geometry.representations import NAMED, ROTATIONS, UPPER_ROWS, Notation, Representation
 from frametool.geometry.representations import notation as parse_notation
 from frametool.grammar.readers import COLUMN_WORDS, NORMALS
@@ -326,8 +326,7 @@ def _half_position(header: Header, rotation: Columns) -> Columns | None:
 
 def listed(names: Sequence[str]) -> str:
     """List the columns there are, the first of very many."""
-    more = f", .. ({len(names)} columns)" if len(names) > MOST_LISTED else ""
-    return ", ".join(map(bare, names[:MOST_LISTED])) + more
+    return first_of(names, MOST_LISTED, quote=bare)
 
 
 def _half_rotation(header: Header, expected: Notation | None) -> str:
@@ -394,7 +393,7 @@ def row_shape(pose: PoseColumns, request: Request) -> Shape:
         )
     notation = rotation.notation
     angles = notation.representation.angles
-    said = [request.in_degrees(notation) if each is None else each for each in rotation.degrees]
+    said = [notation.in_degrees(request.rows.degrees) if each is None else each for each in rotation.degrees]
     degrees = any(said[at] for at in angles if at not in rotation.absent)
     radians_at = tuple(at for at in angles if degrees and not said[at])
     first = 0 if unit is None else len(XYZ)
@@ -477,9 +476,8 @@ def places_named(spec: str, names: Sequence[str] | None, width: int) -> tuple[Se
         if word in numbers:
             places.append(numbers[word])
         elif not is_range:
-            near = did_you_mean(word, numbers)
-            known = listing(numbers, near=word) or f"1-{width}"
-            raise Misused(f"--columns: no column {shown(word)}{near}; columns: {known}")
+            known = alternatives(word, numbers, "columns") if numbers else f"; columns: 1-{width}"
+            raise Misused(f"--columns: no column {shown(word)}{known}")
         elif 1 <= low <= high <= width:
             places += range(low - 1, high)
         else:

@@ -491,7 +491,7 @@ class Request(NamedTuple):
             has_none = shape.notation is None and not by_row and bool(operation.turns or not changed)
             stays = has_none and (asked.by_default or not asked.notations)
             notations = () if stays else asked.notations or (notation("quaternion"),)
-            written = tuple((each, self.in_degrees(each)) for each in notations)
+            written = tuple((each, each.in_degrees(self.rows.degrees)) for each in notations)
             whole = there and len(notations) == 1 and notations[0].representation.whole is not None
             target = Target(None, written, asked.keep_sign, whole)
         else:
@@ -531,7 +531,3 @@ class Request(NamedTuple):
     def counts(self, frame: str) -> bool:
         """Return True if what is under `frame` is a counter rather than a frame's name."""
         return self.rows.frame_is_counter and frame.isdecimal()
-
-    def in_degrees(self, notation: Notation) -> bool:
-        """Return True if a notation's angles are degrees: its own word wins."""
-        return self.rows.degrees if notation.degrees is None else notation.degrees

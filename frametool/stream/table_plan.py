@@ -53,8 +53,8 @@ class Named(NamedTuple):
 PARENT, NAME = 0, 1  # roles of names
 
 Column: TypeAlias = Kept | New | Fixed | Named
-# what a row has before its first cell is 0, then each cell begins at an odd number and ends at an even one, up to the
-# end of the line; a stretch is what is from one of these to another, or a name that is written
+# a stretch is what is between two bounds of a row, or a name that is written; bound 0 is the start of the line, cells
+# begin at 1, 3, .. and end at 2, 4, .., and the last is the end of the line
 Stretch: TypeAlias = tuple[int, int] | Named
 ADDED = (New, Fixed)  # no columns of the input
 

@@ -30,7 +30,8 @@ from frametool.grammar.pose import SCALE
 from frametool.grammar.readers import EARTH_FRAMES
 from frametool.grammar.result import Result, Style
 from frametool.stream.record_results import BlockResults, Documents, csv_rows
-from frametool.stream.row_layout import AS_READ, POSE, SIX, Const, In, Out, Piece, Target
+from frametool.stream.request import Request, ResultOptions, RowOptions
+from frametool.stream.row_layout import AS_READ, POSE, SIX, Const, In, Out, Piece, Shape
 from frametool.stream.rows import (
     RowPoses,
     assemble,
@@ -65,13 +66,10 @@ class PoseWriter:
     def __init__(self, style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> None:
         """Take the style and what a row is, with the numbers that come with each; placed: poses have a position."""
         self.style, self.kind, self.extras, self.placed = style, kind, tuple(extras), placed or kind != POSE
-        unit: Any = style.place or 1.0
-        asked = style.notations or (notation("quaternion"),)
-        notations = tuple((each, each.in_degrees(style.degrees)) for each in asked)
-        whole = placed and len(notations) == 1 and notations[0][0].representation.whole is not None
-        self.target = Target(None if whole or not placed else unit, notations, style.keep_sign, whole)
-        if kind != POSE:
-            self.target = Target(None, (), plain=True) if kind in SIX else Target(unit, (), three=True)
+        quaternions = notation("quaternion")
+        asked = ResultOptions(style.notations or (quaternions,), keep_sign=style.keep_sign, place=style.place)
+        shape = Shape(kind, 1.0 if self.placed else None, quaternions if kind == POSE else None)
+        self.target = Request(rows=RowOptions(degrees=style.degrees), results=asked).target(shape)
 
     def columns(self, block: RowPoses) -> Components:
         """Return the numbers of a block as columns; poses that are not placed are at 0."""
