@@ -16,15 +16,13 @@ from frametool.calc.functions import ANGLES, LIST, NUMBER, POINT, POSE, VECTOR, 
 from frametool.calc.parser import RADIAN, CalcError, Line, needs_time, reads_row, walk
 from frametool.documents.source import Source, opened
 from frametool.errors import FormatError, FrametoolError
-from frametool.geometry.representations import notation
 from frametool.grammar.pose import COVARIANCE_KEYS
 from frametool.grammar.readers import Misfit, may_be_on_earth
 from frametool.grammar.readers import tell as tell_notes
 from frametool.ros.messages import LISTS
 from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows
-from frametool.stream.request import Formula, Operation, Request, RowOptions
-from frametool.stream.row_layout import Target
+from frametool.stream.request import Formula, Operation, Request, RowOptions, target_of
 from frametool.stream.trajectories import gathered
 
 if TYPE_CHECKING:
@@ -59,10 +57,7 @@ class RowExpressions(Formula):
         self.bindings = tuple(bindings)
         self.scope = scope
         self.degrees = style.degrees
-        forms = style.notations or (notation("quaternion"),)
-        whole = len(forms) == 1 and forms[0].representation.whole is not None
-        written = tuple((fmt, fmt.in_degrees(style.degrees)) for fmt in forms)
-        self.target = Target(None if whole else 1.0, written, style.keep_sign, whole)
+        self.target = target_of(style.changed(place=None))
         self.adds = all(line.name for line in lines)
         parts = [branch for line in (*bindings, *lines) for branch in walk(line.tree)]
         self.columns = tuple(dict.fromkeys(each.value for each in parts if each.kind == "column"))

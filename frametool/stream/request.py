@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from frametool.geometry.place import Earth, Place
     from frametool.geometry.types import Components, Namespace, Number, Rigid
+    from frametool.grammar.result import Style
     from frametool.stream.gathering import Gathered
 
     Rename: TypeAlias = Callable[[str | None, str | None], tuple[str | None, str | None]]
@@ -531,3 +532,11 @@ class Request(NamedTuple):
     def counts(self, frame: str) -> bool:
         """Return True if what is under `frame` is a counter rather than a frame's name."""
         return self.rows.frame_is_counter and frame.isdecimal()
+
+
+def target_of(style: Style, kind: str = POSE, *, placed: bool = True) -> Target:
+    """Return how results are written in a style; placed: poses have a position."""
+    quaternions = notation("quaternion")
+    asked = ResultOptions(style.notations or (quaternions,), keep_sign=style.keep_sign, place=style.place)
+    shape = Shape(kind, 1.0 if placed else None, quaternions if kind == POSE else None)
+    return Request(rows=RowOptions(degrees=style.degrees), results=asked).target(shape)

@@ -25,13 +25,12 @@ from frametool.formats.rows.pose_rows import IMAGE, MOST_NAMED, NUMBER, RowForm,
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import arrays, floats, quaternion, rigid
-from frametool.geometry.representations import notation
 from frametool.grammar.pose import SCALE
 from frametool.grammar.readers import EARTH_FRAMES
 from frametool.grammar.result import Result, Style
 from frametool.stream.record_results import BlockResults, Documents, csv_rows
-from frametool.stream.request import Request, ResultOptions, RowOptions
-from frametool.stream.row_layout import AS_READ, POSE, SIX, Const, In, Out, Piece, Shape
+from frametool.stream.request import target_of
+from frametool.stream.row_layout import AS_READ, POSE, SIX, Const, In, Out, Piece
 from frametool.stream.rows import (
     RowPoses,
     assemble,
@@ -66,10 +65,7 @@ class PoseWriter:
     def __init__(self, style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> None:
         """Take the style and what a row is, with the numbers that come with each; placed: poses have a position."""
         self.style, self.kind, self.extras, self.placed = style, kind, tuple(extras), placed or kind != POSE
-        quaternions = notation("quaternion")
-        asked = ResultOptions(style.notations or (quaternions,), keep_sign=style.keep_sign, place=style.place)
-        shape = Shape(kind, 1.0 if self.placed else None, quaternions if kind == POSE else None)
-        self.target = Request(rows=RowOptions(degrees=style.degrees), results=asked).target(shape)
+        self.target = target_of(style, kind, placed=self.placed)
 
     def columns(self, block: RowPoses) -> Components:
         """Return the numbers of a block as columns; poses that are not placed are at 0."""
@@ -98,6 +94,7 @@ class SingleWriter(PoseWriter):
         if kind != POSE and "points" not in FORMATS[style.format].writes:
             raise ValueInvalid(f"{style.format} holds poses; a {kind} has no rotation")
         self.dropped: dict[str, None] = {}
+        self.made_up: dict[str, None] = {}
         self.first: Any = None
 
     def of_block(self, block: RowPoses) -> bytes:
@@ -117,9 +114,12 @@ class SingleWriter(PoseWriter):
         return write([self.first, *results], self.style)[len(known) :].encode()
 
     def end(self) -> Iterator[bytes]:
-        """Warn of what was left out."""
-        if self.dropped:
-            warn(f"{self.style.format}: {listing(self.dropped, MOST_NAMED)} left out")
+        """Warn in one line of what was left out or made up."""
+        left = [words for words in LOSABLE if words in self.dropped]
+        if others := self.dropped.keys() - {*LOSABLE}:
+            left.append(listing(others, MOST_NAMED))
+        if said := [f"{', '.join(left)} left out"] * bool(left) + [*self.made_up]:
+            warn(f"{self.style.format}: {'; '.join(said)}")
         return iter(())
 
 
@@ -132,23 +132,17 @@ class TextWriter(SingleWriter):
         if any(each.spec != "quaternion" for each in style.notations):
             raise ValueInvalid(f"{style.format} writes rotations in its own way; leave --to out")
         self.fixed = rows_of(style.format) or RowForm(())
-        self.made_up: dict[str, None] = {}
+        self.made_up |= dict.fromkeys(filter(None, [self.fixed.constants]))
         self.count = 0
 
     def end(self) -> Iterator[bytes]:
-        """Yield what comes behind the last pose, and warn in one line of what was left out or made up."""
-        left = [words for words in LOSABLE if words in self.dropped]
-        if others := self.dropped.keys() - {*LOSABLE}:
-            left.append(listing(others, MOST_NAMED))
-        said = [f"{', '.join(left)} left out"] if left else []
-        said += [*filter(None, [self.fixed.constants]), *self.made_up]
-        fmt, axes = self.style.format, FORMATS[self.style.format].rows.axes
+        """Yield what comes behind the last pose, and warn."""
+        axes = FORMATS[self.style.format].rows.axes
         if self.count and is_turned(self.style):
-            said.append(f"camera axes turned from {self.style.axes} to {axes}, half a turn about x")
+            self.made_up[f"camera axes turned from {self.style.axes} to {axes}, half a turn about x"] = None
         elif axes and not self.style.axes:
-            said.append(f"the axes of the poses are taken for {axes}, as {fmt} has them")
-        if said:
-            warn(f"{fmt}: {'; '.join(said)}")
+            self.made_up[f"the axes of the poses are taken for {axes}, as {self.style.format} has them"] = None
+        yield from super().end()
         yield self.fixed.tail if self.count else self.fixed.head + self.fixed.tail
 
     def of_block(self, block: RowPoses) -> bytes:
