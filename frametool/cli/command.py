@@ -10,6 +10,7 @@ import re
 import sys
 from contextlib import contextmanager, suppress
 from functools import cache, partial, reduce
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -32,7 +33,6 @@ NEGATIVE = r"(?i)-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translat
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
 EVERYTHING = "frametool.everything"  # a key in a context's `meta`
 INPUTS = "frametool.inputs"  # the key in a context's `meta`
-PASSED = "frametool.passed"  # the same: the options on the command line
 # the value of an option of several values in a command without it
 WITHOUT = {"input_formats": (), "topics": (), "joints": (), "joint_files": (), "named_frames": (), "messages": ()}
 # options that any way may ignore: they are about what is said, not about what is done
@@ -47,9 +47,9 @@ class Inputs:
     earth: what the options say of places on the Earth, made when first needed
     """
 
-    def __init__(self, values: Mapping[str, Any], idle: dict[str, str] | None = None) -> None:
+    def __init__(self, values: dict[str, Any], idle: dict[str, str] | None = None) -> None:
         """Keep the values, and the options that were passed."""
-        self._values = {**values}
+        self._values = values
         self.idle = {} if idle is None else idle
         self.reads_trees = False
         self.earth: Earth | None = None
@@ -143,8 +143,7 @@ def inputs() -> Inputs:
     context = click.get_current_context(silent=True)
     if context is None:
         return Inputs({"quiet": True})
-    found: Inputs = context.meta.get(INPUTS) or Inputs(context.params)
-    return found
+    return context.meta.get(INPUTS) or Inputs(context.params)
 
 
 def asking(kind: type[Record], options: Mapping[str, Sequence[str]]) -> type[Record]:
@@ -375,21 +374,13 @@ class Command(WithHelp):
     own check of misspelled options; `Text` takes the blank off again.
     """
 
+    parser: Any = None
+
     def make_parser(self, ctx: click.Context) -> Any:
-        """Make click's parser, which notes the options that are passed; of one value twice, one would not be used."""
-        parser: Any = super().make_parser(ctx)
-        parse = parser.parse_args
-
-        def parse_noting(args: list[str]) -> Any:
-            found = parse(args=args)
-            passed = ctx.meta[PASSED] = [each for each in found[2] if isinstance(each, Option)]
-            for each in passed:
-                if passed.count(each) > 1 and not (each.multiple or each.is_flag or ctx.resilient_parsing):
-                    raise click.UsageError(f"{each.opts[-1]} appears twice; only one can be used", ctx)
-            return found
-
-        parser.parse_args = parse_noting
-        return parser
+        """Return click's parser, made once: it is asked for the options that are passed, and in a batch again."""
+        self.parser = self.parser or super().make_parser(ctx)
+        self.parser.ctx = ctx
+        return self.parser
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Shield negative numbers (-j is an option where joints are), give bare options their values, then parse."""
@@ -398,14 +389,21 @@ class Command(WithHelp):
             args = [f" {each}" if _is_negative(each) and each not in options else each for each in args]
         if "inv" in args:
             args = _joined(args, ctx, always=self.name in OF_POSES)
+        for name, value in pairwise(args):
+            refuse(value in OPTIONAL.get(name, ()), f"{name} {value} is gone: {name}={value}")
         args = [f"{each}={OPTIONAL[each][0]}" if each in OPTIONAL else each for each in args]
+        passed: dict[Any, Option] = {}
+        for each in () if ctx.resilient_parsing else self.make_parser(ctx).parse_args(args=[*args])[2]:
+            if isinstance(each, Option):
+                is_twice = each.name in passed and not (each.multiple or each.is_flag)
+                refuse(is_twice, f"{each.opts[-1]} appears twice; only one can be used")
+                passed[each.name] = each
         rest = super().parse_args(ctx, args)
-        passed: Sequence[Option] = () if ctx.resilient_parsing else ctx.meta[PASSED]
-        called = {each.name: each.opts[-1] for each in passed}
-        for option in passed:
-            if others := [called[other] for other in option.excludes if other in called]:
+        ctx.meta[INPUTS] = Inputs(ctx.params, {each: passed[each].opts[-1] for each in passed.keys() - OF_MESSAGES})
+        for option in passed.values():
+            if others := [passed[other].opts[-1] for other in option.excludes if other in passed]:
                 raise click.UsageError(f"{option.opts[-1]} and {others[0]} exclude each other", ctx)
-            if option.requires and called.keys().isdisjoint(option.requires):
+            if option.requires and passed.keys().isdisjoint(option.requires):
                 known = {each.name: each.opts[-1] for each in self.params}
                 choices = " or ".join(known[needed] for needed in option.requires if needed in known)
                 raise click.UsageError(f"{option.opts[-1]} needs {choices}", ctx)
@@ -413,8 +411,7 @@ class Command(WithHelp):
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command on its inputs, each of which must have been asked for when something is written."""
-        idle = {each.name: each.opts[-1] for each in ctx.meta[PASSED] if each.name not in OF_MESSAGES}
-        passed = ctx.meta[INPUTS] = Inputs(ctx.params, idle)
+        passed: Inputs = ctx.meta[INPUTS]
         CHECKS.append(passed.refuse_idle)
         try:
             result = ctx.invoke(self.callback or (lambda _: 0), passed)

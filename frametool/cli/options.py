@@ -8,12 +8,12 @@ from __future__ import annotations
 import os
 import re
 from functools import partial
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import OPTIONAL, Inputs, Text, inputs, misuse, option, refuse, say_if_typed, together
+from frametool.cli.command import Inputs, Text, inputs, misuse, option, refuse, say_if_typed, together
+from frametool.cli.sink import encoded
 from frametool.errors import SHOWN, FormatError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
 from frametool.geometry.euler import AXES
@@ -31,10 +31,7 @@ READ = readers("tree", "records", "rows", "arrays", "joints", "drawing")
 
 def utf8(text: str) -> str:
     """Return text that will be part of a result; bytes that are no text are refused."""
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        raise ValueInvalid(f"{shown(text)} is not UTF-8 text") from None
+    encoded(text)
     return text
 
 
@@ -393,15 +390,14 @@ REPLACED = {
     "--tf2": "numbers are tf2's anyway; --cache 10 keeps as much as its buffer, --moving reads one stamp as it does",
     "--explain-full": "--explain writes every product",
     "--array": 'NPZ is not read; one NPY for each array, `numpy.save("NEW.npy", numpy.load("OLD.npz")["NAME"])`',
-    **{f"{name} {value}": f"{name}={value}" for name, values in OPTIONAL.items() for value in values},
 }
 
 
 def replacement(arguments: Sequence[str]) -> str | None:
     """Return the sentence on the first word of a command line that went; None where all are in use."""
-    for before, word in pairwise(("", *arguments)):
+    for word in arguments:
         option = word.partition("=")[0]
-        for name in (option, word, f"{before} {word}", f"{arguments[0]} {option}"):
+        for name in (option, word, f"{arguments[0]} {option}"):
             if name in REPLACED:
                 return f"{name} is gone: {REPLACED[name]}"
     return None

@@ -16,10 +16,10 @@ from click import UsageError
 
 from frametool.cli.command import Inputs, refuse
 from frametool.cli.options import FULL
-from frametool.cli.sink import in_colour, is_special, say, writing
+from frametool.cli.sink import encoded, in_colour, is_special, say, writing
 from frametool.errors import ValueInvalid, first_of, listing, printable, shown, warn
 from frametool.formats import table
-from frametool.geometry.representations import EARTH_FRAMES, Notation, notation
+from frametool.geometry.representations import Notation, notation
 from frametool.grammar.result import RecordingStyle, Result, Style, sample_results
 
 if TYPE_CHECKING:
@@ -73,6 +73,10 @@ def copied_as(fmt: str, path: str, output: str | None, named: str | None) -> tup
 BATCH = 256  # poses
 QUATERNION = (notation("quaternion"),)  # where no representation is asked for
 ZEROS = r"(?<![\w.:])(?P<dim>-?0\.0+)(?![\w.])"
+ENDS = (  # of a pose
+    r"(?m)^(?P<green>\S.*?)(?: at \S+)? seen from (?P<cyan>.*?)(?=  \(maps|$)",
+    r"\(maps points in (?P<green>.+?) to points in (?P<cyan>.+?)\)$",
+)
 WITH_PLACES = ("text", "yaml", "json", "csv", *table.writers("recording"))
 OF_TEXT = (".txt", ".out", ".log", ".dat")
 BLOCK = 1 << 13  # poses of a trajectory
@@ -81,7 +85,7 @@ BLOCK = 1 << 13  # poses of a trajectory
 class Output:
     """Where results go and how they look: what the options of a command say."""
 
-    marks: tuple[str, ...] = (ZEROS,)  # patterns of what has a style in text on a terminal
+    marks: tuple[str, ...] = (ZEROS, *ENDS)  # patterns of what has a style in text on a terminal
 
     def __init__(self, inputs: Inputs, *what: str, otherwise: str | None = None) -> None:
         """Choose the format: as chosen, else by the file's suffix, else text for a terminal and YAML for a pipe.
@@ -126,12 +130,6 @@ class Output:
             refuse(not is_pair, "--frames takes WORLD,BODY, different names")
             self.style.recording = RecordingStyle(tuple(inputs.messages), inputs.topic_out or "", frames, folder)
 
-    def check_target(self, target: str) -> None:
-        """Stop where places are asked for of what is seen from another frame than the Earth's."""
-        if self.style.place is not None and target not in EARTH_FRAMES:
-            what = f"what is in {shown(target)} has no lat and lon"
-            raise UsageError(f"--to {self.style.place.name} wants TARGET ecef: {what}")
-
     def take_axes(self, known: str, operation: Operation | None = None) -> None:
         """Keep the axes of the camera that poses are of: as --camera-axes says, else as their format has them."""
         stated = self._inputs.peek("camera_axes") or ""
@@ -146,21 +144,18 @@ class Output:
         if source in tree.camera_axes or not tree.camera_axes:
             self.take_axes(tree.camera_axes.get(source, ""))
 
-    def _refuse_place(self) -> None:
-        """Stop where a format has no place for latitude and longitude."""
+    def values(self, values: Iterable[Value]) -> None:
+        """Write results: poses as poses; points, vectors and messages as the mappings they are."""
+        writer: Any = self._writer()
+        batches = _batched(values) if self._in_blocks else [values]
+        self.pieces(filter(None, chain(map(writer.of, batches), writer.end())))
+
+    def _writer(self) -> Blocks | AllTogether:
+        """Return what writes results; stop where the format has no place for latitude and longitude."""
         if self.style.place is not None and self.style.format not in WITH_PLACES:
             names = ", ".join(each.name for each in (self.style.place, *self.style.place.more))
             raise ValueInvalid(f"{self.style.format} has no place for {names}; write csv, json, yaml or text")
-
-    def values(self, values: Iterable[Value]) -> None:
-        """Write results: poses as poses; points, vectors and messages as the mappings they are."""
-        self._refuse_place()
-        if self._in_blocks:
-            self.pieces(self._blocks(values))
-            return
-        text, keys = self.text_of([*values])
-        self.pieces([text])
-        self.warn_dropped(keys)
+        return Blocks(self) if self._in_blocks else AllTogether(self)
 
     def text_of(self, found: list[Value]) -> tuple[str, set[str]]:
         """Return the text of all results, and the keys of what they say besides."""
@@ -189,17 +184,13 @@ class Output:
         if self.style.screen and not self.style.notations:
             self.style.notations = notation("quaternion"), notation("rpy_deg")
 
-    def warn_dropped(self, keys: set[str]) -> None:
-        """Name what results say besides where the format has no place for it."""
-        others = keys - {"stamp_ns", "point", "vector", "frame"}
-        if others and self.style.format not in ("text", "yaml", "json", "csv"):
-            warn(f"{self.style.format}: {listing(others)} left out")
-
     def poses_as_they_come(self, results: Iterator[Result]) -> None:
         """Write poses that have the same keys, in batches."""
-        self._refuse_place()
         self._shorten()
-        self.pieces(self._blocks(results) if self._in_blocks else self._batches(results))
+        if isinstance(self._writer(), Blocks):
+            self.values(results)
+        else:
+            self.pieces(self._batches(results))
 
     def _batches(self, results: Iterator[Result]) -> Iterator[str | bytes]:
         """Yield the text of some results after the other, short batches first.
@@ -215,20 +206,13 @@ class Output:
             yield write_poses([begin[0], *batch], self.style)[known:]
             size = min(2 * size, BATCH)
 
-    def _blocks(self, values: Iterable[Value]) -> Iterator[bytes]:
-        """Yield a trajectory, columns of numbers or a recording, block after block of things of one kind."""
-        writer = Blocks(self)
-        yield from map(writer.of, _batched(values))
-        yield from writer.end()
-
     def writer(self) -> ResultWriter:
         """Return what writes the results of a stream of records."""
         from frametool.stream.record_results import CsvTable, Documents
 
         if self.style.format in ("csv", "json", "yaml"):
             return CsvTable(self.style) if self.style.format == "csv" else Documents(self.style)
-        self._refuse_place()
-        return Blocks(self) if self._in_blocks else AllTogether(self)
+        return self._writer()
 
     def tree(self, tree: Frames, color: str = "auto") -> None:
         """Write a tree; on a terminal in colour, or as `color` says; in a format made of poses with every sample."""
@@ -334,22 +318,28 @@ def _batched(values: Iterable[Value]) -> Iterator[list[Value]]:
 
 
 class AllTogether:
-    """Keep the results of a stream of records, for formats that are written of all of them at once."""
+    """Keep results, for formats that are written of all of them at once."""
 
     def __init__(self, output: Output) -> None:
         """Begin without any."""
         self.output, self.values = output, list[Any]()
 
-    def of_block(self, block: BlockResults) -> bytes:
-        """Keep those of a block; nothing is written."""
-        self.values += block.in_order()
+    def of(self, values: Iterable[Value]) -> bytes:
+        """Keep some results; nothing is written."""
+        self.values += values
         return b""
 
+    def of_block(self, block: BlockResults) -> bytes:
+        """Keep those of a block of records."""
+        return self.of(block.in_order())
+
     def end(self) -> Iterator[bytes]:
-        """Yield the text of all, and warn of what it leaves out."""
+        """Yield the text of all, and name what they say besides where the format has no place for it."""
         text, keys = self.output.text_of(self.values)
-        yield self.output.shown(text).encode()
-        self.output.warn_dropped(keys)
+        yield encoded(self.output.shown(text))
+        fmt, others = self.output.style.format, keys - {"stamp_ns", "point", "vector", "frame"}
+        if others and fmt not in ("text", "yaml", "json", "csv"):
+            warn(f"{fmt}: {listing(others)} left out")
 
 
 class Blocks:

@@ -12,8 +12,6 @@ from functools import lru_cache, partial
 from io import BufferedReader, BytesIO
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from frametool.cli.command import misuse, refuse, refuse_two_readers, say_if_typed
 from frametool.documents.source import Pasted, Source, decode, read_text
 from frametool.errors import FormatError, Misused, NamedTuple, ValueInvalid, heard_by, shown, warn
@@ -24,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from frametool.cli.output import Output
-    from frametool.cli.streaming import PoseTask
+    from frametool.cli.streaming import Task
     from frametool.geometry.representations import Notation
     from frametool.grammar.result import Result
     from frametool.stream.request import Request
@@ -49,14 +47,11 @@ def is_pasted(text: str, notation: Notation | None = None) -> bool:
 
     Raises FormatError for a text that is known and cannot be taken.
     """
-    if is_inline(text) or text == "-":
+    if is_inline(text) or text == "-" or os.path.exists(text):
         return is_inline(text)
-    if os.path.exists(text):
-        return False
-    if _inverted(text):
+    if _inverted(text) or "\n" in text or re.match(r"\w+: *[\[{]", text):
         return True
-    has_key = "\n" in text or re.match(r"\w+: *[\[{]", text) is not None
-    return has_key or rewritten(Source(INLINE, text), notation, normalize=False, points=False) is not None
+    return rewritten(Source(INLINE, text), notation, normalize=False, points=False) is not None
 
 
 @lru_cache(8)  # an argument is looked at before it is read, and warned of once
@@ -199,7 +194,6 @@ def values_of(arguments: Sequence[str | Source], request: Request, output: Outpu
     """Yield the results of the records of arguments."""
     from frametool.stream.record_values import results
 
-    request = request.with_results(notations=request.results.notations or output.notations)
     for argument in arguments:
         yield from read_with(argument, request, partial(results, style=output.style))
 
@@ -248,6 +242,11 @@ class ArgumentPoses(NamedTuple):
             warn(f"{self.source.name}: {', '.join(map(shown, left_out))} left out: only its pose is used")
         return self.poses
 
+    def only_pose(self, *, timed: bool = False) -> Pose:
+        """Return the one pose as `only_poses` does; raises click.UsageError for several."""
+        refuse(len(self.poses) != 1, f"one pose is wanted here, {self.source.name} holds {len(self.poses)}")
+        return self.only_poses(timed=timed)[0]
+
 
 def _read_argument(argument: str | Source, request: Request) -> ArgumentPoses:
     """Read all poses of one of several arguments, and keep the warnings for later."""
@@ -285,15 +284,14 @@ class Operands(NamedTuple):
     timed: dict[str, Any] | None
 
 
-def rows_among(arguments: Sequence[str], request: Request, task: PoseTask) -> Operands:
+def rows_among(arguments: Sequence[str], request: Request, task: Task) -> Operands:
     """Choose them: standard input, a table, what holds several poses, or the last that says more than a pose."""
     bare = [without_inverse(each)[0] for each in arguments]
     refuse_two_readers(bare)
     refuse(task.path and "-" not in bare, "-i FILE is read where - stands among the poses")
     streams = [at for at, each in enumerate(bare) if each == "-" or task.has_table(each)]
-    if len(streams) > 1:
-        files = " and ".join(bare[at] for at in streams)
-        raise click.UsageError(f"only one argument may hold rows, {files} do; frametool compare takes two trajectories")
+    files = " and ".join(bare[at] for at in streams)
+    refuse(len(streams) > 1, f"only one argument may hold rows, {files} do; frametool compare takes two trajectories")
     stream = streams[0] if streams else None
     read = [None if at == stream else _read_argument(each, request) for at, each in enumerate(arguments)]
     says_more = [at for at, each in enumerate(read) if each and each.others]
@@ -307,10 +305,8 @@ def rows_among(arguments: Sequence[str], request: Request, task: PoseTask) -> Op
         from frametool.grammar.pose_algebra import shared_stamp
 
         timed = shared_stamp(pose for each in read if each for pose in each.poses)
-    before, behind = (
-        [_only(each.only_poses(timed=timed is not None), each.source) for each in side if each]
-        for side in (read[:at], read[at + 1 :])
-    )
+    sides = read[:at], read[at + 1 :]
+    before, behind = ([each.only_pose(timed=timed is not None) for each in side if each] for side in sides)
     streamed = "inv(-)" if without_inverse(arguments[at])[1] else "-"
     return Operands(at, rows.source if rows else streamed, before, behind, timed)
 
@@ -326,14 +322,7 @@ def combinations(arguments: Sequence[str], request: Request) -> list[tuple[Pose,
 
 def one_pose(argument: str | Source, request: Request) -> Pose:
     """Read the one pose of an argument; warn of what else it holds."""
-    return _only(_read_argument(argument, request).only_poses(timed=False), argument)
-
-
-def _only(poses: list[Pose], argument: str | Source) -> Pose:
-    if len(poses) != 1:
-        name = argument if isinstance(argument, str) else argument.name
-        raise click.UsageError(f"one pose is wanted here, {name} holds {len(poses)}")
-    return poses[0]
+    return _read_argument(argument, request).only_pose()
 
 
 def pose_from_numbers(texts: Sequence[str], request: Request) -> Pose:

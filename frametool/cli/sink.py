@@ -66,7 +66,7 @@ def writing(path: str | None, *, force: bool = False, folder: bool = False) -> I
 @contextmanager
 def _replacing(path: str, *, force: bool, folder: bool) -> Iterator[Write]:
     """Yield what writes a part that takes the place of `path` if all goes well."""
-    refuse = partial(_refuse_folder if folder else refuse_existing, path, force=force)
+    refuse = partial(refuse_existing, path, force=force, folder=folder)
     refuse()
     STATE.cleans_up = True
     place = os.path.realpath(path)
@@ -136,10 +136,17 @@ def check() -> None:
         each()
 
 
-def refuse_existing(path: str | None, *, force: bool) -> None:
-    """Raise FileProblem for a file that `writing` would refuse to replace."""
-    if path is not None and path != "-" and not force and os.path.exists(path) and not is_special(path):
+def refuse_existing(path: str | None, *, force: bool, folder: bool = False) -> None:
+    """Raise FileProblem for what `writing` would refuse to replace: without --force, a folder of more than a bag."""
+    if path is None or path == "-" or not os.path.exists(path) or (is_special(path) and not folder):
+        return
+    if not force:
         raise FileProblem(f"{printable(path)}: exists; give --force to replace it")
+    if folder and not os.path.isdir(path):
+        raise FileProblem(f"{printable(path)}: is a file; a folder is to be written there")
+    names = os.listdir(path) if folder else ()
+    if others := sorted(name for name in names if name != BAG_FILE and not name.endswith(BAG_DATA)):
+        raise FileProblem(f"{printable(path)}: holds more than a bag ({shown(others[0])}); it is not replaced")
 
 
 def is_special(path: str) -> bool:
@@ -153,15 +160,20 @@ def _own_stream(path: str) -> int | None:
     return int(found[1]) if found else {"/dev/stdout": 1, "/dev/stderr": 2}.get(path)
 
 
+def encoded(text: str) -> bytes:
+    """Return text in UTF-8; raises ValueInvalid for bytes of a name that are no text."""
+    try:
+        return text.encode()
+    except UnicodeEncodeError as error:
+        raise ValueInvalid(f"{shown(error.object[error.start :])} cannot be written as UTF-8 text") from None
+
+
 def writer_into(stream: BinaryIO, name: str) -> Write:
     """Return what checks the call and writes pieces into an open stream, which messages call by a name."""
 
     def write(piece: str | bytes | memoryview) -> None:
         check()
-        try:
-            view = memoryview(piece.encode() if isinstance(piece, str) else piece)
-        except UnicodeEncodeError as error:
-            raise ValueInvalid(f"{shown(error.object[error.start :])} cannot be written as UTF-8 text") from None
+        view = memoryview(encoded(piece) if isinstance(piece, str) else piece)
         STATE.writing = True  # Ctrl-C waits until the block of lines is written
         try:
             with problems_of(name):
@@ -221,19 +233,6 @@ def _remove(part: str) -> None:
         os.unlink(part)
 
 
-def _refuse_folder(path: str, *, force: bool) -> None:
-    """Raise FileProblem for a folder that may not be replaced: without --force, or of other files than a bag's."""
-    if not os.path.lexists(path):
-        return
-    if not force:
-        raise FileProblem(f"{printable(path)}: exists; give --force to replace it")
-    if not os.path.isdir(path):
-        raise FileProblem(f"{printable(path)}: is a file; a folder is to be written there")
-    others = sorted(name for name in os.listdir(path) if name != BAG_FILE and not name.endswith(BAG_DATA))
-    if others:
-        raise FileProblem(f"{printable(path)}: holds more than a bag ({shown(others[0])}); it is not replaced")
-
-
 PLACES: list[dict[str, Any]] = []  # source and line of a batch; the last one begins all messages
 
 
@@ -274,10 +273,9 @@ def say_warning(message: str, rule: str = "") -> None:
     """
     if rule in ("slash", "by-size"):
         context = click.get_current_context()
-        said = context.meta if not context.params.get("quiet") else {"by-size": True, "slash": True}
-        if said.get(rule):
+        if context.params.get("quiet") or context.meta.get(rule):
             return
-        said[rule] = rule == "by-size"
+        context.meta[rule] = rule == "by-size"
     say(f"warning: {message}")
 
 

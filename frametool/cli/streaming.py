@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
-from contextlib import closing, nullcontext
+from contextlib import closing, nullcontext, suppress
 from functools import partial
 from importlib import import_module
 from io import BufferedReader
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli import options
-from frametool.cli.command import OPTIONAL, Inputs, option, refuse, say_if_typed, together
+from frametool.cli.command import Inputs, option, refuse, say_if_typed, together
 from frametool.cli.output import Output
 from frametool.cli.poses import inline_misuse, is_pasted, pasted_stream, pose_source, values_of, without_inverse
 from frametool.cli.sink import say, say_error
@@ -68,15 +68,24 @@ explain_option = partial(
 EXPLAIN = explain_option()
 
 
-class Stream:
-    """The stream of a command and where its results go, as the options describe them."""
+class Task:
+    """What a command is asked: its stream or arguments and where the results go, as the options describe them.
+
+    plan: how the derivation is written, if it is wanted instead of the result
+    window: the first and the last nanosecond that --start and --stop leave
+    """
 
     _opened: BufferedReader | None = None
     within = ""  # the format of the records in a bag
+    plan: DerivationStyle | None = None
 
-    def __init__(self, inputs: Inputs, output: Output) -> None:
-        """Look at what the options say; each is asked for where it counts."""
-        self.inputs, self.output = inputs, output
+    def __init__(self, inputs: Inputs, *what: str, output: Output | None = None) -> None:
+        """Look at what the options say; each is asked for where it counts.
+
+        what: the results that the command writes, where its output is not made yet
+        """
+        self.inputs, self.normalize = inputs, bool(inputs.normalize)
+        self.output = output = output or Output(inputs, *what)
         path = inputs.peek("input_path")
         self.paths: Sequence[str] = path if isinstance(path, tuple) else () if path is None else (path,)
         self.path: str | None = self.paths[0] if self.paths and self.paths[0] != "-" else None
@@ -88,6 +97,12 @@ class Stream:
         self.place = ""
         if self.notation is not None and self.notation.representation.is_place:
             self.notation, self.place = None, self.notation.representation.name
+        self.window = options.window_of(inputs)
+        if inputs.explain:
+            from frametool.explain.derive import DerivationStyle
+
+            refuse(output.chosen not in (None, "text"), f"--explain writes text or markdown, not {output.chosen}")
+            self.plan = DerivationStyle(output.style, significant(inputs.precision))
 
     def opened(self) -> BufferedReader:
         """Open the input once: of a pipe, what a first reader has taken is gone for a second; raises FileProblem."""
@@ -106,10 +121,9 @@ class Stream:
         """Return True if what comes later does not change the format that is found."""
         if has_record(begin) or not has_line(begin):
             return has_record(begin)
-        try:
-            return bool(self.chosen_format() or self.detected(begin, is_table=self._is_table))
-        except FormatError:
-            return False
+        with suppress(FormatError):
+            return bool(self.format_of(begin, is_table=self._is_table))
+        return False
 
     def messages(self) -> BufferedReader | None:
         """Return the points, poses or fixes of the bag that -i names as JSON lines; None for any other file.
@@ -166,16 +180,11 @@ class Stream:
             return False
         once = os.path.exists(argument) and not (os.path.isfile(argument) or os.path.isdir(argument))
         if not (once or is_bag(argument)):
-            fmt = self.chosen_format()
-            if not fmt:
-                from frametool.formats.detect import detect
-
-                try:
-                    with open(argument, "rb") as file:
-                        fmt = detect(file.read(HEAD), *options.STREAMED, name=argument)
-                except (OSError, ValueError):  # it cannot be read, or its format is unknown
-                    return False
-            if fmt in RECORDS:
+            try:
+                with open(argument, "rb") as file:
+                    if self.format_of(file.read(HEAD), name=argument) in RECORDS:
+                        return False
+            except (OSError, ValueError):  # it cannot be read, or its format is unknown
                 return False
         self.path = argument
         return True
@@ -221,15 +230,20 @@ class Stream:
         if may_be_pasted and not (fmt or is_table):
             pasted, stream = pasted_stream(stream, self.name, request, self.notation, self.place)
             if pasted is not None:
-                return self._run_pasted(pasted, request)
+                self.inputs.ask("from_rep")
+                if request.gathered is None:
+                    output.values(values_of([pasted], request, output))
+                else:
+                    from frametool.stream.record_values import read_poses
+
+                    request.gathered.add(read_poses(pasted, request), pasted.name)
+                return 0
         if not fmt:
-            fmt = self.detected(stream.peek(), is_table=is_table)
+            fmt = self.format_of(stream.peek(), is_table=is_table)
             if self.inputs.verbose:
                 say(f"{self.name}: read as {fmt} ({FORMATS[fmt].summary})")
         if fmt == "kitti" and self.notation and not self.chosen_format():
             fmt = "columns"  # --from says what the numbers are, and nothing of pictures
-        if request.rows.poses:
-            self.inputs.ask(*FORMATS[fmt].required_options)
         if output.chosen is None and (output.path or "").endswith(".bin") and not fmt.endswith("-bin"):
             raise click.UsageError(f"-o {output.path} does not name its format; give -f kitti-bin or nuscenes-bin")
         refuse(looks_up and fmt in RECORDS, f"frames are looked up for the rows of a table, not of {fmt}")
@@ -238,8 +252,8 @@ class Stream:
             from frametool.stream.record_stream import at_other_times
 
             stream = at_other_times(stream, fmt, request.offset_ns)
-        elif request.offset_ns and "arrays" in FORMATS[fmt].reads:
-            raise click.UsageError(f"--time-offset is for text, {fmt} holds numbers; convert it to csv first")
+        of_numbers = f"--time-offset is for text, {fmt} holds numbers; convert it to csv first"
+        refuse(request.offset_ns and holds_arrays(fmt), of_numbers)
         output.take_axes(FORMATS[fmt].rows.axes, request.operation)
         if is_trajectory(fmt) and not output.notations:
             request = request.with_results(notations=())  # its rows stay what they are
@@ -265,11 +279,12 @@ class Stream:
             self.inputs.note(f"{self.name}: {tally.assumed}")
         return status
 
-    def detected(self, begin: bytes, *, is_table: bool = False) -> str:
-        """Find the format of the stream by what it begins with, and by its name."""
+    def format_of(self, begin: bytes, *, name: str = "", is_table: bool = False) -> str:
+        """Return the format of the stream as --in names it, else by what it begins with, and by its name."""
         from frametool.formats.detect import detect
 
-        return detect(begin, *options.STREAMED, name=self.path or "", otherwise="columns" if is_table else "")
+        otherwise, chosen = "columns" if is_table else "", self.within or self.chosen_format()
+        return chosen or detect(begin, *options.STREAMED, name=name or self.path or "", otherwise=otherwise)
 
     def _outcomes(self, stream: Any, fmt: str, request: Request) -> tuple[Generator[Outcome], str, Diagnostics | None]:
         """Choose how rows become results: as columns of numbers, as poses in another format, or in place.
@@ -287,67 +302,52 @@ class Stream:
         # a trajectory has no room for more columns, or for other ones
         no_room = output.is_trajectory and bool(request.extras(Shape(POSE)) or output.notations or output.style.place)
         turns = output.style.axes and not output.notations and is_turned(output.style.changed(format=chosen or fmt))
-        converts = chosen not in (None, fmt) or no_room or turns
-        if (listed and gathers) or ((listed or converts) and not (gathers or is_kindred or fmt in RECORDS)):
-            return self._poses(stream, fmt, request)
+        converts = not (gathers or is_kindred or fmt in RECORDS) and (chosen not in (None, fmt) or no_room or turns)
+        if listed or converts:
+            from frametool.cli.trees import answers
+            from frametool.stream.as_poses import FormatConverter
+
+            target = chosen or (fmt if "poses" in FORMATS[fmt].writes and not output.notations else "csv")
+            no_stream = f"--format {target} is for single results and records, not for a stream of {fmt}"
+            refuse(target not in FORMATS, no_stream)
+            request = request.with_results(by_default=not output.notations)
+            converted = FormatConverter(fmt, request, self.name, output.style.changed(format=target), answers())
+            return converted.outcomes(stream, header=self.inputs.header), target, converted.tally
         request = request.with_results(notations=()) if gathers else request
         if fmt in RECORDS:
-            return self._records(stream, fmt, request, "" if gathers else chosen or "")
+            return *self._records(stream, fmt, request, "" if gathers else chosen or ""), None
         from frametool.stream.table import run_table
 
         return run_table(stream, fmt, request, source=self.name, header=self.inputs.header), fmt, None
 
-    def _records(self, stream: Any, fmt: str, request: Request, chosen: str) -> tuple[Generator[Outcome], str, None]:
+    def _records(self, stream: Any, fmt: str, request: Request, chosen: str) -> tuple[Generator[Outcome], str]:
         """Write the results of records in place, or in a format that was chosen."""
         from frametool.stream.record_results import written_by
         from frametool.stream.record_stream import run_records
 
         if chosen in ("", fmt):
-            return run_records(stream, fmt, request, source=self.name), fmt, None
-        if self.inputs.on_error == NULL and chosen not in ("csv", *RECORDS):
+            return run_records(stream, fmt, request, source=self.name), fmt
+        if request.on_error == NULL and chosen not in ("csv", *RECORDS):
             raise click.UsageError(f"--on-error null: {chosen} cannot hold a row without a result; give skip")
         request = request.with_results(by_default=has_no_text(chosen) and not self.output.notations)
         if table.is_recording(chosen):
             request = request.with_results(place=None)  # a fix is made of ecef, unless of what was read
         outcomes = run_records(stream, fmt, request, source=self.name, style=self.output.style)
-        return written_by(self.output.writer(), outcomes, self.inputs.on_error), chosen, None
-
-    def _poses(self, stream: Any, fmt: str, request: Request) -> tuple[Generator[Outcome], str, Diagnostics]:
-        """Write the results of rows, or of poses that no table holds, in another format."""
-        from frametool.cli.trees import answers
-        from frametool.stream.as_poses import FormatConverter
-
-        output = self.output
-        target = output.chosen or (fmt if "poses" in FORMATS[fmt].writes and not output.notations else "csv")
-        refuse(target not in FORMATS, f"--format {target} is for single results and records, not for a stream of {fmt}")
-        request = request.with_results(by_default=not output.notations)
-        converted = FormatConverter(fmt, request, self.name, output.style.changed(format=target), answers())
-        return converted.outcomes(stream, header=self.inputs.header), target, converted.tally
+        return written_by(self.output.writer(), outcomes, request.on_error), chosen
 
     def _columns(self, stream: Any, fmt: str, request: Request) -> Generator[Outcome]:
         """Write columns of numbers in the format they came in, or in another that holds such."""
         from frametool.stream.column_stream import OtherColumns, run_columns
 
         output = self.output
-        if output.path is None and request.gathered is None and sys.stdout.isatty():
-            raise click.UsageError(f"{fmt} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
+        is_seen = output.path is None and request.gathered is None and sys.stdout.isatty()
+        refuse(is_seen, f"{fmt} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
         columns = open_columns(InputFile(self.path or "-", stream), fmt)
         style = output.style.changed(format=output.chosen or fmt)
         request = request.with_results(by_default=not output.notations)
         if output.chosen and request.gathered is None and FORMATS[output.chosen].writer != FORMATS[fmt].reader:
             return OtherColumns([(columns, request, self.name)], style).outcomes()
         return run_columns(columns, request, style, source=self.name)
-
-    def _run_pasted(self, source: Source, request: Request) -> int:
-        """Write the results of a text that was pasted."""
-        self.inputs.ask("from_rep")
-        if request.gathered is None:
-            self.output.values(values_of([source], request, self.output))
-            return 0
-        from frametool.stream.record_values import read_poses
-
-        request.gathered.add(read_poses(source, request), source.name)
-        return 0
 
     def policy(self, name: str, counted: str = "line") -> BadRows:
         """Return what reports and counts the bad rows of a source."""
@@ -364,91 +364,46 @@ class Stream:
         if (is_table or request.operation.only_adds) and alone:
             request = request.with_results(prefix=inputs.prefix)
         if request.rows.poses:
-            inputs.ask("from_rep")
+            inputs.ask("from_rep", *FORMATS[fmt].required_options)
             request = request.with_rows(columns=inputs.columns)
         several = not is_table and "," in ",".join(request.rows.columns)
         refuse(several, "--columns names one key of records, as detections.pose")
         if not has_no_text(output.chosen or fmt):
             inputs.ask("precision")
-        request = request.with_rows(given=request.rows.given or self.notation, given_place=self.place)
-        style = output.style.changed(format=output.chosen or fmt)
-        return request._replace(on_error=inputs.on_error).with_results(
-            notations=request.results.notations or output.notations, place=style.place,
-            precision=style.precision, keep_sign=style.keep_sign,
-        )  # fmt: skip
+        place = output.style.changed(format=output.chosen or fmt).place
+        return request._replace(on_error=inputs.on_error).with_results(place=place)
 
-    def at_places(self, request: Request) -> Request:
-        """Add what the options say of places on the Earth, where they say anything."""
-        place = self.output.style.place
-        if not (place or self.place or self.inputs.says_earth()):
-            return request
-        from frametool.cli.earth import earth
+    def request(self, *, notations: tuple[Any, ...] = (), **asked: Any) -> Request:
+        """Return what is done with rows and records, which are read as the options say.
 
-        usual = request.results.by_default or not self.output.notations
-        request = request._replace(earth=earth()).with_rows(given_place=self.place)
-        return request.with_results(place=place, by_default=usual)
-
-
-def open_columns(file: InputFile, fmt: str) -> Any:
-    """Return the columns of numbers that a file of a format holds."""
-    file.format = fmt
-    return import_module(FORMATS[fmt].reader).open_columns(file)
-
-
-def is_bag(path: str) -> bool:
-    """Recognize a bag by its first bytes, or as a folder."""
-    if not os.path.isfile(path):
-        from frametool.formats.detect import of_folder
-
-        return of_folder(path) in BAGS
-    with open(path, "rb") as file:
-        head = file.read(HEAD)
-    return bool(re.match(b"|".join(_MAGICS), head, re.DOTALL) if head else table.by_suffix(path, BAGS))
-
-
-class PoseTask(Stream):
-    """What the options of a command on poses say.
-
-    plan: how the derivation is written, if it is wanted instead of the result
-    window: the first and the last nanosecond that --start and --stop leave
-    """
-
-    def __init__(self, inputs: Inputs, *what: str) -> None:
-        """Look at what the options say; `what` are the results that the command writes."""
-        self.normalize: bool = inputs.normalize
-        super().__init__(inputs, Output(inputs, *what or ("poses",)))
-        self.window = options.window_of(inputs)
-        self.plan: DerivationStyle | None = None
-        if inputs.explain:
-            from frametool.explain.derive import DerivationStyle
-
-            if self.output.chosen not in (None, "text"):
-                written = ", ".join(OPTIONAL["--explain"])
-                both = f"--explain writes {written}, not {self.output.chosen}"
-                raise click.UsageError(f"{both}; leave one of them out")
-            self.plan = DerivationStyle(self.output.style, significant(inputs.precision))
-
-    def request(
-        self, *, poses: int = 1, extra_column: str | None = None, notations: tuple[Any, ...] = (), **rest: Any
-    ) -> Request:
-        """Return what is done with rows and records: they are read as the options say."""
+        asked: fields of a request, and of how its rows are read
+        """
         from frametool.stream.request import Request, ResultOptions, RowOptions
 
-        offset_ns = 0 if self.inputs.reads_trees else self.inputs.time_offset or 0
+        inputs, style = self.inputs, self.output.style
         if self.window:
-            self.inputs.ask("start", "stop")
-            extra_column = extra_column or ""
-        said = [self.inputs.peek(name) or () for name in ("values", "poses", "pose", "a", "b")]
-        texts = [text for each in said for text in ([each] if isinstance(each, str) else each)]
-        mappings = ((bare := without_inverse(each)[0].strip()).startswith("{") and ":" in bare for each in texts)
-        if poses and not (texts and all(mappings)):  # whose keys say what their numbers are
-            self.inputs.ask("from_rep")
-        rows = RowOptions(
-            poses, given=self.notation, degrees=self.output.style.degrees, normalize=self.normalize,
-            extra_column=extra_column,
+            inputs.ask("start", "stop")
+            asked["extra_column"] = asked.get("extra_column") or ""
+        for name in ("values", "poses", "pose", "a", "b"):
+            said = inputs.peek(name) or ()
+            for text in [said] if isinstance(said, str) else said:
+                bare = without_inverse(text)[0].strip()
+                if not (bare.startswith("{") and ":" in bare):  # whose keys say what its numbers are
+                    inputs.ask("from_rep")
+        if says_earth := bool(style.place or self.place or inputs.says_earth()):
+            from frametool.cli.earth import earth
+
+            asked["earth"] = earth()
+        asked = {
+            "given": self.notation, "given_place": self.place, "degrees": style.degrees, "normalize": self.normalize,
+            "offset_ns": 0 if inputs.reads_trees else inputs.time_offset or 0, "window": self.window, **asked,
+        }  # fmt: skip
+        rows = RowOptions(**{name: asked.pop(name) for name in RowOptions._fields if name in asked})
+        results = ResultOptions(
+            notations or self.output.notations, says_earth and not self.output.notations, place=style.place,
+            precision=style.precision, keep_sign=style.keep_sign,
         )  # fmt: skip
-        made = Request(rows=rows, results=ResultOptions(notations), offset_ns=offset_ns, window=self.window, **rest)
-        made = self.at_places(made)
+        made = Request(rows=rows, results=results, **asked)
         self.output.take_axes("", made.operation)
         return made
 
@@ -503,6 +458,23 @@ class PoseTask(Stream):
         made: Explanation = getattr(derive, operation)(self.plan, *parts, **more)
         self.output.text(made.render(self.inputs.explain))
         return 0
+
+
+def open_columns(file: InputFile, fmt: str) -> Any:
+    """Return the columns of numbers that a file of a format holds."""
+    file.format = fmt
+    return import_module(FORMATS[fmt].reader).open_columns(file)
+
+
+def is_bag(path: str) -> bool:
+    """Recognize a bag by its first bytes, or as a folder."""
+    if not os.path.isfile(path):
+        from frametool.formats.detect import of_folder
+
+        return of_folder(path) in BAGS
+    with open(path, "rb") as file:
+        head = file.read(HEAD)
+    return bool(re.match(b"|".join(_MAGICS), head, re.DOTALL) if head else table.by_suffix(path, BAGS))
 
 
 def significant(precision: int | None) -> int | None:

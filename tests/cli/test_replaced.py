@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from frametool.cli.command import OPTIONAL
 from frametool.cli.options import REPLACED, replacement
 
 if TYPE_CHECKING:
@@ -33,16 +34,19 @@ TYPED = {
     "--rows kitti": "compare a.tum b.tum --rows kitti -f csv",
 }
 
+# a value after a blank
+APART = {f"{name} {value}": f"{name}={value}" for name, values in OPTIONAL.items() for value in values}
+
 
 def test_each_has_a_case() -> None:
-    assert set(TYPED) == set(REPLACED)
+    assert set(TYPED) == set(REPLACED) | set(APART)
 
 
 @pytest.mark.parametrize(("name", "typed"), TYPED.items())
 def test_what_went_names_what_to_use_instead(name: str, typed: str, run: Run) -> None:
     done = run(*typed.split())
     assert (done.status, done.out, done.err.count("\n")) == (2, "", 1)
-    assert f"{name} is gone: {REPLACED[name]}" in done.err
+    assert f"{name} is gone: {(REPLACED | APART)[name]}" in done.err
 
 
 def test_an_option_that_never_was_is_not_told_to_be_gone() -> None:

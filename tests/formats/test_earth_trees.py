@@ -191,15 +191,22 @@ def test_a_drawing_says_where_frames_stand(run: Callable[..., Any]) -> None:
     [
         ("tree", "t.yaml", "--to", "lla", "-f", "csv"),
         ("tree", "t.yaml", "--to", "enu", "--origin", "{lat: 48, lon: 11, alt: 0}"),
-        ("lookup", "t.yaml", "map", "gps", "--to", "lla"),
         ("lookup", "t.yaml", "ecef", "gps", "--to", "utm", "--covariance"),
         ("echo", "t.yaml", "ecef", "gps", "--to", "lla"),
-        ("echo", "t.yaml", "map", "gps", "--to", "lla", "-f", "json"),
     ],
 )
 def test_places_where_there_are_none_are_misused(arguments: tuple[str, ...], run: Callable[..., Any]) -> None:
     found = run(*arguments, files={"t.yaml": SITE})
     assert (found.status, found.out, found.err.count("\n")) == (2, "", 1)
+
+
+@pytest.mark.parametrize("form", ["text", "json", "csv"])
+@pytest.mark.parametrize("command", ["lookup", "echo"])
+def test_what_is_not_in_ecef_has_no_place(command: str, form: str, run: Callable[..., Any]) -> None:
+    arguments = ("-f", form) if (command, form) != ("echo", "text") else ("-f", "yaml")
+    found = run(command, "t.yaml", "map", "gps", "--to", "lla", *arguments, files={"t.yaml": SITE})
+    assert (found.status, found.out) == (1, "")
+    assert "--to lla wants poses in ecef: this one is in 'map'" in found.err
 
 
 def test_rows_get_places_where_their_target_is_the_earth(run: Callable[..., Any]) -> None:

@@ -9,14 +9,14 @@ import os
 import sys
 from importlib import import_module
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 from frametool import __version__
 from frametool.cli.command import WithHelp, show_help
 from frametool.cli.sink import writing
-from frametool.errors import FileProblem, Misused, any_near, shown
+from frametool.errors import Misused, any_near, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -124,13 +124,11 @@ class Group(WithHelp, click.Group):
 PACKAGES = ("numpy", "click", "rich", "pyyaml", "rosbags", "pyarrow", "laspy", "matplotlib")
 
 
-def _show_version(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:  # click's signature
+def _show_version(ctx: click.Context) -> NoReturn:
     """Print the version, with -v also those of Python and of the packages there are, for a report of a fault.
 
     It is a literal, because asking importlib.metadata for it takes 25 ms.
     """
-    if not chosen:
-        return
     lines = [f"frametool {__version__}"]
     if ctx.params.get("all_versions"):
         import platform
@@ -147,8 +145,8 @@ def _show_version(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:
 group = Group("group", help=HELP, params=[
     click.Option(["-v", "all_versions"], is_flag=True, is_eager=True,
                  help="with --version: of Python and of its packages too"),
-    click.Option(["--version"], is_flag=True, expose_value=False, callback=_show_version,
-                 help="Show the version and exit."),
+    click.Option(["--version"], is_flag=True, expose_value=False, help="Show the version and exit.",
+                 callback=lambda ctx, _, chosen: chosen and _show_version(ctx)),
 ])  # fmt: skip
 
 
@@ -219,10 +217,4 @@ def answered(call: Callable[[], object], arguments: Sequence[str]) -> int:
         from frametool.cli.options import usage_sentence
 
         raise Misused(usage_sentence(error, arguments)) from None
-    except FileProblem as error:
-        from frametool.cli.options import replacement
-
-        if gone := replacement(arguments):  # its value was taken for a file
-            raise Misused(gone) from error
-        raise
     return result if isinstance(result, int) else 0

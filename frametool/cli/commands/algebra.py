@@ -11,7 +11,7 @@ from frametool.cli import options, poses
 from frametool.cli.command import Inputs, argument, command_named, misuse, option, refuse
 from frametool.cli.output import Output
 from frametool.cli.sink import say, say_first
-from frametool.cli.streaming import EXPLAIN, PoseTask, one_argument, pose_stream_options
+from frametool.cli.streaming import EXPLAIN, Task, one_argument, pose_stream_options
 from frametool.errors import warn
 from frametool.grammar.pose import LEFT_OUT, Pose
 from frametool.grammar.result import Result
@@ -40,7 +40,7 @@ def compose_command(inputs: Inputs) -> int:
     POSE is a mapping, a file, or - for standard input. If poses name their frames, adjacent frames must match. The
     inverse of a pose is inv(POSE) or ~POSE, in quotes, or the word inv before it.
     """
-    task = PoseTask(inputs)
+    task = Task(inputs, "poses")
     if task.plan:
         return task.derive("compose", *map(task.written, inputs.poses))
     from frametool.grammar.pose_algebra import product
@@ -74,7 +74,7 @@ def invert_command(inputs: Inputs) -> int:
 
     POSE is a mapping, a file, or - for standard input, also with several poses.
     """
-    task = PoseTask(inputs)
+    task = Task(inputs, "poses")
     if task.plan:
         return task.derive("invert", task.written(inputs.pose))
     operation = Operation(inverse=True, similar=True, multiples=inputs.scale)
@@ -109,7 +109,7 @@ def relative_command(inputs: Inputs) -> int:
 
     The twist in dt seconds is the body's, seen in A: linear R_A' (p_B - p_A) / dt, angular rotvec(A^-1 B) / dt.
     """
-    task, a, b = PoseTask(inputs), inputs.a, inputs.b
+    task, a, b = Task(inputs, "poses"), inputs.a, inputs.b
     if task.plan:
         return task.derive("relative", *map(task.written, [one_argument(each) for each in (a, b)]))
     if inputs.consecutive or inputs.first:
@@ -156,7 +156,7 @@ def interpolate_command(inputs: Inputs) -> int:
     Fractions are numbers, or START:STOP:STEP; those outside 0 .. 1 extrapolate. The rotation takes the shorter arc.
     Unlike a screw motion, position and rotation are independent.
     """
-    task, asked = PoseTask(inputs), [each for some in inputs.fractions for each in some]
+    task, asked = Task(inputs, "poses"), [each for some in inputs.fractions for each in some]
     if task.plan:
         refuse(len(asked) != 1, f"--explain derives one fraction, found {len(asked)}")
         return task.derive("interpolate", task.written(inputs.a), task.written(inputs.b), asked[0])
@@ -196,7 +196,7 @@ def mean_command(inputs: Inputs) -> int:
     `count`. A warning lists each with its place, how far off it is, and u, that in sigmas. Without outliers the
     numbers are those of the plain mean. Weights are in proportion to 1 / variance.
     """
-    task, weights, by, robust = PoseTask(inputs), inputs.weights, inputs.by, inputs.robust
+    task, weights, by, robust = Task(inputs, "poses"), inputs.weights, inputs.by, inputs.robust
     from frametool.stream.gathering import Gathered, means_of
     from frametool.stream.record_values import read_poses
 

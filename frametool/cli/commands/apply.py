@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Components
     from frametool.recordings.messages import PointCloud
+    from frametool.stream.request import Formula
     from frametool.stream.written import ByTree
 
 
@@ -51,7 +52,7 @@ _WRITTEN = f"formats: {', '.join(writers('arrays'))}"
 class BagOfClouds:
     """The clouds of a bag that -i names, and the files that they become."""
 
-    def __init__(self, task: streaming.PoseTask) -> None:
+    def __init__(self, task: streaming.Task) -> None:
         """Open the bag and choose its topics; of --topic, what names no clouds is left to the tree."""
         from frametool.recordings.messages import cloud_topics
         from frametool.recordings.read import opened_recording
@@ -120,7 +121,7 @@ class BagOfClouds:
 class SeveralClouds:
     """Clouds of several -i that become one: each is expressed in a frame of its own, or all in SOURCE."""
 
-    def __init__(self, task: streaming.PoseTask) -> None:
+    def __init__(self, task: streaming.Task) -> None:
         """Take --frames and the --in of clouds; the tree may not have them too.  Raises click.UsageError."""
         self.task, inputs = task, task.inputs
         self.paths: Sequence[str] = inputs.input_path
@@ -199,31 +200,28 @@ def apply_command(inputs: Inputs) -> int:
     A RECORD is a pose, {vector: [x, y, z]} or a point, also X Y Z (help records). Without SOURCE it names its frame. -i
     FILE or stdin holds several: rows, JSON lines, clouds, what `ros2 topic echo` prints.
     """
-    task = streaming.PoseTask(inputs, "points", "trajectory")
+    task = streaming.Task(inputs, "points", "trajectory")
     output, plan = task.output, task.plan
     clouds: BagOfClouds | SeveralClouds | None = None
     if len(task.paths) > 1:
         clouds = SeveralClouds(task)
     elif task.path and streaming.is_bag(task.path) and (holds_arrays(output.chosen or "") or task.messages() is None):
         clouds = BagOfClouds(task)  # whose messages are no records
-    way = Way(task) if inputs.pose is not None else TreeWay(inputs, numbers=bool(task.place))
-    rest = way.rest
-    is_stream = rest in ((), ("-",))
+    way = Way(task) if inputs.pose is not None else TreeWay(task, numbers=bool(task.place))
+    rest, is_stream = way.rest, way.is_stream
     if clouds is not None:
         is_more = way.uncertain or not is_stream or plan is not None
         refuse(is_more, "clouds are moved whole, without records, --covariance or --explain")
         return clouds.run(way)
     kinds, count = inputs.kinds, len(inputs.peek("columns"))
-    if len(kinds) > 1 and len(kinds) != count:
-        raise click.UsageError(f"--as appears {len(kinds)} times, --columns {count} times; each --columns has its own")
+    counts = f"--as appears {len(kinds)} times, --columns {count} times; each --columns has its own"
+    refuse(len(kinds) not in (0, 1, count), counts)
     kind = kinds[0] if len(kinds) == 1 else None
     if plan is not None:
         records = list(sources_of(rest, kind))
         refuse(is_stream or len(records) != 1, f"a stream, or several records; {streaming.ONE_RECORD}")
         return _derived(task, plan, way, records[0], kind or "")
-    request = way.request(*((inputs.frame_column, inputs.time_column) if is_stream else (None, None)))
-    request = request.with_rows(kind=kind or "", degrees=output.style.degrees, normalize=task.normalize)
-    request = task.at_places(request)
+    request = way.request(kind=kind or "")
     status = 0
     if is_stream:
         if count > 1:
@@ -241,7 +239,7 @@ def apply_command(inputs: Inputs) -> int:
     return status
 
 
-def _derived(task: streaming.PoseTask, plan: DerivationStyle, way: Way, record: str | Source, kind: str) -> int:
+def _derived(task: streaming.Task, plan: DerivationStyle, way: Way, record: str | Source, kind: str) -> int:
     """Write the derivation of one record."""
     from frametool.stream.written import ByTree, derive_record
 
@@ -267,19 +265,19 @@ class Way:
     uncertain: whether the covariance of what moves records counts, which then comes behind the seven components
     has_source: whether all come from one frame
     counters: whether no frame has a number for its name
-    rest: the arguments that are records
+    rest: the arguments that are records; is_stream: whether a stream takes their place
     into: in which frame records are then expressed, for messages
     """
 
     tree: Frames | None = None
     has_source = counters = True
 
-    def __init__(self, task: streaming.PoseTask) -> None:
+    def __init__(self, task: streaming.Task) -> None:
         """Read the pose of --transform."""
         inputs = task.inputs
-        self.uncertain, self.rest = bool(inputs.covariance), inputs.arguments
+        self.task, self.uncertain, self.rest = task, bool(inputs.covariance), inputs.arguments
         asked = task.request(operation=COMBINED._replace(similar=True, multiples=inputs.scale))
-        self.read = pose_source(inputs.pose, asked)
+        self.is_stream, self.read = self.rest in ((), ("-",)), pose_source(inputs.pose, asked)
         pose = one_pose(self.read, asked)
         refuse(self.uncertain and pose.covariance is None, "--covariance: POSE has neither sigma nor covariance")
         if pose.covariance is not None and not self.uncertain:
@@ -293,14 +291,20 @@ class Way:
         _settled(own, self.source)
         return self.pose.placed
 
-    def request(self, frame_column: str | None, time_column: str | None) -> Request:
-        """Return how records move: from one frame or each from its own, all alike or each at its own time."""
+    def request(self, formula: Formula | None = None, **asked: Any) -> Request:
+        """Return how records move: from one frame or each from its own, all alike or each at its own time.
+
+        asked: more of the request
+        """
+        inputs = self.task.inputs
+        frame_column, time_column = (inputs.frame_column, inputs.time_column) if self.is_stream else (None, None)
         has_source = self.has_source and frame_column is None
         left = self.from_frame(None) if has_source and not time_column else None
-        return Request(
-            Operation(left=left, moves=True, uncertain=self.uncertain),
-            RowOptions(frames=() if has_source else (frame_column or "",), frame_is_counter=self.counters),
-            pose_from_frame=self.from_frame, rename=lambda _parent, name: (self.target, name),
+        return self.task.request(
+            operation=Operation(left=left, moves=True, uncertain=self.uncertain, formula=formula),
+            frames=() if has_source else (frame_column or "",), frame_is_counter=self.counters,
+            pose_from_frame=self.from_frame, rename=None if formula else lambda _parent, name: (self.target, name),
+            **asked,
         )  # fmt: skip
 
 
@@ -309,19 +313,20 @@ class TreeWay(Way):
 
     tree: Frames
 
-    def __init__(self, inputs: Inputs, *, numbers: bool) -> None:
+    def __init__(self, task: streaming.Task, *, numbers: bool) -> None:
         """Take tree, target and, if one is named, source from the arguments.
 
         numbers: what looks like one is no frame's name
         """
-        self.at, self.uncertain = inputs.at, bool(inputs.covariance)
+        inputs = task.inputs
+        self.task, self.at, self.uncertain = task, inputs.at, bool(inputs.covariance)
         arguments = inputs.arguments
         refuse(len(arguments) < 2, "name TREE and TARGET, or give --transform")
         is_named = len(arguments) > 2 and not is_record(arguments[2]) and not (numbers and begins_number(arguments[2]))
         named = arguments[2:3] if is_named else ()
         self.rest = arguments[2 + len(named) :]
-        streams = self.rest in ((), ("-",))
-        self.tree = tree = load_tree(arguments[0], inputs.more, streams=streams)
+        self.is_stream = self.rest in ((), ("-",))
+        self.tree = tree = load_tree(arguments[0], inputs.more, streams=self.is_stream)
         self.lookups = lookups_in(tree, carried=self.uncertain)
         self.target: str = frame_name(arguments[1], tree)
         self.into = f" in {self.target}"
@@ -348,15 +353,16 @@ class TreeWay(Way):
         """Return columns of the same; nan where there is no data."""
         return self.lookups.many(self.target, self.start(own), times_ns)
 
-    def request(self, frame_column: str | None, time_column: str | None) -> Request:
+    def request(self, formula: Formula | None = None, **asked: Any) -> Request:
         """Return how records move, unless all move at one time each at its own."""
         from frametool.stream.request import Timed
 
         timed = None if not self.in_time else Timed(
-            time_column or "", self.at_times, self.from_frame, width=UNCERTAIN if self.uncertain else EXACT,
+            (self.is_stream and self.task.inputs.time_column) or "", self.at_times, self.from_frame,
+            width=UNCERTAIN if self.uncertain else EXACT,
             moves=lambda own: self.tree.latest(self.target, self.start(own)) is not None,
         )  # fmt: skip
-        return super().request(frame_column, time_column)._replace(timed=timed)
+        return super().request(formula, timed=timed, **asked)
 
 
 def _settled(own: str | None, source: str | None) -> str | None:

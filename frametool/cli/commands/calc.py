@@ -17,10 +17,9 @@ from frametool.calc.parser import RADIAN, Line, mentions_row, walk
 from frametool.cli.command import Command, Inputs, Text, argument, command_named, option, refuse
 from frametool.cli.commands.help import topic
 from frametool.cli.options import COLUMN, pose_result_options, reading_options
-from frametool.cli.output import Output
 from frametool.cli.poses import source_of
-from frametool.cli.sink import say_error, tell, writing
-from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.sink import say_error, show, tell
+from frametool.cli.streaming import Task, stream_options
 from frametool.cli.trees import load_tree
 from frametool.documents.source import HEAD, decode, opened, read_text
 from frametool.errors import FrametoolError, ValueInvalid, printable
@@ -34,6 +33,7 @@ from frametool.stream.faults import STOP, Fault
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+    from frametool.cli.output import Output
     from frametool.stream.request import Request
 
 
@@ -193,7 +193,7 @@ def shown_of(values: Iterable[tuple[Line, Term]]) -> Iterator[Term]:
         yield last
 
 
-def calculate_lines(stream: Stream, scope: Scope) -> int:
+def calculate_lines(stream: Task, scope: Scope) -> int:
     """Write the value of each line of standard input.
 
     Ends at the first error, or with --on-error skip goes on behind it, and then returns 3.
@@ -244,17 +244,13 @@ def talk(scope: Scope, output: Output) -> int:
 
 def _answer(line: str, scope: Scope, output: Output) -> None:
     """Print the value of a line, or what is wrong with it."""
-    if line.strip() == "help":
-        with writing(None) as write:
-            write(topic("calc"))
-        return
     try:
-        if file_named_in(line, scope) is None:
+        if line.strip() == "help":
+            show(topic("calc"), paged=False)
+        elif file_named_in(line, scope) is None:
             output.pieces(value_texts([evaluate_line(read_line(line), scope)], output.style))
     except click.UsageError as error:
         tell(f"frametool: {error.format_message()}")
-    except BrokenPipeError:
-        raise
     except FrametoolError as error:
         say_error(error, in_json=False)
 
@@ -331,8 +327,8 @@ def calc_command(inputs: Inputs) -> int:
     NAME=EXPR to a value. An expression with row is computed for each row of -i FILE or standard input and replaces
     what the row was. Without an expression a terminal gets a prompt; from a pipe one expression a line is read.
     """
-    output = Output(inputs, "points")
-    stream = Stream(inputs, output)
+    task = Task(inputs, "points")
+    output = task.output
     scope = Scope(degrees=inputs.deg, normalize=inputs.normalize)
     if inputs.says_earth():
         from frametool.cli.earth import earth
@@ -349,35 +345,34 @@ def calc_command(inputs: Inputs) -> int:
         scope.tree = load_tree(".", streams=True) if asks or not lines else None
     if not lines:
         inputs.ask("origin", "local_axes", "zone")  # whatever comes
-        refuse(stream.path is not None, "-i FILE needs an expression over row")
+        refuse(task.path is not None, "-i FILE needs an expression over row")
         is_prompt = sys.stdin is not None and sys.stdin.isatty()
-        return talk(scope, output) if is_prompt else calculate_lines(stream, scope)
-    if stream.path is not None or any(mentions_row(line.tree) for line in lines):
-        return stream.run(_over_rows(lines, len(texts), scope, inputs, output.style))
+        return talk(scope, output) if is_prompt else calculate_lines(task, scope)
+    if task.path is not None or any(mentions_row(line.tree) for line in lines):
+        return task.run(_over_rows(lines, len(texts), scope, task))
     values = ((line, evaluate_line(line, scope)) for line in lines)
     output.pieces(value_texts(shown_of(values), output.style))
     return 0
 
 
-def _over_rows(lines: Sequence[Line], behind: int, scope: Scope, inputs: Inputs, style: Style) -> Request:
+def _over_rows(lines: Sequence[Line], behind: int, scope: Scope, task: Task) -> Request:
     """Return what is asked of rows: lines whose results are written, those of -e or the last; others bind names.
 
     behind: so many lines come before those of -e
     """
     from frametool.calc.rows import RowExpressions
-    from frametool.stream.request import Operation, Request, RowOptions, Timed
+    from frametool.stream.request import Operation, Timed
 
+    inputs = task.inputs
     results = [line for at, line in enumerate(lines) if at >= behind or not line.name] or [lines[-1]]
     names = [line.name for line in results]
     refuse(len(names) > 1 and not all(names), "rows get one result, or several with names: -e NAME=EXPR -e NAME=EXPR")
     refuse(twice := next((name for name in names if name and names.count(name) > 1), ""), f"-e {twice}= appears twice")
-    formula = RowExpressions(results, [line for line in lines if line not in results], scope, style)
+    formula = RowExpressions(results, [line for line in lines if line not in results], scope, task.output.style)
     formula.check((inputs.kind,) if inputs.kind else ("pose", "point", "vector"))
     timed = Timed.of_rows(inputs.time_column or "") if formula.needs_time else None
     counters = not any(frame.isdecimal() for _, tree in formula.scope.trees for frame in tree.frames)
-    return Request(
-        Operation(moves=True, formula=formula), timed=timed, earth=formula.scope.earth,
-        rows=RowOptions(
-            kind=inputs.kind or "", degrees=inputs.deg, normalize=inputs.normalize, frame_is_counter=counters
-        ),
+    return task.request(
+        operation=Operation(moves=True, formula=formula), timed=timed, earth=formula.scope.earth,
+        kind=inputs.kind or "", frame_is_counter=counters,
     )  # fmt: skip

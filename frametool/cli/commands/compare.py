@@ -322,9 +322,6 @@ def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Com
     for est, fmt in zip(ests, formats[1:], strict=True):
         estimate, name, some = trajectory(inputs, est, fmt, inputs.on_error)
         skipped |= some
-        if (reference.stamps_ns is None) != (estimate.stamps_ns is None):
-            lacking = ref_name if reference.stamps_ns is None else name
-            raise click.UsageError(f"{lacking} has no stamps, the other has; give them with --stamps FILE")
         found.append(compared(reference, estimate, chosen, (ref_name, name)))
         for hint in found[-1].hints:
             warn(hint)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from math import radians
 from typing import TYPE_CHECKING, Any
-
-import click
 
 from frametool.cli import options, poses
 from frametool.cli.command import Inputs, argument, command_named, misuse, option, refuse
 from frametool.cli.output import QUATERNION, Output
 from frametool.cli.sink import say
-from frametool.cli.streaming import EXPLAIN, ONE_RECORD, PoseTask, one_argument, pose_stream_options
+from frametool.cli.streaming import EXPLAIN, ONE_RECORD, Task, one_argument, pose_stream_options
 from frametool.documents.source import Source
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats
@@ -58,7 +57,7 @@ def convert_command(inputs: Inputs) -> int:
     VALUES are numbers in the order of the representation, after x y z when there is a position; an angle may carry
     its unit: 90deg, 1.57rad, pi/2. POSE is a mapping, what a tool printed (help pose), a file, or - for stdin.
     """
-    values, task = poses.rejoined(inputs.values), PoseTask(inputs, "poses", "points")
+    values, task = poses.rejoined(inputs.values), Task(inputs, "poses", "points")
     output, axes, world, operation = task.output, inputs.axes, inputs.world, Operation()
     if {axes, world, inputs.all_axes} != {None}:
         axes, world, operation = _change_of_axes(axes, world, inputs.all_axes)
@@ -122,13 +121,9 @@ def _are_numbers(values: Sequence[str], *, has_from: bool) -> bool:
     """Distinguish bare numbers from mappings and files; one that is alone is a number where --from says of what."""
     if not values or poses.is_inline(values[0]):
         return False
-    if len(values) > 1:
-        return True
-    try:
-        parse_angle(values[0])
-    except ValueInvalid:
-        return False
-    return has_from
+    with suppress(ValueInvalid):
+        return len(values) > 1 or (bool(parse_angle(values[0])) and has_from)
+    return False
 
 
 def _found(poses: Sequence[Pose], find: str, tolerance: float, style: Style) -> Style:
@@ -136,14 +131,13 @@ def _found(poses: Sequence[Pose], find: str, tolerance: float, style: Style) -> 
     from frametool.geometry.conventions import find_euler
     from frametool.geometry.transform import Rotation
 
-    if len(poses) != 1 or poses[0].rotation is None:
-        raise click.UsageError("--find is about one rotation")
+    refuse(len(poses) != 1 or poses[0].rotation is None, "--find is about one rotation")
     with misuse("--find: "):
         read = [parse_angle(text) for text in find.split(",")]
     refuse(len(read) != 3, f"--find takes three angles like 0.1,0,pi/2; found {len(read)}")
     degrees = style.degrees
     angles = [radians(angle) if unit == "deg" or (degrees and unit is None) else angle for angle, unit in read]
-    axes = find_euler(Rotation.of(*poses[0].rotation), angles, tolerance=tolerance)
+    axes = find_euler(Rotation.of(*poses[0].components[3:7]), angles, tolerance=tolerance)
     return style.changed(notations=tuple(notation(f"{'euler_deg' if degrees else 'euler'}:{each}") for each in axes))
 
 

@@ -14,8 +14,8 @@ from frametool import __version__
 from frametool.cli import command as shared
 from frametool.cli.command import EXIT_CODES, FILE, Inputs, Text, argument, command_named, option, refuse
 from frametool.cli.commands import COMMANDS, group
-from frametool.cli.sink import refuse_existing, show, writing
-from frametool.errors import FileProblem, ValueInvalid, any_near, printable, shown
+from frametool.cli.sink import problems_of, refuse_existing, show, writing
+from frametool.errors import FileProblem, ValueInvalid, any_near, shown
 from frametool.formats.table import FORMATS, format_entry
 
 if TYPE_CHECKING:
@@ -212,9 +212,9 @@ def help_command(ctx: click.Context, inputs: Inputs) -> None:
     words = inputs.words
     name = " ".join(words)
     named = _commands(ctx).get(name) if words[:1] and words[0] in COMMANDS else None
-    if inputs.fmt == "json":
-        from frametool.documents.writers import dump_json
+    from frametool.documents.writers import dump_json
 
+    if inputs.fmt == "json":
         if name and not named:
             hint = any_near(name, COMMANDS, "`frametool help` lists all")
             raise click.UsageError(f"-f json is about commands, and {shown(name)} is not one{hint}")
@@ -233,7 +233,6 @@ def help_command(ctx: click.Context, inputs: Inputs) -> None:
     elif words[0] == "cookbook":
         text = cookbook(words[1:])
     elif name == "schema":
-        from frametool.documents.writers import dump_json
         from frametool.formats.trees.schema import schema
 
         text = f"{dump_json(schema())}\n"
@@ -283,10 +282,8 @@ def examples_command(inputs: Inputs) -> None:
     refuse(name is None and output == "-", "--output - prints one example; name it, or a folder for all")
     if name is None or os.path.isdir(output):
         targets = {each: os.path.join(output, each) for each in ([name] if name else names())}
-        try:
+        with problems_of(output):
             os.makedirs(output, exist_ok=True)
-        except OSError as error:
-            raise FileProblem(f"{printable(output)}: {(error.strerror or str(error)).lower()}") from None
     else:
         targets = {name: output}
     for path in targets.values():  # all of them first: nothing is copied by half

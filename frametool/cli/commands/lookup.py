@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -13,9 +12,9 @@ from frametool.cli import options
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, together
 from frametool.cli.output import QUATERNION, Output
 from frametool.cli.sink import say_error
-from frametool.cli.streaming import EXPLAIN, PoseTask, Stream, stream_options
+from frametool.cli.streaming import EXPLAIN, Task, stream_options
 from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, opened, state
-from frametool.errors import FrametoolError, NoDataAt, UnknownFrame, printable, warn
+from frametool.errors import FrametoolError, NoDataAt, UnknownFrame, warn
 from frametool.formats.table import holds_arrays
 from frametool.geometry.rigid import EXACT, UNCERTAIN
 from frametool.grammar import pose_algebra as algebra
@@ -99,21 +98,16 @@ def lookup_command(inputs: Inputs) -> int:
     TREE is a file, -, or . for FRAMETOOL_TREE's (help time).
     Trajectories and tables (-f tum, csv ..) hold all samples, those from --start to --stop.
     """
-    task = PoseTask(inputs)
+    task = Task(inputs, "poses")
     columns = inputs.target_column, inputs.source_column
     output, target, source = task.output, inputs.target, inputs.source
     by_row = {*columns, inputs.time_column} != {None}
     refuse(not by_row and source is None, f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
-    if target is not None and columns[0] is None:
-        output.check_target(target)
-    covariance = inputs.covariance
-    if covariance:
-        if (place := output.style.place) is not None:
-            both = f"--to {place.name}: the covariance is along the axes of ecef"
-            raise click.UsageError(f"{both}; leave one of the two out")
+    if covariance := inputs.covariance:
+        refuse(output.style.place, "--covariance is along the axes of ecef; leave --to PLACE out")
         fmt = output.chosen if by_row else output.style.format
-        if fmt not in (None, "text", *WITH_COVARIANCE) and not holds_arrays(fmt):
-            raise click.UsageError(f"{fmt} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")
+        has_none = not (fmt in (None, "text", *WITH_COVARIANCE) or holds_arrays(fmt))
+        refuse(has_none, f"{fmt} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")
     tree = load_tree(inputs.tree, inputs.more, streams=by_row)
     lookups, at = lookups_in(tree, carried=covariance), options.at_ns(inputs.at)
     if by_row:
@@ -125,11 +119,6 @@ def lookup_command(inputs: Inputs) -> int:
     if task.plan:
         return task.derive("lookup", tree, target, source, at_ns=at, source_at_ns=source_at, fixed=fixed)
     output.take_axes_in(tree, source)
-    seen, by = re.escape(printable(source)), re.escape(printable(target))
-    output.marks += (
-        rf"(?m)^(?P<green>{seen})(?: at \S+)? seen from (?P<cyan>{by})(?= |$)",
-        rf"\(maps points in (?P<green>{seen}) to points in (?P<cyan>{by})\)",
-    )
     status, every = 0, output.holds_all or task.window is not None
     every = every and inputs.at is None and fixed is None and tree.latest(target, source) is not None
     if inputs.times is not None or every:
@@ -142,13 +131,13 @@ def lookup_command(inputs: Inputs) -> int:
     return status
 
 
-def _many(task: PoseTask, lookups: algebra.Lookups, target: str, source: str) -> int:
+def _many(task: Task, lookups: algebra.Lookups, target: str, source: str) -> int:
     """Print the results at --times, or at those of all samples; with --on-error skip report the others."""
     inputs, tree, window = task.inputs, lookups.tree, task.window
     times, skipped = inputs.times, Skipped(in_json=task.output.chosen == "json")
     skip = times is not None and inputs.on_error == SKIP
-    if times is not None and inputs.on_error == NULL:
-        raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")
+    is_null = times is not None and inputs.on_error == NULL
+    refuse(is_null, "--on-error null is for tables; with --times it is stop or skip")
     report = skipped.add if skip else stop
     asked = algebra.sample_stamps(tree, target, source) if times is None else options.read_times(times, report)
     if window is not None:
@@ -170,7 +159,7 @@ def _many(task: PoseTask, lookups: algebra.Lookups, target: str, source: str) ->
     return skipped.finish(len(asked) + unread - skipped.count)
 
 
-def _by_row(task: PoseTask, lookups: algebra.Lookups, target: str | None, source: str | None) -> int:
+def _by_row(task: Task, lookups: algebra.Lookups, target: str | None, source: str | None) -> int:
     """Add the pose of SOURCE in TARGET to every row; a frame named on the command line is every row's."""
     from frametool.stream.request import Operation, Timed
 
@@ -205,9 +194,9 @@ def _by_row(task: PoseTask, lookups: algebra.Lookups, target: str | None, source
     timed = None if inputs.time_column is None else Timed(inputs.time_column, many, edge_of, width=width)
     request = task.request(
         poses=0, pose_from_frame=edge_of, notations=task.output.notations or QUATERNION,
-        operation=Operation(uncertain=lookups.carried), timed=timed,
+        operation=Operation(uncertain=lookups.carried), timed=timed, frames=frames,
     )  # fmt: skip
-    return task.run(request.with_rows(frames=frames))
+    return task.run(request)
 
 
 @command_named("echo")
@@ -236,9 +225,7 @@ def echo_command(inputs: Inputs) -> int:
     target, source, start, stop, limit = inputs.target, inputs.source, inputs.start, inputs.stop, inputs.limit
     refuse(start is not None and stop is not None and start > stop, "--start is after --stop")
     out = Output(inputs, "poses", otherwise=None if inputs.output else "text")
-    out.check_target(target)
-    if out.style.place is not None and out.style.format == "text":
-        raise click.UsageError(f"--to {out.style.place.name}: tf2_echo's blocks have x, y, z; -f yaml, json or csv")
+    refuse(out.style.place and out.style.format == "text", "tf2_echo's blocks have x, y, z; give -f yaml, json or csv")
     frames = load_tree(inputs.tree, inputs.more)
     target, source = frame_name(target, frames), frame_name(source, frames)
     out.take_axes_in(frames, source)
@@ -289,24 +276,23 @@ def fk_command(inputs: Inputs) -> int:
     [deg], finger_mm. Other columns are unchanged. A joint of the chain without a column needs --joint or --joints; a
     mimic joint follows its leader. For a single posture use `frametool lookup arm.urdf arm_base tool -j elbow=30deg`.
     """
-    stream = Stream(inputs, Output(inputs, "poses"))
+    stream = Task(inputs, "poses")
     if (joints := inputs.peek("joints")) and not stream.path and not stream.has_input():
         words = " ".join((inputs.tree, inputs.base, inputs.tip, *(f"-j {each}" for each in joints)))
         raise click.UsageError(f"no rows of joint values: give -i FILE; for one posture, frametool lookup {words}")
     from frametool.formats.robots.urdf import robot_of
     from frametool.stream.formulas import JointRows, names_in
-    from frametool.stream.request import Operation, Request, RowOptions
+    from frametool.stream.request import Operation
 
     (file,) = opened((inputs.tree,), streams=True)
     robot, posture = robot_of(file)
     rows = JointRows(robot, posture, frame_name(inputs.base, robot), frame_name(inputs.tip, robot))
     with stream.opened() as source:
         begin = source.peek()
-        fmt = stream.chosen_format() or stream.detected(begin)
+        fmt = stream.format_of(begin)
         refuse(holds_arrays(fmt), f"rows of joints are a table of text, records or messages, not {fmt}")
         names = names_in(begin, fmt, stream.name, "a key for each joint, or JointState messages", header=inputs.header)
         rows.bind(names, stream.name, fixed=frozenset(file.answers.joints))
         file.tally.assumed = ""  # rows say where each joint on the way is
         state([file])
-        operation = Operation(moves=True, formula=rows)
-        return stream.run(Request(operation, RowOptions(poses=0, degrees=inputs.deg, normalize=inputs.normalize)))
+        return stream.run(stream.request(operation=Operation(moves=True, formula=rows), poses=0))

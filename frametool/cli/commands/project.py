@@ -14,7 +14,7 @@ from frametool.cli.commands.apply import begins_number, is_record
 from frametool.cli.output import Output
 from frametool.cli.poses import is_inline, values_of
 from frametool.cli.sink import refuse_existing, say, writing
-from frametool.cli.streaming import Stream, is_bag, stream_options
+from frametool.cli.streaming import Task, is_bag, stream_options
 from frametool.cli.trees import FRAME, frame_name
 from frametool.documents.source import InputFile, Source
 from frametool.errors import FormatError, ValueInvalid, listing, shown
@@ -102,8 +102,7 @@ def project_command(inputs: Inputs) -> int:
     take = None if overlay is None else overlay.take
     name, ranged = task.camera_name, bool(inputs.ranged)
     seen = PixelsOfPoints(task.camera, inputs.first_pixel, name=name, ranged=ranged, take=take)
-    request = task.request(inputs.frame_column if task.is_stream else None, seen)
-    status = task.answer(request, () if task.is_stream else [*apply.sources_of(task.rest, None)], seen)
+    status = task.finish(task.adds(seen), () if task.is_stream else [*apply.sources_of(task.rest, None)], seen)
     if overlay is not None:
         with writing(overlay.path, force=inputs.force) as write:
             write(overlay.drawn())
@@ -111,14 +110,14 @@ def project_command(inputs: Inputs) -> int:
     return status
 
 
-class CameraTask(Stream):
+class CameraTask(Task):
     """What the arguments and options of both commands say: the camera, how rows move, which records there are."""
 
     def __init__(self, inputs: Inputs, output: Output, named: str) -> None:
         """Read tree and camera; named: the arguments that lead to the camera, if there is a tree."""
-        super().__init__(inputs, output)
-        if self.messages() is None and self.path and is_bag(self.path):  # of a bag, --topic is what is streamed
-            raise click.UsageError(f"write the clouds of {self.path} as files first: apply -o '{{stamp_ns}}.pcd'")
+        super().__init__(inputs, output=output)
+        holds_clouds = self.messages() is None and self.path and is_bag(self.path)  # of a bag, --topic is streamed
+        refuse(holds_clouds, f"write the clouds of {self.path} as files first: apply -o '{{stamp_ns}}.pcd'")
         self.way: apply.TreeWay | None = None
         self.rest: tuple[str, ...] = inputs.arguments
         _, colon, name = (inputs.camera or "").rpartition(":")
@@ -130,7 +129,7 @@ class CameraTask(Stream):
             if len(self.rest) < len(names) or begins_number(self.rest[0]):
                 raise click.UsageError(f"name {', '.join(before)} and CAMERA, or give --camera FILE[:NAME]")
             self.camera_name = self.rest[len(before)]
-            self.way = apply.TreeWay(inputs, numbers=True)
+            self.way = apply.TreeWay(self, numbers=True)
             self.rest = self.way.rest
         self.is_stream, tree = self.rest in ((), ("-",)), None if self.way is None else self.way.tree
         from frametool.formats.cameras import load_camera, resized
@@ -151,17 +150,14 @@ class CameraTask(Stream):
         inputs = self.inputs
         return self.camera.rectified(from_first=bool(inputs.from_first)) if inputs.rectified else self.camera
 
-    def request(self, frame_column: str | None, formula: Formula) -> Request:
-        """Return what is done with rows."""
-        inputs = self.inputs
-        asked = Request(Operation(moves=True))
+    def adds(self, formula: Formula, **asked: Any) -> Request:
+        """Return what is done with rows, to which the results of a formula are added."""
+        self.inputs.ask("keep")
         if self.way is not None:
-            asked = self.way.request(frame_column, inputs.time_column if self.is_stream else None)
-        operation = asked.operation._replace(formula=formula)
-        inputs.ask("keep")
-        return asked._replace(operation=operation, rename=None).with_rows(normalize=bool(inputs.normalize))
+            return self.way.request(formula, **asked)
+        return self.request(operation=Operation(moves=True, formula=formula), **asked)
 
-    def answer(self, request: Request, records: Sequence[Source | str], seen: Seen) -> int:
+    def finish(self, request: Request, records: Sequence[Source | str], seen: Seen) -> int:
         """Write the rows of the stream, or the results of records; then say what became of them."""
         status, output = 0, self.output
         if self.is_stream:
@@ -170,7 +166,7 @@ class CameraTask(Stream):
         else:
             if output.style.format == "text":
                 output.style = output.style.changed(format="yaml")
-            request = request.with_results(prefix=self.inputs.prefix, precision=output.style.precision)
+            request = request.with_results(prefix=self.inputs.prefix)
             output.values(values_of(records, request, output))
         if (self.is_stream or seen.lost) and (summary := seen.summary()):
             is_wrong = seen.is_mostly_behind and not self.inputs.camera_axes
@@ -232,10 +228,10 @@ def unproject_command(inputs: Inputs) -> int:
         task.way = GroundWay(task.way, inputs.ground, task.camera_name)
     target = "" if task.way is None else task.way.target
     seen = PointsOfPixels(task.camera, inputs.first_pixel, columns, far=far, height=height, into=into, target=target)
-    request = task.request(None, seen)
+    request = task.adds(seen, poses=0)
     if request.timed is not None and height is not None:
         request = request._replace(timed=request.timed._replace(width=2 * EXACT))
-    return task.answer(request.with_rows(poses=0, frames=()), records, seen)
+    return task.finish(request, records, seen)
 
 
 class GroundWay(apply.TreeWay):
@@ -273,8 +269,7 @@ def _columns(task: CameraTask, records: Sequence[Source]) -> Sequence[str]:
     else:
         task.read_clouds_as_rows()
         begin = task.opened().peek()
-        fmt = task.within or task.chosen_format() or task.detected(begin, is_table=True)
-        names = names_in(begin, fmt, task.name, WANTED, header=inputs.header)
+        names = names_in(begin, task.format_of(begin, is_table=True), task.name, WANTED, header=inputs.header)
     if inputs.peek("columns"):
         columns: Sequence[str] = [each.strip() for each in inputs.columns[0].split(",")]
         refuse(len(columns) not in (2, 3), "--columns names those of u and v, and of a depth if there is one")
