@@ -189,19 +189,14 @@ class Topics:
         """Return True if a topic was named; only then are messages read that are poses and not transforms."""
         return topic.strip("/") in self.chosen
 
-    def agrees(self, topic: str, child: str) -> bool:
-        """Return True if a frame came by this namespace before, or by none."""
-        first = self._first.setdefault(child, topic)
-        if first == topic:
-            return True
-        ends = [f"/{each}" for each in (first, topic)]  # `tf` and `tf_static` of one namespace belong together
-        return len({each.removesuffix("_static") if each.endswith("/tf_static") else each for each in ends}) == 1
-
     def conflict(self, topic: str, child: str) -> str:
         """Return an error if a frame comes from two namespaces, as with two robots; once for each frame."""
-        if self.agrees(topic, child) or (child, topic) in self._reported:
+        first = self._first.setdefault(child, topic)
+        if first == topic or (child, topic) in self._reported:
             return ""
-        first = self._first[child]
+        ends = [f"/{each}" for each in (first, topic)]  # `tf` and `tf_static` of one namespace belong together
+        if len({each.removesuffix("_static") if each.endswith("/tf_static") else each for each in ends}) == 1:
+            return ""
         self._reported.add((child, topic))
         return f"frame {child!r} comes by {first} and by {topic}; choose with --topic {first} or --topic {topic}"
 

@@ -181,23 +181,6 @@ class ColumnRows(PlannedRows):
         weights[invalid] = 0.0
         return [weights], dict.fromkeys(np.flatnonzero(invalid).tolist(), (name, "not finite"))
 
-    def in_other_format(self, columns: Sequence[OutColumn], batch: Batch) -> tuple[int, dict[str, Made]]:
-        """Return how many results a batch has, and their columns by name, for a file of another format."""
-        rows, numbers = self.of_batch(batch)
-        new, found = iter(self.made(columns, rows, numbers)), {}
-        for column in columns:
-            place = column.passed
-            if place is None:
-                made = next(new)
-                made = made if isinstance(made.values, np.ndarray) else Made(objects(made.values))
-            elif column.kind is not None and column.kind.kind in FLOATS:
-                values, nulls = batch.numbers(place)
-                made = Made(values.astype(column.kind)[rows], None if nulls is None else nulls[rows])
-            else:
-                made = Made(taken(batch.column(place), rows))
-            found[column.name] = made
-        return len(numbers), found
-
     def made(self, columns: Sequence[OutColumn], rows: Ints, numbers: Floats) -> list[Made]:
         """Return what is in the columns that are made, in their order."""
         made = []
@@ -271,11 +254,22 @@ class OtherColumns:
         file, rows = self.parts[at]
         columns = rows.out_columns(named=True)
         for batch in chain([file.nothing()], file.batches()):  # which names the columns even where there are no rows
-            size, made = rows.in_other_format(columns, batch)
-            for name, kind in self.kinds.items():
-                if kind is not None and is_typed(values := made[name].values):  # whole numbers with gaps are objects
-                    made[name] = made[name]._replace(values=values.astype(kind, copy=False))
-            yield rows.outcome(batch, self.writer.of_columns(size, {name: made[name] for name in self.kinds}))
+            chosen, numbers = rows.of_batch(batch)
+            new, found = iter(rows.made(columns, chosen, numbers)), dict[str, Made]()
+            for column in columns:
+                place, kind = column.passed, self.kinds.get(column.name)
+                if place is None:
+                    each = next(new)
+                    each = each if isinstance(each.values, np.ndarray) else Made(objects(each.values))
+                elif column.kind is not None and column.kind.kind in FLOATS:
+                    values, nulls = batch.numbers(place)
+                    each = Made(values.astype(column.kind)[chosen], None if nulls is None else nulls[chosen])
+                else:
+                    each = Made(taken(batch.column(place), chosen))
+                if kind is not None and is_typed(each.values):  # whole numbers with gaps are objects
+                    each = each._replace(values=each.values.astype(kind, copy=False))
+                found |= {column.name: each} if column.name in self.kinds else {}
+            yield rows.outcome(batch, self.writer.of_columns(len(numbers), found))
         if rows is self.parts[-1][1]:
             yield from map(Outcome, self.writer.end())
 

@@ -303,8 +303,15 @@ class RecordRun:
             used = [each for each in self.used if self.counts[each]]
             if not more and not used:
                 raise FormatError("no transforms in it; --with FILE brings some", source=self.path)
+            children = {edge.child for edge in more}
+
+            def as_copied(_: FrameFile, options: Options) -> Iterator[Edge]:
+                found = recorded_edges(reader, used, options) if used else ()
+                yield from (edge for piece in found for edge in piece.edges() if edge.child not in children)
+                yield from more
+
             source = FrameFile(self.path, topics=self.transform_topics)
-            source.reader = lambda _, options: edges_of_copy(reader, used, more, options)
+            source.reader = as_copied
             frames = load_sources([source], Rules(normalize=request.normalize))
             self.mover = MessageMover(frames, request.into, reader.types, normalize=request.normalize)
 
@@ -438,16 +445,6 @@ class RecordRun:
                 yield f"types that it does not define are {how}: {first_of(kinds, MOST_NAMED)}"
         if not (self.plan.added or self.rewritten or self.moved or self.request.window):
             yield f"nothing is changed: {_count(self.counts.total())} copied"
-
-
-def edges_of_copy(
-    reader: RecordingReader, channels: Sequence[Channel], more: Sequence[Edge], options: Options
-) -> Iterator[Edge]:
-    """Yield the edges of a recording as its copy has them: some are replaced, and others are added."""
-    children = {edge.child for edge in more}
-    found = recorded_edges(reader, channels, options) if channels else ()
-    yield from (edge for piece in found for edge in piece.edges() if edge.child not in children)
-    yield from more
 
 
 def _listed(edges: Sequence[Edge]) -> str:
