@@ -524,20 +524,13 @@ def plain(node: Node) -> Any:
     if type(node.value) is list:
         return [plain(item) for item in node.value]
     refuse_alias(node)
-    if node.quote or node.value is None:
-        return node.value
-    return _plain_scalar(node.value)
-
-
-def _plain_scalar(text: str) -> str | Verbatim | None:
-    """Return a scalar without quotes as a plain value: numbers and truth values keep their text."""
-    if text in ("null", "~", ""):
-        return None
-    return Verbatim(text) if text in ("true", "false") or re.fullmatch(JSON_NUMBER, text) else text
+    return node.value if node.quote or node.value is None else plain_text(node.value, "")
 
 
 def plain_text(text: str, quote: str) -> Any:
-    """Return the text within the quotes of a scalar as a plain value."""
-    if not quote:
-        return _plain_scalar(text)
-    return plain(parse_nodes(f"{quote}{text}{quote}")[0]) if "\\" in text else text
+    """Return the text within the quotes of a scalar as a plain value; numbers and truth values keep theirs."""
+    if quote:
+        return plain(parse_nodes(f"{quote}{text}{quote}")[0]) if "\\" in text else text
+    if text in ("null", "~", ""):
+        return None
+    return Verbatim(text) if text in ("true", "false") or re.fullmatch(JSON_NUMBER, text) else text

@@ -100,10 +100,7 @@ class Splitter:
         """Scan JSON values one after the other, in an array with commas between them."""
         opening = _OPENING.match(text) if self.layout == ARRAY else None
         start = opening.end() if opening else 3 if text.startswith(MARK) else 0
-        found, closed = _scanned(text, start, array=self.layout == ARRAY, final=final, first=bool(opening))
-        if self.layout == ARRAY:
-            return found, closed
-        return [each if each.final else _with_separator(text, each.start, each.end) for each in found], False
+        return _scanned(text, start, array=self.layout == ARRAY, final=final, first=bool(opening))
 
 
 def _of_line(text: bytes, start: int, end: int) -> list[Part]:
@@ -113,18 +110,17 @@ def _of_line(text: bytes, start: int, end: int) -> list[Part]:
     if not body:
         return []
     begin = start + line.find(body)
-    if not _SEVERAL.search(body):
-        return [_with_separator(text, begin, begin + len(body))]
-    found, _ = _scanned(body, 0, array=False, final=True)
-    parts = [_with_separator(text, begin + each.begin, begin + each.end, each.problem) for each in found]
-    kept = text.rfind(body[-1:], start, end) + 1  # the end of the line goes with none of several
-    return [part._replace(after=min(part.after, kept)) for part in parts] if len(parts) > 1 else parts
+    found, _ = _scanned(body, 0, array=False, final=True) if _SEVERAL.search(body) else ([], False)
+    if len(found) > 1:  # the end of the line goes with none of several
+        return [each.behind(begin)._replace(final=False) for each in found]
+    stop = begin + len(body)
+    return [Part(begin, begin, stop, _after(text, stop), found[0].problem if found else "")]
 
 
-def _with_separator(text: bytes, start: int, end: int, problem: str = "") -> Part:
-    """Let what follows a record on its line go with it."""
-    after = _AFTER.match(text, end)
-    return Part(start, start, end, after.end() if after else end, problem)
+def _after(text: bytes, end: int) -> int:
+    """Return the end of what follows a record on its line, which goes with it."""
+    found = _AFTER.match(text, end)
+    return found.end() if found else end
 
 
 def _layout_of(text: bytes, *, final: bool) -> str:
@@ -208,7 +204,7 @@ def _scanned(
             problem, begin, place = wrong or "not JSON: it is cut off", at if array else start, end if wrong else start
             return [*found, Part(begin, place, len(data), len(data), problem, final=True)], False
         problem = "a comma is missing before this record" if needs_comma and not comma else ""
-        found.append(Part(at if array else start, start, end, end, problem))
+        found.append(Part(at if array else start, start, end, end if array else _after(data, end), problem))
         at, needs_comma = end, array
 
 
