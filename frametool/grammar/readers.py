@@ -39,6 +39,7 @@ COLUMN_WORDS = {
 NORMALS: tuple[tuple[str, ...], ...] = (("normal_x", "normal_y", "normal_z"), ("nx", "ny", "nz"))
 # velocities and rates of bodies; names such as velocity_x, twist.linear.x resemble a second position and are refused
 RATES = r"(?i)((?:body[_.])?[vw])[xyz]([ _\[(].*)?"
+RATE_KEYS = rf"{RATES}|(?:linear_|angular_)?velocity"  # of records
 STAMP_KEYS = ("stamp_ns", "stamp", "timestamp", "time", "t")
 NANOSECONDS = ("%time", "field.header.stamp")  # names that `rostopic echo -p` writes
 # compiled at first use, not at start-up
@@ -266,11 +267,6 @@ def read_numbers(
 
 
 # --- names of keys and columns ---
-
-
-def is_rate(key: str) -> bool:
-    """Return True if a key of a record is that of a velocity or of turn rates."""
-    return re.fullmatch(rf"{RATES}|(?:linear_|angular_)?velocity", key) is not None
 
 
 def in_nanoseconds(name: str) -> int:

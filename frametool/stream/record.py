@@ -9,6 +9,7 @@ Arguments, files, streams and messages are read by this one definition; keys tha
 
 from __future__ import annotations
 
+import re
 from functools import partial
 from itertools import chain, islice, product
 from math import nan
@@ -59,9 +60,6 @@ COVARIANCES = ("covariance", "position_covariance", "orientation_covariance")
 NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS)).difference(LISTED_WORDS)
 KNOWN = frozenset((*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS))
 XYZ = ("x", "y", "z")
-VELOCITIES = frozenset(f"{body}{word}{axis}" for body in ("", "body_") for word in "vw" for axis in XYZ).union(
-    ("velocity", "linear_velocity", "angular_velocity")
-)  # fmt: skip
 MOST_KEYS = 8  # named in a message
 QUATERNION = (*XYZ, "w")
 USED = KNOWN.difference(NAME_KEYS).union(ROTATION_KEYS, (readers.AXES_KEY, "sigma"), COVARIANCES, *PARTS.values())
@@ -214,8 +212,8 @@ def _search(value: Any, path: Path, request: Request, reading: Reading) -> Itera
             found = _search_inside(value, path, request, reading, stays)
         if not operation.keeps_frames and (operation.formula is None or operation.formula.reads_row):
             _refuse_half(value, found, path, stays if operation.moves else ())
-        if found and (operation.turns or (operation.moves and not VELOCITIES.isdisjoint(value))):
-            rates = [key for key in value if key not in holds and readers.is_rate(key)]
+        if found and operation.takes_points and (rates := [*filter(partial(re.fullmatch, readers.RATE_KEYS), value)]):
+            rates = [key for key in rates if key not in holds]
             if rates and operation.turns:
                 what = f"{first_of(rates, 3, quote=shown)} would keep to the old axes; a table turns vx, vy, vz along"
                 raise Misfit(f"{what}; leave them out, or convert to CSV first", (*path, rates[0]), key=True)

@@ -129,7 +129,7 @@ class RecordRows:
         )  # fmt: skip
         try:
             root = Node(0, len(text), parse_nodes(text))
-            unit = unit_of(record, root.at(record.path[:1]).value)
+            unit = unit_of(record)
             own_style = style if is_spelled else style.changed(format="csv")
             (value,) = values_of_unit(root.at(unit), unit, [Answer(shown, parts)], self.request, own_style)
         except (FrametoolError, ValueError):

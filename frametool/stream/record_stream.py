@@ -23,7 +23,7 @@ from frametool.grammar.result import NoResult, Style
 from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote
 from frametool.stream.record_results import BlockResults, text_in_order
 from frametool.stream.record_values import MOST_ENTRIES, ROUNDED, Outside, RecordText, plain, values_of_text
-from frametool.stream.splice import attempt, column_in, fault_at, null_of, nulled, rendered
+from frametool.stream.splice import attempt, column_in, fault_at, nulled, rendered
 from frametool.stream.splitter import ARRAY, NO_END, Part, Splitter
 from frametool.text.lines import Pieces, read_blocks, readiness, with_edits
 
@@ -270,8 +270,10 @@ class RecordBlocks:
         if self.request.on_error == NULL and not made.final:
             found.kept += 1
             is_json = self.fmt == "json"
-            if style is None:  # itself, with null in the place of numbers
-                found.items.append(_put(text, part, null_of(record, json=is_json)))
+            if style is None:  # itself, with null in the place of numbers, or null
+                body = record.rstrip(b"\r\n")
+                row = (nulled(body, json=is_json) or "null").encode() + record[len(body) :]
+                found.items.append(_put(text, part, row))
             else:
                 found.items.append((part.start, _no_result(record, style, json=is_json)))
 

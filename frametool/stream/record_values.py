@@ -299,7 +299,7 @@ def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
     known = read_text(source, request)
     for record in known.records:
         poses.append(pose_of(record, request)._replace(stamp_ns=stamp_of(known.values, record, source)))
-        unit = unit_of(record, value_at(known.values, record.path[:1]))
+        unit = unit_of(record)
         extra.update(_header_stamp(record), _rest(known.root.at(unit), unit, record))
     if not poses:
         raise FormatError("nothing in it; a pose is {xyz: [x, y, z], rpy_deg: [roll, pitch, yaw]}", source=source.name)
@@ -351,8 +351,7 @@ def values_of_text(known: RecordText, answers: Sequence[Answer], style: Style) -
     """Yield the results of a text as values; raises FormatError for an alias, and where nothing is in it."""
     units: dict[Path, list[Answer]] = {}
     for each in answers:
-        record = each.entry.record
-        units.setdefault(unit_of(record, value_at(known.values, record.path[:1])), []).append(each)
+        units.setdefault(unit_of(each.entry.record), []).append(each)
     for unit, ours in units.items():
         try:
             yield from values_of_unit(known.root.at(unit), unit, ours, known.request, style)
@@ -362,9 +361,9 @@ def values_of_text(known: RecordText, answers: Sequence[Answer], style: Style) -
         raise FormatError("nothing in it", source=known.source.name)
 
 
-def unit_of(record: Record, document: Any) -> Path:
+def unit_of(record: Record) -> Path:
     """Return the path of the thing that a record's result is: the document, or an item of the list it is."""
-    return record.path[: 1 + (type(document) is list and len(record.path) > 1)]
+    return record.path[: 1 + (len(record.path) > 1 and type(record.path[1]) is int)]
 
 
 def values_of_unit(node: Node, unit: Path, answers: list[Answer], request: Request, style: Style) -> Iterator[Value]:

@@ -358,12 +358,6 @@ def nulled(record: bytes, *, json: bool) -> str | None:
     return with_edits(text, edits) if edits else None
 
 
-def null_of(record: bytes, *, json: bool) -> bytes:
-    """Return what replaces a record without a result: its keys with null in the place of ours, or null."""
-    body = record.rstrip(b"\r\n")
-    return (nulled(body, json=json) or "null").encode() + record[len(body) :]
-
-
 def column_in(text: bytes, place: int) -> int:
     """Return the column, from 1, at which a place is in its line."""
     return len(text[text.rfind(b"\n", 0, place) + 1 : place].decode("utf-8", "replace")) + 1
