@@ -77,23 +77,18 @@ def _sign_bits(x: Array | float) -> Indices:
     return bits
 
 
-def first_nonzero(*values: Array) -> Array:
-    """Return element by element the first non-zero value, or the last value."""
-    found = values[0]
-    for value in values[1:]:
-        if np.asarray(found).all():
-            break
-        found = where(found == 0.0, value, found)
-    return found
-
-
 def canonical_sign(x: Array, y: Array, z: Array, w: Array) -> Four[Array]:
     """Return q or -q such that w > 0, or w == 0 and the first non-zero of x, y, z is positive; no -0 where negated.
 
     Flipping bits costs 0.2 ns per number, `where` 0.85.  The added zero is +0 where the sign was flipped, and
     -0 elsewhere, which changes nothing.
     """
-    flip = _sign_bits(first_nonzero(w, x, y, z))
+    found = w
+    for part in (x, y, z):  # where all before are zero
+        if np.asarray(found).all():
+            break
+        found = where(found == 0.0, part, found)
+    flip = _sign_bits(found)
     zero = (flip ^ SIGN_BIT).view(np.float64)
     signed = []
     for part in (x, y, z, w):

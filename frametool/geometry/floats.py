@@ -163,11 +163,6 @@ def furthest(value: float, centre: float = 0.0) -> float:
     return abs(value - centre)
 
 
-def first_nonzero(a: float, b: float, c: float, d: float) -> float:
-    """Return the first non-zero value, or the last value."""
-    return a or b or c or d
-
-
 def doubled_sincos(y: float) -> tuple[float, float]:
     """Return sine and cosine of 2y, |y| <= pi/4, by the same steps as `arrays`."""
     squared = y * y

@@ -298,8 +298,7 @@ class Spot(NamedTuple):
     @property
     def ecef(self) -> Vector:
         """Return x, y, z in ECEF."""
-        x, y, z = self.place.ecef(self.numbers)
-        return x, y, z
+        return self.place.ecef(self.numbers)
 
 
 class Unmoved(tuple[Any, ...]):  # noqa: SLOT001 - the slots of a tuple cannot be added to

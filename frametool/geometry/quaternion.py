@@ -399,5 +399,5 @@ def from_mrp(px: N, py: N, pz: N) -> Four[N]:
 
 def as_mrp(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Three[N]:
     """Return modified Rodrigues parameters of length 0 to 1: those of the shorter rotation."""
-    divisor = xp.copysign(1.0 + abs(w), xp.first_nonzero(w, x, y, z))
-    return x / divisor, y / divisor, z / divisor
+    x, y, z, w = xp.canonical_sign(x, y, z, w)
+    return x / (1.0 + w), y / (1.0 + w), z / (1.0 + w)

@@ -377,14 +377,13 @@ class Transform(Batched):
             ValueInvalid: wrong shape, another last row, not finite, or not a rotation; names the first such row.
         """
         m = validation.matrices(matrices, 4, "matrix")
-        off = sum(abs(entry - wanted) for entry, wanted in zip(m[12:], LAST_ROW, strict=True))
-        if not (type(off) is float and off <= SILENT):
-            import numpy as np
+        import numpy as np
 
-            if (bad := ~(np.asarray(off) <= SILENT)).any():
-                place, row = validation.first_bad(m[12:], bad, "matrix")
-                numbers = " ".join(f"{value:g}" for value in row)
-                raise ValueInvalid(f"{place}: last row {numbers}; expected 0 0 0 1")
+        off = sum(abs(entry - wanted) for entry, wanted in zip(m[12:], LAST_ROW, strict=True))
+        if (bad := ~(np.asarray(off) <= SILENT)).any():
+            place, row = validation.first_bad(m[12:], bad, "matrix")
+            numbers = " ".join(f"{value:g}" for value in row)
+            raise ValueInvalid(f"{place}: last row {numbers}; expected 0 0 0 1")
         rotation = Rotation.from_columns("matrix", (*m[0:3], *m[4:7], *m[8:11]), "matrix", normalize=normalize)
         return cls.of(*validation.joined((m[3], m[7], m[11]), rotation.components, "matrix"))
 
