@@ -11,9 +11,7 @@ Knows numbers only; components are floats or arrays of one shape, and both take 
 
 from __future__ import annotations
 
-from functools import reduce
 from math import isfinite
-from operator import iadd
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion
@@ -50,33 +48,6 @@ def compose(
         r11 * btx + r12 * bty + r13 * btz + atx, r21 * btx + r22 * bty + r23 * btz + aty,
         r31 * btx + r32 * bty + r33 * btz + atz, x, y, z, w,
     )  # fmt: skip
-
-
-def go_on(a: Rigid, b: Rigid) -> Rigid:
-    """Compose poses: as `compose`, but plain zeros, of which robot models are full, cost nothing among columns."""
-    if all(type(part) is float for part in (*a, *b)):
-        return compose(*a, *b)
-    (*shift, ax, ay, az, aw), (btx, bty, btz, bx, by, bz, bw) = a, b
-    if not (_is_zero(btx) and _is_zero(bty) and _is_zero(btz)):
-        r = quaternion.to_matrix(ax, ay, az, aw)
-        shift = [_sum((r[at], btx), (r[at + 1], bty), (r[at + 2], btz)) + shift[at // 3] for at in (0, 3, 6)]
-    ix, iy, iz = (part if _is_zero(part) else -part for part in (ax, ay, az))
-    turn = (
-        _sum((aw, bx), (ax, bw), (ay, bz), (iz, by)), _sum((aw, by), (ix, bz), (ay, bw), (az, bx)),
-        _sum((aw, bz), (ax, by), (iy, bx), (az, bw)), _sum((aw, bw), (ix, bx), (iy, by), (iz, bz)),
-    )  # fmt: skip
-    norm = 0.5 + 0.5 * _sum(*zip(turn, turn, strict=True))
-    return *shift, *(part if _is_zero(part) else part / norm for part in turn)
-
-
-def _is_zero(number: Number) -> bool:
-    return type(number) is float and number == 0.0
-
-
-def _sum(*terms: tuple[Number, Number]) -> Number:
-    """Add products, but not those with a plain zero."""
-    products = [one * other for one, other in terms if not (_is_zero(one) or _is_zero(other))]
-    return reduce(iadd, products) if products else 0.0
 
 
 def inverse(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N) -> Seven[N]:

@@ -184,7 +184,7 @@ def _product(*poses: Rigid) -> Rigid:
     product = rigid.IDENTITY
     for each in poses:
         if each is not rigid.IDENTITY:
-            product = each if product is rigid.IDENTITY else rigid.go_on(product, each)
+            product = each if product is rigid.IDENTITY else rigid.compose(*product, *each)
     return product
 
 
@@ -418,10 +418,9 @@ class Chain:
                 joint = self._joints[name]
                 known[name] = followed(joint, known[leader]) if leader else joint.start
         top_from_base, top_from_tip = (
-            reduce(rigid.go_on, (link.pose([known[joint.name] for joint in link.joints], xp) for link in links))
-            if links else rigid.IDENTITY
+            _product(*(link.pose([known[joint.name] for joint in link.joints], xp) for link in links))
             for links in (self._down, self._up)
-        )  # fmt: skip
+        )
         if not self._down:
             return top_from_tip
         if not self._up:
