@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 ALIGNMENTS = ("none", "origin", "yaw", "se3", "sim3")
 SCALED = ("sim3", "origin+scale")
-FEWEST = 3  # pairs
+FEWEST = 3  # pairs; and poses with a clock: two speeds are the shortest signal
 STILL = 1e-9  # rms, relative to 1 + the largest coordinate: the effect of rounding
 THIN = 1e-5  # ratio of the second axis to the first: a straight line
 
@@ -247,7 +247,6 @@ def interval(stamps_ns: Array) -> float:
 LIMIT_S = 10.0
 REFINED_S = 1e-7
 STEPS = 8
-LEAST = 3  # poses: two speeds are the shortest signal
 NEARBY = 1.2  # of a step: the largest error of the best of all lags and its neighbours
 DOUBT = 0.25  # of a step: the largest acceptable standard error of least squares
 TINY = 1e-12
@@ -271,7 +270,7 @@ def clock_offset(
     by_turning: use angular speeds only if both rotate, because they do not depend on the sensor's position
     If the two spans do not overlap, their first stamps are aligned and every lag is tried.
     """
-    if min(ref.size, est.size) < LEAST:
+    if min(ref.size, est.size) < FEWEST:
         return ClockOffset(0.0, -1.0)
     unit = np.ldexp(1.0, np.frexp(max(np.abs(ref.xyz).max(), np.abs(est.xyz).max()))[1])  # so that no square overflows
     ref, est = (each._replace(xyz=each.xyz / unit) for each in (ref, est))

@@ -22,6 +22,7 @@ from itertools import chain, count, cycle, repeat
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import Misused, ValueInvalid, listing, printable, shown
+from frametool.frames.lookups import checked_rate
 from frametool.frames.stamps import BILLION
 
 if TYPE_CHECKING:
@@ -236,7 +237,6 @@ class ServiceRefused(ValueInvalid):
 class WallHit(NamedTuple):
     """A tick at which a turtle was moved back to the wall; `place` is where it would have been, y up."""
 
-    t_ns: int
     turtle: str
     place: TurtleState
 
@@ -324,7 +324,7 @@ class World:
     def tick(self, now_ns: int) -> list[WallHit]:
         """Move every turtle by one tick; returns those that hit a wall."""
         outside = ((name, turtle.update(now_ns)) for name, turtle in sorted(self.turtles.items()))
-        return [WallHit(now_ns, name, place) for name, place in outside if place is not None]
+        return [WallHit(name, place) for name, place in outside if place is not None]
 
 
 def complete(service: str, arguments: dict[str, float | str]) -> dict[str, float | str]:
@@ -348,7 +348,6 @@ def complete(service: str, arguments: dict[str, float | str]) -> dict[str, float
 
 # law -> rate in Hz, linear gain in 1/s, angular gain in 1/s: turtle_tf2_listener of each ROS
 LAWS = {"ros1": (10.0, 0.5, 4.0), "ros2": (1.0, 0.5, 1.0)}
-SLOWEST, FASTEST = 1e-6, 1e6  # Hz; two steps must not fall on one nanosecond
 ARRIVED = 2e-6  # metres: positions near 11 m are float32, 1e-6 apart; the bearing of a neighbour is rounding
 
 
@@ -373,7 +372,7 @@ class FollowController:
         if law not in LAWS:
             raise ValueInvalid(f"no law {shown(law)}; laws: {', '.join(LAWS)}")
         own_rate, own_linear, own_angular = LAWS[law]
-        self.rate = _checked("rate", own_rate if rate is None else rate, SLOWEST, FASTEST)
+        self.rate = checked_rate(own_rate if rate is None else rate)
         self.gain_linear = _checked("gain_linear", own_linear if gain_linear is None else gain_linear)
         self.gain_angular = _checked("gain_angular", own_angular if gain_angular is None else gain_angular)
         self.max_linear = math.inf if max_linear is None else _checked("max_linear", max_linear, 0.0)
@@ -403,11 +402,10 @@ class FollowController:
         return round(number * BILLION / self.rate)
 
 
-def _checked(name: str, value: float, least: float = -math.inf, most: float = math.inf) -> float:
-    """Return a number if it is finite and within its bounds."""
-    if not (math.isfinite(value) and least <= value <= most):
-        bounds = f"{least:g} .. {most:g} Hz" if most < math.inf else f"finite{', 0 or more' * (least == 0.0)}"
-        raise ValueInvalid(f"{name} must be {bounds}, found {value:g}")
+def _checked(name: str, value: float, least: float = -math.inf) -> float:
+    """Return a number if it is finite and not below the least."""
+    if not (math.isfinite(value) and least <= value):
+        raise ValueInvalid(f"{name} must be finite{', 0 or more' * (least == 0.0)}, found {value:g}")
     return float(value)
 
 

@@ -43,6 +43,7 @@ TITLES = {
     "est": "est", "ate": "ate_m", "max": "max_m", "deg": "ate_deg", "along": "along_m", "across": "across_m",
     "up": "up_m", "rpe": "rpe_percent", "kitti": "kitti_percent", "scale": "scale", "paired": "paired",
 }  # fmt: skip
+PATHS = SHORT | {"rpe": "rpe.-1.percent"}
 RANKED = range(1, [*TITLES].index("scale"))
 LATEX = {letter: f"\\{letter}" for letter in "_%&#${}"}
 LATEX |= {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
@@ -95,10 +96,7 @@ def _statistics(label: str, summed: dict[str, float] | None) -> str:
 
 def write_table(found: Sequence[dict[str, Any]], fmt: str = "text") -> str:
     """Write one row per comparison: `csv`, or `text`, `markdown`, `latex` with the best value of each column marked."""
-    rows: list[list[Any]] = []
-    for each in found:
-        own = {"est": each["est"], "rpe": each["rpe"][-1]["percent"] if each["rpe"] else None}
-        rows.append([own[title] if title in own else number_at(each, SHORT[title]) for title in TITLES])
+    rows = [[number_at(each, PATHS.get(title, title)) for title in TITLES] for each in found]
     if fmt == "csv":
         return write_points([dict(zip(TITLES.values(), row, strict=True)) for row in rows], Style("csv"))
     known = ([cell for cell in column if isinstance(cell, float)] for column in zip(*rows, strict=True))

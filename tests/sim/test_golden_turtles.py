@@ -42,7 +42,7 @@ def scene_of(trace: dict[str, Any]) -> Any:
 
 def walls(steps: list[SimulationStep]) -> list[tuple[float, float, float]]:
     """Return time and place of every wall hit."""
-    return [(hit.t_ns / 1e9, hit.place.x, hit.place.y) for step in steps for hit in step.walls]
+    return [(step.t_ns / 1e9, hit.place.x, hit.place.y) for step in steps for hit in step.walls]
 
 
 def recorded_walls(warnings: list[list[Any]]) -> list[Any]:

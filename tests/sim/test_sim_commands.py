@@ -93,7 +93,7 @@ def test_the_example_scene_has_three_turtles_that_come_together(run: Run) -> Non
         (("follow", "--leader", "circel"), 2, "did you mean 'circle'? leaders: "),
         (("follow", "--leader", "missing.csv"), 5, "missing.csv: no such file"),
         (("follow", "--spawn", "1"), 2, "expected [x, y, theta]"),
-        (("follow", "--rate", "0"), 2, "rate must be"),
+        (("follow", "--rate", "0"), 2, "a rate of 0 Hz has no steps"),
         (("follow", "--gain-linear", "nan"), 2, "is not finite"),
         (("follow", "--duration", "-1"), 2, "duration must be 0 .. "),
         (("follow", "--reach", "-1"), 2, "--reach must be 0 or more"),

@@ -152,7 +152,7 @@ def test_a_leader_file_beside_the_scene_is_read(tmp_path: Path) -> None:
         ("turtles:\n  a: {follow: a, leader: still}\n", "s.yaml:2:18: a turtle has a leader script or follows"),
         ("turtles:\n  a: {law: ros1}\n", "s.yaml:2:7: law says how to follow; add follow: NAME"),
         ("turtles:\n  a:\n  b: {follow: a, law: ros3}\n", "s.yaml:3:23: unknown 'ros3'; did you mean"),
-        ("turtles:\n  a:\n  b: {follow: a, rate: 0}\n", "s.yaml:3:24: rate must be"),
+        ("turtles:\n  a:\n  b: {follow: a, rate: 0}\n", "s.yaml:3:24: a rate of 0 Hz has no steps"),
         ("turtles:\n  a: {spawn: [1, x]}\n", "s.yaml:2:18: 'x' is not a number"),
         ("turtles:\n  a: {spawn: 3}\n", "s.yaml:2:14: expected [x, y, theta], found '3'"),
         ("turtles:\n  a:\n  a:\n", "s.yaml:3:3: key 'a' appears twice"),
