@@ -254,7 +254,7 @@ def _controller(simulation: Simulation, name: str, follow: Follow) -> Process:
         try:
             twist = follow.controller.command(x, y)
         except ValueInvalid as error:
-            raise ValueInvalid(f"{name}: {error}") from None
+            raise ValueInvalid(f"{name}: {error}; give smaller gains, or limits") from None
         turtle.command(twist)
         leader, state = simulation.states.get(follow.leader), simulation.states[name]
         step.commands.append(IssuedCommand(step.t_ns, name, twist, math.sqrt(x * x + y * y), leader, state))

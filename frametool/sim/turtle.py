@@ -386,16 +386,9 @@ class FollowController:
         distance = math.sqrt(x * x + y * y)
         if distance < ARRIVED:
             return Twist(0.0, 0.0)
-        linear = self.gain_linear * distance
-        angular = self.gain_angular * math.atan2(y, x)
-        try:
-            return Twist(
-                max(-self.max_linear, min(self.max_linear, linear)),
-                max(-self.max_angular, min(self.max_angular, angular)),
-            )
-        except ValueInvalid:
-            gains = f"gain_linear {self.gain_linear:g}, gain_angular {self.gain_angular:g}"
-            raise ValueInvalid(f"{gains} give no finite velocity at {distance:g} m") from None
+        linear = max(-self.max_linear, min(self.max_linear, self.gain_linear * distance))
+        angular = max(-self.max_angular, min(self.max_angular, self.gain_angular * math.atan2(y, x)))
+        return Twist(linear, angular)
 
     def due_ns(self, number: int) -> int:
         """Return the time of the n-th control step, from 0; rounded once, so that no rate drifts."""
