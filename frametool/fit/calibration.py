@@ -67,21 +67,21 @@ def solve_mean(
     poses = lsq.batch_of(poses, "poses")
     mass = validation.masses(weights, poses.shape)
     counts, roots = mass > 0.0, np.sqrt(mass)[:, None]
-    own, robust = poses[counts], robust and counts.sum() >= FEWEST
+    own, weight, robust = poses[counts], mass[counts], robust and counts.sum() >= FEWEST
 
     def apart(at: int) -> float:
         """Return how far a pose is from the others, by the medians of metres and radians."""
         return sum(log(max(np.median(roots[counts, 0] * off), lsq.LEAST)) for off in own[at].distance(own))
 
-    def mean_of(_: Transform, weights: Array) -> Transform:
-        chosen = weights > 0.0
-        return own[chosen].mean((weights * mass[counts])[chosen])
+    def mean_of(_: Transform, kept: Array) -> Transform:
+        return own[kept > 0.0].mean(weight[kept > 0.0])
 
     tried = range(len(own)) if len(own) <= MOST_TRIED else next(lsq.draws(1, MOST_TRIED, len(own)))
     start = own[min(tried, key=apart)] if robust else own[0]
     found = lsq.settled(
-        start, lambda middle: roots[counts] * lsq.errors(own, middle), mean_of, mean_of, unknown=3, robust=robust
-    )
+        start, lambda middle: roots[counts] * lsq.errors(own, middle),
+        lambda _, weights: own.mean(weights * weight), mean_of, unknown=3, robust=robust,
+    )  # fmt: skip
     used, mean = counts.copy(), found.model
     used[counts] = found.kept
     inliers, shares = poses[used], mass[used]

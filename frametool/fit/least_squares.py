@@ -113,7 +113,9 @@ def off_text(metres: float, radians: float, *, digits: int = 1) -> str:
 
 def skew(v: Array) -> Array:
     """Return [v]x of vectors (.., 3): [v]x a = v x a."""
-    return np.cross(np.eye(3), v[..., None, :])
+    x, y, z = np.moveaxis(v, -1, 0)
+    zero = np.zeros_like(x)
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*v.shape, 3)
 
 
 def inverse_left_jacobian(rotvecs: Array) -> Array:
