@@ -25,7 +25,7 @@ from collections import Counter
 from functools import partial
 from io import BytesIO
 from itertools import accumulate
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -272,16 +272,18 @@ class PcdFile(CloudFile):
             data = np.frombuffer(unpack(packed, size), np.uint8)
         except ValueInvalid as error:
             raise file.error(f"the packed points cannot be unpacked: {error}") from None
-        rows, columns, at = np.zeros(points, self.record), iter(self.record.names or ()), 0
+        columns, at = list[Any](), 0
         for field in fields:
             end = at + points * field.values * field.size
             if field.name != PADDING:
-                for values in data[at:end].view(field.code).reshape(points, field.values).T:
-                    rows[next(columns)] = values
+                columns.extend(data[at:end].view(field.code).reshape(points, field.values).T)
             at = end
         step = column_file.rows_of_batch(self.record.itemsize)
         for first in range(0, points, step):
-            yield column_file.StructuredBatch(rows[first : first + step])
+            rows = np.zeros(min(step, points - first), self.record)
+            for name, values in zip(self.record.names or (), columns, strict=True):
+                rows[name] = values[first : first + step]
+            yield column_file.StructuredBatch(rows)
 
     def _fields_of(self, columns: Sequence[OutColumn]) -> tuple[PcdField, ...]:
         """Return the fields of an output: those of the input with new ones after them, or one for each column.

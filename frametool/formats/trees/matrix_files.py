@@ -452,8 +452,9 @@ class Matrices:
         """Read a rotation and its translation."""
         path, place = (*block.path, key), (*block.path, translation)
         shift = within(place, grid_of, block.entries[translation])
-        if shift is None:
-            raise Misfit(f"{translation}: expected 3 numbers, found {kind(block.entries[translation])}", place)
+        if shift is None or not shift.holds(3):
+            found = shift.size if shift else kind(block.entries[translation])
+            raise Misfit(f"{translation}: expected 3 numbers, found {found}", place)
         meaning = self._named(block, path)
         if meaning is None and target == "cam1":  # of two cameras cam0 is named first
             source, target = self.answers.names(source, target)
@@ -468,8 +469,6 @@ class Matrices:
             raise Misfit(f"expected a 3 x 3 matrix or a rotation vector, found {turn.size}", path)
         representation = notation("rotvec" if turn.holds(3) else "matrix")
         rotation = within(path, read_spelled, representation, turn.texts, turn.places, self.reading)[1]
-        if not shift.holds(3):
-            raise Misfit(f"expected 3 numbers, found {shift.size}", place)
         numbers = zip(shift.places, shift.texts, strict=True)
         position = (within((*place, *at), read_number, text) for at, text in numbers)
         return Stated(*meaning[:3], (*position, *rotation), path)
