@@ -176,7 +176,7 @@ class FormatConverter:
             if self.looks_up_places:
                 poses = poses._replace(parents=EARTH_FRAMES[:1])
             if file:
-                poses = poses._replace(stamps_ns=np.array([*map(file.at, range(before, count))], np.int64))
+                poses = poses._replace(stamps_ns=np.array(file.between(before, count), np.int64))
             elif fmt.counted and poses.stamps_ns is None:
                 poses = poses._replace(stamps_ns=np.arange(before, count) * BILLION)
             yield poses._replace(stamps_ns=self._held(poses.stamps_ns, fmt)), outcome

@@ -171,12 +171,12 @@ class StampFile:
                 except ValueInvalid as error:
                     raise FormatError(str(error), source=path, line=number) from None
 
-    def at(self, index: int) -> int:
-        """Return the time of a pose, counted from 0."""
-        if index >= len(self.stamps):
+    def between(self, begin: int, end: int) -> list[int]:
+        """Return the times of poses, counted from 0."""
+        if end > len(self.stamps):
             message = f"{len(self.stamps)} times are too few for the poses; one a line is wanted"
             raise FormatError(message, source=self.path)
-        return self.stamps[index]
+        return self.stamps[begin:end]
 
     def finish(self, count: int, name: str) -> None:
         """Check that there was one time per pose."""
@@ -260,9 +260,9 @@ def blocks(file: InputFile, options: Options, *, named: bool = True) -> Iterator
         for row in some if stamps is None else ():
             if row.number >= NUMBERED:
                 raise error_at(file, row, f"{row.number} is too large to count seconds; give --stamps FILE")
-        times = [stamps.at(count + at) if stamps else row.number * BILLION for at, row in enumerate(some)]
+        before, count = count, count + len(some)
+        times = stamps.between(before, count) if stamps else [row.number * BILLION for row in some]
         good = [at for at in range(len(some)) if at not in found.reasons]
-        count += len(some)
         yield PoseBlock(tuple(part[good] for part in poses), np.array(times, np.int64)[good], [some[at] for at in good])
     if stamps:
         stamps.finish(count, file.name)

@@ -296,10 +296,9 @@ def stamp_of(entry: dict[str, Any]) -> int | None:
     """Read `stamp: 12.5` in seconds or `stamp_ns: 12500000000`, exactly; None if there is neither."""
     if STAMP_KEYS.isdisjoint(entry):
         return None
-    keys = [key for key in ("stamp", "stamp_ns") if key in entry]
-    if len(keys) > 1:
+    if STAMP_KEYS.issubset(entry):
         raise Misfit("stamp and stamp_ns in one entry; keep one", ("stamp",), key=True)
-    return read_time(entry, keys[0])
+    return read_time(entry, "stamp" if "stamp" in entry else "stamp_ns")
 
 
 def read_time(entry: dict[str, Any], key: str, example: str = "") -> int:
