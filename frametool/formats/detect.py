@@ -35,7 +35,7 @@ from itertools import chain, repeat
 
 from frametool.documents.source import HEAD, LOOKED_AT, UTF16, not_text
 from frametool.errors import FormatError, NamedTuple, ValueInvalid, bare, first_of
-from frametool.formats.table import BAG, FORMATS, NUMBER, by_suffix, readers
+from frametool.formats.table import BAG, FORMATS, by_suffix, readers
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -388,11 +388,6 @@ class Unsupported(NamedTuple):
 
 
 _COLMAP_MODELS = "(?:SIMPLE_|FULL_)?(?:PINHOLE|RADIAL|OPENCV|FOV)(?:_FISHEYE)?|(?:RAD_TAN_)?THIN_PRISM_FISHEYE"
-_NO_INDICES = r"(?!\s*0\s+1\s+2\s+0\s[^\n]*\n\s*1\s[^\n]*\n\s*2\s)"  # of a data frame
-_OPEN3D = (
-    rf"\A\ufeff?{_NO_INDICES}\s*\d+[ \t]+\d+[ \t]+\d+[^\S\n]*+\n"
-    rf"(?:\s*+(?:{NUMBER}[ \t]+){{3}}{NUMBER}[^\S\n]*+\n){{2}}"
-)
 _SRDF = (
     "group|group_state|gripper|end_effector|virtual_joint|passive_joint|joint_property|link_sphere_approximation|"
     "(?:disable|enable|disable_default)_collisions"
@@ -412,7 +407,7 @@ UNSUPPORTED = {
     "open3d": Unsupported(
         "Open3D camera trajectory",
         "use kitti: the first 12 numbers of each pose in a line, optical axes (of JSON's extrinsics the inverse)",
-        (("text", _OPEN3D), ("json path", "parameters/extrinsic")),
+        (("json path", "parameters/extrinsic"),),
     ),
     "bundler": Unsupported(
         "Bundler's bundle.out",

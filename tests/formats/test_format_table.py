@@ -313,7 +313,6 @@ KNOWN: dict[str, tuple[bytes, str]] = {
     "directives of Drake": (b"# c\n\ndirectives:\n- add_model:\n", "drake"),
     "a stream of Arrow": (b"\xff\xff\xff\xff\x80\0\0\0" + bytes(40), "arrows"),
     "NPZ": (b"PK\x03\x04" + bytes(26) + b"points.npy" + bytes(20), "npz"),
-    "Open3D's log": (b"0 0 1\n1 0 0 2 \n0 1 0 2 \n0 0 1 -3e-1 \n0 0 0 1 \n", "open3d"),
     "Open3D's JSON": (b'{"class_name": "PinholeCameraTrajectory", "parameters": [{"extrinsic": [1', "open3d"),
     "Bundler": (b"# Bundle file v0.3\n1 2\n", "bundler"),
     "SRDF": (b'<?xml version="1.0"?>\n<robot name="r"><!-- c --><group name="arm">', "srdf"),
