@@ -84,7 +84,8 @@ def to_quaternion(sheet: Sheet, numbers: Sequence[float], notation: Notation, *,
     """Add the derivation of the quaternion from the numbers of a notation."""
     values: Values = dict(zip(names_of(notation, 0, degrees=degrees), numbers, strict=True))
     words = _words(notation, values, degrees=degrees)
-    return quaternion_of(sheet.play(f"{notation.representation.name} to", values, **words))
+    sheet.play(f"{notation.representation.name} to", values, **words)
+    return values["x"], values["y"], values["z"], values["w"]
 
 
 def from_quaternion(
@@ -113,28 +114,22 @@ def posed(letter: str, pose: Rigid) -> Values:
     return named(f"t{letter}", pose[:3]) | named(letter, pose[3:])
 
 
-def vector_of(values: Values, prefix: str) -> Vector:
-    """Return a vector by the name of its numbers."""
-    x, y, z = (values[prefix + each] for each in "xyz")
-    return x, y, z
-
-
-def quaternion_of(values: Values, prefix: str = "") -> Quaternion:
-    """Return a quaternion by the name of its numbers."""
-    return *vector_of(values, prefix), values[f"{prefix}w"]
+def pose_of(values: Values, letter: str = "") -> Rigid:
+    """Return a pose by the names of its numbers: position t, rotation by a letter."""
+    tx, ty, tz = (values[f"t{each}"] for each in "xyz")
+    x, y, z, w = (values[letter + each] for each in "xyzw")
+    return tx, ty, tz, x, y, z, w
 
 
 def product(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str]) -> Rigid:
     """Multiply two poses: `frames` are those of a_from_b and b_from_c, in this order."""
     words = dict(zip(("first", "middle", "last"), frames, strict=True))
-    values = sheet.play("compose", posed("a", a) | posed("b", b), **words)
-    return *vector_of(values, "t"), *quaternion_of(values, "c")
+    return pose_of(sheet.play("compose", posed("a", a) | posed("b", b), **words), "c")
 
 
 def inverse(sheet: Sheet, pose: Rigid, target: str, source: str) -> Rigid:
     """Invert target_from_source."""
-    values = sheet.play("inverse", posed("", pose), target=target, source=source)
-    return *vector_of(values, "t"), *quaternion_of(values)
+    return pose_of(sheet.play("inverse", posed("", pose), target=target, source=source))
 
 
 def between(sheet: Sheet, a: Rigid, b: Rigid, *, fraction: float) -> Rigid:
@@ -142,14 +137,15 @@ def between(sheet: Sheet, a: Rigid, b: Rigid, *, fraction: float) -> Rigid:
     sheet.stretch = max(sheet.stretch, abs(fraction))
     line = sheet.play("line", {"f": fraction} | named("a", a[:3]) | named("b", b[:3]))
     arc = sheet.play("slerp", {"f": fraction} | named("a", a[3:]) | named("b", b[3:]))
-    return *vector_of(line, "t"), *quaternion_of(arc, "q")
+    return pose_of(line | arc, "q")
 
 
 def moved(sheet: Sheet, kind: str, pose: Rigid, numbers: Sequence[float], target: str, source: str) -> Vector:
     """Transform a point or a vector from one frame to another."""
     values = named("t", pose[:3]) | named("q", pose[3:]) | named(kind[0], numbers)
     sheet.play(kind, values, target=target, source=source)
-    return vector_of(values, kind[0])
+    x, y, z = (values[kind[0] + each] for each in "xyz")
+    return x, y, z
 
 
 class OtherAxes(NamedTuple):
@@ -361,7 +357,7 @@ def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationSty
     if pose.position is not None:
         check_vector(sheet, derived[:3], pose.position)
         if not any(each.representation.whole for each in plan.notations):
-            rows.append(row("xyz", "xyz", pose.position, METRES))
+            rows.append(Row("xyz", "xyz", pose.position, METRES))
     target = quaternion.unit(*pose.components[3:], floats)
     for each in plan.notations:
         degrees, whole, angles = each.in_degrees(style.degrees), each.representation.whole, each.representation.angles
@@ -380,9 +376,9 @@ def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationSty
             cut = angles[0] if angles else len(numbers)
             angular = each.names[cut:], numbers[cut:], DEGREES if degrees else RADIANS
             lines = [part for part in ((each.names[:cut], numbers[:cut], ""), angular) if part[1]]
-        rows += (row(each.spec * (not at), *line) for at, line in enumerate(lines))
-    rows += [row(key, [""], [own.extras[key]], unit) for key, unit in ANGLE_UNITS.items() if key in own.extras]
-    sheet.result(f"{printable(pose.parent)}_from_{printable(pose.name)}" if pose.parent and pose.name else "", rows)
+        rows += (Row(each.spec * (not at), *line) for at, line in enumerate(lines))
+    rows += [Row(key, [""], [own.extras[key]], unit) for key, unit in ANGLE_UNITS.items() if key in own.extras]
+    sheet.result(_named(pose.parent, pose.name) if pose.parent and pose.name else "", rows)
 
 
 def check_vector(sheet: Sheet, derived: Sequence[float], own: Sequence[float]) -> None:
@@ -391,11 +387,6 @@ def check_vector(sheet: Sheet, derived: Sequence[float], own: Sequence[float]) -
     off = max(abs(a - b) for a, b in zip(derived, own, strict=True))
     if not off <= CLOSE * sheet.reach * sheet.stretch:
         raise DerivationWrong(f"the derivation is off by {off:.3g} from the result; {REPORT}")
-
-
-def row(label: str, names: Sequence[str], numbers: Sequence[float], unit: str = "") -> Row:
-    """Return a line of the result, with all digits."""
-    return Row(label, [(name, repr(number + 0.0)) for name, number in zip(names, numbers, strict=True)], unit)
 
 
 def convert(
@@ -417,8 +408,7 @@ def convert(
         (world, left), (axes, right) = (side or ("", IDENTITY[3:]) for side in (change.world, change.axes))
         values = named("t", found[:3]) | named("q", found[3:]) | named("W", left) | named("B", right)
         values |= {"world": float(bool(world)), "axes": float(bool(axes)), "mirrors": float(change.mirrors)}
-        sheet.play("other axes", values, world_axes=world, body_axes=axes)
-        return *vector_of(values, "t"), *quaternion_of(values, "q")
+        return pose_of(sheet.play("other axes", values, world_axes=world, body_axes=axes), "q")
 
     begin = pose.notation.spec if pose.notation else "identity"
     title = f"{begin} to {', '.join(notation.spec for notation in plan.notations)}"
@@ -456,8 +446,7 @@ def invert(plan: DerivationStyle, pose: WrittenPose) -> Explanation:
     target, source = frames_of([pose.pose])
 
     def way(sheet: Sheet) -> Rigid:
-        (found,) = derived_from(sheet, [pose], [(target, source)])
-        return inverse(sheet, found, target, source)
+        return inverse(sheet, derived_from(sheet, [pose], [(target, source)])[0], target, source)
 
     return derived_pose(plan, f"{source}_from_{target}", own, way)
 
@@ -472,7 +461,7 @@ def relative(plan: DerivationStyle, a: WrittenPose, b: WrittenPose) -> Explanati
         words = dict(zip(("world", "first", "second"), frames, strict=True))
         turns = named("A", one[3:]) | named("B", other[3:])
         found = sheet.play("relative", named("a", one[:3]) | named("b", other[:3]) | turns, **words)
-        pose: Rigid = (*vector_of(found, "t"), *quaternion_of(found, "c"))
+        pose = pose_of(found, "c")
         values = sheet.play("extent", posed("", pose), frame=frames[1])
         for name, key in zip(pose_algebra.RELATIVE_EXTRAS, ("d", "angle", "angle_deg"), strict=True):
             value = values[key]
@@ -488,11 +477,10 @@ def interpolate(plan: DerivationStyle, a: WrittenPose, b: WrittenPose, fraction:
     fraction = float(fraction)
     own = Result(pose_algebra.interpolated(a.pose, b.pose, fraction))
     frames, labels = _three_frames(a, b)
-
-    def way(sheet: Sheet) -> Rigid:
-        return between(sheet, *derived_from(sheet, [a, b], labels), fraction=fraction)
-
-    return derived_pose(plan, f"{frames[1]} to {frames[2]} at {fraction!r}", own, way)
+    title = f"{frames[1]} to {frames[2]} at {fraction!r}"
+    return derived_pose(
+        plan, title, own, lambda sheet: between(sheet, *derived_from(sheet, [a, b], labels), fraction=fraction)
+    )
 
 
 def _three_frames(a: WrittenPose, b: WrittenPose) -> tuple[tuple[str, str, str], list[tuple[str, str]]]:
@@ -524,7 +512,7 @@ def lookup(
         sheet.play("across", {})
         return product(sheet, first, second, (printable(target), printable(fixed), printable(source)))
 
-    return derived_pose(plan, f"{printable(target)}_from_{printable(source)}", own, way)
+    return derived_pose(plan, _named(target, source), own, way)
 
 
 def write_explanation(found: dict[str, Any]) -> str:
@@ -538,11 +526,11 @@ def write_explanation(found: dict[str, Any]) -> str:
         ref=printable(found["ref"]), possible=found["poses"]["possible"], align=found["settings"]["align"],
         turn=sheet.numbers([*fit["quaternion"].values()]), shift=sheet.numbers(fit["xyz"]),
     )  # fmt: skip
-    for row in found["rpe"]:
-        if row["m"]:
-            size = 0.0 if row["percent"] is None else float(row["delta"][:-1])
-            summed = {"sse": row["m"]["sse"], "pairs": float(row["pairs"]), "size": size}
-            sheet.play("relative error", summed, delta=row["delta"])
+    for each in found["rpe"]:
+        if each["m"]:
+            size = 0.0 if each["percent"] is None else float(each["delta"][:-1])
+            summed = {"sse": each["m"]["sse"], "pairs": float(each["pairs"]), "size": size}
+            sheet.play("relative error", summed, delta=each["delta"])
     if kitti := found["kitti"]:
         means = {key: kitti[key] for key in ("percent", "deg_per_m")}
         sheet.play("kitti", means, segments=kitti["segments"])

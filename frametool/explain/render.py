@@ -107,11 +107,11 @@ def result_lines(rows: Sequence[run.Row]) -> list[str]:
     lines = []
     for row in rows:
         head = f"{INDENT}{row.label:<{width}}  "
-        cells = [f"{name} {number}".lstrip() for name, number in row.cells]
+        cells = [f"{name} {number + 0.0!r}".lstrip() for name, number in zip(row.names, row.numbers, strict=True)]
         unit = f" {row.unit}" if row.unit else ""
         texts = ["  ".join(cells) + unit]
         if len(head + texts[0]) > WIDTH:
-            if any(name for name, _ in row.cells):
+            if any(row.names):
                 texts = [cell + unit for cell in cells]
             else:
                 texts = wrap("  ".join(cells), WIDTH - len(head), break_on_hyphens=False, break_long_words=False)

@@ -156,10 +156,11 @@ class MatrixLine(NamedTuple):
 
 
 class Row(NamedTuple):
-    """A line of the result: a label, named numbers, a unit."""
+    """A line of the result: a label, the numbers and their names, a unit."""
 
     label: str
-    cells: Sequence[tuple[str, str]]
+    names: Sequence[str]
+    numbers: Sequence[float]
     unit: str = ""
 
 
@@ -356,12 +357,6 @@ class Sheet:
         self.step(values, sine, f"sin({name}/2)", exactly=ROOTS[eighths % 8] if is_exact else "")
         if is_exact:
             self.caveat(EXACT)
-
-    def direction(self, values: Values, name: str, parts: str, found: str, unit: str = "") -> None:
-        """Add the length of a non-zero vector and its direction."""
-        self.length(values, name, parts, unit)
-        for each, part in zip(_each(found), _each(parts), strict=True):
-            self.step(values, each, f"{part}/{name}")
 
     def length(self, values: Values, name: str, parts: str, unit: str = "") -> None:
         """Add the length of a vector."""

@@ -23,10 +23,9 @@ from frametool.explain.derive import (
     DerivationWrong,
     WrittenPose,
     explained,
-    row,
     spans,
 )
-from frametool.explain.run import DIGITS
+from frametool.explain.run import DIGITS, Row
 from frametool.frames.lookups import Frames
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry.representations import notation, notations
@@ -125,9 +124,9 @@ def derive_follow(plan: DerivationStyle, steps: FollowStep | Sequence[FollowStep
             twist, name = step.command.twist, printable(step.command.turtle)
             label = f"{name} " if len(found) > 1 else ""
             rows += [
-                row(f"{label}linear_x", [""], [twist.linear_x], "m/s"),
-                row(f"{label}angular_z", [""], [twist.angular_z], "rad/s"),
-                row(f"{label}distance", [""], [step.command.distance or 0.0], METRES),
+                Row(f"{label}linear_x", [""], [twist.linear_x], "m/s"),
+                Row(f"{label}angular_z", [""], [twist.angular_z], "rad/s"),
+                Row(f"{label}distance", [""], [step.command.distance or 0.0], METRES),
             ]
         sheet.result(f"the command of {', '.join(printable(step.command.turtle) for step in found)}", rows)
 

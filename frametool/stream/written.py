@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import ValueInvalid, printable, shown
 from frametool.explain import derive
 from frametool.explain.derive import WrittenPose
+from frametool.explain.run import Row
 from frametool.geometry import floats
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
@@ -90,7 +91,7 @@ def derive_record(
             sheet.reached(start)
             derive.check_vector(sheet, derive.moved(sheet, shape.kind, pose, start, into, out_of), result)
             unit = derive.METRES if shape.kind == POINT else ""
-            sheet.result(f"in {into}", [derive.row(shape.kind, "xyz", result, unit)])
+            sheet.result(f"in {into}", [Row(shape.kind, "xyz", result, unit)])
             return
         name = printable(written.pose.name or "it")
         sheet.heading("The record")
