@@ -8,7 +8,7 @@ A lookup has such a result too: the pose of SOURCE in TARGET as an entry of a tr
 from __future__ import annotations
 
 import math
-from itertools import islice, repeat
+from itertools import islice
 from math import isfinite
 
 from frametool.errors import LookupFailed, ValueInvalid, shown, warn
@@ -162,9 +162,8 @@ class Lookups:
         """Look up at one time; None is the latest, and the result states it."""
         at_ns = self.tree.latest(target, source) if at_ns is None else at_ns
         found = self.tree.lookup_components(target, source, at_ns)
-        if not self.carried:
-            return result_at(found, target, source, at_ns)
-        return self._noted(result_at(found, target, source, at_ns, self.tree.carried(target, source, at_ns)))
+        entries = self.tree.carried(target, source, at_ns) if self.carried else None
+        return self._noted(result_at(found, target, source, at_ns, entries))
 
     def results(
         self, target: str, source: str, times: Sequence[int], miss: Callable[[int], None] | None = None
@@ -175,39 +174,37 @@ class Lookups:
         """
         for begin in range(0, len(times), BLOCK):
             block = times[begin : begin + BLOCK]
-            found = self.tree.lookup_many(target, source, block, missing="nan" if miss else "raise").components
-            entries: Iterable[list[float] | None] = repeat(None)
-            if self.carried:
-                from frametool.frames.trajectory import carried_many
-
-                entries = carried_many(self.tree, target, source, block, found).tolist()
-            for at_ns, *row, each in zip(block, *(column.tolist() for column in found), entries, strict=False):
+            found = self._columns(target, source, block, "nan" if miss else "raise")
+            for at_ns, *row in zip(block, *(column.tolist() for column in found), strict=True):
                 if isfinite(row[6]):
-                    result = result_at(row, target, source, at_ns, each)
-                    yield self._noted(result) if self.carried else result
+                    yield self._noted(result_at(row[:7], target, source, at_ns, row[7:] or None))
                 elif miss:
                     miss(at_ns)
 
     def one(self, target: str, source: str, at_ns: int | None) -> Components:
         """Return the components of a pose, with those of its covariance."""
-        if not self.carried:
-            return self.tree.lookup(target, source, at_ns).components
         found = self.result(target, source, at_ns)
-        return *found.pose.components, *found.extras["covariance"]
+        return *found.pose.components, *found.extras.get("covariance", ())
 
     def many(self, target: str, source: str, times_ns: Any) -> Components:
         """Return the same at times, as columns; nan where there are no data."""
-        poses = self.tree.lookup_many(target, source, times_ns, missing="nan").components
+        found = self._columns(target, source, times_ns, "nan")
+        for at_ns in islice((at_ns for at_ns, w in zip(times_ns, found[6], strict=True) if isfinite(w)), self.carried):
+            self.edges |= {track.child for track in self.tree.way(target, source, int(at_ns))}
+        return found
+
+    def _columns(self, target: str, source: str, times_ns: Any, missing: str) -> Components:
+        poses = self.tree.lookup_many(target, source, times_ns, missing=missing).components
         if not self.carried:
             return poses
         from frametool.frames.trajectory import carried_many
 
-        for at_ns in islice((at_ns for at_ns, w in zip(times_ns, poses[6], strict=True) if isfinite(w)), 1):
-            self.edges |= {track.child for track in self.tree.way(target, source, int(at_ns))}
         return *poses, *carried_many(self.tree, target, source, times_ns, poses).T
 
     def _noted(self, result: Result) -> Result:
-        """Record a result with its covariance."""
+        """Record a result with its covariance, if it has one."""
+        if not self.carried:
+            return result
         from frametool.geometry.uncertainty import widest_turn
 
         target, source, found = result.pose.parent or "", result.pose.name or "", result.extras["covariance"]
