@@ -15,7 +15,7 @@ import click
 
 from frametool.cli import options
 from frametool.cli.command import Inputs, option, refuse, say_if_typed, together
-from frametool.cli.output import Output
+from frametool.cli.output import QUATERNION, Output
 from frametool.cli.poses import inline_misuse, is_pasted, pasted_stream, pose_source, values_of, without_inverse
 from frametool.cli.sink import say, say_error
 from frametool.documents.source import HEAD, InputFile, Source, has_line, has_record, opened
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence
     from contextlib import AbstractContextManager
 
-    from frametool.explain.derive import DerivationStyle, WrittenPose
+    from frametool.explain.derive import WrittenPose
     from frametool.explain.render import Explanation
     from frametool.grammar.edges import Diagnostics
     from frametool.stream.request import Request
@@ -77,7 +77,7 @@ class Task:
 
     _opened: BufferedReader | None = None
     within = ""  # the format of the records in a bag
-    plan: DerivationStyle | None = None
+    plan: Style | None = None
 
     def __init__(self, inputs: Inputs, *what: str, output: Output | None = None) -> None:
         """Look at what the options say; each is asked for where it counts.
@@ -99,10 +99,9 @@ class Task:
             self.notation, self.place = None, self.notation.representation.name
         self.window = options.window_of(inputs)
         if inputs.explain:
-            from frametool.explain.derive import DerivationStyle
-
             refuse(output.chosen not in (None, "text"), f"--explain writes text or markdown, not {output.chosen}")
-            self.plan = DerivationStyle(output.style, significant(inputs.precision))
+            notations = output.style.notations or QUATERNION
+            self.plan = output.style.changed(precision=significant(inputs.precision), notations=notations)
 
     def opened(self) -> BufferedReader:
         """Open the input once: of a pipe, what a first reader has taken is gone for a second; raises FileProblem."""

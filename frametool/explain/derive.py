@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import FrametoolError, ValueInvalid, printable, shown
 from frametool.explain.render import Explanation
-from frametool.explain.run import DIGITS, ENTRIES, Row, Sheet
+from frametool.explain.run import ENTRIES, Row, Sheet
 from frametool.frames.lookups import Frames
 from frametool.frames.stamps import BILLION, format_stamp
-from frametool.geometry import euler, floats, quaternion, representations
+from frametool.geometry import euler, floats, quaternion
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar import pose_algebra
 from frametool.grammar.pose_algebra import Lookups, looked_up_across
-from frametool.grammar.result import Result, Style, pose_numbers
+from frametool.grammar.result import Result, pose_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Rigid
     from frametool.grammar.pose import Pose
     from frametool.grammar.readers import Quaternion, Vector
+    from frametool.grammar.result import Style
 
     Edge = tuple[str, str, Rigid]  # parent, child, parent_from_child
 
@@ -313,26 +314,13 @@ class DerivationWrong(FrametoolError):
     """A derivation that does not lead to the result: a bug, never to be printed."""
 
 
-class DerivationStyle(NamedTuple):
-    """How a derivation is written.
+def explained(style: Style, title: str, write: Callable[[Sheet], None]) -> Explanation:
+    """Write a derivation; if rounding errors shown as 0 lead too far away, as near singular numbers, without that.
 
-    style: notations, unit and sign of the result
-    digits: significant digits; None for all
+    style: its precision counts significant digits here, None for all
     """
-
-    style: Style
-    digits: int | None = DIGITS
-
-    @property
-    def notations(self) -> Sequence[Notation]:
-        """Return the notations of the result."""
-        return self.style.notations or (representations.notation("quaternion"),)
-
-
-def explained(plan: DerivationStyle, title: str, write: Callable[[Sheet], None]) -> Explanation:
-    """Write a derivation; if rounding errors shown as 0 lead too far away, as near singular numbers, without that."""
-    for clean in dict.fromkeys((plan.digits is not None, False)):
-        sheet = Sheet(plan.digits, clean=clean)
+    for clean in dict.fromkeys((style.precision is not None, False)):
+        sheet = Sheet(style.precision, clean=clean)
         try:
             write(sheet)
             break
@@ -342,24 +330,24 @@ def explained(plan: DerivationStyle, title: str, write: Callable[[Sheet], None])
     return Explanation(title, sheet.items)
 
 
-def derived_pose(plan: DerivationStyle, title: str, own: Result, way: Callable[[Sheet], Rigid]) -> Explanation:
+def derived_pose(style: Style, title: str, own: Result, way: Callable[[Sheet], Rigid]) -> Explanation:
     """Write the derivation of a pose, then of its notations; `own` is the command's result."""
-    return explained(plan, title, lambda sheet: end_with_pose(sheet, way(sheet), own, plan))
+    return explained(style, title, lambda sheet: end_with_pose(sheet, way(sheet), own, style))
 
 
-def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationStyle) -> None:
+def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, style: Style) -> None:
     """Continue from the quaternion to the requested notations, check them, and end with the command's own result.
 
     Numbers of a notation are compared as rotations, also near gimbal lock.
     """
-    pose, style = own.pose, plan.style
+    pose = own.pose
     rows: list[Row] = []
     if pose.position is not None:
         check_vector(sheet, derived[:3], pose.position)
-        if not any(each.representation.whole for each in plan.notations):
+        if not any(each.representation.whole for each in style.notations):
             rows.append(Row("xyz", "xyz", pose.position, METRES))
     target = quaternion.unit(*pose.components[3:], floats)
-    for each in plan.notations:
+    for each in style.notations:
         degrees, whole, angles = each.in_degrees(style.degrees), each.representation.whole, each.representation.angles
         ends = from_quaternion(sheet, derived[3:], each, degrees=degrees, keep_sign=style.keep_sign)
         found = each.to_quaternion(tuple(ends), floats, degrees=degrees)
@@ -390,7 +378,7 @@ def check_vector(sheet: Sheet, derived: Sequence[float], own: Sequence[float]) -
 
 
 def convert(
-    plan: DerivationStyle, pose: WrittenPose, *, own: Pose | None = None, change: OtherAxes | None = None
+    style: Style, pose: WrittenPose, *, own: Pose | None = None, change: OtherAxes | None = None
 ) -> Explanation:
     """Derive one pose or rotation in the requested notations.
 
@@ -411,8 +399,8 @@ def convert(
         return pose_of(sheet.play("other axes", values, world_axes=world, body_axes=axes), "q")
 
     begin = pose.notation.spec if pose.notation else "identity"
-    title = f"{begin} to {', '.join(notation.spec for notation in plan.notations)}"
-    return derived_pose(plan, title, Result(own or pose.pose), way)
+    title = f"{begin} to {', '.join(notation.spec for notation in style.notations)}"
+    return derived_pose(style, title, Result(own or pose.pose), way)
 
 
 def derived_from(sheet: Sheet, poses: Sequence[WrittenPose], labels: Sequence[tuple[str, str]]) -> list[Rigid]:
@@ -423,7 +411,7 @@ def derived_from(sheet: Sheet, poses: Sequence[WrittenPose], labels: Sequence[tu
     return [each.components(sheet, *label) for each, label in zip(poses, labels, strict=True)]
 
 
-def compose(plan: DerivationStyle, *poses: WrittenPose) -> Explanation:
+def compose(style: Style, *poses: WrittenPose) -> Explanation:
     """Derive the product of poses."""
     if not poses:
         raise ValueInvalid("compose takes at least one pose")
@@ -437,10 +425,10 @@ def compose(plan: DerivationStyle, *poses: WrittenPose) -> Explanation:
             pose = product(sheet, pose, factor, (names[0], middle, last))
         return pose
 
-    return derived_pose(plan, f"{names[0]}_from_{names[-1]}", own, way)
+    return derived_pose(style, f"{names[0]}_from_{names[-1]}", own, way)
 
 
-def invert(plan: DerivationStyle, pose: WrittenPose) -> Explanation:
+def invert(style: Style, pose: WrittenPose) -> Explanation:
     """Derive the inverse of a pose."""
     own = Result(pose_algebra.inverse(pose.pose))
     target, source = frames_of([pose.pose])
@@ -448,10 +436,10 @@ def invert(plan: DerivationStyle, pose: WrittenPose) -> Explanation:
     def way(sheet: Sheet) -> Rigid:
         return inverse(sheet, derived_from(sheet, [pose], [(target, source)])[0], target, source)
 
-    return derived_pose(plan, f"{source}_from_{target}", own, way)
+    return derived_pose(style, f"{source}_from_{target}", own, way)
 
 
-def relative(plan: DerivationStyle, a: WrittenPose, b: WrittenPose) -> Explanation:
+def relative(style: Style, a: WrittenPose, b: WrittenPose) -> Explanation:
     """Derive the pose of B in A, with distance and angle."""
     own = pose_algebra.relative(a.pose, b.pose)
     frames, labels = _three_frames(a, b)
@@ -469,17 +457,17 @@ def relative(plan: DerivationStyle, a: WrittenPose, b: WrittenPose) -> Explanati
                 raise DerivationWrong(f"the derived {name} is {value!r}, not {own.extras[name]!r}; {REPORT}")
         return pose
 
-    return derived_pose(plan, f"{frames[1]}_from_{frames[2]}", own, way)
+    return derived_pose(style, f"{frames[1]}_from_{frames[2]}", own, way)
 
 
-def interpolate(plan: DerivationStyle, a: WrittenPose, b: WrittenPose, fraction: float) -> Explanation:
+def interpolate(style: Style, a: WrittenPose, b: WrittenPose, fraction: float) -> Explanation:
     """Derive the pose at a fraction from A to B."""
     fraction = float(fraction)
     own = Result(pose_algebra.interpolated(a.pose, b.pose, fraction))
     frames, labels = _three_frames(a, b)
     title = f"{frames[1]} to {frames[2]} at {fraction!r}"
     return derived_pose(
-        plan, title, own, lambda sheet: between(sheet, *derived_from(sheet, [a, b], labels), fraction=fraction)
+        style, title, own, lambda sheet: between(sheet, *derived_from(sheet, [a, b], labels), fraction=fraction)
     )
 
 
@@ -491,7 +479,7 @@ def _three_frames(a: WrittenPose, b: WrittenPose) -> tuple[tuple[str, str, str],
 
 
 def lookup(
-    plan: DerivationStyle, tree: Frames, target: str, source: str, *, at_ns: int | None = None,
+    style: Style, tree: Frames, target: str, source: str, *, at_ns: int | None = None,
     source_at_ns: int | None = None, fixed: str | None = None,
 ) -> Explanation:  # fmt: skip
     """Derive the pose of one frame of a tree in another; with `fixed` across two times."""
@@ -512,7 +500,7 @@ def lookup(
         sheet.play("across", {})
         return product(sheet, first, second, (printable(target), printable(fixed), printable(source)))
 
-    return derived_pose(plan, _named(target, source), own, way)
+    return derived_pose(style, _named(target, source), own, way)
 
 
 def write_explanation(found: dict[str, Any]) -> str:

@@ -19,7 +19,6 @@ from frametool.explain.derive import (
     CLOSE,
     METRES,
     REPORT,
-    DerivationStyle,
     DerivationWrong,
     WrittenPose,
     explained,
@@ -111,7 +110,7 @@ def _at(samples: Sequence[Sample], at_ns: int) -> Sighting:
     return at_ns, before, None if before[0] == at_ns or after == len(samples) else samples[after]
 
 
-def derive_follow(plan: DerivationStyle, steps: FollowStep | Sequence[FollowStep]) -> Explanation:
+def derive_follow(style: Style, steps: FollowStep | Sequence[FollowStep]) -> Explanation:
     """Derive the commands of followers at one step; raises ValueInvalid for anything but the steps of followers."""
     found = [steps] if isinstance(steps, FollowStep) else list(steps) if isinstance(steps, (list, tuple)) else []
     if not found or not all(isinstance(each, FollowStep) for each in found):
@@ -130,7 +129,7 @@ def derive_follow(plan: DerivationStyle, steps: FollowStep | Sequence[FollowStep
             ]
         sheet.result(f"the command of {', '.join(printable(step.command.turtle) for step in found)}", rows)
 
-    return explained(plan, f"follow, step {found[0].number}", write)
+    return explained(style, f"follow, step {found[0].number}", write)
 
 
 def _derive(sheet: Sheet, step: FollowStep) -> None:
@@ -203,14 +202,14 @@ def explain(
     if precision is not None and precision < 1:
         raise ValueInvalid(f"precision counts significant digits, 1 or more; found {precision}")
     chosen = tuple(each for spec in to.split(",") for each in notations(spec.strip()))
-    plan = DerivationStyle(Style("text", chosen, degrees=degrees, keep_sign=keep_sign), precision)
+    style = Style("text", chosen, degrees=degrees, precision=precision, keep_sign=keep_sign)
     derivation, poses = OPERATIONS[operation]
     try:
-        signature(derivation).bind(plan, *operands, **options)
+        signature(derivation).bind(style, *operands, **options)
     except TypeError as error:
         raise ValueInvalid(f"explain {operation}: {error}") from None
     written = [_pose(each, degrees=degrees) for each in operands[:poses]]
-    return derivation(plan, *written, *operands[poses:], **options)
+    return derivation(style, *written, *operands[poses:], **options)
 
 
 def _pose(value: Any, *, degrees: bool) -> WrittenPose:
@@ -237,11 +236,11 @@ def _source(value: Any) -> Source:
     return Source(INLINE, value if isinstance(value, str) else dump_json(value))
 
 
-def _apply(plan: DerivationStyle, *operands: Any, at_ns: int | None = None, kind: str = "") -> Explanation:
+def _apply(style: Style, *operands: Any, at_ns: int | None = None, kind: str = "") -> Explanation:
     by_tree = bool(operands) and isinstance(operands[0], Frames)
     if len(operands) not in ((3, 4) if by_tree else (2,)):
         raise ValueInvalid("apply takes TREE TARGET [SOURCE] RECORD, or POSE RECORD")
-    degrees = plan.style.degrees
+    degrees = style.degrees
     if by_tree:
         tree, target, *source, record = operands
         way: ByTree | WrittenPose = ByTree(tree, target, source[0] if source else None, at_ns)
@@ -254,7 +253,7 @@ def _apply(plan: DerivationStyle, *operands: Any, at_ns: int | None = None, kind
         except (TypeError, ValueError):
             raise ValueInvalid(f"expected three numbers or a mapping, found {shown(record)}") from None
         record = {kind or "point": [x, y, z]}
-    return derive_record(plan, way, _source(record), RowOptions(kind=kind, degrees=degrees))
+    return derive_record(style, way, _source(record), RowOptions(kind=kind, degrees=degrees))
 
 
 OPERATIONS: dict[str, tuple[Callable[..., Explanation], int]] = {  # and how many of the operands are poses

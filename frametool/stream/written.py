@@ -18,10 +18,10 @@ from frametool.stream.row_layout import POINT, POSE, VECTOR
 
 if TYPE_CHECKING:
     from frametool.documents.source import Source
-    from frametool.explain.derive import DerivationStyle
     from frametool.explain.render import Explanation
     from frametool.explain.run import Sheet
     from frametool.frames.lookups import Frames
+    from frametool.grammar.result import Style
 
 
 class ByTree(NamedTuple):
@@ -53,7 +53,7 @@ def _written_pose(record: Record, request: Request) -> WrittenPose:
 
 
 def derive_record(
-    plan: DerivationStyle, way: ByTree | WrittenPose, source: Source, rows: RowOptions, *, timeless: bool = False
+    style: Style, way: ByTree | WrittenPose, source: Source, rows: RowOptions, *, timeless: bool = False
 ) -> Explanation:
     """Derive where a record is in the target's frame.
 
@@ -97,9 +97,9 @@ def derive_record(
         sheet.heading("The record")
         written.say(sheet, out_of, name)
         found = derive.product(sheet, pose, written.components(sheet, out_of, name), (into, out_of, name))
-        derive.end_with_pose(sheet, found, Result(Pose.of(result, written.pose.name, target)), plan)
+        derive.end_with_pose(sheet, found, Result(Pose.of(result, written.pose.name, target)), style)
 
-    return derive.explained(plan, f"{shape.kind} in {into} of a {shape.kind} in {out_of}", write)
+    return derive.explained(style, f"{shape.kind} in {into} of a {shape.kind} in {out_of}", write)
 
 
 def _target_and_source(way: ByTree | WrittenPose, own: str | None) -> tuple[str, str]:

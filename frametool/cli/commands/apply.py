@@ -31,9 +31,10 @@ from frametool.text.numbers import NotFinite, parse_length
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.explain.derive import DerivationStyle, WrittenPose
+    from frametool.explain.derive import WrittenPose
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Components
+    from frametool.grammar.result import Style
     from frametool.recordings.messages import PointCloud
     from frametool.stream.request import Formula
     from frametool.stream.written import ByTree
@@ -239,7 +240,7 @@ def apply_command(inputs: Inputs) -> int:
     return status
 
 
-def _derived(task: streaming.Task, plan: DerivationStyle, way: Way, record: str | Source, kind: str) -> int:
+def _derived(task: streaming.Task, plan: Style, way: Way, record: str | Source, kind: str) -> int:
     """Write the derivation of one record."""
     from frametool.stream.written import ByTree, derive_record
 

@@ -214,11 +214,10 @@ def follow(inputs: Inputs) -> None:
         return
     scene, output = scene_of(inputs, leader), Output(inputs, "report", otherwise="text")
     refuse(output.style.format != "text", f"--explain-step writes text, not {output.style.format}")
-    from frametool.explain.derive import DerivationStyle
     from frametool.sim.followed import derive_follow, follow_steps
 
-    plan = DerivationStyle(output.style, significant(inputs.precision))
-    output.text(derive_follow(plan, follow_steps(scene, inputs.explain_step)).render(inputs.explain or "text"))
+    style = output.style.changed(precision=significant(inputs.precision))
+    output.text(derive_follow(style, follow_steps(scene, inputs.explain_step)).render(inputs.explain or "text"))
 
 
 def scene_of(inputs: Inputs, leader: MakeLeader) -> Scene:
