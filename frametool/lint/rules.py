@@ -264,21 +264,19 @@ def _statements(
 class Child(EdgeLog):
     """All data of one child frame, and the samples that violate a rule.
 
-    newest: the last one; moved: those under another parent than the one before; late: those after a later stamp
+    newest: the last one
+    odd: by rule, the samples under another parent than the one before, at a known stamp, and after a later stamp
     """
 
     def __init__(self, first: Statement, number: int) -> None:
         """Start before the first edge or sample; `number` counts all that were read."""
         super().__init__(first)
         self.first = self.newest = first
-        self.moved: list[Statement] = []
-        self.late: list[Statement] = []
+        self.odd: dict[str, list[Statement]] = {}
         self.since = (number, first)  # the first with the newest parent
         self.static: Statement | None = None
         self.stamps: dict[int, tuple[int, int]] = {}  # stamp -> hash of the sample, its line
         self.other_pose: Statement | None = None
-        self.again: list[Statement] = []
-        self.clashes: list[Statement] = []
 
     def take(self, seen: Statement, number: int) -> None:
         """Add one more."""
@@ -288,12 +286,12 @@ class Child(EdgeLog):
             fresh = (hash((seen.parent, seen.components)), seen.line)
             known = self.stamps.setdefault(seen.stamp_ns, fresh)
             if known is not fresh:
-                (self.again if known[0] == fresh[0] else self.clashes).append(seen)
+                self.odd.setdefault("repeated" if known[0] == fresh[0] else "repeated-stamp", []).append(seen)
             if self.last_ns is not None and seen.stamp_ns < self.last_ns:
-                self.late.append(seen)
+                self.odd.setdefault("backward", []).append(seen)
         if seen.parent != self.newest.parent:
             self.since = (number, seen)
-            self.moved.append(seen)
+            self.odd.setdefault("reparented", []).append(seen)
         elif seen.components != self.newest.components:
             self.other_pose = self.other_pose or seen
         self.newest = seen
@@ -339,50 +337,45 @@ def _child(child: Child) -> Iterator[Finding]:
         yield moving.broken(topology.static_and_moving(first.child, details))
     elif moves:
         yield from _moving(child, frame)
-        yield from _steps(child)
-    elif child.moved:
-        second = child.moved[0]
+    elif changes := child.odd.get("reparented"):
+        second = changes[0]
         yield second.broken(topology.two_parents(first.child, first.parent, second.parent, (_at(first), _at(second))))
     elif other := child.other_pose:
         yield other.broken(topology.two_poses(first.child, first.parent), f": {_at(first)} and {_at(other)}")
 
 
 def _moving(child: Child, frame: str) -> Iterator[Finding]:
-    """Apply the rules about a moving frame: changes of parent, by pick-and-place or by two publishers, and stamps."""
-    if changes := child.moved:
-        parents = " -> ".join(shown(each.parent) for each in (child.first, *changes[:3]))
-        if len(changes) < FLICKER:
-            yield changes[0].finding("reparented", f"{frame} changes its parent: {parents}")
-        else:
-            times = f"{len(changes)} times: {parents} .."
-            yield changes[0].finding("flicker", f"{frame} changes its parent {times}; two publishers disagree")
-    if child.again:
-        yield child.again[0].finding("repeated", f"{frame}: the same sample again{_more(child.again)}")
-    if child.clashes:
-        first = child.clashes[0]
-        stamp_ns = first.stamp_ns or 0
-        places = f"{format_stamp(stamp_ns)}: lines {child.stamps[stamp_ns][1]} and {first.line}"
-        yield first.finding("repeated-stamp", f"{frame} has two poses at {places}{_more(child.clashes)}")
-    if child.late:
-        first = child.late[0]
-        message = f"{frame}: {format_stamp(first.stamp_ns or 0)} comes after a later stamp"
-        yield first.finding("backward", message + _more(child.late))
+    """Apply the rules about a moving frame: changes of parent, by pick-and-place or by two publishers, and stamps.
 
-
-def _steps(child: Child) -> Iterator[Finding]:
-    """Apply the rules about pauses and distances between samples."""
-    for rule, steps in (("gap", child.gaps()), ("disagreement", child.returns()), ("jump", child.jumps())):
-        if not steps:
+    Then those about pauses and distances between samples.
+    """
+    for rule in filter(child.odd.get, ("reparented", "repeated", "repeated-stamp", "backward")):
+        samples = child.odd[rule]
+        seen, stamp_ns = samples[0], samples[0].stamp_ns or 0
+        stamp, parents = format_stamp(stamp_ns), " -> ".join(shown(each.parent) for each in (child.first, *samples[:3]))
+        if rule == "reparented" and len(samples) >= FLICKER:
+            times = f"{len(samples)} times: {parents} .."
+            yield seen.finding("flicker", f"{frame} changes its parent {times}; two publishers disagree")
             continue
-        step = steps[0]
-        stamp, apart = format_stamp(step.stamp_ns), f"{step.metres:.3g} m and {step.radians:.3g} rad"
         problem = {
-            "gap": f"no data for {step.pause_ns / BILLION:g} s before {stamp}",
-            "disagreement": f"goes back and forth by {apart} at {stamp}; two publishers disagree",
-            "jump": f"jumps by {apart} at {stamp}",
+            "reparented": f" changes its parent: {parents}",
+            "repeated": f": the same sample again{_more(samples)}",
+            "repeated-stamp": f" has two poses at {stamp}: "
+            f"lines {child.stamps.get(stamp_ns, (0, 0))[1]} and {seen.line}{_more(samples)}",
+            "backward": f": {stamp} comes after a later stamp{_more(samples)}",
         }[rule]
-        message = f"{child.newest.parent} -> {child.first.child}: {problem}{_more(steps)}"
-        yield child.first._replace(line=step.line, column=1 if step.line else 0).finding(rule, message)
+        yield seen.finding(rule, frame + problem)
+    for rule, steps in (("gap", child.gaps()), ("disagreement", child.returns()), ("jump", child.jumps())):
+        if steps:
+            step = steps[0]
+            stamp, apart = format_stamp(step.stamp_ns), f"{step.metres:.3g} m and {step.radians:.3g} rad"
+            problem = {
+                "gap": f"no data for {step.pause_ns / BILLION:g} s before {stamp}",
+                "disagreement": f"goes back and forth by {apart} at {stamp}; two publishers disagree",
+                "jump": f"jumps by {apart} at {stamp}",
+            }[rule]
+            message = f"{child.newest.parent} -> {child.first.child}: {problem}{_more(steps)}"
+            yield child.first._replace(line=step.line, column=1 if step.line else 0).finding(rule, message)
 
 
 def _cycles(children: dict[str, Child]) -> Iterator[Finding]:
