@@ -49,7 +49,7 @@ Rows: TypeAlias = "list[list[str]]"
 DECIMAL = r"(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][-+]?[0-9]++)?"
 NUMBER = rf"[-+]?{DECIMAL}"
 LABEL = r"\s*+[A-Za-z_]\w*+\s*+=(?!=)\s*+"  # MATLAB's and Python's `T =`
-_SCALE = rf"\s*({NUMBER})\s*\*\s*\n"  # MATLAB's `1.0e+03 *` above a matrix
+_SCALE = r"\s*1(?:\.0*)?[eE]([-+]?\d+)\s*\*\s*\n"  # MATLAB's `1.0e+03 *` above a matrix
 # of GLSL, and of R
 _BY_COLUMNS = r"(?:[dft]|high|med|low)?p?_?mat[34](?:x[34])?\(|(?:structure\(|matrix\()?c\((?:[^,()]*,){8}(?!.*byrow)"
 _NO_JSON = r"\d\.(?=[\s,\]])|;"
@@ -108,12 +108,7 @@ def number_rows(text: str, *, any_text: bool = False) -> Rows | None:
     fits = any if any_text and not re.search("[:=\"']", body) else all
     if not cells or not fits(re.fullmatch(rf"{NUMBER}|[-+]?(?:nan|inf)", cell, re.IGNORECASE) for cell in cells):
         return None
-    if not scale:
-        return rows
-    power = re.fullmatch(r"1(?:\.0*)?[eE]([-+]?\d+)", scale[1])
-    if not power or any("e" in cell.lower() for cell in cells):
-        raise ValueInvalid(f"a factor {shown(scale[1])} above numbers is not a power of ten; use format long")
-    return [[f"{cell}e{power[1]}" for cell in row] for row in rows]
+    return [[f"{cell}e{scale[1]}" for cell in row] for row in rows] if scale else rows
 
 
 def _undecorated(text: str) -> str:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from frametool.documents.source import Source
     from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Rigid
+    from frametool.grammar.edges import Edge
     from frametool.grammar.readers import Misfit
 
     Find = Callable[[Finding], None]
@@ -154,34 +155,35 @@ class Statement(NamedTuple):
         return self.finding(error.rule, error.message + places)
 
 
-def _read_recording(recording: FrameFile, find: Find, *, normalize: bool) -> Iterator[Statement]:
-    """Read everything that can be read from a recording, and report errors."""
+def _read(file: FrameFile, find: Find, *, normalize: bool) -> Iterator[Statement]:
+    """Read everything that can be read from a file, and report errors; places in documents are searched once."""
 
     def report(error: FormatError) -> None:
         find(error.finding)
 
-    in_documents = []
+    in_documents: list[tuple[Edge, bool]] = []
     try:
-        for edge in recording.edges(report, tell=False, normalize=normalize):
-            if edge.path:
-                in_documents.append(edge)
+        if not file.holds_samples:
+            in_documents = _read_tree(file.source, find, normalize=normalize)
+        for edge in file.edges(report, tell=False, normalize=normalize) if file.holds_samples else ():
+            if edge.path:  # formats with matrices or angles, and with quaternions by name or always w first
+                in_documents.append((edge, False))
             elif edge.parent is not None:
                 column, w_first = 1 if edge.line else 0, looks_w_first(edge.components)
-                yield Statement(edge.parent, *edge[1:4], recording.name, edge.line, column, w_first)
+                yield Statement(edge.parent, *edge[1:4], file.name, edge.line, column, w_first)
     except Unanswered:
         raise
     except FormatError as error:  # nothing after it can be read
         report(error)
-    places = locate_many(recording.text, [edge.path for edge in in_documents]) if in_documents else []
-    w_first = False  # formats with matrices or angles, and with quaternions by name or always w first
-    for edge, (line, column) in zip(in_documents, places, strict=True):
+    places = locate_many(file.text, [edge.path for edge, _ in in_documents]) if in_documents else []
+    for (edge, w_first), place in zip(in_documents, places, strict=True):
         if edge.parent is not None:
-            yield Statement(edge.parent, *edge[1:4], recording.name, line, column, w_first)
-    if counts := recording.topics.counts:
+            yield Statement(edge.parent, *edge[1:4], file.name, *place, w_first)
+    if counts := file.topics.counts:
         listed = ", ".join(f"{topic} ({count})" for topic, count in counts.items())
-        find(Finding("topics", f"transforms on {listed}", recording.name, 1, 1))
-    for note in recording.tally.findings():
-        find(note._replace(source=recording.name, column=1))
+        find(Finding("topics", f"transforms on {listed}", file.name, 1, 1))
+    for note in file.tally.findings():
+        find(note._replace(source=file.name, column=1))
 
 
 def looks_w_first(components: Rigid) -> bool:
@@ -190,31 +192,24 @@ def looks_w_first(components: Rigid) -> bool:
     return bool(abs(x) == 1.0 and y == z == w == 0.0)
 
 
-def _read_tree(source: Source, find: Find, *, normalize: bool) -> Iterator[Statement]:
-    """Read a tree; places are searched once, for everything that was found and read."""
-    try:
-        documents = parse_documents(source.text, source.name)
-    except FormatError as error:
-        find(error.finding)
-        return
+def _read_tree(source: Source, find: Find, *, normalize: bool) -> list[tuple[Edge, bool]]:
+    """Read a tree: its edges, and whether each was written x, y, z, w with x = 1, as a quaternion, not as angles."""
+    documents = parse_documents(source.text, source.name)
     values = {each.index: each.value for each in documents}
     notes: list[Finding] = []
     faults: list[Misfit] = []
     edges = []
     for edge in edges_of(documents, read_edges, notes, faults, normalize=normalize):
-        if edge.parent is not None:
-            value: Any = values
-            for step in edge.path:
-                value = value[step]
-            written = value if type(value) is dict and not any(map(may_be_on_earth, value)) else {}
-            # as a quaternion, not as angles
-            edges.append((edge, not WRITTEN_XYZW.isdisjoint(written) and looks_w_first(edge.components)))
+        value: Any = values
+        for step in edge.path:
+            value = value[step]
+        written = value if type(value) is dict and not any(map(may_be_on_earth, value)) else {}
+        edges.append((edge, not WRITTEN_XYZW.isdisjoint(written) and looks_w_first(edge.components)))
     for fault, line, column in located(faults, source):
         find(Finding(fault.rule or "syntax", str(fault), source.name, line, column))
     for note, (line, column) in zip(notes, locate_many(source.text, [note.path for note in notes]), strict=True):
         find(note._replace(source=source.name, line=line, column=column))
-    for (edge, w_first), place in zip(edges, locate_many(source.text, [edge.path for edge, _ in edges]), strict=True):
-        yield Statement(edge.parent or "", *edge[1:4], source.name, *place, w_first)
+    return edges
 
 
 FLICKER = 3  # this many changes of parent are not a pick-and-place
@@ -246,10 +241,7 @@ def _statements(
         before = len(findings)
         may_be_other = others and by_sign(file.head(), "tree") is None
         each = None
-        read = _read_recording(file, findings.append, normalize=normalize)
-        if not file.holds_samples:
-            read = _read_tree(file.source, findings.append, normalize=normalize)
-        for each in read:
+        for each in _read(file, findings.append, normalize=normalize):
             earth = earth or next((name for name in each[:2] if name in EARTH_FRAMES), "")
             parent, child = (earth if name in EARTH_FRAMES else name for name in each[:2])
             if parent != child or each.parent == each.child or any(each.components[:6]):
