@@ -305,9 +305,7 @@ class _Walk:
         scope = self.scope
         if not name:
             if scope.tree is None:
-                named = next((each for each, _ in scope.trees), "")
-                hint = f", or ask {named}[TARGET<-SOURCE]" if named else ", or name one: d=FILE and d[TARGET<-SOURCE]"
-                raise NoTree(f"no tree to look up in: give --tree FILE{hint}")
+                raise NoTree("no tree to look up in: give --tree FILE, or name one: d=FILE and d[TARGET<-SOURCE]")
             scope.leave_out(scope.tree.covariances)
             return scope.tree
         if name not in scope.names:

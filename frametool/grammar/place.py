@@ -314,12 +314,16 @@ def _numbers_of(frame: str | None, position: Sequence[float], place: Place, read
     return [number + 0.0 for number in place.numbers(x, y, z, read if stays else None)]
 
 
-def _seen_there(pose: Pose, place: Place) -> Pose:
-    """Return a pose of ecef without its position, its rotation in the axes of a position."""
+def _written(pose: Pose, place: Place) -> tuple[list[float], Pose]:
+    """Return the numbers of the position of a pose in ecef, and the pose without it, in the axes there.
+
+    Raises ValueInvalid as `_numbers_of`.
+    """
+    numbers = _numbers_of(pose.parent, pose.components[:3], place, pose.read)
     if pose.rotation is None:
-        return pose._replace(position=None)
+        return numbers, pose._replace(position=None)
     x, y, z, w = place.local(*pose.components[:3], pose.rotation)
-    return pose._replace(position=None, rotation=(x, y, z, w))
+    return numbers, pose._replace(position=None, rotation=(x, y, z, w))
 
 
 def placed_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
@@ -327,11 +331,11 @@ def placed_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
 
     Raises ValueInvalid for a pose in another frame, and for a position that cannot be written in this notation.
     """
-    entry = place.entry(_numbers_of(pose.parent, pose.components[:3], place, pose.read))
+    numbers, there = _written(pose, place)
+    entry = place.entry(numbers)
     if place.name == ECEF:
-        entry = {"xyz": entry.pop(ECEF)} | entry
-    axes = {} if pose.rotation is None or place.name == ECEF else {AXES_KEY: place.axes}
-    return entry | axes, _seen_there(pose, place)
+        return {"xyz": entry.pop(ECEF)} | entry, there
+    return entry | ({} if pose.rotation is None else {AXES_KEY: place.axes}), there
 
 
 def placed_cells(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
@@ -339,13 +343,13 @@ def placed_cells(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
 
     Raises as `placed_entry`.
     """
-    numbers = _numbers_of(pose.parent, pose.components[:3], place, pose.read)
+    numbers, there = _written(pose, place)
     cells = {
         name: place.words[at][int(number)] if at in place.words else number
         for at, (name, number) in enumerate(zip(place.columns, numbers, strict=True))
     }
     axes = {} if pose.rotation is None else {AXES_KEY: place.axes}
-    return cells | axes, _seen_there(pose, place)
+    return cells | axes, there
 
 
 def overview(pose: Pose) -> list[tuple[str, str]]:

@@ -59,27 +59,15 @@ class Style:
     """
 
     axes = ""
-    in_camera = in_cm = screen = False
+    degrees = full = keep_sign = in_camera = in_cm = screen = False
+    precision: int | None = None
     place: Place | None = None
     recording = RecordingStyle()
 
-    def __init__(
-        self,
-        fmt: str,
-        notations: tuple[Notation, ...] = (),
-        *,
-        degrees: bool = False,
-        precision: int | None = None,
-        full: bool = False,
-        keep_sign: bool = False,
-    ) -> None:
-        """Store the options of a command."""
-        self.format = fmt
-        self.notations = notations
-        self.degrees = degrees
-        self.precision = precision
-        self.full = full
-        self.keep_sign = keep_sign
+    def __init__(self, fmt: str, notations: tuple[Notation, ...] = (), **fields: Any) -> None:
+        """Store the options of a command: the format, the notations, and the fields above that are set."""
+        self.format, self.notations = fmt, notations
+        vars(self).update(fields)
 
     def changed(self, **fields: Any) -> Style:
         """Return the same style with other fields."""
