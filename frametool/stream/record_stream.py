@@ -320,18 +320,16 @@ class RecordBlocks:
 
 def _no_result(record: bytes, style: Style, *, json: bool) -> NoResult:
     """Return what a bad record says besides its numbers; in a table those are empty cells under names of their own."""
+    is_table = style.format == "csv"
     try:
-        said = plain(parse_nodes(nulled(record, json=json) or record.decode())[0])
+        root = parse_nodes(nulled(record, json=json) or record.decode())[0]
+        kept = {
+            key: plain(node) for key, (_, node) in (root.value.items() if type(root.value) is dict else ())
+            if not is_table or any(plain(leaf) is not None for leaf in node.leaves())
+        }  # fmt: skip
     except (FormatError, UnicodeDecodeError, IndexError, TypeError):  # broken: no parser has taken it before
-        said = None
-    kept = said if type(said) is dict else {}
-    return NoResult(Pose(), {key: value for key, value in kept.items() if style.format != "csv" or _says(value)})
-
-
-def _says(value: Any) -> bool:
-    """Return True if there is more than null in a value."""
-    inner = value.values() if type(value) is dict else value if type(value) is list else None
-    return value is not None if inner is None else any(map(_says, inner))
+        kept = {}
+    return NoResult(Pose(), kept)
 
 
 def _with_lines(text: bytes, parts: Iterable[Part]) -> Iterator[tuple[Part, int]]:
