@@ -59,9 +59,7 @@ VELOCITY = ("linear_x", "linear_y", "linear_z", "angular_x", "angular_y", "angul
 DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "angle_deg", *SPREAD, *VELOCITY))
 NAMES = frozenset((*readers.NAME_KEYS, *readers.PARENT_NAMES))
 OTHER_NAMES = NAMES.difference(("name", "parent"))
-MOST_NAMED = 5  # unknown keys in one message, if they fit
 MOST_CHOICES = 10  # representations listed in an error; `help rotations` has all
-MOST_CHARACTERS = 80
 SCALE = "scale"
 COVARIANCE_KEYS = frozenset(("sigma", "covariance"))
 LEFT_OUT = "covariances left out: {} has none"  # completed with the name of a command
@@ -234,28 +232,21 @@ def _read_choice(key: str, value: Any, yes: str, no: str) -> bool:
     return bool(value == yes)
 
 
-def unknown_keys(hints: Sequence[tuple[str, str]], count: int) -> str:
-    """Return unknown keys, each with its hint, as long as they fit; and the number of the others."""
-    named: list[str] = []
-    for key, hint in hints:
-        text = f"unknown key {shown(key)}{hint.replace('; ', ', ')}"
-        if named and len("; ".join([*named, text])) > MOST_CHARACTERS:
-            break
-        named.append(text)
-    left = count - len(named)
-    last = [f"and {shown(hints[-1][0]) if left == 1 else f'{left} more'}"] if left else []
-    return "; ".join([*named, *last])
+def unknown_key(unknown: Sequence[str], hint: str) -> Misfit:
+    """Return the error for unknown keys of an entry, the first with a hint at what was meant."""
+    others = shown(unknown[-1]) if len(unknown) == 2 else f"{len(unknown) - 1} more"
+    named = f"unknown key {shown(unknown[0])}{hint.replace('; ', ', ')}{f'; and {others}' * (len(unknown) > 1)}"
+    choices = ", ".join([*ROTATIONS][:MOST_CHOICES])
+    return Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (unknown[0],), key=True)
 
 
 def _unknown_keys(unknown: Sequence[str], mapping: dict[str, Any], also: Collection[str]) -> Misfit:
-    """Return the error for the unknown keys of an entry, each with its nearest known one."""
+    """Return the error for the unknown keys of an entry."""
     if "children" in also and type(mapping[unknown[0]]) is dict:
         below = f"children: {{{unknown[0]}: ..}}"
         return Misfit(f"frames below one with a pose are under {below}", (unknown[0],), key=True)
     known = POSE_KEYS.union(also) - LISTED_WORDS
-    named = unknown_keys([(key, did_you_mean(key, known)) for key in unknown[: MOST_NAMED + 1]], len(unknown))
-    choices = ", ".join([*ROTATIONS][:MOST_CHOICES])
-    return Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (unknown[0],), key=True)
+    return unknown_key(unknown, did_you_mean(unknown[0], known))
 
 
 _ROWS_OF_A_POSE = 12  # numbers of a 3x4 matrix

@@ -81,16 +81,12 @@ def parse_tolerance(text: str, otherwise: Tolerance = Tolerance()) -> Tolerance:
 
 
 class Apart(NamedTuple):
-    """The distance of two poses, in metres and radians, and how many metres of it may be rounding; 0 in one edge."""
+    """The distance of two poses, in metres and radians, and how much of each may be rounding; 0 in one edge."""
 
     metres: float
     radians: float
     rounding: float = 0.0
-
-    @property
-    def turn_rounding(self) -> float:
-        """Return how much of the angle may be rounding."""
-        return ROUNDING if self.rounding else 0.0
+    turn_rounding: float = 0.0
 
     @property
     def millimetres(self) -> float:
@@ -249,7 +245,8 @@ class _Pair:
             reach = max(1.0, *(abs(part) for pose in (*one.values(), *other.values()) for part in pose[:3]))
             for frame in self.common:
                 if frame != each and frame in one and frame in other and frame not in self.seen:
-                    self.seen[frame] = each, _apart(one[frame], other[frame])._replace(rounding=ROUNDING * reach)
+                    apart = _apart(one[frame], other[frame])
+                    self.seen[frame] = each, apart._replace(rounding=ROUNDING * reach, turn_rounding=ROUNDING)
 
     def about(self, frame: str) -> Iterator[Difference]:
         """Yield the differences of a common frame; `same` if there are none."""
@@ -277,22 +274,18 @@ class _Pair:
     def cameras(self) -> Iterator[Difference]:
         """Yield the common frames whose intrinsics differ; note what cannot be compared."""
         try:
-            in_a, in_b = (_cameras(side.tree) for side in (self.a, self.b))
+            in_a, in_b = map(_cameras, (self.a.tree, self.b.tree))
+            shared = [frame for frame in self.common if frame in in_a and frame in in_b]
+            both = {frame: (_intrinsics(in_a[frame]), _intrinsics(in_b[frame])) for frame in shared}
         except FrametoolError as error:
             self.notes.append(f"intrinsics are not compared: {error}")
             return
         if alone := [frame for frame in self.common if (frame in in_a) != (frame in in_b)]:
             self.notes.append(f"intrinsics in only one of A and B are not compared: {listing(alone, 8)}")
-        for frame in self.common:
-            if frame in in_a and frame in in_b:
-                try:
-                    one, other = _intrinsics(in_a[frame]), _intrinsics(in_b[frame])
-                except FrametoolError as error:
-                    self.notes.append(f"intrinsics of {shown(frame)} are not compared: {error}")
-                    continue
-                keys = [key for key in {**one, **other} if one.get(key) != other.get(key)]
-                if note := ", ".join(f"{key} {one.get(key, 'none')} -> {other.get(key, 'none')}" for key in keys):
-                    yield Difference("camera", frame, self.a.parent(frame), self.b.parent(frame), note=note)
+        for frame, (one, other) in both.items():
+            keys = [key for key in {**one, **other} if one.get(key) != other.get(key)]
+            if note := ", ".join(f"{key} {one.get(key, 'none')} -> {other.get(key, 'none')}" for key in keys):
+                yield Difference("camera", frame, self.a.parent(frame), self.b.parent(frame), note=note)
 
     def _other_samples(self, frame: str) -> Difference | None:
         """Compare all samples of a frame that moves in both."""

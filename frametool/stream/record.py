@@ -18,12 +18,11 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import MOST_COMPARED, NamedTuple, ValueInvalid, alternatives, did_you_mean, first_of, shown
 from frametool.geometry import floats
-from frametool.geometry.representations import ROTATIONS, notation
+from frametool.geometry.representations import notation
 from frametool.grammar import readers
 from frametool.grammar.pose import (
     COVARIANCE_KEYS,
     LISTED_WORDS,
-    MOST_CHOICES,
     POSE_KEYS,
     POSITION_KEYS,
     ROTATION_KEYS,
@@ -36,7 +35,7 @@ from frametool.grammar.pose import (
     read_angle_unit,
     read_pose,
     read_rotation,
-    unknown_keys,
+    unknown_key,
 )
 from frametool.grammar.readers import EARTH_FRAMES, NAME_KEYS, PARENT_KEYS, STAMP_KEYS, Misfit, Reading, kind, within
 from frametool.stream.row_layout import ACCEL, PARTS, POINT, POSE, TURN, VECTOR, Shape, checked_rotation, doubt
@@ -559,9 +558,7 @@ def _refuse_typos(value: dict[str, Any], wanted: set[str]) -> None:
         hint = f"; did you mean {shown(word)}?" if word in wanted else did_you_mean(key, wanted, cutoff=0.75)
         near += [(key, hint)] if hint else []
     if near:
-        choices = ", ".join([*ROTATIONS][:MOST_CHOICES])
-        message = f"{unknown_keys(near, len(near))}; a pose has xyz and one rotation: {choices}"
-        raise Misfit(message, (near[0][0],), key=True)
+        raise unknown_key([key for key, _ in near], near[0][1])
 
 
 # what others call a rotation or a position; as a list or mapping it is no further field of a record

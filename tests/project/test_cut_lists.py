@@ -10,7 +10,7 @@ import pytest
 
 import frametool
 from frametool.errors import UnknownFrame, alternatives, first_of, listing
-from frametool.grammar.pose import unknown_keys
+from frametool.grammar.pose import unknown_key
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -70,10 +70,9 @@ def test_the_nearest_topic_is_shown_of_many(run: Run) -> None:
 
 def test_unknown_keys_name_a_last_one() -> None:
     long = [f"quite_a_long_unknown_key_{at}_of_some_more_characters" for at in range(4)]
-    hints = [(key, "") for key in long]
-    first = f"unknown key '{long[0]}'"
-    assert unknown_keys(hints[:2], 2) == f"{first}; and '{long[1]}'"
-    assert unknown_keys(hints[:3], 3) == f"{first}; and 2 more"
+    first = f"unknown key '{long[0]}', did you mean 'xyz'?"
+    assert str(unknown_key(long[:2], "; did you mean 'xyz'?")).startswith(f"{first}; and '{long[1]}'; a pose has ")
+    assert str(unknown_key(long[:3], "; did you mean 'xyz'?")).startswith(f"{first}; and 2 more; a pose has ")
 
 
 @pytest.mark.parametrize("name", ["conver", "lokup", "mnitor"])
