@@ -141,7 +141,7 @@ _KITTI = (
 )
 
 _KEY = r"""(?:\s|\{|#[^\n]*\n)*+["']?(?:%s)["']?:[ \t]*+"""
-_TWO_KEYS = "(?m)^" + 2 * (_KEY % r"[\w./-]+")
+_TWO_KEYS = "(?m)^" + _KEY % r"[\w./-]+" + _KEY % r"(?!(?:linear|angular|force|torque)['\":])[\w./-]+"
 _POSE_IN_TWO = rf"{_TWO_KEYS}(?:{_KEY % 'x|y|z|roll|pitch|yaw'}{NUMBER}[ ,]*){{3}}"
 
 _EUROC = (
