@@ -141,8 +141,9 @@ _KITTI = (
 )
 
 _KEY = r"""(?:\s|\{|#[^\n]*\n)*+["']?(?:%s)["']?:[ \t]*+"""
-_TWO_KEYS = "(?m)^" + _KEY % r"[\w./-]+" + _KEY % r"(?!(?:linear|angular|force|torque)['\":])[\w./-]+"
-_POSE_IN_TWO = rf"{_TWO_KEYS}(?:{_KEY % 'x|y|z|roll|pitch|yaw'}{NUMBER}[ ,]*){{3}}"
+_PARTS = "linear|angular|force|torque|position|translation"  # of a message
+_TWO_KEYS = "(?m)^" + _KEY % r"[\w./-]+" + _KEY % rf"(?!(?:{_PARTS})['\":])[\w./-]+"
+_POSE_IN_TWO = rf"{_TWO_KEYS}(?:{_KEY % 'x|y|z|roll|pitch|yaw'}{NUMBER}[ ,]*){{3,}}+(?!{_KEY % 'q?[wxyz]'}{NUMBER})"
 
 _EUROC = (
     "#timestamp [ns]", "p_RS_R_x [m]", "p_RS_R_y [m]", "p_RS_R_z [m]", "q_RS_w []", "q_RS_x []", "q_RS_y []",

@@ -168,7 +168,7 @@ def _refuse(document: Any) -> None:
         if type(document) is list and document:
             raise _bare_numbers(document)
         raise Misfit(f"expected a pose like {{xyz: [x, y, z], rpy_deg: [..]}}, found {kind(document)}")
-    _refuse_typos(document, {*POINT_KEYS, *ROTATION_KEYS})
+    _refuse_typos(document, {*POINT_KEYS, *ROTATION_KEYS}, cutoff=0.6)
     wanted = "a point like {point: [x, y, z]} or a pose like {xyz: [..], rpy_deg: [..]}"
     raise Misfit(f"expected {wanted}, found the keys {first_of(list(document), MOST_KEYS, quote=shown)}")
 
@@ -545,7 +545,7 @@ def _two_vectors(value: dict[str, Any], name: str, path: Path, request: Request)
     return Record(path, Shape(name, None), paths, numbers)
 
 
-def _refuse_typos(value: dict[str, Any], wanted: set[str]) -> None:
+def _refuse_typos(value: dict[str, Any], wanted: set[str], cutoff: float = 0.75) -> None:
     """Stop at a key that is nearly one of those that would say a rotation or a position."""
     if not wanted or KNOWN.issuperset(value):
         return
@@ -555,7 +555,7 @@ def _refuse_typos(value: dict[str, Any], wanted: set[str]) -> None:
     near = []
     for key in islice(others, MOST_COMPARED):
         word = OTHER_WORDS.get(key.lower(), "") if type(value[key]) in (list, dict) else ""
-        hint = f"; did you mean {shown(word)}?" if word in wanted else did_you_mean(key, wanted, cutoff=0.75)
+        hint = f"; did you mean {shown(word)}?" if word in wanted else did_you_mean(key, wanted, cutoff=cutoff)
         near += [(key, hint)] if hint else []
     if near:
         raise unknown_key([key for key, _ in near], near[0][1])
@@ -565,6 +565,7 @@ def _refuse_typos(value: dict[str, Any], wanted: set[str]) -> None:
 OTHER_WORDS = dict.fromkeys(("q", "quats", "quaternions", "orient", "so3"), "quaternion") | {
     "loc": "xyz", "location": "xyz", "xzy": "xyz",
     "rpi": "rpy", "ypr": "rpy", "eul": "rpy", "euler_angles": "rpy", "angle_axis": "axis_angle",
+    "ypr_deg": "rpy_deg", "ypr_rad": "rpy_rad", "euler_xyz": "euler", "euler_zyx": "euler",
 }  # fmt: skip
 
 

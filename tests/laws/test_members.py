@@ -99,6 +99,21 @@ def test_what_is_no_pose_is_refused_for_that_reason_on_every_way(run: Run, comma
     assert (done.status, done.out) == (1, "")
 
 
+@pytest.mark.parametrize("form", ["line", "pretty", "document"])
+@pytest.mark.parametrize("key", ["pose", "transform", "object"])
+def test_what_is_wrong_with_a_message_is_told_of_the_message(run: Run, key: str, form: str) -> None:
+    place, turn = {"x": 1.0, "y": 2.0, "z": 3.0}, {"x": 0.0, "y": 0.0, "z": 0.6, "w": 0.8}
+    inner: dict[str, object] = {"translation": place, "rotation": turn} if key == "transform" else {"position": place, "orientation": turn}
+    if key == "object":
+        inner = {"pose": {**place, "qx": 0.0, "qy": 0.0, "qz": 0.0, "qw": 1.0}}
+    record = {"header": {"stamp": {"sec": 1, "nanosec": 2}, "frame_id": "base"}, key: inner}
+    text = document(record) if form == "document" else json.dumps(record, indent=2 if form == "pretty" else None)
+    done = run("relative", MAP_FROM_BASE, "-", stdin=text)
+    reason = "its fields are 'object'" if key == "object" else "A is in 'map' and B in 'base'"
+    assert (done.status, done.out) == (1, "")
+    assert reason in done.err
+
+
 IMU = {
     "header": {"stamp": {"sec": 1, "nanosec": 0}, "frame_id": "base"},
     "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
@@ -122,3 +137,21 @@ def test_what_names_another_frame_has_moved_whole_or_is_refused(run: Run, way: s
             continue
         assert found["header"]["frame_id"] == "map"
         assert found["angular_velocity"] == {"x": 0.0, "y": 1.0, "z": 0.0}
+
+
+@pytest.mark.parametrize("record", ['{{"{}": [0, 0, 90]}}', '{{"x": 1, "{}": [0, 0, 90]}}', '{{"xyz": [1, 2, 3], "{}": [0, 0, 90]}}'])
+@pytest.mark.parametrize(("key", "near"), [("ypr_deg", "rpy_deg"), ("ypr_rad", "rpy_rad"), ("euler_zyx", "euler")])
+@pytest.mark.parametrize("rows", [1, TWENTY])
+def test_a_rotation_under_a_key_of_others_is_no_further_field(run: Run, rows: int, key: str, near: str, record: str) -> None:
+    done = run("convert", "--to", "quaternion", stdin=f"{record.format(key)}\n" * rows)
+    assert f"unknown key '{key}', did you mean '{near}'?" in done.err
+    assert (done.status, done.out) == (1, "")
+
+
+def test_a_number_under_such_a_key_stays(run: Run) -> None:
+    assert run("invert", stdin='{"xyz": [1, 2, 3], "ypr_deg": 4}\n').out.endswith(', "ypr_deg": 4}\n')
+
+
+def test_without_a_record_a_key_is_compared_loosely(run: Run) -> None:
+    assert "unknown key 'quatern', did you mean 'quaternion'?" in run("convert", stdin='{"quatern": [0, 0, 0, 1]}\n').err
+    assert "unknown key 'rotaxion_x', did you mean 'rotation'?" in run("convert", stdin='{"rotaxion_x": [0, 0, 0, 1]}\n').err
