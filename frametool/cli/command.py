@@ -390,13 +390,14 @@ class Command(WithHelp):
         if "inv" in args:
             args = _joined(args, ctx, always=self.name in OF_POSES)
         for name, value in pairwise(args):
-            refuse(value in OPTIONAL.get(name, ()), f"{name} {value} is gone: {name}={value}")
+            if value in OPTIONAL.get(name, ()) and not ctx.resilient_parsing:
+                raise click.UsageError(f"{name} {value} is gone: {name}={value}", ctx)
         args = [f"{each}={OPTIONAL[each][0]}" if each in OPTIONAL else each for each in args]
         passed: dict[Any, Option] = {}
         for each in () if ctx.resilient_parsing else self.make_parser(ctx).parse_args(args=[*args])[2]:
             if isinstance(each, Option):
-                is_twice = each.name in passed and not (each.multiple or each.is_flag)
-                refuse(is_twice, f"{each.opts[-1]} appears twice; only one can be used")
+                if each.name in passed and not (each.multiple or each.is_flag):
+                    raise click.UsageError(f"{each.opts[-1]} appears twice; only one can be used", ctx)
                 passed[each.name] = each
         rest = super().parse_args(ctx, args)
         ctx.meta[INPUTS] = Inputs(ctx.params, {each: passed[each].opts[-1] for each in passed.keys() - OF_MESSAGES})

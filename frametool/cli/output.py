@@ -74,8 +74,8 @@ BATCH = 256  # poses
 QUATERNION = (notation("quaternion"),)  # where no representation is asked for
 ZEROS = r"(?<![\w.:])(?P<dim>-?0\.0+)(?![\w.])"
 ENDS = (  # of a pose
-    r"(?m)^(?P<green>\S.*?)(?: at \S+)? seen from (?P<cyan>.*?)(?=  \(maps|$)",
-    r"\(maps points in (?P<green>.+?) to points in (?P<cyan>.+?)\)$",
+    r"(?m)^(?P<green>\S.*?)(?: at \S+)? seen from (?P<cyan>.*?)(?: at \S+)?(?=  \(maps|$)",
+    r"(?m)\(maps points in (?P<green>.+?) to points in (?P<cyan>.+?)\)$",
 )
 WITH_PLACES = ("text", "yaml", "json", "csv", *table.writers("recording"))
 OF_TEXT = (".txt", ".out", ".log", ".dat")

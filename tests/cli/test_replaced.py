@@ -47,6 +47,7 @@ def test_what_went_names_what_to_use_instead(name: str, typed: str, run: Run) ->
     done = run(*typed.split())
     assert (done.status, done.out, done.err.count("\n")) == (2, "", 1)
     assert f"{name} is gone: {(REPLACED | APART)[name]}" in done.err
+    assert name not in APART or done.err.startswith(f"frametool: {typed.split(maxsplit=1)[0]}: ")
 
 
 def test_an_option_that_never_was_is_not_told_to_be_gone() -> None:

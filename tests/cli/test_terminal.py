@@ -63,6 +63,7 @@ COLOURED = [
     (("lookup", "examples/drive.yaml", "map", "box", "--at", "1"), f"{green('box')} seen from {cyan('map')} at 1.000000000  (maps points in {green('box')} to points in {cyan('map')})\n"),
     (("lookup", "{name: seen, parent: from, xyz: [1, 2, 3]}", "from", "seen"), f"{green('seen')} seen from {cyan('from')}  (maps points in {green('seen')} to points in {cyan('from')})\n"),
     (("lookup", "examples/drive.yaml", "map", "base_link", "--times", "0,1", "-f", "text"), f"{green('base_link')} seen from {cyan('map')} at 1.000000000\n  (maps points in {green('base_link')} to points in {cyan('map')})\n"),
+    (("convert", "{name: b c, parent: a, xyz: [1, 2, 3]}"), f"{green('b c')} seen from {cyan('a')}  (maps points in {green('b c')} to points in {cyan('a')})\n"),
     (("check", "table.csv"), "table.csv:1: \x1b[31merror\x1b[0m: no column name nor stamp among frame, x, y, z, yaw_deg;\n"),
     (("monitor", LATE), "\x1b[31ma <- b"),
     (("monitor", LATE, "a", "c"), "its edges \x1b[31mshare no time\x1b[0m: "),

@@ -145,7 +145,7 @@ def test_an_option_of_one_value_given_twice(run: Run, command: str, option: clic
     for names in ((option.opts[0],) * 2, (option.opts[0], option.opts[-1])):
         done = run(command, names[0], "1", names[1], "1")
         assert (done.status, done.out) == (2, "")
-        assert f"{option.opts[-1]} appears twice; only one can be used" in done.err
+        assert f": {option.opts[-1]} appears twice; only one can be used; `frametool" in done.err
 
 
 @pytest.mark.parametrize("command", ["convert", "lookup", "tree", "compose", "view", "sim"])
