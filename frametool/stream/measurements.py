@@ -133,7 +133,8 @@ def _measurement(argument: Any, place: str) -> Measurement:
     if transform.shape:
         raise ValueInvalid(f"{place}: expected one transform, got shape {transform.shape}")
     try:
-        return Measurement(parent, child, transform.components, taken(argument[3] if len(argument) > 3 else None))
+        covariance = taken(argument[3] if len(argument) > 3 else None) or None
+        return Measurement(parent, child, transform.components, covariance)
     except ValueInvalid as error:
         raise ValueInvalid(f"{place}: {error}") from None
 
