@@ -257,7 +257,7 @@ class _Walk:
         """Name both frames of a pose, or the frame of a point, a vector, a twist or angles."""
         type_ = term.type
         if type_.kind not in ((POSE,) if len(frames) == 2 else functions.FRAMED):
-            takes = "as names the two frames of a pose, in the one of a point or vector"
+            takes = ".. in FRAME names the frame of a point or vector, .. as TARGET<-SOURCE the two of a pose"
             raise CalcError(f"{takes}; found {type_.named}")
         target, source = (*frames, type_.source)[:2]
         if not (functions.meet(type_.target, target) and functions.meet(type_.source, source)):

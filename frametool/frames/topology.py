@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Components, Rigid
 
-MOST_SHOWN = 16  # frames of a cycle
+MOST_SHOWN = 16  # frames of a path or a cycle
 OTHER_CLOCK = 10**8 * BILLION  # three years: beyond it, only one of two clocks counts from 1970
 
 

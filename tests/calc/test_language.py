@@ -255,6 +255,12 @@ frametool: expected a time with its unit, 2.5s or 2500000000ns, or latest or row
 frametool: row is known in streams only: -i FILE, or standard input
   dist(row, map<-tool)
        ^
+frametool: .. in FRAME names the frame of a point or vector, .. as TARGET<-SOURCE the two of a pose; found the pose map<-lidar
+  (map<-lidar) in map
+               ^
+frametool: .. in FRAME names the frame of a point or vector, .. as TARGET<-SOURCE the two of a pose; found a point
+  [1, 2, 3] as a<-b
+            ^
 frametool: a { is not closed
   inv({xyz: [1, 2, 3]
       ^
