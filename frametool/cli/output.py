@@ -120,21 +120,21 @@ class Output:
         self.style = Style(
             fmt, notations or usual, degrees=bool(inputs.deg), precision=None if digits == FULL else digits,
             full=digits is not None, keep_sign=bool(inputs.keep_sign),
-        )  # fmt: skip
-        self.style.screen = self.chosen in (None, "text") and self.path is None and sys.stdout.isatty()
-        self.style.put_at(place)
+            screen=self.chosen in (None, "text") and self.path is None and sys.stdout.isatty(),
+        ).changed(place=place)  # fmt: skip
         if table.is_recording(fmt):
             folder = folder_of(_place(fmt, self.path))
             frames = inputs.recorded_frames or next(iter(inputs.named_frames), ())
             is_pair = len(frames) in (0, 2) and len({*frames}) == len(frames)
             refuse(not is_pair, "--frames takes WORLD,BODY, different names")
-            self.style.recording = RecordingStyle(tuple(inputs.messages), inputs.topic_out or "", frames, folder)
+            recording = RecordingStyle(tuple(inputs.messages), inputs.topic_out or "", frames, folder)
+            self.style = self.style._replace(recording=recording)
 
     def take_axes(self, known: str, operation: Operation | None = None) -> None:
         """Keep the axes of the camera that poses are of: as --camera-axes says, else as their format has them."""
         stated = self._inputs.peek("camera_axes") or ""
-        self.style.axes = (stated or known) if operation is None or operation.keeps_child else ""
-        self.style.in_camera = operation is not None and operation.looks_back
+        axes = (stated or known) if operation is None or operation.keeps_child else ""
+        self.style = self.style._replace(axes=axes, in_camera=operation is not None and operation.looks_back)
         row = table.FORMATS.get(self.style.format)
         if self.style.axes and row and row.rows.axes:
             self._inputs.ask("camera_axes")
@@ -182,7 +182,7 @@ class Output:
     def _shorten(self) -> None:
         """Show poses on a terminal by quaternion and rpy only, where no representation is asked for."""
         if self.style.screen and not self.style.notations:
-            self.style.notations = notation("quaternion"), notation("rpy_deg")
+            self.style = self.style._replace(notations=(notation("quaternion"), notation("rpy_deg")))
 
     def poses_as_they_come(self, results: Iterator[Result]) -> None:
         """Write poses that have the same keys, in batches."""
@@ -244,7 +244,8 @@ class Output:
         from frametool.view.reports import TREE_MARKS, write_tree
 
         text, self.marks = write_tree(tree, self.style), TREE_MARKS
-        self.style.screen = self.path is None and (color == "always" or (color == "auto" and self.style.screen))
+        screen = self.path is None and (color == "always" or (color == "auto" and self.style.screen))
+        self.style = self.style._replace(screen=screen)
         self.text(text)
 
     def report(self, entries: Sequence[dict[str, Any]]) -> None:

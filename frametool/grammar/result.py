@@ -8,7 +8,6 @@ a degree.
 
 from __future__ import annotations
 
-from copy import copy
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import NamedTuple, ValueInvalid, listing, shown, warn
@@ -45,7 +44,7 @@ class RecordingStyle(NamedTuple):
     folder: str = ""
 
 
-class Style:
+class Style(NamedTuple):
     """How results are written: format, notations, unit of bare angles, digits, sign of quaternions.
 
     precision: decimals; None for the shortest text that reads back
@@ -58,27 +57,24 @@ class Style:
     recording: how results are written to a recording
     """
 
-    axes = ""
-    degrees = full = keep_sign = in_camera = in_cm = screen = False
+    format: str
+    notations: tuple[Notation, ...] = ()
+    degrees: bool = False
     precision: int | None = None
+    full: bool = False
+    keep_sign: bool = False
+    screen: bool = False
+    axes: str = ""
+    in_camera: bool = False
     place: Place | None = None
-    recording = RecordingStyle()
-
-    def __init__(self, fmt: str, notations: tuple[Notation, ...] = (), **fields: Any) -> None:
-        """Store the options of a command: the format, the notations, and the fields above that are set."""
-        self.format, self.notations = fmt, notations
-        vars(self).update(fields)
+    in_cm: bool = False
+    recording: RecordingStyle = RecordingStyle()
 
     def changed(self, **fields: Any) -> Style:
-        """Return the same style with other fields."""
-        style = copy(self)
-        vars(style).update(fields)
-        style.put_at(style.place)
-        return style
-
-    def put_at(self, place: Place | None) -> None:
-        """Write positions as positions on the Earth; tables have no columns for convergence and scale of UTM."""
-        self.place = place and place.with_grid(gridded=self.format in ("text", "yaml", "json"))
+        """Return the same style with other fields; tables have no columns for convergence and scale of UTM."""
+        style = self._replace(**fields)
+        gridded = style.format in ("text", "yaml", "json")
+        return style._replace(place=style.place and style.place.with_grid(gridded=gridded))
 
     def number(self, value: float) -> str:
         """Format a finite number: the shortest text that reads back to the same bits, or fixed decimals; never -0."""

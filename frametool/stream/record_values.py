@@ -243,8 +243,10 @@ class RecordText:
     @property
     def lost(self) -> str:
         """Name a frame that a record names and its result cannot."""
-        named = (entry for entry in self.entries if entry.parent is None and entry.name is None)
-        return next((lost for each in named if (lost := each.record.parent.text or each.record.name.text)), "")
+        for record, _, _, _, parent, name in self.entries:
+            if parent is None and name is None and (lost := record.parent.text or record.name.text):
+                return lost
+        return ""
 
     def notes_at(self, line: int, column: int, answers: Sequence[Answer] = ()) -> list[RowNote]:
         """Return all warnings about the records, their numbers, and what became of them, each with its place.
@@ -367,13 +369,16 @@ def unit_of(record: Record) -> Path:
 
 
 def values_of_unit(node: Node, unit: Path, answers: list[Answer], request: Request, style: Style) -> Iterator[Value]:
-    """Yield what one document or item becomes: a pose, or a mapping, for each record in it.
-
-    Several things at one place are one message, as an Imu: a mapping without levels, a key for each of their numbers.
-    """
-    if not request.operation.moves or len({each.entry.record.path for each in answers}) == len(answers):
-        yield from (_result(node, unit, each, request, style.format) for each in answers)
+    """Yield what one document or item becomes: a pose, or a mapping, for each record in it."""
+    if request.operation.moves and len({each.entry.record.path for each in answers}) < len(answers):
+        yield _of_several(node, unit, answers, request)
         return
+    for each in answers:
+        yield _result(node, unit, each, request, style.format)
+
+
+def _of_several(node: Node, unit: Path, answers: list[Answer], request: Request) -> dict[str, Any]:
+    """Return several things at one place, as in an Imu: a mapping without levels, a key for each of their numbers."""
     last = answers[-1].entry  # of the first, an orientation, nothing may be known: then it stays
     found = {"frame": last.parent} | _header_stamp(last.record) | _rest(node, unit, last.record)
     for each in answers:
@@ -383,7 +388,7 @@ def values_of_unit(node: Node, unit: Path, answers: list[Answer], request: Reque
             found.pop(field, None)
         found |= {f"{field}_{axis}": number for axis, number in zip("xyzw", numbers, strict=False)}
         found |= _extras(each, request)
-    yield found
+    return found
 
 
 def _header_stamp(record: Record) -> dict[str, int]:

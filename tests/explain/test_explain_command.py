@@ -35,8 +35,8 @@ def test_the_form_follows_the_equals_sign(form: str, begins: str, run: Callable[
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
-    ([*CONVERT, "--explain", "--format", "yaml"], "--explain writes text, markdown, not yaml"),
-    ([*CONVERT, "--explain", "-o", "x.csv"], "--explain writes text, markdown, not csv"),
+    ([*CONVERT, "--explain", "--format", "yaml"], "--explain writes text or markdown, not yaml"),
+    ([*CONVERT, "--explain", "-o", "x.csv"], "--explain writes text or markdown, not csv"),
     ([*CONVERT, "--explain=html"], "'html' is not one of 'text', 'markdown'"),
     ([*CONVERT, "--explain", "--precision", "0"], "--precision counts significant digits with --explain; give 1 or more, or full"),
     (["convert", "--explain"], "standard input is a stream; --explain derives one record"),

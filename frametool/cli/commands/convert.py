@@ -179,8 +179,9 @@ def _say_of_axes(
     into, _, out_of = (world or "").partition("_from_")
     if into == IN_CENTIMETRES:
         separate = not any(each.representation.whole for each in output.notations)
-        output.style.in_cm = is_anew and separate and output.style.format in ("text", "yaml", "json")
-        here = "is written as xyz_cm" if output.style.in_cm else "stays in metres, or in the unit its name says"
+        in_cm = is_anew and separate and output.style.format in ("text", "yaml", "json")
+        output.style = output.style._replace(in_cm=in_cm)
+        here = "is written as xyz_cm" if in_cm else "stays in metres, or in the unit its name says"
         say(f"note: Unreal counts in centimetres: xyz {here}")
     if out_of == IN_CENTIMETRES:
         say("note: Unreal counts in centimetres: xyz is read as metres, xyz_cm and x_cm say them")
