@@ -400,7 +400,8 @@ class Command(WithHelp):
                     raise click.UsageError(f"{each.opts[-1]} appears twice; only one can be used", ctx)
                 passed[each.name] = each
         rest = super().parse_args(ctx, args)
-        ctx.meta[INPUTS] = Inputs(ctx.params, {each: passed[each].opts[-1] for each in passed.keys() - OF_MESSAGES})
+        idle = {name: each.opts[-1] for name, each in passed.items() if name not in OF_MESSAGES}
+        ctx.meta[INPUTS] = Inputs(ctx.params, idle)
         for option in passed.values():
             if others := [passed[other].opts[-1] for other in option.excludes if other in passed]:
                 raise click.UsageError(f"{option.opts[-1]} and {others[0]} exclude each other", ctx)
