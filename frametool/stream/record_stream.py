@@ -263,7 +263,7 @@ class RecordBlocks:
                 found.rows, found.kept = found.rows + 1, found.kept + 1
                 found.items += items
                 return
-        if made.kind == Outside.kind:
+        if isinstance(made.reason, Outside):
             return
         found.rows += 1
         found.faults.append((part.begin, made))

@@ -155,3 +155,14 @@ def test_a_number_under_such_a_key_stays(run: Run) -> None:
 def test_without_a_record_a_key_is_compared_loosely(run: Run) -> None:
     assert "unknown key 'quatern', did you mean 'quaternion'?" in run("convert", stdin='{"quatern": [0, 0, 0, 1]}\n').err
     assert "unknown key 'rotaxion_x', did you mean 'rotation'?" in run("convert", stdin='{"rotaxion_x": [0, 0, 0, 1]}\n').err
+
+
+@pytest.mark.parametrize("form", [(), ("-f", "csv"), ("-f", "json"), ("--on-error", "null"), ("--on-error", "skip")], ids=" ".join)
+@pytest.mark.parametrize("rows", [1, 3, TWENTY])
+@pytest.mark.parametrize("into", ["json", "yaml"])
+def test_a_record_beyond_the_window_is_left_out_without_a_word(run: Run, into: str, rows: int, form: tuple[str, ...]) -> None:
+    records = [{"stamp": 1.0 + (at > 0), "xyz": [1, 5, 3], "rpy_deg": [0, 0, 7]} for at in range(rows)]
+    text = "".join(f"{json.dumps(each)}\n" for each in records) if into == "json" else "---\n".join(map(document, records))
+    done = run("convert", "--start", "1.5", *form, stdin=text)
+    assert (done.status, done.err) == (0, "")
+    assert len(re.findall(r"\b2(?:\.0|000000000)\b", done.out)) == rows - 1
