@@ -275,14 +275,17 @@ class _Pair:
         """Yield the common frames whose intrinsics differ; note what cannot be compared."""
         try:
             in_a, in_b = map(_cameras, (self.a.tree, self.b.tree))
-            shared = [frame for frame in self.common if frame in in_a and frame in in_b]
-            both = {frame: (_intrinsics(in_a[frame]), _intrinsics(in_b[frame])) for frame in shared}
         except FrametoolError as error:
             self.notes.append(f"intrinsics are not compared: {error}")
             return
         if alone := [frame for frame in self.common if (frame in in_a) != (frame in in_b)]:
             self.notes.append(f"intrinsics in only one of A and B are not compared: {listing(alone, 8)}")
-        for frame, (one, other) in both.items():
+        for frame in (frame for frame in self.common if frame in in_a and frame in in_b):
+            try:
+                one, other = _intrinsics(in_a[frame]), _intrinsics(in_b[frame])
+            except FrametoolError as error:
+                self.notes.append(f"intrinsics of {shown(frame)} are not compared: {error}")
+                continue
             keys = [key for key in {**one, **other} if one.get(key) != other.get(key)]
             if note := ", ".join(f"{key} {one.get(key, 'none')} -> {other.get(key, 'none')}" for key in keys):
                 yield Difference("camera", frame, self.a.parent(frame), self.b.parent(frame), note=note)

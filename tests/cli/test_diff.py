@@ -135,6 +135,13 @@ def test_intrinsics_that_cannot_be_compared_are_noted(run: Run) -> None:
     assert "intrinsics are not compared: b.yaml: " in done.err
 
 
+def test_one_camera_that_cannot_be_compared_hides_no_other(run: Run) -> None:
+    text = CHAIN + CHAIN.replace("cam0", "cam1").replace("pinhole", "foo")
+    done = run("diff", "a.yaml", "b.yaml", files={"a.yaml": text, "b.yaml": text.replace("461.5", "463")})
+    assert (done.status, done.out) == (1, "'cam0' has other intrinsics: fx 461.5 -> 463\n")
+    assert "intrinsics of 'cam1' are not compared: a.yaml: cam1: camera model 'foo' is not known" in done.err
+
+
 def test_all_lists_the_frames_that_did_not_move_too(run: Run) -> None:
     entries = [json.loads(line) for line in run("diff", "a.yaml", "b.yaml", "--all", "-f", "json", files=FILES).out.splitlines()]
     assert {each["frame"] for each in entries if each["kind"] == "same"} == {"base", "mast", "lidar"}
