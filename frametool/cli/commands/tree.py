@@ -53,7 +53,7 @@ def tree_command(inputs: Inputs) -> None:
     output = Output(inputs, "tree", "trajectory")
     place, drawn = output.style.place, output.style.format in ("yaml", "json", "text", "dot", "mermaid")
     is_unsaid = place is not None and (not drawn or place.origin is not None)
-    refuse(is_unsaid, "trees say places by lla or utm, in yaml, json, text and drawings")
+    refuse(is_unsaid, f"--to {place and place.name}: trees say places by lla or utm, in yaml, json, text and drawings")
     frames = load_tree(inputs.tree, inputs.more, drawings=True)
     stamp = options.at_ns(inputs.at)
     output.tree(frames if stamp is None else frames.tree_at(stamp), inputs.color)
