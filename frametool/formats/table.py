@@ -142,7 +142,8 @@ _KITTI = (
 
 _KEY = r"""(?:\s|\{|#[^\n]*\n)*+["']?(?:%s)["']?:[ \t]*+"""
 _PARTS = "linear|angular|force|torque|position|translation"  # of a message
-_TWO_KEYS = "(?m)^" + _KEY % r"[\w./-]+" + _KEY % rf"(?!(?:{_PARTS})['\":])[\w./-]+"
+_FIRST = r"""(?m)^[ \t{]*+["']?[\w./-]+["']?:[ \t]*+"""  # no lines before it: the search begins at each line
+_TWO_KEYS = _FIRST + _KEY % rf"(?!(?:{_PARTS})['\":])[\w./-]+"
 _POSE_IN_TWO = rf"{_TWO_KEYS}(?:{_KEY % 'x|y|z|roll|pitch|yaw'}{NUMBER}[ ,]*){{3,}}+(?!{_KEY % 'q?[wxyz]'}{NUMBER})"
 
 _EUROC = (

@@ -21,6 +21,7 @@ import numpy as np
 
 from frametool.errors import FormatError, Unanswered, ValueInvalid, first_of, listing, shown
 from frametool.frames.stamps import BILLION
+from frametool.grammar.edges import Diagnostics
 from frametool.recordings.read import Channel, MessageTypes, Recorded, RecordingReader, opened_recording
 from frametool.ros.message_stream import edge_columns, unit_components
 from frametool.ros.messages import PATH, POSES, STAMPS, body_of, stamp_problem
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Diagnostics, EdgeColumns, Options
+    from frametool.grammar.edges import EdgeColumns, Options
 
 
 CLOUD, POSE_ARRAY = "sensor_msgs/msg/PointCloud2", "geometry_msgs/msg/PoseArray"
@@ -441,8 +442,8 @@ def recorded_edges(reader: RecordingReader, channels: Sequence[Channel], options
             messages = [*part]
             found = zip(_contents(reader, messages, number, options), messages, strict=True)
             if rows := [(each, at, sent) for at, (some, sent) in enumerate(found, number + 1) for each in some]:
-                columns = _columns(rows, reader.path, options)
-                yield columns._replace(stamps_ns=[None] * len(rows)) if is_static else columns
+                for columns in _columns(rows, reader.path, options):
+                    yield columns._replace(stamps_ns=[None] * len(columns.lines)) if is_static else columns
             number += len(messages)
     if not number:
         raise FormatError(f"no messages on {', '.join(each.topic for each in channels)}", source=reader.path)
@@ -478,8 +479,10 @@ def _transforms(reader: RecordingReader, message: Recorded, number: int, options
     return [RawTransform.of(each, body_of(channel.topic, options.answers)) for each in parts]
 
 
-def _columns(rows: Sequence[tuple[RawTransform, int, Recorded]], path: str, options: Options) -> EdgeColumns:
-    """Return the edges of many messages at once; raises FormatError for the first one that is invalid.
+def _columns(
+    rows: Sequence[tuple[RawTransform, int, Recorded]], path: str, options: Options
+) -> Iterator[EdgeColumns]:  # fmt: skip
+    """Yield the edges of many messages at once; raises FormatError for the first invalid one, behind those before it.
 
     rows: transforms, each with the number of its message among those with transforms
     """
@@ -493,14 +496,20 @@ def _columns(rows: Sequence[tuple[RawTransform, int, Recorded]], path: str, opti
         topics=topics, received_ns=[each.log_ns for each in sent],
     )  # fmt: skip
     if found is None:
-        raise next(filter(None, (_problem(said, number, bare, path, options) for said, number, _ in rows)))
+        told = options._replace(tally=Diagnostics())  # those before it are noted when they are read again
+        problems = (_problem(said, number, bare, path, told) for said, number, _ in rows)
+        at, problem = next((at, each) for at, each in enumerate(problems) if each)
+        if at:
+            yield from _columns(rows[:at], path, options)
+        options.topics.takes(topics[at])
+        raise problem
     options.topics.counts.update(Counter(topics) + Counter(options.topics.counts))
     pairs = [*zip(topics, children, strict=True)]
     for pair in dict.fromkeys(pairs):
         if problem := options.topics.conflict(*pair):
             line = lines[pairs.index(pair)]
             options.report(FormatError(problem, source=path, line=line, column=1, rule="two-topics"))
-    return found
+    yield found
 
 
 def _problem(

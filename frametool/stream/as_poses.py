@@ -308,7 +308,8 @@ def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
         }
         for fault in [*(each._replace(line=line + each.line) for each in outcome.faults), *nameless.values()]:
             options.report(BadRow(fault, str(fault.reason), source=file.name))
-        yield _edges(block, line, fmt, options)
+        if len(block.numbers):
+            yield _edges(block, line, fmt, options)
         line, count = line + outcome.lines, count + len(block.numbers)
     if len(named) < 2:
         describe(options, fmt, count)

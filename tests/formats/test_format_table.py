@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -390,6 +392,21 @@ def test_what_is_no_form_is_told_in_one_line_without_its_content(run: Callable[.
 def test_an_empty_file_has_no_frames(run: Callable[..., Any], data: bytes) -> None:
     found = run("tree", "file", files={"file": data})
     assert (found.status, found.err) == (1, "frametool: file: no frames in it\n")
+
+
+@pytest.mark.parametrize("text", ["#timestamp,x,y,z,qw,qx,qy,qz\n", "stamp,parent,child,x,y,z,qx,qy,qz,qw\n"])
+def test_a_table_without_rows_has_no_frames(run: Callable[..., Any], text: str) -> None:
+    found = run("tree", "a.csv", files={"a.csv": text.encode()})
+    assert (found.status, found.out, found.err) == (1, "", "frametool: a.csv: no frames in it\n")
+
+
+@pytest.mark.parametrize("gap", ["\n", " \n", "#\n", "{\n", "a:\n", "a:\n" + 50 * "\n"])
+def test_a_long_beginning_without_data_is_told_at_once(gap: str) -> None:
+    head = gap.encode() * (60_000 // len(gap)) + b"hello world\n"
+    begun = perf_counter()
+    with suppress(FormatError):
+        detect(head, "tree")
+    assert perf_counter() - begun < 5.0
 
 
 def test_a_form_that_is_not_read_cannot_be_told_either(run: Callable[..., Any]) -> None:

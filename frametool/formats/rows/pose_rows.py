@@ -228,7 +228,8 @@ def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
     for block in blocks(file, options):
         poses = [*zip(*(part.tolist() for part in block.poses), strict=True)]
         worlds, bodies, lines = [parent] * len(poses), [child] * len(poses), [row.line for row in block.rows]
-        yield EdgeColumns(worlds, bodies, block.stamps_ns.tolist(), poses, lines, is_ordered=True)
+        if poses:
+            yield EdgeColumns(worlds, bodies, block.stamps_ns.tolist(), poses, lines, is_ordered=True)
     options.tally.axes[child] = options.answers.camera_axes or spec.axes
 
 
