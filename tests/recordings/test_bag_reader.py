@@ -178,3 +178,18 @@ def test_transforms_that_lie_alike_are_the_same_edges_one_by_one(
     monkeypatch.setattr("frametool.recordings.messages.alike", lambda *_: ())
     assert at_once == edges_and_notes()
     assert len(at_once[0]) == 120 * count + 3
+
+
+def test_what_comes_before_a_bad_transform_is_checked_too(tmp_path: Path, run: Run) -> None:
+    made, good, half = Maker("mcap"), (1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0), (1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.5)
+    edges = [("odom", "base", good), ("map", "base", good), ("odom", "base", half), ("odom", "base", good)]
+    sent = [Sent("/tf", *made.transforms((*edge, START + at)), START + at) for at, edge in enumerate(edges)]
+    path = write(tmp_path / "run", "mcap", sent)
+    found = run("check", str(path), "--topic", "/tf")
+    error, topics, parent = (line.removeprefix(f"{path}:") for line in found.out.splitlines())
+    assert error.startswith(" error: message 3: 'odom' -> 'base': quaternion 0 0 0 0.5 has norm 0.5;")
+    assert topics == "1:1: note: transforms on /tf (3) [topics]"
+    assert parent == "2:1: note: frame 'base' changes its parent: 'odom' -> 'map' [reparented]"
+    path = write(tmp_path / "bad", "mcap", sent[2:])
+    found = run("check", str(path), "--topic", "/tf")
+    assert found.err == "frametool: 1 error, 1 note\n"
