@@ -496,13 +496,13 @@ def _columns(
         topics=topics, received_ns=[each.log_ns for each in sent],
     )  # fmt: skip
     if found is None:
-        told = options._replace(tally=Diagnostics())  # those before it are noted when they are read again
-        problems = (_problem(said, number, bare, path, told) for said, number, _ in rows)
-        at, problem = next((at, each) for at, each in enumerate(problems) if each)
+        apart = options._replace(tally=Diagnostics())  # those before it are noted when they are read again
+        problems = (_problem(said, number, bare, path, apart) for said, number, _ in rows)
+        at, refused = next((at, each) for at, each in enumerate(problems) if each)
         if at:
             yield from _columns(rows[:at], path, options)
         options.topics.takes(topics[at])
-        raise problem
+        raise refused
     options.topics.counts.update(Counter(topics) + Counter(options.topics.counts))
     pairs = [*zip(topics, children, strict=True)]
     for pair in dict.fromkeys(pairs):
