@@ -106,17 +106,17 @@ def test_no_imports_inside_a_room_run_in_a_circle() -> None:
 
 
 MOST_LINES = {  # code lines of a room, and behind it what is aimed at; a feature pays for its lines with others
-    "stream": 8_321,  # 6 200
-    "formats": 6_274,  # 6 900; cameras 300, solids 92
-    "cli": 5_058,  # 5 200; `run` of programs 97
+    "stream": 8_154,  # 6 200
+    "formats": 6_165,  # 6 900; cameras 300, solids 92
+    "cli": 4_973,  # 5 200; `run` of programs 97
     "ros": 838,  # with recordings 1 900
-    "recordings": 995,
-    "fit": 1_965,  # 2 200
-    "view": 1_799,  # 1 800; the report of compare 294
-    "explain": 877,  # 1 000
+    "recordings": 1_005,
+    "fit": 1_892,  # 2 200
+    "view": 1_788,  # 1 800; the report of compare 294
+    "explain": 865,  # 1 000
 }
-MOST_IN_ALL = 37_452  # the aim is 37 000
-MOST_FILES = 178
+MOST_IN_ALL = 36_754  # 37 000 were allowed; a feature pays for its lines with others
+MOST_FILES = 175
 MOST_OF_PAGES = 1_900
 
 
