@@ -400,7 +400,7 @@ class Command(WithHelp):
                     raise click.UsageError(f"{each.opts[-1]} appears twice; only one can be used", ctx)
                 passed[each.name] = each
         rest = super().parse_args(ctx, args)
-        ctx.meta[INPUTS] = Inputs(ctx.params, {at: each.opts[-1] for at, each in passed.items() if at not in OF_MESSAGES})
+        ctx.meta[INPUTS] = Inputs(ctx.params, {at: one.opts[-1] for at, one in passed.items() if at not in OF_MESSAGES})
         for option in passed.values():
             if others := [passed[other].opts[-1] for other in option.excludes if other in passed]:
                 raise click.UsageError(f"{option.opts[-1]} and {others[0]} exclude each other", ctx)
