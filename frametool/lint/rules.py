@@ -257,14 +257,14 @@ class Child(EdgeLog):
     """All data of one child frame, and the samples that violate a rule.
 
     newest: the last one
-    odd: by rule, the samples under another parent than the one before, at a known stamp, and after a later stamp
+    irregular: by rule, the samples under another parent than the one before, at a known stamp, and after a later stamp
     """
 
     def __init__(self, first: Statement, number: int) -> None:
         """Start before the first edge or sample; `number` counts all that were read."""
         super().__init__(first)
         self.first = self.newest = first
-        self.odd: dict[str, list[Statement]] = {}
+        self.irregular: dict[str, list[Statement]] = {}
         self.since = (number, first)  # the first with the newest parent
         self.static: Statement | None = None
         self.stamps: dict[int, tuple[int, int]] = {}  # stamp -> hash of the sample, its line
@@ -278,12 +278,12 @@ class Child(EdgeLog):
             fresh = (hash((seen.parent, seen.components)), seen.line)
             known = self.stamps.setdefault(seen.stamp_ns, fresh)
             if known is not fresh:
-                self.odd.setdefault("repeated" if known[0] == fresh[0] else "repeated-stamp", []).append(seen)
+                self.irregular.setdefault("repeated" if known[0] == fresh[0] else "repeated-stamp", []).append(seen)
             if self.last_ns is not None and seen.stamp_ns < self.last_ns:
-                self.odd.setdefault("backward", []).append(seen)
+                self.irregular.setdefault("backward", []).append(seen)
         if seen.parent != self.newest.parent:
             self.since = (number, seen)
-            self.odd.setdefault("reparented", []).append(seen)
+            self.irregular.setdefault("reparented", []).append(seen)
         elif seen.components != self.newest.components:
             self.other_pose = self.other_pose or seen
         self.newest = seen
@@ -329,7 +329,7 @@ def _child(child: Child) -> Iterator[Finding]:
         yield moving.broken(topology.static_and_moving(first.child, details))
     elif moves:
         yield from _moving(child, frame)
-    elif changes := child.odd.get("reparented"):
+    elif changes := child.irregular.get("reparented"):
         second = changes[0]
         yield second.broken(topology.two_parents(first.child, first.parent, second.parent, (_at(first), _at(second))))
     elif other := child.other_pose:
@@ -341,8 +341,8 @@ def _moving(child: Child, frame: str) -> Iterator[Finding]:
 
     Then those about pauses and distances between samples.
     """
-    for rule in filter(child.odd.get, ("reparented", "repeated", "repeated-stamp", "backward")):
-        samples = child.odd[rule]
+    for rule in filter(child.irregular.get, ("reparented", "repeated", "repeated-stamp", "backward")):
+        samples = child.irregular[rule]
         seen, stamp_ns = samples[0], samples[0].stamp_ns or 0
         stamp, parents = format_stamp(stamp_ns), " -> ".join(shown(each.parent) for each in (child.first, *samples[:3]))
         if rule == "reparented" and len(samples) >= FLICKER:

@@ -30,7 +30,10 @@ if TYPE_CHECKING:
 
 XYZ = ("x", "y", "z")
 POSITIONS = (XYZ, ("tx", "ty", "tz"), ("px", "py", "pz"))
-TURNED = ("rvec_", "qvec_", "quat_", "rot_", "rotvec_", "axis_", "mrp_", "euler_")  # x, y, z behind these: no position
+TURNED = (  # x, y and z behind these are no position
+    "rvec_", "qvec_", "quat_", "rot_", "euler_",
+    *(column[:-1] for row in ROTATIONS.values() for column in row.columns if column.endswith("_x")),
+)  # fmt: skip
 TELLING = ("position", "translation", "point", "vector")
 FORCES = ("fx", "fy", "fz")
 LETTERS = {

@@ -62,7 +62,7 @@ def test_files_may_be_called_as_the_system_allows(tmp_path: Path) -> None:
 def test_what_becomes_part_of_a_result_is_text() -> None:
     status, out, err = shell.run("invert", "--prefix", b"\xff", text=b"x,y,z,qx,qy,qz,qw\n1,2,3,0,0,0,1\n")
     assert (status, out) == (2, b"")
-    assert b"is not UTF-8 text" in err
+    assert b"cannot be written as UTF-8 text" in err
 
 
 def test_a_nul_ends_no_name(tmp_path: Path) -> None:
