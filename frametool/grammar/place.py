@@ -184,7 +184,7 @@ def coordinate(value: Any, field: str) -> float:
             raise
         if (match := DMS.fullmatch(value)) is None:
             marks = f"{shown(value)}: degrees, minutes and seconds need their marks: 48°08'14.5\"N"
-            is_several = len(re.findall(r"\d+(?:\.\d+)?", value)) > 1
+            is_several = len(re.findall(r"\d+(?:[.,]\d+)?", value)) > 1
             raise Misfit(marks if is_several else str(error), rule=error.rule) from None
     sign, degrees, minutes, seconds, letter = match.groups()
     parts = [float(part or 0.0) for part in (degrees, minutes, seconds)]

@@ -434,6 +434,7 @@ REFUSED: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {  # the senten
     "no marks": (
         "'48 08 14.5': degrees, minutes and seconds need their marks: 48°08'14.5\"N", {"lat": "48 08 14.5", "lon": 1, "alt": 1}, {},
     ),
+    "decimal comma": ("'48,137' has a decimal comma; write a point", {"lat": "48,137", "lon": 1, "alt": 1}, {}),
 }  # fmt: skip
 
 
@@ -451,7 +452,7 @@ def test_what_is_refused_is_refused_in_every_form(name: str, run: Callable[..., 
     done = [
         run("convert", json.dumps(record, ensure_ascii=False)),
         run("convert", stdin=json.dumps(record, ensure_ascii=False) + "\n"),
-        run("convert", stdin=table(",".join(place | beside), [(place | beside).values()])),
+        run("convert", stdin=table(",".join(place | beside), [(place | beside).values()], ";")),
         run("lookup", "a.yaml", "ecef", "a", files={"a.yaml": document}),
     ]
     for each, kind in zip(done, ("argument", "record", "table", "tree"), strict=True):
