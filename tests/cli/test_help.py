@@ -132,6 +132,11 @@ def test_the_cookbook_lists_its_questions_and_shows_those_with_a_word(run: Calla
     assert run("help", "cookbook", "kdl").status == 2
 
 
+def test_the_subject_of_streams_names_the_commands_that_read_rows(run: Callable[..., Any]) -> None:
+    named = re.split(r", | and ", " ".join(topic("streams").split("\n\n")[1].split()).partition(" read rows")[0])
+    assert sorted(named) == sorted(name for name in COMMANDS if "  -i, --input FILE" in run(name, "--help-all").out)
+
+
 def test_common_options_are_explained_in_one_place(run: Callable[..., Any]) -> None:
     text = run("help", "common").out
     shown = {option.name: option for words in WORDS for option in options_of(words)}
