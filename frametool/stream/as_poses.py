@@ -41,7 +41,7 @@ from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, BadRow, Fault, Outcome
 from frametool.stream.request import Request, RowOptions
 from frametool.stream.row_layout import POINT, POSE, Shape, Target
-from frametool.stream.rows import Block, RowPoses, kept, spans_of
+from frametool.stream.rows import NO_STAMP, Block, RowPoses, kept, spans_of
 from frametool.stream.table import PlannedRows, TableRows
 from frametool.stream.writers import LEARNED, RowsWriter, SingleWriter, TextWriter
 
@@ -284,7 +284,7 @@ def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
     fmt = FORMATS[file.format].rows
     if what := not_text(file.head()):
         raise FormatError(what, source=file.name)
-    request = Request(rows=RowOptions(normalize=options.normalize))
+    request = Request(rows=RowOptions(normalize=options.normalize, some_static=True))
     converter = FormatConverter(file.format, request, file.name, answers=options.answers)
     named, line, count = dict[int, str](), 0, 0
     for block, outcome in converter.steps(cast("ByteStream", file.stream)):
@@ -306,10 +306,18 @@ def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
             for row, name in enumerate(() if all(names) else names)
             if not name
         }
-        for fault in [*(each._replace(line=line + each.line) for each in outcome.faults), *nameless.values()]:
+        faults, parts = [each._replace(line=line + each.line) for each in outcome.faults], [block]
+        if block.stamps_ns is not None and (bare := block.stamps_ns == NO_STAMP).any():
+            static, moving = (kept(block, np.flatnonzero(each)) for each in (bare, ~bare))
+            parts = [static._replace(stamps_ns=None), moving]
+            if len(named) < 2:
+                column = rows.table.name(cast("int", rows.layout.time))
+                faults += [Fault(line + at, column, "no stamp") for at in parts.pop(0).lines.tolist()]
+        for fault in [*faults, *nameless.values()]:
             options.report(BadRow(fault, str(fault.reason), source=file.name))
-        if len(block.numbers):
-            yield _edges(block, line, fmt, options)
+        for part in parts:
+            if len(part.numbers):
+                yield _edges(part, line, fmt, options)
         line, count = line + outcome.lines, count + len(block.numbers)
     if len(named) < 2:
         describe(options, fmt, count)

@@ -363,6 +363,7 @@ class RowOptions(NamedTuple):
     degrees: whether bare angles are in degrees; normalize: take any non-zero quaternion
     columns: which columns are ours, one entry a pose; frames: columns that name a row's frame
     extra_column: the column or key of a stamp or weight that is read with the pose; "" is the usual stamp
+    some_static: the stamp of a row may be empty
     frame_is_counter: a decimal `frame` is a counter, because no frame is called so
     """
 
@@ -376,6 +377,7 @@ class RowOptions(NamedTuple):
     columns: tuple[str, ...] = ()
     frames: tuple[str, ...] = ()
     extra_column: str | None = None
+    some_static: bool = False
     frame_is_counter: bool = True
 
 

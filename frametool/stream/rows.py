@@ -283,6 +283,8 @@ def read_extra(cells: Sequence[Spans], request: Request, name: str) -> tuple[Any
     if not request.weighs:
         values, reasons = read_stamps(cells, in_ns=in_nanoseconds(name) if len(cells) == 1 else 0)
         values[[*reasons]] = NO_STAMP
+        if request.rows.some_static:
+            reasons = {row: reason for row, reason in reasons.items() if any(each.text(row).strip() for each in cells)}
     elif request.gathered is not None and request.gathered.by:
         return np.array(texts_of(cells[0]), object), {}
     else:
@@ -312,7 +314,7 @@ def read_stamps(cells: Sequence[Spans], *, in_ns: int) -> tuple[Ints, dict[int, 
 
 # --- what became of rows: poses for trees and for other formats; single results as such blocks and back ---
 
-NO_STAMP = np.iinfo(np.int64).min  # of a bad row that is kept
+NO_STAMP = np.iinfo(np.int64).min  # of a bad row that is kept, of a static one
 
 
 class RowPoses(NamedTuple):

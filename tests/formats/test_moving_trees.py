@@ -11,6 +11,12 @@ from frametool.errors import FormatError, FrametoolWarning, TooLate
 
 if TYPE_CHECKING:
     from pathlib import Path
+    from typing import Protocol
+
+    from conftest import Outcome
+
+    class Run(Protocol):
+        def __call__(self, *arguments: str, stdin: str = ..., files: dict[str, str] | None = None) -> Outcome: ...
 
 EPOCH = 1_700_000_000_123_456_789
 MOVING = """\
@@ -144,3 +150,16 @@ def test_a_sample_may_name_another_parent(tmp_path: Path) -> None:
 """
     buffer = loaded(tmp_path, text)
     assert [x_of(buffer, "w", "ball", at) for at in (0, 5, 10**9)] == [101.0, 101.0, 2.0]
+
+
+def test_a_row_of_a_table_without_a_stamp_is_static_beside_those_that_move(run: Run, tmp_path: Path) -> None:
+    text = run("tree", "m.yaml", "-f", "csv", files={"m.yaml": MOVING}).out
+    assert "lidar,base,1.0,0.0,0.0,0.0,0.0,0.0,1.0,\n" in text
+    assert run("diff", "m.yaml", "m.csv", files={"m.yaml": MOVING, "m.csv": text}).status == 0
+    table = tmp_path / "t.csv"
+    table.write_text("parent,name,t,x,y,z,yaw\nmap,base,1,0,0,0,0\nmap,base,,1,0,0,0\n")
+    with pytest.raises(FormatError, match=r"t\.csv:2: frame 'base' is both static and moving"):
+        load(table)
+    table.write_text("t,x,y,z,yaw\n1,0,0,0,0\n,0,0,0,0\n")
+    with pytest.raises(FormatError, match=r"t\.csv:3:t: no stamp"):
+        load(table)
