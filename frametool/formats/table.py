@@ -230,6 +230,7 @@ FORMATS = {
             ("line", r".*\bstatic_transform_publisher\s+[-\d.]|--[\w-]+[ =]"),
             # numbers and two names: poses of a trajectory are numbers only
             ("line", r"[-+]?[\d.]+\s(?:\S+\s+){5,6}(?!-?[\d.])\S+\s+\S+\s*\d*\s*&?$"),
+            ("last", r"(?m)^[^#\n]*\bstatic_transform_publisher\s+[-\d.]"),
         ),
     ),
     "bag1": _RECORDING._replace(

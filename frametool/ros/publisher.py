@@ -80,13 +80,21 @@ def write_tree(tree: Frames, style: Style) -> str:
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the pose that each line publishes; a line that ends in a backslash continues in the next."""
-    line = 1
+    """Yield the pose that each line publishes; a line that ends in a backslash continues in the next.
+
+    Other lines of a script that calls the tool are skipped and counted.
+    """
+    line, others, in_script = 1, dict[int, str](), CALL in file.text
     for call in re.findall(r"(?:[ \t]*#.*|(?:.*\\\n)*.*)(?:\n|\Z)", re.sub("\r\n?", "\n", file.text)):
-        is_call = call.strip() and not call.lstrip().startswith("#")
-        if is_call and (edge := read_edge(call, file, options, line)):
-            yield edge
+        if (bare := call.strip()) and not bare.startswith("#"):
+            if in_script and CALL not in bare and not re.match(r"[-+.\d]", bare):
+                others[line] = bare
+            elif edge := read_edge(call, file, options, line):
+                yield edge
         line += call.count("\n")
+    for line, text in [*others.items()][:1]:
+        many = "a line that publishes" if len(others) == 1 else f"{len(others)} lines that publish"
+        options.tally.note(f"{many} nothing skipped: {shown(text)}", line)
 
 
 def read_edge(

@@ -97,8 +97,8 @@ def test_calls_are_parted_by_any_line_end(begin: str, end: str, tmp_path: Path) 
     lines = [f"{begin}{at} 0 0 0 0 0 f{at} f{at + 1}" for at in range(3)]
     (tmp_path / "a").write_bytes(end.join([*lines, "", "# nothing", ""]).encode())
     assert load(tmp_path / "a", format="calls").frames == ("f0", "f1", "f2", "f3")
-    (tmp_path / "a").write_bytes(end.join([*lines, "oops"]).encode())
-    with pytest.raises(FormatError, match=r"a:4: static_transform_publisher takes .* found 1 words"):
+    (tmp_path / "a").write_bytes(end.join([*lines, "1 oops"]).encode())
+    with pytest.raises(FormatError, match=r"a:4: static_transform_publisher takes .* found 2 words"):
         load(tmp_path / "a", format="calls")
 
 
@@ -140,3 +140,23 @@ def test_the_end_of_a_line_behind_a_backslash_is_a_blank_wherever_a_call_is_past
     for command in (["static", call], ["convert", f"static_transform_publisher {call}"], ["lookup", "a.launch", "a", "b"]):
         found = run(*command, "-f", "json", files={"a.launch": node})
         assert '"xyz": [1.0, 2.0, 3.0]' in found.out, found.err
+
+
+def test_other_lines_of_a_script_are_skipped_and_counted(run: Callable[..., Outcome]) -> None:
+    script = """#!/bin/bash
+source /opt/ros/jazzy/setup.bash
+ros2 run tf2_ros static_transform_publisher --z 1 --frame-id a --child-frame-id b &
+rosrun tf static_transform_publisher 1 2 3 \\
+  0 0 0 b c 100 &
+wait
+"""
+    done = run("lookup", "rig", "a", "c", "-f", "json", files={"rig": script})
+    assert '"xyz": [1.0, 2.0, 4.0]' in done.out
+    assert done.err == "frametool: warning: rig:2: 2 lines that publish nothing skipped: 'source /opt/ros/jazzy/setup.bash'\n"
+    assert "no frames" not in run("static", "rig", files={"rig": script}).err
+
+
+def test_names_lose_one_slash_as_arguments_too(run: Callable[..., Outcome]) -> None:
+    done = run("static", "1", "2", "3", "0", "0", "0", "/a", "b", "-f", "json")
+    assert '"name": "b", "parent": "a"' in done.out
+    assert "frame '/a': the leading / is no part of a name" in done.err

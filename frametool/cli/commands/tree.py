@@ -98,9 +98,9 @@ def static_command(inputs: Inputs) -> None:
     reading = Reading(Source("arguments", ""), normalize=inputs.normalize)
     with misuse():
         pose = read_flags(flags, reading) if flags else read_positional(arguments, reading)
+    tree.add_components(reading.bare(pose.parent or ""), reading.bare(pose.name or ""), pose.components)
     for note in reading.notes:  # the flags are in radians
         warn(note.message.partition("; degrees?")[0])
-    tree.add_components(pose.parent or "", pose.name or "", pose.components)
     output.tree(tree)
 
 
