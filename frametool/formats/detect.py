@@ -68,7 +68,10 @@ class Beginning:
     @cached_property
     def first_line(self) -> str:
         """Return the first line that is not a comment; a comment with commas or tabs, like the rows, is a header."""
-        lines = [line.strip("\r") for line in self.text.split("\n") if line.strip()]
+        from frametool.ros.messages import is_noise
+
+        found = (line.strip("\r") for line in self.text.split("\n") if line.strip())
+        lines = [line for line in found if not is_noise(line)]
         plain = next((line for line in lines if not line.startswith("#")), "")
         if lines and re.match("#.*[,\t]", lines[0]) and (not plain or re.search("[,\t]", plain)):
             return lines[0]

@@ -304,7 +304,7 @@ _ODD_START = r"(?m)^(?=[A-Z\t\[\d$^\ufeff])"  # no key that ROS prints begins li
 
 
 def without_noise(text: str, line: int = 0, tally: Diagnostics | None = None) -> str:
-    """Blank the lines that are known not to be data, and record them; the others keep their numbers."""
+    """Blank the lines that are known not to be data, and record them; the others keep their places."""
     if re.search(_ODD_START, text) is None:
         return text
     kept = text.split("\n")
@@ -312,7 +312,7 @@ def without_noise(text: str, line: int = 0, tally: Diagnostics | None = None) ->
         if is_noise(each.rstrip("\r")):
             if tally is not None:
                 tally.noise.append((line + index, each.strip()))
-            kept[index] = "---" if each.endswith("---") else ""
+            kept[index] = " " * len(each.encode())
     return "\n".join(kept)
 
 

@@ -362,12 +362,13 @@ class RecordCutter:
         if not known.entries:
             return None
         template = Template(known)
-        if known.is_long:  # no expression is made of it
-            sizes = [len(template.text[start:end].encode()) for start, end in template.stretches]
-            ends = list(accumulate(sizes, initial=part.start))
-            return template, list(pairwise(ends))
-        self.templates = [*self.templates[-MOST_TEMPLATES + 1 :], template]
-        return self.match(text, part)
+        if not known.is_long:  # no expression is made of such
+            self.templates = [*self.templates[-MOST_TEMPLATES + 1 :], template]
+            if hit := self.match(text, part):
+                return hit
+        # long, or with lines between its own that tools print: blanks of that size are in the template's text
+        sizes = [len(template.text[start:end].encode()) for start, end in template.stretches]
+        return template, list(pairwise(accumulate(sizes, initial=part.start)))
 
 
 def _cut_by(template: Template, text: bytes, rest: list[tuple[int, int]], cuts: list[Cut]) -> list[tuple[int, int]]:

@@ -299,8 +299,6 @@ class Operation(NamedTuple):
         if not self.of:
             return result
         others = poses[1:] if self.fixed is None else (self.fixed,)
-        if not others:
-            raise ValueInvalid("cannot be compared with the one before: only whole messages can, without other lines")
         first, second = (*others, result) if self.of == "first" else (result, *others)
         result = rigid.relative_full(first, second)
         tx, ty, tz, x, y, z, w = result[:EXACT]

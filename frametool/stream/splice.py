@@ -20,7 +20,7 @@ from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream import row_layout
 from frametool.stream.faults import Fault
 from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ, outermost
-from frametool.stream.record_values import Answer, Entry, RecordText, json_documents, written
+from frametool.stream.record_values import Answer, Entry, Outside, RecordText, json_documents, written
 from frametool.stream.row_layout import POSE, SIX, Const, IfLocked, In, Out, Piece, Renamed, Word, count_of, number_text
 from frametool.text.lines import with_edits
 
@@ -374,6 +374,8 @@ def attempt(text: bytes, part: Part, line: int = 0, *, fmt: str, request: Reques
             from frametool.ros.messages import without_noise
 
             decoded = without_noise(decoded)
+            if request.results.canonical and not decoded.strip():
+                return Fault(line, "", Outside("printed between messages"))
         source = source._replace(text=decoded)
         found = RecordText(source, request, json=fmt == "json")
         edits, first = list[Edit](), 0

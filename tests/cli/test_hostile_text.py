@@ -105,7 +105,6 @@ IMU = {
     "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}, "angular_velocity": {"x": 0, "y": 0, "z": 0},
     "linear_acceleration": {"x": 0, "y": 0, "z": 9},
 }  # fmt: skip
-STAMPED = '{"header": {"frame_id": "a"}, "pose": {"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}}'
 ENTRIES = ",".join(f"c{row}{column}" for row in range(1, 7) for column in range(1, 7))
 
 
@@ -117,7 +116,6 @@ ENTRIES = ",".join(f"c{row}{column}" for row in range(1, 7) for column in range(
         (["mean", "-", "--by", "t"], '<origin xyz="1 2 3" rpy="0 0 1"/>\n', 1, "leave --by out"),
         (["invert", "--on-error", "null", "-f", "json"], f"x,y,z,qx,qy,qz,qw,{ENTRIES}\na\n", 3, "expected 43 cells, found 1"),
         (["resample", "hu.csv", "--every", "0.5m"], "", 1, "a place at 1e+308 m"),
-        (["relative", "--consecutive", "-f", "yaml"], f"WARNING: x\n{STAMPED}\n", 1, "cannot be compared with the one before"),
     ],
 )  # fmt: skip
 def test_what_nobody_expects_is_refused_in_one_line(run: Callable[..., Outcome], arguments: list[str], stdin: str, status: int, words: str) -> None:

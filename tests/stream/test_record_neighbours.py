@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from typing import Any
 
 
 RECORDS = {
@@ -127,3 +128,26 @@ def test_a_comma_that_is_missing_is_a_fault_of_the_record_behind_it(text: str) -
     found = flow(text.encode(), MOVE._replace(on_error="skip"), "json")
     assert (found.status, len(json.loads(found.text))) == (3, 2)
     assert "a comma is missing" in found.told[0]
+
+
+PRINTED = [
+    f"header:\n  stamp: {{sec: {at}, nanosec: 0}}\n  frame_id: odom\npose:\n  position: {{x: {at}.0, y: 2.0, z: 3.0}}\n"
+    f"  orientation: {{x: 0.0, y: 0.0, z: {at * 0.25}, w: {(1 - at * at / 16) ** 0.5}}}\n---\n" for at in range(4)
+]  # fmt: skip
+WARNING = "[WARN] [1700000000.1] [echo]: zu spät\n"
+LOSS = "A message was lost!!!\n\ttotal count change:1\n\ttotal count: 1---\n"
+
+
+@pytest.mark.parametrize("noise", [WARNING, LOSS, "$ ros2 topic echo /pose\n", "^C\n"])
+@pytest.mark.parametrize("command", [
+    "mean -f json", "relative --first -f csv", "relative --consecutive -f json", "convert --to rpy --unwrap -f csv", "convert -f csv", "convert -f tum", "calc -e d=norm(trans(row)) -f csv",
+])  # fmt: skip
+def test_what_tools_print_between_messages_changes_no_result(command: str, noise: str, run: Callable[..., Any]) -> None:
+    first, second, *others = PRINTED
+    wanted = run(*command.split(), stdin="".join(PRINTED))
+    assert wanted.status == 0
+    texts = [noise + first + second, first + noise + second, noise + first + second + noise]
+    texts += [first + second.replace("pose:", f"{WARNING}pose:")]
+    for text in texts:
+        done = run(*command.split(), stdin=text + "".join(others))
+        assert (done.status, done.out) == (0, wanted.out), text
