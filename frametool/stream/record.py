@@ -362,11 +362,12 @@ def _only_asked(value: dict[str, Any], path: Path, request: Request) -> Record:
     from frametool.ros import messages
 
     record, header = Record(path, Shape("", None)), value.get("header")
+    ours = {*POSITION_KEYS, *ROTATION_KEYS}.difference(key for key in STAMP_KEYS if type(value.get(key)) is not list)
     if messages.is_joint_state(value):
         record = record._replace(keys=RecordKeys(members=tuple(key for key in messages.STATE_LISTS if key in value)))
         if type(header) is dict:
             record = record._replace(parent=_named(header, ("frame_id",), (*path, "header"), Name(), request))
-    elif there := next((key for key in value if key in (*POSITION_KEYS, *ROTATION_KEYS)), None):
+    elif there := next((key for key in value if key in ours), None):
         raise Misfit(f"key {shown(there)} is there already, where the result would stand", (*path, there), key=True)
     elif request.operation.shown is None:
         return record

@@ -166,6 +166,13 @@ def test_columns_that_are_there_are_not_written_again(run: Run) -> None:
     assert "key 'xyz' is there already" in run(*FK, stdin=json.dumps({**dict.fromkeys(JOINTS, 0), "xyz": [1, 2, 3]})).err
 
 
+def test_a_time_called_t_is_that_of_the_pose(run: Run) -> None:
+    line = json.dumps({"t": 1.5, **dict.fromkeys(JOINTS, 0)})
+    assert json.loads(run(*FK, stdin=line).out)["t"] == 1.5
+    assert run(*FK, "-f", "tum", "--quiet", stdin=line).out.startswith("1.500000000 ")
+    assert "key 't' is there already" in run(*FK, stdin=line.replace("1.5", "[1, 2, 3]")).err
+
+
 @pytest.mark.parametrize("policy", ["skip", "null"])
 def test_bad_rows_are_skipped_or_emptied_and_counted(policy: str, run: Run) -> None:
     done = run(*FK, "--on-error", policy, "--quiet", stdin=table().replace("0.5", "nan"))
