@@ -305,7 +305,7 @@ def option(spec: str, about: str, kind: Any = None, name: str = "", **more: Any)
     taken = " ".join(words[len(names) :])
     kind = kind or OPTIONAL.get(names[-1])
     if taken or kind:
-        more["type"] = _kind(kind or (FILE if taken == "FILE" else TEXT))
+        more["type"] = _kind(kind or (FILE if "FILE" in taken or taken == "TREE" else TEXT))
     else:
         more["is_flag"] = True
     shows = "[default" not in about and more.get("default") not in (None, (), "")

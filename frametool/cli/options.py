@@ -138,7 +138,7 @@ COLUMN = Text(offers=_offer_columns)
 def tree_on_the_line(ctx: click.Context) -> str | None:
     """Return the first file of frames; behind an option click has not come to the arguments."""
     named = ctx.params.get("files") or ctx.params.get("arguments") or ctx.args
-    return ctx.params.get("tree") or next(iter(named), None)
+    return ctx.params.get("tree") or ctx.params.get("recording") or next(iter(named), None)
 
 
 def _offer_joints(ctx: click.Context, incomplete: str) -> Mapping[str, str]:

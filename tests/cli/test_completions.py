@@ -75,6 +75,7 @@ def answered(run: Callable[..., Any], folder: Path, monkeypatch: pytest.MonkeyPa
         ("mean -i a.csv --weights z", ["z"]),
         ("lookup tree.yaml ", ["base", "my frame", "arm:left", "arm:right", "tool=x", "$c*"]),
         ("lookup tree.yaml base arm:l", ["arm:left"]),
+        ("monitor tree.yaml base arm:l", ["arm:left"]),
         ("lookup ~/tree.yaml 'my f", ["my frame"]),
         ("lookup tree.yaml my\\ f", ["my frame"]),
         ("compose '{xyz: [1, 2, 3]}' --outp", ["--output"]),
@@ -97,6 +98,15 @@ def test_words_are_offered_from_what_there_is(words: str, offered: list[str], an
 
 def test_a_name_of_a_file_is_left_to_the_shell(answered: Callable[[str], list[list[str]]]) -> None:
     assert [answered(f"frametool {words}") for words in ("lookup tr", "convert -o ", "convert --output=x")] == [[["file", "tr", ""]], [["file", "", ""]], [["file", "--output=x", ""]]]
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["monitor", "compare", "compare a", "align a", "resample", "static", "mean", "compose a", "convert",
+     "invert", "relative a", "solve", "record", "sim follow --leader", "solve a --fix"],
+)  # fmt: skip
+def test_files_are_completed_wherever_one_may_be(words: str, answered: Callable[[str], list[list[str]]]) -> None:
+    assert answered(f"frametool {words} tr") == [["file", "tr", ""]]
 
 
 def test_a_command_is_offered_with_what_it_does(answered: Callable[[str], list[list[str]]]) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from frametool.cli import options, poses
-from frametool.cli.command import Inputs, argument, command_named, misuse, option, refuse
+from frametool.cli.command import FILE, Inputs, argument, command_named, misuse, option, refuse
 from frametool.cli.output import Output
 from frametool.cli.sink import say, say_first
 from frametool.cli.streaming import EXPLAIN, Task, one_argument, pose_stream_options
@@ -22,7 +22,7 @@ from frametool.text.numbers import parse_fractions, parse_number
 
 
 @command_named("compose")
-@argument("poses", nargs=-1, required=True, metavar="POSE POSE ..")
+@argument("poses", FILE, nargs=-1, required=True, metavar="POSE POSE ..")
 @pose_stream_options
 @options.pose_result_options("poses")
 @options.scale_option
@@ -59,7 +59,7 @@ def compose_command(inputs: Inputs) -> int:
 
 
 @command_named("invert")
-@argument("pose", default="-")
+@argument("pose", FILE, default="-")
 @pose_stream_options
 @options.pose_result_options("poses")
 @options.scale_option
@@ -82,8 +82,8 @@ def invert_command(inputs: Inputs) -> int:
 
 
 @command_named("relative")
-@argument("a", required=False)
-@argument("b", required=False)
+@argument("a", FILE, required=False)
+@argument("b", FILE, required=False)
 @pose_stream_options
 @options.pose_result_options("poses")
 @option("--consecutive", "of a stream, each row relative to the row before it", excludes=("first", "explain"))
@@ -141,8 +141,8 @@ def relative_command(inputs: Inputs) -> int:
 
 
 @command_named("interpolate", own=("notations",))
-@argument("a")
-@argument("b")
+@argument("a", FILE)
+@argument("b", FILE)
 @argument("fractions", parse_fractions, nargs=-1, required=True, metavar="FRACTION..")
 @options.pose_result_options("poses")
 @EXPLAIN
@@ -171,7 +171,7 @@ def interpolate_command(inputs: Inputs) -> int:
 
 
 @command_named("mean")
-@argument("poses", nargs=-1, metavar="[POSE.. | FILE]")
+@argument("poses", FILE, nargs=-1, metavar="[POSE.. | FILE]")
 @option("--weights NAME | W,W,..", "column or key with weights, or the weights of the POSEs", options.COLUMN)
 @option("--by NAME", "one mean per value of this column or key", options.COLUMN, excludes=("weights",))
 @option("--robust", "reject outliers, and list them")

@@ -187,8 +187,8 @@ YEAR_S = 31_557_600
 
 
 @command_named("monitor")
-@argument("recording")
-@argument("frames", nargs=-1, metavar="[TARGET SOURCE]")
+@argument("recording", FILE)
+@argument("frames", FRAME, nargs=-1, metavar="[TARGET SOURCE]")
 @option("--with FILE", "read this file too; may be repeated", name="more", multiple=True, under="Files")
 @options.offset_option
 @options.file_options

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli import options, poses
-from frametool.cli.command import Inputs, argument, command_named, option, refuse, refuse_two_readers, together
+from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, refuse_two_readers, together
 from frametool.cli.output import Output
 from frametool.cli.sink import refuse_existing, say, say_error, writing
 from frametool.cli.trees import answers, load_tree
@@ -95,8 +95,8 @@ EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 5 file; -
 
 
 @command_named("compare", epilog=EXIT_CODES)
-@argument("ref")
-@argument("est", nargs=-1, required=True, metavar="EST..")
+@argument("ref", FILE)
+@argument("est", FILE, nargs=-1, required=True, metavar="EST..")
 @pairing_options
 @option("--delta 1m,5deg,..", "of rpe, also s, deg, frames  [default: 1m,10m,100m]",
         lambda text: tuple(map(read_delta, text.split(","))), name="deltas")  # fmt: skip
@@ -183,8 +183,8 @@ def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], ro
 
 
 @command_named("align")
-@argument("ref")
-@argument("est")
+@argument("ref", FILE)
+@argument("est", FILE)
 @pairing_options
 @option("--names REF,EST", "names of the two worlds  [default: their own]", partial(options.read_names, spec="REF,EST"))
 @trajectory_options
@@ -218,7 +218,7 @@ def align_command(inputs: Inputs) -> int:
 
 
 @command_named("resample")
-@argument("path", metavar="TRAJ")
+@argument("path", FILE, metavar="TRAJ")
 @option("--rate HZ", "poses per second, from the first on", options.read_rate)
 @option("--at FILE|TIMES", "at the timestamps of a file; T,T,.., START:STOP:STEP", name="times")
 @option("--every 1m|5deg", "at even steps of distance or rotation", lambda text: read_delta(text, "m", "deg"))

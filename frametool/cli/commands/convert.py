@@ -7,7 +7,7 @@ from math import radians
 from typing import TYPE_CHECKING, Any
 
 from frametool.cli import options, poses
-from frametool.cli.command import Inputs, argument, command_named, misuse, option, refuse
+from frametool.cli.command import FILE, Inputs, argument, command_named, misuse, option, refuse
 from frametool.cli.output import QUATERNION, Output
 from frametool.cli.sink import say
 from frametool.cli.streaming import EXPLAIN, ONE_RECORD, Task, one_argument, pose_stream_options
@@ -31,7 +31,7 @@ _REPRESENTATIONS = f"Representations: {', '.join(row.spelling for row in REPRESE
 
 @command_named("convert", own=("from_rep", "notations"),
     lists=lambda formatter, _everything: formatter.write_text(_REPRESENTATIONS))  # fmt: skip
-@argument("values", nargs=-1, metavar="[VALUES.. | POSE]")
+@argument("values", FILE, nargs=-1, metavar="[VALUES.. | POSE]")
 @option("--axes NAME", "the pose at the same place in these axes (help axes)", options.AXIS)
 @option("--world-axes A_from_B", "axes of the reference frame (help axes)", options.AXIS, name="world")
 @option("--all-axes A_from_B", "axes of both: unity_from_ros, or x,-y,-z", options.AXIS, excludes=("axes", "world"))

@@ -63,7 +63,7 @@ ABOUT = "as static_transform_publisher has it"
 
 
 @command_named("static")
-@argument("arguments", nargs=-1, metavar="[TREE | X Y Z .. PARENT CHILD]")
+@argument("arguments", FILE, nargs=-1, metavar="[TREE | X Y Z .. PARENT CHILD]")
 @together(*(option(f"--{name} {'FRAME' if name.endswith('id') else 'N'}", ABOUT) for name in FLAGS))
 @options.reading_options
 @options.pose_result_options("tree")
