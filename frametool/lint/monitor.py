@@ -145,7 +145,8 @@ def _apart(poses: Array, under: Indices, by: int) -> Array:
 
     from frametool.geometry import arrays
 
-    found = rigid.distance(*poses[:, :-by], *poses[:, by:], arrays)  # type: ignore[call-arg]
+    with np.errstate(all="ignore"):  # steps between places of 1e308 m overflow
+        found = rigid.distance(*poses[:, :-by], *poses[:, by:], arrays)  # type: ignore[call-arg]
     return np.where(under[:-by] == under[by:], found, 0.0)
 
 

@@ -21,9 +21,8 @@ import numpy as np
 
 from frametool.errors import FormatError, Unanswered, ValueInvalid, first_of, listing, shown
 from frametool.frames.stamps import BILLION
-from frametool.grammar.edges import Diagnostics
 from frametool.recordings.read import Channel, MessageTypes, Recorded, RecordingReader, opened_recording
-from frametool.ros.message_stream import edge_columns, unit_components
+from frametool.ros.message_stream import edge_columns
 from frametool.ros.messages import PATH, POSES, STAMPS, body_of, stamp_problem
 from frametool.text.lines import Pieces
 from frametool.text.spans import MARGIN, Spans, framed, join
@@ -36,7 +35,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import EdgeColumns, Options
+    from frametool.grammar.edges import Answers, Diagnostics, EdgeColumns, Options
 
 
 CLOUD, POSE_ARRAY = "sensor_msgs/msg/PointCloud2", "geometry_msgs/msg/PoseArray"
@@ -435,40 +434,43 @@ def _channels(reader: RecordingReader, options: Options) -> list[Channel]:
 
 
 def recorded_edges(reader: RecordingReader, channels: Sequence[Channel], options: Options) -> Iterator[EdgeColumns]:
-    """Yield the edges of the messages on some channels; raises FormatError if there are none, or one is broken."""
+    """Yield the edges of the messages on some channels; raises FormatError if one is broken."""
+    for rows in raw_transforms(reader, channels, options.answers):
+        for is_static, part in groupby(rows, lambda row: row[2].channel.is_static):
+            for columns in _columns([*part], reader.path, options):
+                yield columns._replace(stamps_ns=[None] * len(columns.lines)) if is_static else columns
+
+
+def raw_transforms(
+    reader: RecordingReader, channels: Sequence[Channel], answers: Answers
+) -> Iterator[list[tuple[RawTransform, int, Recorded]]]:
+    """Yield the transforms and poses of the messages on some channels, many together, each with its message.
+
+    Messages are numbered from 1; those of equal layout are read at once.
+    """
     number = 0
-    for stretch in reader.blocks(channels):
-        for is_static, part in groupby(stretch, lambda each: each.channel.is_static):
-            messages = [*part]
-            found = zip(_contents(reader, messages, number, options), messages, strict=True)
-            if rows := [(each, at, sent) for at, (some, sent) in enumerate(found, number + 1) for each in some]:
-                for columns in _columns(rows, reader.path, options):
-                    yield columns._replace(stamps_ns=[None] * len(columns.lines)) if is_static else columns
-            number += len(messages)
-    if not number:
-        raise FormatError(f"no messages on {', '.join(each.topic for each in channels)}", source=reader.path)
+    for messages in reader.blocks(channels):
+        found: dict[int, list[RawTransform]] = {}
+        for at, layout, values in alike(reader.types, messages):
+            known = _transforms(reader, messages[at[0]]._replace(data=layout.sample), 0, answers)
+            if known and values.shape[1] in (9 * len(known), 10 * len(known)):  # ROS 1 counts its headers
+                numbers = np.vstack([layout.values([layout.sample])[0], values])
+                own, *rows = numbers.reshape(len(numbers), len(known), -1)[:, :, -9:].tolist()
+                if own == [[*each.stamp, *each.numbers] for each in known]:
+                    for place, row in zip(at, rows, strict=True):
+                        found[place] = [
+                            RawTransform(each.parent, each.child, tuple(numbers), (int(second), int(part)))
+                            for each, (second, part, *numbers) in zip(known, row, strict=True)
+                        ]
+        yield [
+            (each, number + at, sent)
+            for at, sent in enumerate(messages, 1)
+            for each in found.get(at - 1) or _transforms(reader, sent, number + at, answers)
+        ]
+        number += len(messages)
 
 
-def _contents(
-    reader: RecordingReader, messages: Sequence[Recorded], number: int, options: Options
-) -> list[list[RawTransform]]:
-    """Return the transforms or the pose in each message, of equal layout at once; `number` of them before."""
-    found: dict[int, list[RawTransform]] = {}
-    for at, layout, values in alike(reader.types, messages):
-        known = _transforms(reader, messages[at[0]]._replace(data=layout.sample), 0, options)
-        if known and values.shape[1] in (9 * len(known), 10 * len(known)):  # ROS 1 counts its headers
-            numbers = np.vstack([layout.values([layout.sample])[0], values])
-            own, *rows = numbers.reshape(len(numbers), len(known), -1)[:, :, -9:].tolist()
-            if own == [[*each.stamp, *each.numbers] for each in known]:
-                for place, row in zip(at, rows, strict=True):
-                    found[place] = [
-                        RawTransform(each.parent, each.child, tuple(numbers), (int(second), int(part)))
-                        for each, (second, part, *numbers) in zip(known, row, strict=True)
-                    ]
-    return [found.get(at) or _transforms(reader, each, number + at + 1, options) for at, each in enumerate(messages)]
-
-
-def _transforms(reader: RecordingReader, message: Recorded, number: int, options: Options) -> list[RawTransform]:
+def _transforms(reader: RecordingReader, message: Recorded, number: int, answers: Answers) -> list[RawTransform]:
     """Return the transforms in a message, or the pose; raises FormatError for invalid bytes."""
     channel = message.channel
     try:
@@ -476,7 +478,7 @@ def _transforms(reader: RecordingReader, message: Recorded, number: int, options
     except ValueInvalid as error:
         raise FormatError(f"message {number} on {channel.topic}: {error}", source=reader.path) from None
     parts = posed_messages(found, channel.type) if channel.type in POSES else found.transforms
-    return [RawTransform.of(each, body_of(channel.topic, options.answers)) for each in parts]
+    return [RawTransform.of(each, body_of(channel.topic, answers)) for each in parts]
 
 
 def _columns(
@@ -491,18 +493,19 @@ def _columns(
     bare = {name: options.tally.names.bare(name) for name in dict.fromkeys(chain(*names))}
     parents, children = ([*map(bare.__getitem__, each)] for each in names)
     topics = [each.channel.topic for each in sent]
-    found = edge_columns(
-        (parents, children), zip(*stamps, strict=True), numbers, lines, options.tally, normalize=options.normalize,
-        topics=topics, received_ns=[each.log_ns for each in sent],
-    )  # fmt: skip
-    if found is None:
-        apart = options._replace(tally=Diagnostics())  # those before it are noted when they are read again
-        problems = (_problem(said, number, bare, path, apart) for said, number, _ in rows)
-        at, refused = next((at, each) for at, each in enumerate(problems) if each)
-        if at:
-            yield from _columns(rows[:at], path, options)
-        options.topics.takes(topics[at])
-        raise refused
+    try:
+        found = edge_columns(
+            (parents, children), zip(*stamps, strict=True), numbers, lines, options.tally, normalize=options.normalize,
+            topics=topics, received_ns=[each.log_ns for each in sent],
+        )  # fmt: skip
+    except ValueInvalid as error:
+        if half := len(rows) // 2:
+            yield from _columns(rows[:half], path, options)
+            yield from _columns(rows[half:], path, options)
+            return
+        options.topics.takes(topics[0])
+        what = f"message {lines[0]}: {shown(parents[0])} -> {shown(children[0])}: {error}"
+        raise FormatError(what, source=path, rule=error.rule) from None
     options.topics.counts.update(Counter(topics) + Counter(options.topics.counts))
     pairs = [*zip(topics, children, strict=True)]
     for pair in dict.fromkeys(pairs):
@@ -510,19 +513,3 @@ def _columns(
             line = lines[pairs.index(pair)]
             options.report(FormatError(problem, source=path, line=line, column=1, rule="two-topics"))
     yield found
-
-
-def _problem(
-    said: RawTransform, number: int, bare: dict[str, str], path: str, options: Options
-) -> FormatError | None:  # fmt: skip
-    """Return the error for an invalid transform in a message; bare: its names without a leading `/`."""
-    parent, child = bare[said.parent], bare[said.child]
-    try:
-        problem = stamp_problem(*said.stamp, STAMPS[0]) if parent and child else ValueInvalid("an empty frame name")
-        unit_components(said.numbers, number, options.tally, options.normalize)
-    except ValueInvalid as error:
-        problem = problem or error
-    if problem is None:
-        return None
-    what = f"message {number}: {shown(parent)} -> {shown(child)}: {problem}"
-    return FormatError(what, source=path, rule=problem.rule)

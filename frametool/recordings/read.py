@@ -220,7 +220,7 @@ def _in_order(chunks: Iterable[list[Recorded]]) -> Iterator[list[Recorded]]:
 class DatabaseFile:
     """A sqlite3 file of rosbag2; the contents of its tables depend on its version."""
 
-    head, compression, stated, total = None, "", None, None
+    head, compression, stated, total, others = None, "", None, None, tuple  # there are no others
 
     def __init__(self, path: Path, opened: ExitStack, _tally: Diagnostics) -> None:
         """Let sqlite3 check its pages, because rows on a broken one would be missing silently, and read its topics."""
@@ -258,7 +258,7 @@ class DatabaseFile:
 class Bag1File:
     """A ROS 1 bag; chunks are read whole, so that the index of their messages is not."""
 
-    head, compression = None, ""
+    head, compression, others = None, "", tuple  # there are no others
 
     def __init__(self, path: Path, opened: ExitStack, _tally: Diagnostics) -> None:
         """Read what the end of the file says of its connections and chunks."""

@@ -159,6 +159,7 @@ class RecordingFile:
         self.format, self.log_ns = fmt, 0
         self.counts: dict[Channel, int] = {}
         self.span: tuple[int, int] | None = None  # of log times
+        self._itself: dict[str, Any] | None = None  # the metadata of rosbag2 in the source of a copy
         self._folder = folder
         self._numbers: dict[Any, Any] = {}  # of schemas and channels, or connections
         with room_in(folder):
@@ -227,23 +228,25 @@ class RecordingFile:
 
     def add_other(self, other: Any) -> None:
         """Write an attachment or metadata, a record of mcap; rosbag2's metadata about the file itself are replaced."""
-        if hasattr(other, "metadata"):
-            self._writer.add_metadata(other.name, other.metadata)
-        else:
+        if not hasattr(other, "metadata"):
             self._writer.add_attachment(other.create_time, other.log_time, other.name, other.media_type, other.data)
+        elif other.name == read.ITSELF:
+            self._itself = read.read_metadata(other.metadata.get(read.SERIALIZED, ""), other.name)
+        else:
+            self._writer.add_metadata(other.name, other.metadata)
 
-    def pieces(self, before: dict[str, Any] | None = None, *, itself: bool = True) -> Iterator[bytes]:
+    def pieces(self, before: dict[str, Any] | None = None) -> Iterator[bytes]:
         """Finish the recording and yield its bytes; for a folder file after file, each starting with a FirstPiece.
 
-        before: the metadata of the source of a copy; itself: whether MCAP contains rosbag2's metadata about a file
+        before: the metadata of the source of a copy, which has those about the file itself if its source had
         """
         metadata: dict[str, Any] = {}
         with room_in(self._folder):
             if self.format == BAG1:
                 self._writer.close()
             else:
-                metadata = self._metadata(before or {})
-                if itself or self.format == BAG2:
+                metadata = self._metadata(self._itself or before or {})
+                if before is None or self._itself is not None or self.format == BAG2:
                     self._writer.add_metadata(read.ITSELF, {read.SERIALIZED: dump_yaml(metadata)})
                 self._writer.finish()
                 self._stream.close()

@@ -379,27 +379,32 @@ def plain_columns(text: str, line: int, tally: Diagnostics, *, normalize: bool =
     if opened.re.groups:
         named = (str(found[gap][1] or "")[1:-1] for gap in gaps)  # type: ignore[index]
         topics = accumulate(named, lambda before, topic: topic or before, initial=opened[1][1:-1])
-    return edge_columns((parents, children), stamps, rows, lines, tally, normalize=normalize, topics=topics)
+    try:
+        return edge_columns((parents, children), stamps, rows, lines, tally, normalize=normalize, topics=topics)
+    except ValueError:  # of what is refused, or no numbers
+        return None
 
 
 def edge_columns(
     names: tuple[Sequence[str], Sequence[str]], stamps: Iterable[Sequence[int]], rows: Iterable[Rigid],
     lines: Sequence[int], tally: Diagnostics, *, normalize: bool, topics: Iterable[str] = (),
     received_ns: Iterable[int] = (),
-) -> EdgeColumns | None:  # fmt: skip
-    """Return edges with unit quaternions; None, and no warnings about numbers, if one of them is refused.
+) -> EdgeColumns:  # fmt: skip
+    """Return edges with unit quaternions; raises ValueInvalid, with no warnings about numbers, if one is refused.
 
     names: of parents and of children; stamps: seconds and nanoseconds; rows: components as they were read
     """
     seconds, nanoseconds = stamps
-    if stamp_problem(max(seconds), max(nanoseconds), STAMPS[0]) or not all(map(all, names)):  # none is below its range
-        return None
+    if not all(map(all, names)):
+        raise ValueInvalid("an empty frame name")
+    if problem := stamp_problem(max(seconds), max(nanoseconds), STAMPS[0]):  # none is below its range
+        raise problem
     rough = len(tally.rough)
     try:
         components = [unit_components(row, line, tally, normalize) for row, line in zip(rows, lines, strict=True)]
-    except ValueError:  # of numbers that are refused, or no numbers
+    except ValueError:
         del tally.rough[rough:]
-        return None
+        raise
     stamps_ns = [second * BILLION + part for second, part in zip(seconds, nanoseconds, strict=True)]
     return EdgeColumns(*names, stamps_ns, components, lines, topics, received_ns)
 

@@ -168,7 +168,7 @@ def test_transforms_that_are_not_read_are_not_passed_over(run: Run, tmp_path: Pa
         by_hand.message(1, bytes(4), START, START),
     )  # fmt: skip
     for data, said in (
-        (other, "/tf holds foxglove.FrameTransform: no transforms of recordings"), (old, "messages of ROS 1 in MCAP are only copied, not read"),
+        (other, "/tf holds foxglove.FrameTransform in protobuf, which is only copied, not read"), (old, "/a holds std_msgs/msg/Int32 in ros1, which is only copied, not read"),
     ):  # fmt: skip
         done = run("record", "run.mcap", "--with", TREE, "-o", "new.mcap", files={"run.mcap": data})
         assert (done.status, done.err.splitlines()[-1]) == (1, f"frametool: run.mcap: {said}")

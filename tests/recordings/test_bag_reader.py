@@ -193,3 +193,13 @@ def test_what_comes_before_a_bad_transform_is_checked_too(tmp_path: Path, run: R
     path = write(tmp_path / "bad", "mcap", sent[2:])
     found = run("check", str(path), "--topic", "/tf")
     assert found.err == "frametool: 1 error, 1 note\n"
+
+
+@pytest.mark.filterwarnings("error")
+def test_steps_that_overflow_are_told_in_words_alone(tmp_path: Path, run: Run) -> None:
+    made, far = Maker("mcap"), [(sign * 1e308, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0) for sign in (1, -1, 1, -1, 1)]
+    sent = [Sent("/tf", *made.transforms(("map", "base", each, START + at)), START + at) for at, each in enumerate(far)]
+    path = str(write(tmp_path / "run", "mcap", [*sent, Sent("/pose", *made.pose("map", START + 1, STILL), START + 1)]))
+    assert "base: goes back and forth by inf m and 0 rad" in run("check", path).out
+    assert run("monitor", path).err == "frametool: inf is not finite and cannot be written\n"
+    assert run("apply", path, "base", "-i", path, "--topic", "/pose").status == 0

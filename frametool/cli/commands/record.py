@@ -65,7 +65,7 @@ def record_command(inputs: Inputs) -> int:
     An MCAP file or ROS 2 bag becomes MCAP (-o NEW.mcap) or a folder (-f bag2 -o FOLDER), a ROS 1 bag one (-o NEW.bag).
     """
     from frametool.recordings.read import opened_recording
-    from frametool.stream.record_run import RecordRequest, RecordRun
+    from frametool.stream.record_run import RecordRun
 
     more, into, normalize = inputs.more, inputs.into, inputs.peek("normalize")
     are_transforms = all(topic.rpartition("/")[2] in TRANSFORMS for topic in inputs.peek("moved_topics"))
@@ -93,17 +93,15 @@ def record_command(inputs: Inputs) -> int:
     inputs.ask(*["normalize"] * bool(more or into))
     on_error = inputs.on_error if into else STOP
     bad = BadRows(path, on_error, tell=lambda error: say_error(error, in_json=False), counted="message")
-    request = RecordRequest(bad, edges, inputs.replace, without_slash(into or ""), topics, inputs.between, normalize)
+    request = (edges, inputs.replace, without_slash(into or ""), topics, inputs.between, normalize)
     quiet, force = inputs.quiet, inputs.force
     inputs.refuse_idle()
     with writing(place, force=force, folder=is_folder(copy)) as write, opened_recording(path, tally) as opened:
-        run = RecordRun(opened, request)
+        run = RecordRun(opened, bad, *request)
         with progress_bar(None, quiet=quiet, counted="messages") as advance:
-            run.look(advance)
             for piece in run.pieces(copy, folder_of(place), advance):
                 write(piece)
-    moved = run.mover.tally.findings() if run.mover else ()
-    for remark in (*tally.findings(), *moved):
+    for remark in (*tally.findings(), *run.tally.findings()):
         warn(f"{path}: {remark.message}", rule=remark.rule)
     inputs.note(*(f"{path}: {sentence}" for sentence in run.summary()))
-    return bad.finish(sum(run.moved.values()))
+    return bad.finish(run.moved.total())
