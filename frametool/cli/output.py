@@ -220,8 +220,9 @@ class Output:
             self.style = self.style.changed(format="text")
         if tree.drawn and self.style.format != "text":
             raise ValueInvalid(f"{tree.name} has no poses to write as {self.style.format}; -f text shows its frames")
-        if tree.covariances and self.style.format not in ("yaml", "json", "text"):
-            warn(f"{self.style.format}: covariances left out")
+        for what, held in (("covariances", tree.covariances), ("intrinsics of cameras", tree.cameras)):
+            if held and self.style.format not in ("yaml", "json", "text"):
+                warn(f"{self.style.format}: {what} left out")
         if table.is_recording(self.style.format):
             self.pieces(self._module("").tree_pieces(tree, self.style))
             return

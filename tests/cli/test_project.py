@@ -63,6 +63,14 @@ def test_trees_bring_their_cameras(run: Run, name: str) -> None:
     check(done.out, tree["pixels"])
 
 
+@pytest.mark.parametrize("form", ["yaml", "json", "text", "csv", "urdf"])
+def test_a_tree_in_a_format_without_cameras_says_what_it_leaves_out(run: Run, form: str) -> None:
+    tree = "frames: [{name: c, parent: b, xyz: [1, 2, 3], camera: {K: [500, 500, 320, 240]}}]"
+    done = run("tree", "-", "-f", form, stdin=tree)
+    assert ("500" in done.out) == (form in ("yaml", "json"))
+    assert (f"warning: {form}: intrinsics of cameras left out\n" in done.err) == (form in ("csv", "urdf"))
+
+
 def test_a_size_may_be_given_for_the_camera_of_a_tree(run: Run) -> None:
     files = {"bare.json": FORMS["transforms.json camera_angle_x, --size"]["files"]["bare.json"]}
     assert "needs --size W,H" in run("project", "bare.json", "camera", "world", "1", "2", "3", files=files).err
