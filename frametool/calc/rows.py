@@ -11,6 +11,8 @@ from __future__ import annotations
 from copy import copy
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from frametool.calc.evaluate import AXES, PLACED, Scope, evaluate_line, literal, term_of_pose
 from frametool.calc.functions import ANGLES, LIST, NUMBER, POINT, POSE, VECTOR, RowValues, Term, Type, numbers_in
 from frametool.calc.parser import RADIAN, CalcError, Line, needs_time, reads_row, walk
@@ -22,8 +24,8 @@ from frametool.grammar.readers import tell as tell_notes
 from frametool.ros.messages import LISTS
 from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows
+from frametool.stream.gathering import gathered
 from frametool.stream.request import Formula, Operation, Request, RowOptions, target_of
-from frametool.stream.trajectories import gathered
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -172,11 +174,11 @@ def poses_of_table(path: str, fmt: str, *, normalize: bool, degrees: bool) -> Te
     """Return the poses or points of a table as a list; raises FormatError at the first bad row."""
     request = Request(Operation(moves=True), RowOptions(normalize=normalize, degrees=degrees))
     with opened(path) as stream:
-        rows = gathered(FormatConverter(fmt, request, path).steps(stream), BadRows(path)).numbers.tolist()
-    is_turned = len(rows[0]) > len(AXES)
-    nowhere = [0.0] * (7 - len(rows[0])) if is_turned else []
+        numbers = gathered(FormatConverter(fmt, request, path).steps(stream), BadRows(path)).numbers
+    is_turned = not np.isnan(numbers[0, -1])
     type_ = Type(POSE if is_turned else POINT)
-    return Term(Type(LIST), (), items=tuple(Term(type_, (*nowhere, *row)) for row in rows))
+    rows = np.nan_to_num(numbers[:, : 7 if is_turned else len(AXES)]).tolist()
+    return Term(Type(LIST), (), items=tuple(Term(type_, tuple(row)) for row in rows))
 
 
 def values_of_document(source: Source, scope: Scope) -> Term | None:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from frametool.stream.record_results import BlockResults, ResultWriter
     from frametool.stream.record_values import Value
     from frametool.stream.request import Operation
-    from frametool.stream.rows import RowPoses
+    from frametool.stream.writers import Blocks
 
 
 def _place(fmt: str, output: str | None) -> str:
@@ -79,7 +79,6 @@ ENDS = (  # of a pose
 )
 WITH_PLACES = ("text", "yaml", "json", "csv", *table.writers("recording"))
 OF_TEXT = (".txt", ".out", ".log", ".dat")
-BLOCK = 1 << 13  # poses of a trajectory
 
 
 class Output:
@@ -146,16 +145,25 @@ class Output:
 
     def values(self, values: Iterable[Value]) -> None:
         """Write results: poses as poses; points, vectors and messages as the mappings they are."""
-        writer: Any = self._writer()
-        batches = _batched(values) if self._in_blocks else [values]
-        self.pieces(filter(None, chain(map(writer.of, batches), writer.end())))
+        writer = self._writer()
+        if isinstance(writer, AllTogether):
+            texts = map(writer.of, [values])
+        else:
+            from frametool.stream.record_results import blocks_of
+
+            texts = map(writer.of_block, blocks_of(values))
+        self.pieces(filter(None, chain(texts, writer.end())))
 
     def _writer(self) -> Blocks | AllTogether:
         """Return what writes results; stop where the format has no place for latitude and longitude."""
         if self.style.place is not None and self.style.format not in WITH_PLACES:
             names = ", ".join(each.name for each in (self.style.place, *self.style.place.more))
             raise ValueInvalid(f"{self.style.format} has no place for {names}; write csv, json, yaml or text")
-        return Blocks(self) if self._in_blocks else AllTogether(self)
+        if not self._in_blocks:
+            return AllTogether(self)
+        from frametool.stream.writers import Blocks
+
+        return Blocks(self.style)
 
     def text_of(self, found: list[Value]) -> tuple[str, set[str]]:
         """Return the text of all results, and the keys of what they say besides."""
@@ -187,7 +195,7 @@ class Output:
     def poses_as_they_come(self, results: Iterator[Result]) -> None:
         """Write poses that have the same keys, in batches."""
         self._shorten()
-        if isinstance(self._writer(), Blocks):
+        if self._in_blocks:
             self.values(results)
         else:
             self.pieces(self._batches(results))
@@ -305,20 +313,6 @@ class Output:
         self.pieces([text])
 
 
-def _as_point(value: Result | dict[str, Any]) -> Result | dict[str, Any]:
-    """Take a result without a rotation for a point."""
-    if not isinstance(value, Result) or value.pose.rotation is not None or value.pose.position is None:
-        return value
-    named = {"name": value.pose.name, "frame": value.pose.parent, "point": list(value.pose.position)}
-    return {key: each for key, each in named.items() if each is not None} | value.extras
-
-
-def _batched(values: Iterable[Value]) -> Iterator[list[Value]]:
-    """Yield values, many together."""
-    rest = iter(values)
-    return iter(lambda: list(islice(rest, BLOCK)), [])
-
-
 class AllTogether:
     """Keep results, for formats that are written of all of them at once."""
 
@@ -342,52 +336,3 @@ class AllTogether:
         fmt, others = self.output.style.format, keys - {"stamp_ns", "point", "vector", "frame"}
         if others and fmt not in ("text", "yaml", "json", "csv"):
             warn(f"{fmt}: {listing(others)} left out")
-
-
-class Blocks:
-    """Write a trajectory, columns of numbers or a recording: of things of one kind, those of the first block."""
-
-    def __init__(self, output: Output) -> None:
-        """Begin without any."""
-        self.output = output
-        self.kind, self.placed = "", True
-        self.writer: Any = None
-
-    def of(self, batch: list[Value] | RowPoses) -> bytes:
-        """Return the text of some results."""
-        from frametool.stream.as_poses import writer_for
-        from frametool.stream.row_layout import POSE
-        from frametool.stream.rows import block_of, block_of_points
-
-        output, kind = self.output, POSE
-        if self.writer is None:
-            turns = [each for each in batch if isinstance(each, Result) and each.pose.position is None]
-            self.placed = not (output.holds_arrays and len(turns) == len(batch))
-        if isinstance(batch, list):
-            found = batch if output.is_trajectory else list(map(_as_point, batch))
-            poses = [each for each in found if isinstance(each, Result)]
-            points = [each for each in found if not isinstance(each, Result)]
-            if points and output.is_trajectory:
-                raise ValueInvalid("a trajectory holds poses; a point has no rotation")
-            if points and poses:
-                raise ValueInvalid(f"{output.style.format} holds things of one kind, found poses among others")
-            kind, block = block_of_points(points) if points else (POSE, block_of(poses, placed=self.placed))
-        else:
-            block = batch if self.placed else batch._replace(numbers=batch.numbers[:, 3:])
-        if self.writer is None:
-            self.kind, self.writer = kind, writer_for(output.style, kind, placed=self.placed)
-        elif kind != self.kind:
-            raise ValueInvalid(f"{output.style.format} holds things of one kind, found {self.kind} and {kind}")
-        text: bytes = self.writer.of_block(block) if len(block.numbers) else b""
-        return text
-
-    def of_block(self, block: BlockResults) -> bytes:
-        """Return the text of a block of records: of one block of poses, or of values, many together."""
-        posed = block.posed()
-        return b"".join(map(self.of, _batched(block.in_order()) if posed is None else [posed]))
-
-    def end(self) -> Iterator[bytes]:
-        """Yield what comes behind the last."""
-        if self.writer is None:
-            self.of([])
-        yield from self.writer.end()

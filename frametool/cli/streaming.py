@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from frametool.explain.derive import WrittenPose
     from frametool.explain.render import Explanation
     from frametool.grammar.edges import Diagnostics
+    from frametool.stream.as_poses import Step
+    from frametool.stream.gathering import MeanRows
     from frametool.stream.request import Request
 
 TOP = 2  # lines of a table up to its first row: what is bad there may be bad in every row
@@ -202,8 +204,11 @@ class Task:
         """Return what messages call the stream."""
         return self.path or "stdin"
 
-    def run(self, request: Request) -> int:
-        """Run the stream and return its exit status; the error that ends it says what to do."""
+    def run(self, request: Request, rows: MeanRows | None = None) -> int:
+        """Run the stream and return its exit status; the error that ends it says what to do.
+
+        rows: takes the results, which are not written then
+        """
         from frametool.formats.detect import refuse_robots, with_hint
 
         self.inputs.ask("input_path", "on_error", "max_errors")
@@ -211,13 +216,13 @@ class Task:
             head = source.peek()
             refuse_robots(head, self.name)
             try:
-                return self._run_opened(source, request)
+                return self._run_opened(source, request, rows)
             except FormatError as error:
                 if isinstance(error, BadRow) and not (error.fault.final or head[:1] == b"[" or error.fault.line <= TOP):
                     error.remedy = "; --on-error skip goes on"
                 raise with_hint(error, head, self.name, chosen=bool(self.chosen_format())) from None
 
-    def _run_opened(self, stream: BufferedReader, request: Request) -> int:
+    def _run_opened(self, stream: BufferedReader, request: Request, rows: MeanRows | None) -> int:
         """Run the stream, of whatever format it is."""
         looks_up = not request.rows.poses and request.operation.formula is None
         output, is_table = self.output, looks_up or self._is_table
@@ -230,12 +235,10 @@ class Task:
             pasted, stream = pasted_stream(stream, self.name, request, self.notation, self.place)
             if pasted is not None:
                 self.inputs.ask("from_rep")
-                if request.gathered is None:
+                if rows is None:
                     output.values(values_of([pasted], request, output))
                 else:
-                    from frametool.stream.record_values import read_poses
-
-                    request.gathered.add(read_poses(pasted, request), pasted.name)
+                    rows.add(pasted, request, name=pasted.name)
                 return 0
         if not fmt:
             fmt = self.format_of(stream.peek(), is_table=is_table)
@@ -246,7 +249,7 @@ class Task:
         if output.chosen is None and (output.path or "").endswith(".bin") and not fmt.endswith("-bin"):
             raise click.UsageError(f"-o {output.path} does not name its format; give -f kitti-bin or nuscenes-bin")
         refuse(looks_up and fmt in RECORDS, f"frames are looked up for the rows of a table, not of {fmt}")
-        request = self._completed(request, fmt)
+        request = self._completed(request, fmt, alone=rows is None)
         if request.offset_ns and fmt in RECORDS:
             from frametool.stream.record_stream import at_other_times
 
@@ -256,23 +259,24 @@ class Task:
         output.take_axes(FORMATS[fmt].rows.axes, request.operation)
         if is_trajectory(fmt) and not output.notations:
             request = request.with_results(notations=())  # its rows stay what they are
-        gathered = request.gathered
-        outcomes, written, tally = self._outcomes(stream, fmt, request)
         bad = self.policy(self.name, "row" if holds_arrays(fmt) else "line")
-        outcomes = outcomes if gathered is None else gathered.placing(outcomes, bad.place)
+        if rows is not None:
+            outcomes, written, tally = rows.take(self._steps(stream, fmt, request), bad.place), "", None
+        else:
+            outcomes, written, tally = self._outcomes(stream, fmt, request)
         progress: AbstractContextManager[Callable[[int, int], None] | None] = nullcontext()
         if not self.inputs.quiet and sys.stderr is not None and sys.stderr.isatty():
             from frametool.view.text import progress_bar
 
             progress = progress_bar(os.path.getsize(self.path) if self.path else None)
         with (
-            output.opened() if gathered is None else nullcontext(lambda _: None) as write,
+            output.opened() if rows is None else nullcontext(lambda _: None) as write,
             progress as advance,
             self.opened(),  # closed before a file takes its place, which Windows asks for
             closing(outcomes),
         ):
             status = run(outcomes, write, bad, advance)
-        if gathered is None:
+        if rows is None:
             output.report_suffix(written)
         if tally is not None and tally.assumed:
             self.inputs.note(f"{self.name}: {tally.assumed}")
@@ -293,15 +297,15 @@ class Task:
         from frametool.formats.rows.pose_rows import is_turned
         from frametool.stream.row_layout import POSE, Shape
 
-        output, gathers, chosen = self.output, request.gathered is not None, self.output.chosen
-        if holds_arrays(fmt) and (gathers or chosen is None or holds_arrays(chosen)):
+        output, chosen = self.output, self.output.chosen
+        if holds_arrays(fmt) and (chosen is None or holds_arrays(chosen)):
             return self._columns(stream, fmt, request), fmt, None
         listed = holds_arrays(fmt) or (is_trajectory(fmt) and not FORMATS[fmt].is_table)
         is_kindred = chosen == "csv" and fmt in ("tsv", "semicolon")
         # a trajectory has no room for more columns, or for other ones
         no_room = output.is_trajectory and bool(request.extras(Shape(POSE)) or output.notations or output.style.place)
         turns = output.style.axes and not output.notations and is_turned(output.style.changed(format=chosen or fmt))
-        converts = not (gathers or is_kindred or fmt in RECORDS) and (chosen not in (None, fmt) or no_room or turns)
+        converts = not (is_kindred or fmt in RECORDS) and (chosen not in (None, fmt) or no_room or turns)
         if listed or converts:
             from frametool.cli.trees import answers
             from frametool.stream.as_poses import FormatConverter
@@ -312,12 +316,23 @@ class Task:
             request = request.with_results(by_default=not output.notations)
             converted = FormatConverter(fmt, request, self.name, output.style.changed(format=target), answers())
             return converted.outcomes(stream, header=self.inputs.header), target, converted.tally
-        request = request.with_results(notations=()) if gathers else request
         if fmt in RECORDS:
-            return *self._records(stream, fmt, request, "" if gathers else chosen or ""), None
+            return *self._records(stream, fmt, request, chosen or ""), None
         from frametool.stream.table import run_table
 
         return run_table(stream, fmt, request, source=self.name, header=self.inputs.header), fmt, None
+
+    def _steps(self, stream: Any, fmt: str, request: Request) -> Iterator[Step]:
+        """Return what becomes of each block as poses that are not written."""
+        from frametool.cli.trees import answers
+        from frametool.stream.as_poses import AS_VALUES, FormatConverter
+        from frametool.stream.gathering import posed
+        from frametool.stream.record_stream import run_records
+
+        request = request.with_results(by_default=True, notations=())
+        if fmt in RECORDS:
+            return posed(run_records(stream, fmt, request, source=self.name, style=AS_VALUES), self.name)
+        return FormatConverter(fmt, request, self.name, AS_VALUES, answers()).steps(stream, header=self.inputs.header)
 
     def _records(self, stream: Any, fmt: str, request: Request, chosen: str) -> tuple[Generator[Outcome], str]:
         """Write the results of records in place, or in a format that was chosen."""
@@ -339,12 +354,12 @@ class Task:
         from frametool.stream.column_stream import OtherColumns, run_columns
 
         output = self.output
-        is_seen = output.path is None and request.gathered is None and sys.stdout.isatty()
+        is_seen = output.path is None and sys.stdout.isatty()
         refuse(is_seen, f"{fmt} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
         columns = open_columns(InputFile(self.path or "-", stream), fmt)
         style = output.style.changed(format=output.chosen or fmt)
         request = request.with_results(by_default=not output.notations)
-        if output.chosen and request.gathered is None and FORMATS[output.chosen].writer != FORMATS[fmt].reader:
+        if output.chosen and FORMATS[output.chosen].writer != FORMATS[fmt].reader:
             return OtherColumns([(columns, request, self.name)], style).outcomes()
         return run_columns(columns, request, style, source=self.name)
 
@@ -353,10 +368,10 @@ class Task:
         tell = partial(say_error, in_json=self.inputs.peek("format_name") == "json")
         return BadRows(name, self.inputs.on_error, most=self.inputs.max_errors, tell=tell, counted=counted)
 
-    def _completed(self, request: Request, fmt: str) -> Request:
-        """Add what the stream's options say to the request."""
+    def _completed(self, request: Request, fmt: str, *, alone: bool) -> Request:
+        """Add what the stream's options say to the request; alone: its results are written."""
         inputs, output = self.inputs, self.output
-        is_table, alone = fmt not in RECORDS, request.gathered is None
+        is_table = fmt not in RECORDS
         adds = bool(request.rows.poses) or request.operation.formula is None  # look-ups add by themselves
         if is_table and output.chosen not in RECORDS and adds and alone:
             request = request.with_results(keep=inputs.keep)

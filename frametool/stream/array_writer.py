@@ -197,12 +197,12 @@ class ArrayWriter(PoseWriter):
     The columns: frames where there are names, numbers, stamps, and what is not ours.
     """
 
-    def __init__(self, style: Style, kind: str, extras: Sequence[str] = (), *, placed: bool = True) -> None:
-        """Choose the format, and take what a row is."""
-        super().__init__(style, kind, extras, placed=placed)
+    def __init__(self, style: Style, first: RowPoses) -> None:
+        """Choose the format, and take of the first block what a row is."""
+        super().__init__(style, first)
         self.file = ColumnsWriter(style)
         self.names = [*self.target.position_columns, *self.target.names]
-        self.names = [*(six_names(kind) if kind in SIX else self.names), *extras]
+        self.names = [*(six_names(self.kind) if self.kind in SIX else self.names), *self.extras]
         self.file.of_columns(0, {name: Made(np.empty(0)) for name in self.names})  # what a file without rows has
 
     def of_block(self, block: RowPoses) -> bytes:

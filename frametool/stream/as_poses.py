@@ -30,7 +30,7 @@ import numpy as np
 
 from frametool.documents.source import InputFile, not_text
 from frametool.errors import FormatError, Misused, ValueInvalid, warn
-from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, describe, rows_of
+from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, describe
 from frametool.formats.table import FORMATS, Rows, is_recording, is_trajectory
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
@@ -39,44 +39,25 @@ from frametool.grammar.readers import EARTH_FRAMES
 from frametool.grammar.result import Style
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, BadRow, Fault, Outcome
+from frametool.stream.record_results import written_by
 from frametool.stream.request import Request, RowOptions
 from frametool.stream.row_layout import POINT, POSE, Shape, Target
-from frametool.stream.rows import NO_STAMP, Block, RowPoses, kept, spans_of
+from frametool.stream.rows import NO_ROWS, NO_STAMP, Block, RowPoses, kept, spans_of
 from frametool.stream.table import PlannedRows, TableRows
-from frametool.stream.writers import LEARNED, RowsWriter, SingleWriter, TextWriter
+from frametool.stream.writers import LEARNED, Blocks
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator, Sequence
+    from collections.abc import Generator, Iterator
 
     from frametool.geometry.types import Components
-    from frametool.stream.array_writer import ArrayWriter
     from frametool.text.lines import ByteStream
     from frametool.text.spans import Ints
 
     Step: TypeAlias = tuple[RowPoses, Outcome]  # what a block became, and what is reported about it
-    BlockWriter: TypeAlias = "SingleWriter | RowsWriter | ArrayWriter"
 
 QUATERNION = notation("quaternion")
 NO_ROTATION = "no rotation among the columns {}: poses are wanted"
 AS_VALUES = Style("json")  # of results that are not written
-
-
-def writer_for(style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> BlockWriter:
-    """Return what writes blocks in the format of a style: text, columns of numbers, or messages of a recording.
-
-    kind: pose, point, ..; extras: the numbers with each; placed: whether poses have a position
-    """
-    writes = FORMATS[style.format].writes
-    if "arrays" in writes:
-        from frametool.stream.array_writer import ArrayWriter
-
-        return ArrayWriter(style, kind, extras, placed=placed)
-    if "recording" in writes:
-        from frametool.stream.recording_writer import RecordingWriter
-
-        return RecordingWriter(style, kind, extras, placed=placed)
-    text = TextWriter if rows_of(style.format) else SingleWriter
-    return (RowsWriter if style.format in LEARNED else text)(style, kind, extras, placed=placed)
 
 
 class FormatConverter:
@@ -109,40 +90,41 @@ class FormatConverter:
 
     def outcomes(self, stream: ByteStream, *, header: bool = True) -> Generator[Outcome]:
         """Yield the text of the results, block by block, and what comes behind the last."""
-        writer: BlockWriter | None = None
-        operation, style = self.request.operation, self.style
-        for made, outcome in self.steps(stream, header=header):
-            if self.request.gathered is not None:
-                yield outcome
-                continue
-            if writer is None:
-                kind = operation.result_kind(self.shape.kind)
-                extras = [self.request.results.prefix + name for name in self.request.extras(self.shape)]
-                if operation.only_adds or not kind or (extras and kind != POSE and operation.formula is not None):
-                    raise Misused(f"a stream of {self.fmt} with such results stays one; leave -f {style.format} out")
-                writer = writer_for(style, kind, extras, placed=self.placed)
-            poses, notes = made, [*outcome.notes]
-            if self.request.on_error == STOP and outcome.faults:
-                poses = kept(made, slice(0, int(np.searchsorted(made.lines, outcome.faults[0].line))))
-            if style.place is not None and style.place.words:
-                from frametool.stream.earth_columns import zone_notes
-
-                if len(there := np.flatnonzero(~np.isnan(poses.numbers[:, 0]))):
-                    columns = style.place.numbers(*np.ascontiguousarray(poses.numbers[there, :3].T))
-                    notes += zone_notes(style.place, columns, poses.lines[there].tolist().__getitem__)
-            yield outcome._replace(text=writer.of_block(poses), notes=notes)
-        if writer is None and self.request.gathered is None:
-            raise FormatError("nothing in it", source=self.source)
-        if writer is not None:
-            yield from map(Outcome, writer.end())
+        yield from written_by(Blocks(self.style), self._to_write(stream, header=header), self.request.on_error)
         for finding in self.tally.findings():
             warn(f"{self.source}:{finding.line}: {finding.message}")
+
+    def _to_write(self, stream: ByteStream, *, header: bool) -> Iterator[Outcome]:
+        """Yield the blocks that are written: up to the first bad row where that ends the stream."""
+        operation, place, is_any = self.request.operation, self.style.place, False
+        for poses, outcome in self.steps(stream, header=header):
+            has_more = poses.more and poses.kind != POSE and operation.formula is not None
+            if not is_any and (operation.only_adds or not poses.kind or has_more):
+                wanted = self.style.format
+                raise Misused(f"a stream of {self.fmt} with such results stays one; leave -f {wanted} out")
+            is_any, notes, left = True, [*outcome.notes], poses
+            if self.request.on_error == STOP and outcome.faults:
+                left = kept(poses, slice(0, int(np.searchsorted(poses.lines, outcome.faults[0].line))))
+            if place is not None and place.words:
+                from frametool.stream.earth_columns import zone_notes
+
+                if len(there := np.flatnonzero(~np.isnan(left.numbers[:, 0]))):
+                    columns = place.numbers(*np.ascontiguousarray(left.numbers[there, :3].T))
+                    notes += zone_notes(place, columns, left.lines[there].tolist().__getitem__)
+            yield outcome._replace(results=left, notes=notes, kept=len(left.numbers))
+        if not is_any:
+            raise FormatError("nothing in it", source=self.source)
 
     def steps(self, stream: ByteStream, *, header: bool = True) -> Iterator[Step]:
         """Yield the results of one block after the other; of rows first a block without any."""
         if self.is_table:
-            return self._rows(stream, header=header)
-        return self._columns(stream) if "arrays" in FORMATS[self.fmt].reads else self._listed(stream)
+            steps = self._rows(stream, header=header)
+        else:
+            steps = self._columns(stream) if "arrays" in FORMATS[self.fmt].reads else self._listed(stream)
+        for poses, outcome in steps:
+            kind, prefix = self.request.operation.result_kind(self.shape.kind), self.request.results.prefix
+            more = tuple(prefix + name for name in self.request.extras(self.shape))
+            yield poses._replace(kind=kind, placed=self.placed, more=more), outcome
 
     def _begin(self, rows: PlannedRows, line: int = 0) -> None:
         """Decide what rows become: without a rotation points, where nobody asked for one; raises FormatError."""
@@ -162,8 +144,7 @@ class FormatConverter:
         file = StampFile(self.answers.stamps) if self.answers.stamps else None
         rows = TableRows(stream, self.fmt, self.request, self.source, header=header)
         self._begin(rows, line=1)
-        none = RowPoses(np.empty((0, 7)), None, np.empty(0, np.int64), [None], [None], {})
-        yield none, Outcome(b"", lines=rows.lines, size=rows.taken)
+        yield NO_ROWS, Outcome(b"", lines=rows.lines, size=rows.taken)
         count = 0
         for text in rows.texts:
             run, outcome, cells = rows.of_text(text)
@@ -177,7 +158,7 @@ class FormatConverter:
                 poses = poses._replace(parents=EARTH_FRAMES[:1])
             if file:
                 poses = poses._replace(stamps_ns=np.array(file.between(before, count), np.int64))
-            elif fmt.counted and poses.stamps_ns is None:
+            elif fmt.counted and poses.stamps_ns is None and not self.request.rows.timeless:
                 poses = poses._replace(stamps_ns=np.arange(before, count) * BILLION)
             yield poses._replace(stamps_ns=self._held(poses.stamps_ns, fmt)), outcome
         if file:
@@ -188,7 +169,8 @@ class FormatConverter:
     def _held(self, stamps_ns: Ints | None, fmt: Rows) -> Ints | None:
         """Return stamps, unless they only count and the other format has no place for them: they are not lost then."""
         counts, other = bool(fmt.counted) and not self.answers.stamps, self.style.format
-        return None if counts and (is_recording(other) or FORMATS[other].rows.counted) else stamps_ns
+        are_lost = self.request.rows.timeless or is_recording(other) or FORMATS[other].rows.counted
+        return None if counts and are_lost else stamps_ns
 
     def _columns(self, stream: ByteStream) -> Iterator[Step]:
         """Yield the rows of columns of numbers; those that stand for no point have no place in a text."""

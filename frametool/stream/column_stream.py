@@ -102,7 +102,7 @@ class ColumnRows(PlannedRows):
     def of_batch(self, batch: Batch) -> tuple[Ints, Floats]:
         """Return the rows (n,) of a batch that are written, and their numbers (n, k), nan if absent."""
         values, absent, bad = self._read(batch)
-        every = self.request.operation.formula is not None or self.request.gathered is not None
+        every = self.request.operation.formula is not None
         shapes = zip(absent, self.plan.shapes, strict=False)
         empty = [flags for flags, shape in shapes if shape.notation or every]
         gone = np.flatnonzero(np.logical_or.reduce(empty)) if np.any(empty) else None  # 0 is a point, but no rotation
@@ -127,7 +127,7 @@ class ColumnRows(PlannedRows):
             rows, numbers = rows[stay], numbers[stay]
         return rows, numbers
 
-    def outcome(self, batch: Batch, text: bytes = b"") -> Outcome:
+    def outcome(self, batch: Batch, text: bytes | memoryview = b"") -> Outcome:
         """Return what is written of the last batch, and what is said of it."""
         mended, self.mended = self.mended, 0
         return Outcome(text, self.run.faults(), batch.size, batch.size, mended, self.run.notes, batch.bytes_read)
@@ -163,23 +163,16 @@ class ColumnRows(PlannedRows):
         return columns.T, absent, bad
 
     def _stamps(self, batch: Batch) -> tuple[list[Any], dict[int, tuple[str, str]]]:
-        """Read the stamps, weights or labels of rows, and which of them have none."""
-        place, below, request = self.layout.time, self.layout.below, self.request
+        """Read the stamps of rows, and which of them have none."""
+        place, below = self.layout.time, self.layout.below
         if place is None:
             return [], {}
         name = self.table.name(place)
-        if not request.weighs:
-            times, reasons = batch.stamps(place, in_ns=in_nanoseconds(name))
-            if below is not None:
-                nanoseconds, more = batch.stamps(below, in_ns=1)
-                times, reasons = times + nanoseconds, {**more, **reasons}
-            return [times], {row: (name, reason) for row, reason in reasons.items()}
-        if request.gathered is not None and request.gathered.by:
-            return [np.array(batch.texts(place), object)], {}
-        weights, nulls = batch.numbers(place)
-        invalid = ~np.isfinite(weights) if nulls is None else nulls | ~np.isfinite(weights)
-        weights[invalid] = 0.0
-        return [weights], dict.fromkeys(np.flatnonzero(invalid).tolist(), (name, "not finite"))
+        times, reasons = batch.stamps(place, in_ns=in_nanoseconds(name))
+        if below is not None:
+            nanoseconds, more = batch.stamps(below, in_ns=1)
+            times, reasons = times + nanoseconds, {**more, **reasons}
+        return [times], {row: (name, reason) for row, reason in reasons.items()}
 
     def made(self, columns: Sequence[OutColumn], rows: Ints, numbers: Floats) -> list[Made]:
         """Return what is in the columns that are made, in their order."""
@@ -205,20 +198,14 @@ def run_columns(file: ColumnFile, request: Request, style: Style, *, source: str
     rows = ColumnRows(file, request, source)
     columns = rows.out_columns()
     move_along(file, request)
-    writer: ColumnWriter | None = None
-    if not request.gathered:
-        _say_rounded([rows])
-        drops = request.on_error == SKIP or request.operation.of == VELOCITIES
-        writer = file.rewriter(columns, None if drops else file.count, style)
+    _say_rounded([rows])
+    drops = request.on_error == SKIP or request.operation.of == VELOCITIES
+    writer: ColumnWriter = file.rewriter(columns, None if drops else file.count, style)
     for batch in file.batches():
-        text: Any = b""
         chosen, numbers = rows.of_batch(batch)
-        if writer is not None:
-            some = None if len(chosen) == batch.size else chosen
-            text = writer.of_rows(batch, some, rows.made(columns, chosen, numbers))
-        yield rows.outcome(batch, text)
-    if writer is not None:
-        yield from map(Outcome, writer.end())
+        some = None if len(chosen) == batch.size else chosen
+        yield rows.outcome(batch, writer.of_rows(batch, some, rows.made(columns, chosen, numbers)))
+    yield from map(Outcome, writer.end())
 
 
 class OtherColumns:
@@ -284,7 +271,7 @@ def _say_rounded(every: Sequence[ColumnRows]) -> None:
 def move_along(file: ColumnFile, request: Request) -> None:
     """Let what else has a place among the points of a file move with them."""
     operation, timed = request.operation, request.timed
-    if operation.moves and not request.results.keep and request.gathered is None:
+    if operation.moves and not request.results.keep:
         by_row = request.rows.frames or (timed is not None and timed.name)
         file.moved_by(None if by_row else operation.left)
 

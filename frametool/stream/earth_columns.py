@@ -331,8 +331,6 @@ def settle(
             raise Misused("a vector has no place on the Earth; leave --as vector out")
         if place.name in (LLA, UTM) and not {"alt", "msl"}.intersection(place.fields) and reads:
             warn(f"{source}: {NO_ALT}")
-        if request.gathered is not None:
-            request.gathered.frame = ECEF
         if operation.keeps_frames and asked.place is None:
             bare = shape.notation is None and all(each.representation.name == "quaternion" for each in asked.notations)
             request = request.with_results(place=Place.written((ECEF,), Earth()), by_default=asked.by_default or bare)
@@ -391,18 +389,16 @@ def placed_record(
         return None
     if request.rows.kind == VECTOR:
         raise Misfit("a vector has no place on the Earth; leave --as vector out")
-    operation, gathered = request.operation, request.gathered
-    if gathered is not None:
-        gathered.frame = EARTH_FRAMES[0]
+    operation = request.operation
     check_parent(value, value)
     there, used = inner(without_place(value))
     mapping = {key: value[key] for key in (*own, AXES_KEY, "parent", "frame", "inverse") if key in value}
     is_fix = "header" in value and operation.formula is None
     covariance = _of_fix(value, mapping, reading, request) if is_fix else ()
     pose = placed_by(mapping, there, reading)
-    if pose.rotation is None and (operation.inverse or operation.similar) and gathered is None:
+    if pose.rotation is None and (operation.inverse or operation.similar):
         raise Misfit(UNSAID)  # as a factor it is a pose
-    takes_points = (operation.takes_points or operation.keeps_frames) and gathered is None
+    takes_points = operation.takes_points or operation.keeps_frames
     is_point = pose.rotation is None and request.rows.kind != POSE and takes_points
     numbers: tuple[float, ...] = pose.components[: 7 if pose.rotation is not None else 3]
     shape = Shape(POINT if is_point else POSE, 1.0, None if pose.rotation is None else notation("quaternion"))
@@ -410,7 +406,7 @@ def placed_record(
         covariance = tuple(covariance[3 * i + j] if max(i, j) < 3 else 0.0 for i in range(6) for j in range(6))
     extra = covariance
     if not extra and pose.covariance is not None:
-        if gathered is None and operation.formula is None and request.results.place is None:
+        if operation.formula is None and request.results.place is None:
             extra = of_position(tuple(pose.covariance)) if is_point else tuple(pose.covariance)
         else:
             reading.note(LEFT_OUT.format("a result at a place" if request.results.place else "this"), rule="left-out")
@@ -443,8 +439,7 @@ def _of_fix(value: dict[str, Any], mapping: dict[str, Any], reading: Reading, re
     status = value.get("status")
     if type(status) is dict and status.get("status") == "-1":
         raise readers.NotARotation("status -1: there was no fix", ("status", "status"))
-    is_left_out = request.results.place is not None or request.gathered is not None
-    if FIX not in value or value.get(FIX_TYPE, "1") == "0" or is_left_out:
+    if FIX not in value or value.get(FIX_TYPE, "1") == "0" or request.results.place is not None:
         return ()
     entries = [number for _, number in within((FIX,), entries_of, value[FIX], (9,))]
     within((FIX,), check, entries)

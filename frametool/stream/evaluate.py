@@ -108,10 +108,6 @@ class Run:
         with np.errstate(all="ignore"):
             self.moved = self._compute()
             self.results, self.locked = self._results()
-        weights = block.stamps[0] if self.request.weighs and self.count else None
-        if weights is not None and weights.dtype == np.float64:  # labels may be any
-            for row in np.flatnonzero(weights < 0.0).tolist():
-                self._blame(row, self.request.rows.extra_column or "", f"weight {weights[row]:g} is negative")
         if self.outside:
             self.reasons = {row: why for row, why in self.reasons.items() if row not in self.outside}
             self.mended = [row for row in self.mended if row not in self.outside]
@@ -119,10 +115,6 @@ class Run:
         if gone := {*self.reasons, *self.outside, *self.lone}:
             self.rows = np.delete(self.rows, [*gone])
         self._note_block()
-        if self.request.gathered:
-            kept = np.isin(np.arange(self.count), self.rows)
-            for shape, parts in zip(plan.shapes, self.moved, strict=False):
-                self.request.gathered.take(shape, parts, kept, weights, block.line_of)
         for column, period in plan.targets[0].angle_columns() if self.request.results.unwrap and len(self.rows) else ():
             values = self.results[self.rows, column]  # full turns are added, so that no step is larger than half a turn
             before = np.concatenate([[state.angles.get(column, values[0])], values[:-1]])
@@ -437,7 +429,7 @@ class Run:
             self.rows = self.rows[places[self.rows] < end]
             unchanged = [(place, text) for place, text in unchanged if place < end]
         groups = []
-        if len(self.rows) and not self.request.gathered:
+        if len(self.rows):
             results, locked, asked = self.results, self.locked, self.request.results
             if len(self.rows) < self.count:  # else nothing is copied
                 results, locked = results[self.rows], locked[self.rows]

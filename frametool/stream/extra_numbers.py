@@ -51,9 +51,7 @@ def with_covariances(
     if is_left_out:
         reading.here = path
         reading.note(LEFT_OUT.format("calc"), rule="left-out")
-    if request.gathered is not None:
-        request.gathered.uncertain = True
-    if request.gathered is not None or is_left_out:
+    if is_left_out:
         return record._replace(keys=record.keys._replace(others=(*record.keys.others, *said)))
     if operation.keeps_frames and not (shape.inverse or (has_sigma and request.results.canonical)):
         for key in there * is_own:
@@ -148,7 +146,7 @@ def covariance_columns(
 ) -> tuple[tuple[int, ...], tuple[Shape, ...]]:
     """Find the columns of a covariance or of sigmas where they count; return their places and the shapes with them."""
     kinds = [shape.kind for shape in shapes]
-    passes = request.operation.keeps_frames and request.gathered is None
+    passes = request.operation.keeps_frames
     own, place = shapes[0].place if shapes else None, request.results.place
     if passes and own and place and own.axes != place.axes:  # its columns would stay along axes that the result has not
         for found, _ in (covariance.find_columns(table.names or (), size) for size in (9, 36)):
@@ -169,9 +167,7 @@ def covariance_columns(
         places, shape = along(own, shape, table.names or (), places, source)
     if places and request.operation.formula is not None:
         warn(f"{source}: {LEFT_OUT.format('calc')}", rule="left-out")
-    if places and request.gathered is not None:
-        request.gathered.uncertain = True
-    if not places or request.gathered is not None or request.operation.formula is not None:
+    if not places or request.operation.formula is not None:
         return (), shapes
     if len(shapes) != 1:
         message = "a covariance beside several poses in a row: whose it is nobody can tell"

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from frametool.stream.record_results import BlockResults
+    from frametool.stream.rows import RowPoses
 
 STOP, SKIP, NULL = "stop", "skip", "null"
 ON_ERROR = (STOP, SKIP, NULL)
@@ -169,9 +170,9 @@ class Outcome(NamedTuple):
     rows, lines, size: how many rows, lines and bytes the block had
     mended: how many rotations were off and normalised
     notes: what is worth telling
-    kept: how many rows are in the text
+    kept: how many rows are in the text, or the results
     is_open: whether an array goes on behind the block; None for what is no array
-    results: of records what is yet to be written
+    results: what is yet to be written
     """
 
     text: bytes | memoryview
@@ -183,7 +184,7 @@ class Outcome(NamedTuple):
     size: int = 0
     kept: int = 0
     is_open: bool | None = None
-    results: BlockResults | None = None
+    results: RowPoses | BlockResults | None = None
 
 
 def run(

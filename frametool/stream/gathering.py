@@ -1,127 +1,239 @@
-"""Poses of a whole stream gathered in arrays, for what needs all of them at once."""
+"""Poses of a whole stream gathered in arrays, for what needs all of them at once: trajectories, points, means."""
 
 from __future__ import annotations
 
+import re
+from functools import reduce
+from itertools import chain
 from math import degrees, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frametool.errors import ValueInvalid
-from frametool.grammar.readers import EARTH_FRAMES
+from frametool.errors import FormatError, ValueInvalid, did_you_mean, shown
+from frametool.geometry.transform import Transform
+from frametool.grammar.covariance import is_sigma
+from frametool.grammar.pose import Pose
+from frametool.grammar.readers import EARTH_FRAMES, NAME_KEYS, PARENT_COLUMNS, stamp_column
+from frametool.grammar.result import Result, uncertain
+from frametool.stream.faults import BadRows, Fault, Outcome, run
+from frametool.stream.record_results import BlockResults
+from frametool.stream.record_values import read_poses
+from frametool.stream.request import COMBINED, Request
+from frametool.stream.row_layout import NOWHERE
+from frametool.stream.rows import RowPoses, block_of, is_typed, kept, objects, plain_cells, read_each, texts_of
+from frametool.text.numbers import parse_number
+from frametool.text.parse import parse_floats
+from frametool.text.spans import Spans, without_quotes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 
-    from frametool.geometry.transform import Transform
-    from frametool.geometry.types import Components
-    from frametool.grammar.pose import Pose
-    from frametool.grammar.result import Result
-    from frametool.stream.faults import Outcome
-    from frametool.stream.row_layout import Shape
-    from frametool.text.spans import Flags, Floats
+    from frametool.documents.source import Source
+    from frametool.stream.as_poses import Step
+    from frametool.text.spans import Floats
+
+POSITION = 3  # numbers
+NO_POSE = "expected poses, or points"
+
+
+def posed(outcomes: Iterable[Outcome], source: str) -> Iterator[Step]:
+    """Yield the results of records as poses with their lines, block by block; raises FormatError for what is none."""
+    for outcome in outcomes:
+        results: BlockResults = outcome.results or BlockResults((), [])  # type: ignore[assignment]
+        found = results.posed()
+        if found is None:
+            pairs = results.placed()
+            values = [value for _, value in pairs if isinstance(value, Result)]
+            if len(values) < len(pairs):
+                raise FormatError("expected poses, or points", source=source)
+            found = block_of(values)._replace(lines=np.array([place for place, _ in pairs], np.int64))
+            for row, (position, rotation, *_) in enumerate(each.pose for each in values):
+                found.numbers[row, : POSITION * (position is None)] = np.nan
+                found.numbers[row, 7 if rotation else POSITION :] = np.nan
+        ends = np.flatnonzero(np.frombuffer(results.text, np.uint8) == ord("\n"))
+        yield found._replace(lines=np.searchsorted(ends, found.lines)), outcome
 
 
 class Gathered:
-    """The poses that were read so far, in metres and as unit quaternions, and a number or text with each."""
+    """The rows of a stream as poses (n, 7), in metres and as unit quaternions; a part that is missing is nan.
 
-    def __init__(self, *, named: bool = False, by: str | None = None) -> None:
-        """Begin with none; named: so that `places` says where each was read; by: the column or key of their labels."""
-        self.by = by
-        self.places: list[str] = []
-        self._lines: list[int] | None = [] if named else None  # of the block that was read last
-        self.placed = self.turned = self.uncertain = self.stamped = False
-        self.frame: str | None = None  # that of the Earth, where what was gathered is placed there
-        self._poses: list[Floats] = []
-        self._extra: list[Floats] = []
+    keys: of other columns, those that are kept
+    """
 
-    def take(
-        self, shape: Shape, pose: Components, kept: Flags, extra: Floats | None, line_of: Callable[[int], int]
-    ) -> None:
-        """Add the rows of a block that are kept: components of a pose, and what comes with them."""
-        if self._lines is not None:
-            self._lines += map(line_of, np.flatnonzero(kept).tolist())
-        self.placed |= shape.whole or shape.unit is not None
-        self.turned |= shape.notation is not None
-        rows = np.stack([np.broadcast_to(np.asarray(part, np.float64), len(kept)) for part in pose[:7]], axis=-1)
-        self._poses.append(rows[kept])
-        if extra is not None:
-            self._extra.append(extra[kept])
+    def __init__(self, keys: Sequence[str] = ()) -> None:
+        """Begin without rows."""
+        self.keys = keys
+        self.blocks: list[RowPoses] = []
 
-    def placing(self, outcomes: Iterable[Outcome], place: Callable[[int], str]) -> Generator[Outcome]:
-        """Pass the outcomes of blocks, and keep the places of what was taken from each; place: names a line."""
+    def of(self, steps: Iterable[Step]) -> Generator[Outcome]:
+        """Keep the rows of blocks, with their lines from 1; pass on what is reported about them."""
         line = 1
-        for outcome in outcomes:
-            if self._lines is not None:
-                self.places += [place(line + below) for below in self._lines]
-                self._lines = []
+        for rows, outcome in steps:
+            if len(rows.numbers):
+                numbers = rows.numbers[:, : 7 if rows.placed else 4]
+                missing = (7 - numbers.shape[1], 0) if not rows.placed else (0, 7 - numbers.shape[1])
+                numbers = np.pad(numbers, ((0, 0), missing), constant_values=np.nan)
+                extras = {key: rows.extras[key] for key in self.keys if key in rows.extras}
+                self.blocks.append(rows._replace(numbers=numbers, lines=rows.lines + line, extras=extras))
             line += outcome.lines
             yield outcome
 
-    def add(self, poses: Sequence[Pose], name: str = "") -> None:
-        """Add poses that were read one by one from something with a name."""
-        self.places += [f"{name}, pose {at}" for at in range(1, len(poses) + 1)] if len(poses) > 1 else [name]
-        self.placed |= any(pose.position is not None for pose in poses)
-        self.turned |= any(pose.rotation is not None for pose in poses)
-        self.frame = next((pose.parent for pose in poses if pose.parent in EARTH_FRAMES), self.frame)
-        self.uncertain |= any(pose.covariance is not None for pose in poses)
-        self.stamped |= any(pose.stamp_ns is not None for pose in poses)
-        self._poses.append(np.array([pose.components for pose in poses], np.float64).reshape(-1, 7))
-
     @property
-    def transforms(self) -> Transform:
-        """Return all poses as one batch; raises ValueInvalid if there are none."""
-        from frametool.geometry.transform import Transform
+    def numbers(self) -> Floats:
+        """Return all poses."""
+        return np.concatenate([np.empty((0, 7)), *(each.numbers for each in self.blocks)])
 
-        rows = np.concatenate([np.empty((0, 7)), *self._poses])
-        if not len(rows):
-            raise ValueInvalid("no poses to take the mean of")
-        return Transform.of(*map(np.ascontiguousarray, rows.T))
+    def rows(self, source: str) -> RowPoses:
+        """Return all rows as one block, with the columns that all have; raises FormatError if there are none."""
+        if not self.blocks:
+            raise FormatError("no poses or points in it", source=source)
+        stamps = [each.stamps_ns for each in self.blocks if each.stamps_ns is not None]
+        if len(stamps) not in (0, len(self.blocks)):
+            raise FormatError("some poses have a stamp and some have none", source=source)
+        parents = [*chain.from_iterable(each.for_each(each.parents) for each in self.blocks)]
+        names = [*chain.from_iterable(each.for_each(each.names) for each in self.blocks)]
+        extras = {
+            key: objects(chain.from_iterable(plain_cells(each.extras[key]) for each in self.blocks))
+            for key in self.keys if all(key in each.extras for each in self.blocks)
+        }  # fmt: skip
+        lines = np.concatenate([each.lines for each in self.blocks])
+        return RowPoses(self.numbers, np.concatenate(stamps) if stamps else None, lines, parents, names, extras)
 
-    @property
-    def extra(self) -> Any:
-        """Return the numbers or texts with the poses, (n,); None if there are none."""
-        return np.concatenate(self._extra) if self._extra else None
+
+def gathered(steps: Iterable[Step], bad: BadRows, keys: Sequence[str] = ()) -> RowPoses:
+    """Return all results of a stream as one block with their lines from 1, and some of its other columns as values.
+
+    Bad rows go to `bad`.  Raises FormatError if no row is left.
+    """
+    found = Gathered(keys)
+    run(found.of(steps), lambda _: None, bad)
+    return found.rows(bad.source)
 
 
-def means_of(
-    gathered: Gathered, values: list[float] | None, *, robust: bool
-) -> Iterator[tuple[Result, list[str]]]:
-    """Yield the mean of all poses, or of those of each label, with its spread, and a message for each outlier."""
+class MeanRows(Gathered):
+    """The rows of means, and the poses of arguments, with a weight or a label each, if a column or key holds such.
+
+    place: names a line of the stream; named: the places of the poses of arguments
+    """
+
+    def __init__(self, weights: str | None, by: str | None) -> None:
+        """Begin without rows; weights, by: the column or key of the weights, or of the labels."""
+        super().__init__()
+        self.key, self.by = by or weights, by
+        self.uncertain = self.stamped = False
+        self.frame: str | None = None  # that of the Earth, where rows are placed there
+        self.extra: list[Any] = []
+        self.named: list[str] = []
+        self.place: Callable[[int], str] = str
+
+    def take(self, steps: Iterable[Step], place: Callable[[int], str]) -> Generator[Outcome]:
+        """Keep the rows of a stream; those without a weight are bad."""
+        self.place = place
+        return self.of(map(self._looked_at, steps))
+
+    def add(self, source: Source, request: Request, *, name: str) -> list[Pose]:
+        """Add the poses of a text that is no stream, with what it is called; return them."""
+        poses = read_poses(source, request._replace(operation=COMBINED))
+        self.named += [f"{name}, pose {at}" for at in range(1, len(poses) + 1)] if len(poses) > 1 else [name]
+        results = BlockResults((), [*enumerate(map(Result, poses))])
+        for _ in self.of(map(self._looked_at, posed([Outcome(b"", results=results)], name))):
+            self.stamped |= any(pose.stamp_ns is not None for pose in poses)
+            self.uncertain |= any(pose.covariance is not None for pose in poses)
+        return poses
+
+    def _looked_at(self, step: Step) -> Step:
+        """Look at what comes with the rows of a block; those without a weight are bad."""
+        rows, outcome = step
+        if not len(rows.numbers):
+            return step
+        with_each = (*rows.extras, *rows.more)
+        self.uncertain |= any(re.fullmatch("sigma|c11|.*covariance", key) or is_sigma(key) for key in with_each)
+        self.stamped |= rows.stamps_ns is not None or stamp_column(with_each) is not None
+        self.frame = next((name for name in rows.parents if name in EARTH_FRAMES), self.frame)
+        if self.key is None or self.named:
+            return step
+        values, reasons = self._values(rows, self.key)
+        good = np.delete(np.arange(len(values)), [*reasons])
+        self.extra.append(values[good])
+        faults = [Fault(int(rows.lines[row]), self.key, reason) for row, reason in reasons.items()]
+        return kept(rows, good), outcome._replace(faults=sorted([*outcome.faults, *faults]))
+
+    def _values(self, rows: RowPoses, key: str) -> tuple[Any, dict[int, str]]:
+        """Return the weights or labels of rows, and why some have none."""
+        cells: Any = rows.extras.get(key, rows.extras.get(f"column {key}"))
+        if cells is None and key in NAME_KEYS + PARENT_COLUMNS:
+            cells = objects(rows.for_each(rows.names if key in NAME_KEYS else rows.parents))
+        elif cells is None:  # that of a mapping: `detections.weight`
+            first, *steps = key.split(".")
+            outer = plain_cells(rows.extras[first]) if first in rows.extras else [None] * len(rows.numbers)
+            cells = objects(reduce(_below, steps or [key], each) for each in outer)
+        size, missing, numbers = len(rows.numbers), dict[int, str](), np.zeros(len(rows.numbers))
+        if not (isinstance(cells, Spans) or is_typed(cells)):
+            none = f"no key {shown(key)}{did_you_mean(key, rows.extras)}"
+            missing = {row: none for row in range(size) if cells[row] is None}
+        if self.by is not None:
+            return np.array(texts_of(cells), object), missing
+        unread = np.arange(size)
+        if isinstance(cells, Spans):
+            numbers, unread = parse_floats(without_quotes(cells))
+        elif is_typed(cells):
+            numbers, unread = cells.astype(np.float64), np.flatnonzero(~np.isfinite(cells))
+        texts = texts_of(cells) if len(unread) else []
+        there = (row for row in unread.tolist() if row not in missing)
+        reasons = missing | read_each(numbers, there, lambda row: parse_number(texts[row]))
+        negative = np.flatnonzero(numbers < 0.0).tolist()
+        return numbers, reasons | {row: f"weight {numbers[row]:g} is negative" for row in negative}
+
+
+def _below(value: Any, key: str) -> Any:
+    return value.get(key) if type(value) is dict else None
+
+
+def means_of(rows: MeanRows, values: list[float] | None, *, robust: bool) -> Iterator[tuple[Result, list[str]]]:
+    """Yield the mean of all poses, or of those of each label, with its spread, and a message for each outlier.
+
+    values: the weights of poses that are arguments
+    """
     from frametool.fit.calibration import solve_mean
     from frametool.fit.least_squares import length, off_text
-    from frametool.grammar.pose import Pose
-    from frametool.grammar.result import Result, uncertain
 
-    poses, extra = gathered.transforms, gathered.extra
+    numbers, by = rows.numbers, rows.by
+    if not len(numbers):
+        raise ValueInvalid("no poses to take the mean of")
+    placed, turned = (not np.isnan(part).all() for part in (numbers[:, 0], numbers[:, POSITION]))
+    poses = Transform.of(*np.where(np.isnan(numbers), NOWHERE, numbers).T.copy())
+    extra = np.concatenate(rows.extra) if rows.extra else None
+    lines = np.concatenate([each.lines for each in rows.blocks])
     rows_of: dict[str, Any] = {}
-    if gathered.by is not None:
+    if by is not None:
         if extra is None:
             raise ValueInvalid("what was pasted has no columns or keys to group it by; leave --by out")
         for row, label in enumerate(extra.tolist()):
             rows_of.setdefault(label, []).append(row)
-    weights = None if gathered.by is not None else extra if values is None else values
-    for label, rows in (rows_of or {"": range(len(poses))}).items():
-        found = solve_mean(poses[rows] if rows_of else poses, weights=weights, robust=robust)
+    weights = None if by is not None else extra if values is None else values
+    for label, at in (rows_of or {"": range(len(poses))}).items():
+        found = solve_mean(poses[at] if rows_of else poses, weights=weights, robust=robust)
         (metres, radians), (farthest, widest), covariance = found.rms, found.most, found.covariance
-        extras: dict[str, Any] = {} if gathered.by is None else {gathered.by: label}
+        extras: dict[str, Any] = {} if by is None else {by: label}
         extras |= {"count": len(found.used)} | ({"used": int(found.used.sum())} if robust else {})
         left_out: list[str] = []
-        for at in found.left_out.nonzero()[0].tolist():
-            off = off_text(*length(found.residuals[at].reshape(2, 3)), digits=2)
-            left_out.append(f"{gathered.places[rows[at]]}: left out, {off} off (u {found.u[at]:.1f})")
+        for row in found.left_out.nonzero()[0].tolist():
+            off = off_text(*length(found.residuals[row].reshape(2, 3)), digits=2)
+            place = rows.named[at[row]] if rows.named else rows.place(int(lines[at[row]]))
+            left_out.append(f"{place}: left out, {off} off (u {found.u[row]:.1f})")
         pose = Pose.of(found.transform.components)
-        if gathered.placed:
+        if placed:
             extras |= {"distance_rms": metres, "distance_max": farthest}
-        if gathered.turned:
+        if turned:
             extras |= {"angle_rms": radians, "angle_rms_deg": degrees(radians)}
             extras |= {"angle_max": widest, "angle_max_deg": degrees(widest)}
         if covariance is not None:
-            if gathered.placed:
+            if placed:
                 extras |= {f"std_{axis}": sqrt(covariance[at, at]) for at, axis in enumerate("xyz")}
-            if gathered.turned:
+            if turned:
                 angle = sqrt(covariance[3:, 3:].trace())
                 extras |= {"std_angle": angle, "std_angle_deg": degrees(angle)}
-            extras |= uncertain((covariance if gathered.turned else covariance[:3, :3]).ravel().tolist())
-        position, rotation = pose.position if gathered.placed else None, pose.rotation if gathered.turned else None
-        yield Result(Pose(position, rotation, None, gathered.frame), extras), left_out
+            extras |= uncertain((covariance if turned else covariance[:3, :3]).ravel().tolist())
+        position, rotation = pose.position if placed else None, pose.rotation if turned else None
+        yield Result(Pose(position, rotation, None, rows.frame), extras), left_out

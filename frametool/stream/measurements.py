@@ -23,7 +23,7 @@ from frametool.formats.load import EdgePlace, FrameFile, close_all, lines_of, lo
 from frametool.formats.trees.tree_reader import MOST_KEYS, read_edges
 from frametool.frames.lookups import FrameTree, taken
 from frametool.geometry.transform import Transform
-from frametool.grammar.covariance import AXES, columns, is_sigma
+from frametool.grammar.covariance import AXES, is_sigma
 from frametool.grammar.pose import COVARIANCE_KEYS, Pose, inverted, read_angle_unit
 from frametool.grammar.readers import NAME_KEYS, STAMP_KEYS, Misfit, Path, Reading, kind, tell, within
 from frametool.stream.faults import BadRows
@@ -197,7 +197,7 @@ def _of_table(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
             warn(f"{file.name}:1: no rotation among the columns {rows.columns}: each is taken for 0")
         line = line or 1
         BadRows(file.name).take(fault._replace(line=line + fault.line) for fault in outcome.faults)
-        results = values_of(block, POSE, columns() if shape.covariance else (), placed=has_place)
+        results = values_of(block)
         inputs = rows.inputs.T.tolist() if results else []
         for at, result, own in zip((block.lines + line).tolist(), results, inputs, strict=True):
             pose, cells = result.pose, result.extras

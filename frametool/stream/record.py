@@ -459,7 +459,7 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     is_sure = type(sigma) is dict and any(each[:3] in ("rpy", "rol", "pit", "yaw") for each in sigma)
     turns = turned or (not operation.moves and is_sure)
     # a PointStamped or Vector3Stamped stays one where it is written anew and nobody asked for a rotation
-    is_kept = operation.changes_nothing and operation.formula is None and request.gathered is None
+    is_kept = operation.changes_nothing and operation.formula is None
     stays = not turns and "header" in value and key in (POINT, VECTOR) and is_kept and not (rows.kind or rows.given)
     stays = stays and {each.spec for each in request.results.notations} <= {"quaternion"}
     record = Record(path, Shape(key if stays else _kind(key, turns, request), None), keys=RecordKeys(key))
@@ -493,8 +493,6 @@ def _given_on_earth(record: Record, request: Request) -> Record:
     if shape.unit != 1.0:
         raise Misfit(f"--from {request.rows.given_place} takes metres")
     is_point = shape.notation is None and not request.rows.kind and request.operation.keeps_frames
-    if request.gathered is not None:
-        request.gathered.frame, is_point = EARTH_FRAMES[0], False
     shape = shape._replace(unit=place, kind=POINT if is_point else shape.kind)
     return record._replace(shape=shape, parent=Name(EARTH_FRAMES[0]))
 
@@ -731,8 +729,6 @@ def _with_names(record: Record, root: Any, request: Request) -> Record:
             else:
                 parent = _named(header, ("frame_id",), inside, parent, request)
             record = _with_stamp(record, header, (*inside, "stamp"))
-        if request.gathered is not None:
-            request.gathered.stamped |= record.stamp_ns is not None or any(key in value for key in STAMP_KEYS)
     if on_earth:
         parent = parent._replace(text=parent.text or record.parent.text)
     return record._replace(parent=parent, name=name) if parent.paths or name.paths or on_earth else record

@@ -22,7 +22,7 @@ from frametool.stream.evaluate import Plan
 from frametool.stream.faults import NULL, SKIP, Fault
 from frametool.stream.record import KEYS_REMEDY, POINT_KEYS
 from frametool.stream.row_layout import POSE, Const, In, Renamed
-from frametool.stream.rows import Block, chosen, numbered, read_extra, spans_of
+from frametool.stream.rows import Block, chosen, numbered, spans_of, stamps_in
 from frametool.stream.splice import OURS, column_in, quoted_name, stretches_of
 from frametool.stream.splitter import DOCUMENTS, LINES, Part, Splitter
 from frametool.text.spans import MARGIN, Bytes, Ints, Spans, without_quotes
@@ -228,7 +228,7 @@ class Template:
         placed = {(*record.path, key) for record, *_ in self.entries for key in record.keys.placed}
         number = JSON_NUMBER if self.json else YAML_NUMBER
         operation = self._request.operation
-        passes = operation.keeps_frames and operation.formula is None and self._request.gathered is None
+        passes = operation.keeps_frames and operation.formula is None
         stamps = {path: STAMP[at % 2] for record, *_ in self.entries for at, path in enumerate(record.stamps)}
         for path, leaf in _leaves(self._root, ()):
             depth = next((depth for depth in range(len(path), 0, -1) if type(path[depth - 1]) is str), 0)
@@ -443,7 +443,7 @@ def block_of(cut: Cut, data: Bytes, text: bytes, request: Request) -> Block:
     stamps, bad = list[Any](), dict[int, tuple[str, str]]()
     column = request.timed.column if request.timed else request.rows.extra_column or ""
     for each in template.stamps:
-        found, late = read_extra([without_quotes(parts[index]) for index in each], request, column)
+        found, late = stamps_in([without_quotes(parts[index]) for index in each], column)
         stamps.append(found)
         bad = {**late, **bad}
     named = [names_of(cut, at, text) for at in range(len(template.entries))]

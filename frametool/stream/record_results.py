@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from itertools import chain
+from itertools import chain, islice
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -22,20 +22,39 @@ if TYPE_CHECKING:
     from frametool.text.spans import Ints, Spans
 
 
+TOGETHER = 1 << 13  # results that are written as one block
+
+
 class BlockResults(NamedTuple):
-    """What the rows or records of a block became: those that are alike together, and single results, by place."""
+    """What the records of a block became: those that are alike together, and single results, by place in its text."""
 
     batches: Sequence[AlikeRows]
     values: list[tuple[int, Value]]
+    text: bytes = b""
 
     def posed(self) -> RowPoses | None:
         """Return the rows as one block of poses; None where they are more, or others."""
         return None if self.values or len(self.batches) != 1 else self.batches[0].poses()
 
+    def placed(self) -> list[tuple[int, Value]]:
+        """Return all results as values, each with its place, in the order of their records."""
+        rows = (zip(batch.places.tolist(), batch.values(), strict=True) for batch in self.batches)
+        return sorted(chain(self.values, *rows), key=itemgetter(0))
+
     def in_order(self) -> Iterator[Value]:
         """Yield all results as values, in the order of their records."""
-        rows = (zip(batch.places.tolist(), batch.values(), strict=True) for batch in self.batches)
-        yield from map(itemgetter(1), sorted(chain(self.values, *rows), key=itemgetter(0)))
+        yield from map(itemgetter(1), self.placed())
+
+    def together(self) -> Iterator[list[Value]]:
+        """Yield them many together."""
+        rest = self.in_order()
+        return iter(lambda: list(islice(rest, TOGETHER)), [])
+
+
+def blocks_of(values: Iterable[Value]) -> Iterator[BlockResults]:
+    """Yield single results as blocks."""
+    rest = enumerate(values)
+    return (BlockResults((), each) for each in iter(lambda: [*islice(rest, TOGETHER)], []))
 
 
 LINE = re.compile(rb'((?:[^"\n]|"[^"]*")*+)\n')
@@ -53,7 +72,7 @@ def text_in_order(lines: Sequence[tuple[int, bytes]], groups: Sequence[tuple[Int
 class ResultWriter(Protocol):
     """Writes the results of blocks: some text at once, the rest at the end."""
 
-    def of_block(self, block: BlockResults) -> bytes:
+    def of_block(self, block: Any) -> bytes:
         """Return what is written of a block at once."""
 
     def end(self) -> Iterable[bytes]:
@@ -63,17 +82,20 @@ class ResultWriter(Protocol):
 
 def written_by(writer: ResultWriter, outcomes: Iterator[Outcome], on_error: str) -> Generator[Outcome]:
     """Let a writer write the results of blocks; what it holds back comes before the error that ends a stream."""
+    begun = False
     while True:
         try:
             outcome = next(outcomes, None)
         except FrametoolError:
-            yield from map(Outcome, writer.end())
+            if begun:
+                yield from map(Outcome, writer.end())
             raise
         if outcome is None:
             yield from map(Outcome, writer.end())
             return
+        begun = begun or outcome.kept > 0
         text = b"" if outcome.results is None else writer.of_block(outcome.results)
-        if outcome.faults and any(on_error == STOP or fault.final for fault in outcome.faults):
+        if begun and any(on_error == STOP or fault.final for fault in outcome.faults):
             yield from map(Outcome, (text, *writer.end()))
             text = b""
         yield outcome._replace(text=text)

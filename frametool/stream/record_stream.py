@@ -212,7 +212,7 @@ class RecordBlocks:
             groups = [group for run in found.runs for group in run.groups(end)]
             return outcome._replace(text=text_in_order(items, groups))
         alike = [each.take((each.places < end).nonzero()[0]) for each in found.alike] if stops else found.alike
-        return outcome._replace(results=BlockResults([each for each in alike if len(each.places)], items))
+        return outcome._replace(results=BlockResults([each for each in alike if len(each.places)], items, text))
 
     def _take(self, text: bytes, start: int, end: int, found: Found) -> bool:
         """Take records one by one; what is between them passes.  Return whether an array ends there."""

@@ -295,7 +295,7 @@ def read_poses(source: Source, asked: Request) -> list[Pose]:
 def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
     """Return every pose of a text as `read_poses` does, and the keys that come with any of them."""
     own = RowOptions(kind=POSE, degrees=asked.rows.degrees, normalize=asked.rows.normalize)
-    request = Request(asked.operation, own, gathered=asked.gathered)
+    request = Request(asked.operation, own)
     poses: list[Pose] = []
     extra: set[str] = set()
     known = read_text(source, request)

@@ -16,7 +16,7 @@ from frametool.stream.rows import RowPoses, plain_cells
 from frametool.stream.writers import SingleWriter, refuse_infinite, refuse_scale_in
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from frametool.grammar.result import Style
     from frametool.text.spans import Floats, Ints
@@ -32,13 +32,13 @@ NO_STAMPS = "{}: the rows have no stamps, and messages need them; `convert --sta
 class RecordingWriter(SingleWriter):
     """Write blocks of poses or points as messages of one topic, or of several that go side by side."""
 
-    def __init__(self, style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> None:
-        """Choose the messages; kind: what a row is; extras: the numbers with each; placed: poses have a position.
+    def __init__(self, style: Style, first: RowPoses) -> None:
+        """Choose the messages for what the rows of the first block are.
 
         Raises ValueInvalid for rows and notations that no message holds, FileProblem without the extra.
         """
-        super().__init__(style, kind, extras, placed=placed)
-        asked = style.recording
+        super().__init__(style, first)
+        asked, kind = style.recording, self.kind
         if kind not in KINDS_OF:
             raise ValueInvalid(f"{style.format} is not written of rows of a {kind}; write csv, json or yaml")
         for name in asked.kinds:
@@ -57,7 +57,7 @@ class RecordingWriter(SingleWriter):
         if asked.topic and len(self.kinds) > 1:
             raise ValueInvalid(f"there are {len(self.kinds)} topics ({', '.join(self.kinds)}); {asked.topic} names one")
         self.file = RecordingFile(style.format, asked.folder)
-        self.dropped |= dict.fromkeys(extras)
+        self.dropped |= dict.fromkeys(self.extras)
         self.path: list[tuple[str, Ints, Floats]] = []
         self.lost: dict[str, None] = {}  # names of frames that poses are of
         self.is_named = True  # whether all rows say what they are seen from

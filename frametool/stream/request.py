@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from frametool.geometry.place import Earth, Place
     from frametool.geometry.types import Components, Namespace, Number, Rigid
     from frametool.grammar.result import Style
-    from frametool.stream.gathering import Gathered
 
     Rename: TypeAlias = Callable[[str | None, str | None], tuple[str | None, str | None]]
 
@@ -145,7 +144,7 @@ class Operation(NamedTuple):
         if passes or shape.kind not in (POSE, POINT, VECTOR):
             return ()
         sizes = {*map(len, filter(None, (self.left, *self.right, self.fixed)))}
-        if SCALED in sizes or 1 in shape.covariance or self.reads_scale(shape):
+        if SCALED in sizes or shape.has_scale or self.reads_scale(shape):
             return () if self.moves else (SCALE,)
         of_position = shape.kind == POSE and 9 in shape.covariance and not shape.rewritten  # it stays what it is
         if of_position or not (self.uncertain or shape.covariance or UNCERTAIN in sizes):
@@ -160,7 +159,7 @@ class Operation(NamedTuple):
         A scale that comes with it says it already.
         """
         return self.multiples and shape.notation is not None and (
-            shape.notation.representation.whole is not None and 1 not in shape.covariance
+            shape.notation.representation.whole is not None and not shape.has_scale
         )
 
     def result_kind(self, kind: str) -> str:
@@ -360,7 +359,8 @@ class RowOptions(NamedTuple):
     given: the notation of their rotations; given_place: what unnamed numbers are of a position on the Earth
     degrees: whether bare angles are in degrees; normalize: take any non-zero quaternion
     columns: which columns are ours, one entry a pose; frames: columns that name a row's frame
-    extra_column: the column or key of a stamp or weight that is read with the pose; "" is the usual stamp
+    extra_column: the column or key of a stamp that is read with the pose; "" is the usual stamp
+    apart: a column that is no number of the pose; timeless: stamps are not read, unless they are asked for
     some_static: the stamp of a row may be empty
     frame_is_counter: a decimal `frame` is a counter, because no frame is called so
     """
@@ -375,6 +375,8 @@ class RowOptions(NamedTuple):
     columns: tuple[str, ...] = ()
     frames: tuple[str, ...] = ()
     extra_column: str | None = None
+    apart: str | None = None
+    timeless: bool = False
     some_static: bool = False
     frame_is_counter: bool = True
 
@@ -408,7 +410,6 @@ class Request(NamedTuple):
 
     pose_from_frame: the pose that moves a record expressed in a frame; timed: the poses that do so at its own time
     rename: turns a record's (parent, name) into those of its result
-    gathered: takes the poses, nothing is written then
     earth: what is said of all places: the origin, the axes of rotations, the zone
     offset_ns: added to the stamps of rows and records, also `FromFirst`; window: the first and the last that are left
     """
@@ -419,7 +420,6 @@ class Request(NamedTuple):
     pose_from_frame: Callable[[str | None], Rigid] | None = None
     timed: Timed | None = None
     rename: Rename | None = None
-    gathered: Gathered | None = None
     on_error: str = STOP
     earth: Earth | None = None
     offset_ns: int = 0
@@ -454,15 +454,10 @@ class Request(NamedTuple):
         return (lambda _parent, _name: (None, None)) if operation.of == PAIR else None
 
     @property
-    def weighs(self) -> bool:
-        """Return True if the extra column holds weights or labels rather than stamps."""
-        return self.gathered is not None and bool(self.rows.extra_column)
-
-    @property
     def in_order(self) -> bool:
         """Return True if a row's result depends on the rows before it."""
         takes_first = self.earth is not None and self.earth[0] is not None and self.earth[0].place is None
-        return self.results.unwrap or self.operation.looks_back or self.gathered is not None or takes_first
+        return self.results.unwrap or self.operation.looks_back or takes_first
 
     @property
     def keeps_position(self) -> bool:

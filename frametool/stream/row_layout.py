@@ -105,6 +105,11 @@ class Shape(NamedTuple):
         return rotation + count_of(self.unit)
 
     @property
+    def has_scale(self) -> bool:
+        """Return True if a scale comes with it."""
+        return 1 in self.covariance and not self.sigma
+
+    @property
     def place(self) -> Place | None:
         """Return how its position on the Earth is written, None of any other."""
         return place_of(self.unit)

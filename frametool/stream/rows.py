@@ -24,8 +24,7 @@ from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.readers import in_nanoseconds
 from frametool.grammar.result import NoResult, Result, with_entries
 from frametool.stream.row_layout import AS_READ, NOWHERE, PARTS, POSE, Const, IfLocked, In, Instead, Out, Piece, Word
-from frametool.text.numbers import parse_number
-from frametool.text.parse import FURTHEST, parse_floats, parse_stamps
+from frametool.text.parse import FURTHEST, parse_stamps
 from frametool.text.spans import MARGIN, Floats, Ints, Spans, framed, join, without_quotes
 from frametool.text.write import float_spans, replaced, rounded_to_single
 
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
     from frametool.geometry.place import Place, Spot
     from frametool.geometry.types import Components
     from frametool.stream.faults import Fault
-    from frametool.stream.request import Request
 
     Cells: TypeAlias = Spans | NDArray[Any]
 
@@ -70,7 +68,7 @@ class Block(NamedTuple):
     unchanged: place and text of what passes as it is
     broken: place and fault of rows that no number can be read from
     names: those of the rows, and of their results
-    stamps: for each shape (or one for all) the nanoseconds, None where it has none; of gathered rows weights or labels
+    stamps: for each shape (or one for all) the nanoseconds, None where it has none
     bad: rows that are bad by what is no number: column and reason
     frames: for each shape (or one for all) the name of the frame each row is expressed in, or one for all rows; for
         look-ups the two names, parted by NUL
@@ -270,28 +268,22 @@ def _in_order(groups: Sequence[tuple[Ints, list[Spans]]]) -> bytes:
     return join([Spans(np.concatenate([each.data for each in rows]), starts[order], ends[order])])
 
 
-# --- stamps and weights ---
+# --- stamps ---
 
-def read_extra(cells: Sequence[Spans], request: Request, name: str) -> tuple[Any, dict[int, tuple[str, str]]]:
-    """Read the stamps of rows, or the weights or labels of those that are gathered; give also which rows have none.
+def stamps_in(
+    cells: Sequence[Spans], name: str, *, some_static: bool = False
+) -> tuple[Ints | None, dict[int, tuple[str, str]]]:
+    """Read the stamps of rows, and which rows have none.
 
-    cells: as for `read_stamps`, or () for none; name: that of their column or key
+    cells: as for `read_stamps`, or () for none; name: that of their column or key; some_static: they may be empty
     """
     if not cells:
         return None, {}
-    values: Any
-    if not request.weighs:
-        values, reasons = read_stamps(cells, in_ns=in_nanoseconds(name) if len(cells) == 1 else 0)
-        values[[*reasons]] = NO_STAMP
-        if request.rows.some_static:
-            reasons = {row: reason for row, reason in reasons.items() if any(each.text(row).strip() for each in cells)}
-    elif request.gathered is not None and request.gathered.by:
-        return np.array(texts_of(cells[0]), object), {}
-    else:
-        values, bad = parse_floats(cells[0])
-        texts = {row: cells[0].text(row).decode("utf-8", "replace").strip(" \t\"'") for row in bad.tolist()}
-        reasons = read_each(values, texts, lambda row: parse_number(texts[row]))
-    return values, {row: (name, reason) for row, reason in reasons.items()}
+    stamps, reasons = read_stamps(cells, in_ns=in_nanoseconds(name) if len(cells) == 1 else 0)
+    stamps[[*reasons]] = NO_STAMP
+    if some_static:
+        reasons = {row: reason for row, reason in reasons.items() if any(each.text(row).strip() for each in cells)}
+    return stamps, {row: (name, reason) for row, reason in reasons.items()}
 
 
 def read_stamps(cells: Sequence[Spans], *, in_ns: int) -> tuple[Ints, dict[int, str]]:
@@ -326,6 +318,8 @@ class RowPoses(NamedTuple):
     parents, names: one a row, one for all, or none
     extras: columns that are not ours, by name: cells of text, numbers as they are, or objects (see `objects`)
     read: (n, 3) lat lon alt of positions on the Earth that nothing has moved, as they were read
+    kind: what a row is: a pose, a point, ..; placed: whether poses have positions, which else are left out
+    more: the names of the numbers that come behind those of the thing itself
     """
 
     numbers: Floats
@@ -335,6 +329,9 @@ class RowPoses(NamedTuple):
     names: Sequence[str | None]
     extras: Mapping[str, Cells]
     read: Floats | None = None
+    kind: str = POSE
+    placed: bool = True
+    more: tuple[str, ...] = ()
 
     def for_each(self, names: Sequence[str | None]) -> Sequence[str | None]:
         """Return parents or names, one a row."""
@@ -349,6 +346,9 @@ class RowPoses(NamedTuple):
         if self.read is None:
             return parts
         return _place().Unmoved(parts, _place().spot_of(np.ascontiguousarray(self.read.T)))  # type: ignore[no-any-return]
+
+
+NO_ROWS = RowPoses(np.empty((0, 7)), None, np.empty(0, np.int64), (None,), (None,), {})
 
 
 def _place() -> Any:
@@ -391,12 +391,10 @@ def is_typed(cells: Any) -> bool:
 
 
 def block_of(results: Sequence[Result], *, placed: bool = True) -> RowPoses:
-    """Return results as a block of poses; raises ValueInvalid for one without a rotation.
+    """Return results as a block of poses; what they lack is 0 and the identity.
 
     placed: they have positions
     """
-    if any(result.pose.rotation is None for result in results):
-        raise ValueInvalid("a trajectory holds poses; a point has no rotation")
     stamped = ["stamp_ns" in result.extras for result in results]
     if any(stamped) and not all(stamped):
         raise ValueInvalid("some poses have a stamp and some have none; add it, or leave it out of all")
@@ -405,11 +403,11 @@ def block_of(results: Sequence[Result], *, placed: bool = True) -> RowPoses:
     parents, names = [pose.parent for pose in poses], [pose.name for pose in poses]
     scales: list[dict[str, Any]] = [{} if pose.scale == 1.0 else {SCALE: pose.scale} for pose in poses]
     others = [scale | result.extras for scale, result in zip(scales, results, strict=True)]
-    return _block(numbers, parents, names, others)
+    return _block(numbers, parents, names, others)._replace(placed=placed)
 
 
-def block_of_points(records: Sequence[Mapping[str, Any]]) -> tuple[str, RowPoses]:
-    """Return mappings of points, vectors, twists or wrenches as a block, and what they are.
+def block_of_points(records: Sequence[Mapping[str, Any]]) -> RowPoses:
+    """Return mappings of points, vectors, twists or wrenches as a block.
 
     Raises ValueInvalid for no such column, or several of them.
     """
@@ -429,7 +427,7 @@ def block_of_points(records: Sequence[Mapping[str, Any]]) -> tuple[str, RowPoses
     if len(kinds) > 1:
         raise ValueInvalid(f"columns hold things of one kind, found {' and '.join(sorted(kinds))}")
     frames = [record.get("frame") for record in records]
-    return min(kinds), _block(np.array(found, np.float64), frames, [None], rest)
+    return _block(np.array(found, np.float64), frames, [None], rest)._replace(kind=min(kinds))
 
 
 def _block(
@@ -460,13 +458,12 @@ def objects(values: Iterable[Any]) -> NDArray[Any]:
     return column
 
 
-def values_of(
-    block: RowPoses, kind: str, extras: Sequence[str] = (), place: Place | None = None, *, placed: bool = True
-) -> list[Any]:
-    """Return a block as single results of a kind: poses, placed or not, or points, vectors, .. as mappings.
+def values_of(block: RowPoses, place: Place | None = None) -> list[Any]:
+    """Return a block as single results: poses, placed or not, or points, vectors, .. as mappings.
 
-    extras: the numbers that come with each; place: how positions on the Earth are written
+    place: how positions on the Earth are written
     """
+    kind, extras, placed = block.kind, block.more, block.placed
     names, parents = map(block.for_each, (block.names, block.parents))
     others = {name: plain_cells(cells) for name, cells in block.extras.items()}
     stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()

@@ -28,6 +28,7 @@ from frametool.grammar.readers import Misfit, Path, Reading, as_mapping, tell, w
 from frametool.grammar.result import Result
 from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows
+from frametool.stream.gathering import gathered
 from frametool.stream.header import listed
 from frametool.stream.record import find_records, pose_of, value_at
 from frametool.stream.record_values import read_text
@@ -35,7 +36,7 @@ from frametool.stream.request import Operation, Request, RowOptions
 from frametool.stream.row_layout import IDENTITY, POSE
 from frametool.stream.rows import RowPoses, block_of, plain_cells
 from frametool.stream.table import open_table
-from frametool.stream.trajectories import TREE, gathered
+from frametool.stream.trajectories import TREE
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
@@ -134,11 +135,11 @@ def _of_table(file: InputFile, fmt: str, columns: Sequence[str], *, normalize: b
     for each in columns:
         request = Request(Operation(moves=True), RowOptions(columns=(each,), normalize=normalize))
         poses = gathered(FormatConverter(fmt, request, file.name).steps(BytesIO(text)), BadRows(file.name))
-        numbers = poses.numbers
-        if numbers.shape[1] not in (4, 7):
+        missing = np.isnan(poses.numbers)
+        if missing[0, -1]:
             raise FormatError(f"no rotation among the columns {each}", source=file.name, line=1)
-        placed |= numbers.shape[1] == 7
-        sides.append(Transform.of(*np.pad(numbers, ((0, 0), (7 - numbers.shape[1], 0))).T.copy()))
+        placed |= not missing[0, 0]
+        sides.append(Transform.of(*np.where(missing, 0.0, poses.numbers).T.copy()))
         places = [f"{file.name}:{line}" for line in poses.lines.tolist()]
     return HandEyeSamples(sides[0], sides[1], places, (None,) * 4, (file.name,), placed=placed)
 
@@ -241,7 +242,7 @@ def read_points(argument: str, *, fmt: str, answers: Answers, policy: Callable[[
         else:
             converter = FormatConverter(fmt, Request(Operation(moves=True)), file.name, answers=answers)
             rows = gathered(converter.steps(cast("ByteStream", file.stream)), policy(file.name), (*IDS, WEIGHT))
-            if rows.numbers.shape[1] < 3 or not converter.placed:
+            if np.isnan(rows.numbers[0, 0]):
                 raise FormatError("no positions in it: rotations alone are no points", source=file.name)
             row = " row " if "arrays" in reads else ":"
             lines = rows.lines if row == ":" else np.arange(1, len(rows.numbers) + 1)

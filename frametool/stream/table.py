@@ -34,9 +34,9 @@ from frametool.stream.rows import (
     Coded,
     RowPoses,
     coded,
-    read_extra,
     read_stamps,
     spans_of,
+    stamps_in,
     taken,
     written,
 )
@@ -293,7 +293,7 @@ def as_trajectory(table: Table, fmt: str, request: Request, source: str) -> tupl
     return table._replace(names=names), request
 
 
-def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming, request: Request) -> Block:
+def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming, *, some_static: bool) -> Block:
     """Find the rows of a block, their numbers, their names, and the stretches of text that pass."""
     places = layout.places
     is_run = places and places == tuple(range(places[0], places[0] + len(places)))  # then nothing is copied
@@ -309,7 +309,7 @@ def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming, requ
     ]
     times = [place for place in (layout.time, layout.below) if place is not None]
     columns = [without_quotes(cells.column(place)) for place in times]
-    stamps, late = read_extra(columns, request, table.name(times[0])) if times else (None, {})
+    stamps, late = stamps_in(columns, table.name(times[0]), some_static=some_static) if times else (None, {})
     unchanged, broken, before = [], [], cache(cells.lines_before)
     if len(cells.rows) < len(cells.counts):
         named = f" ({' '.join(table.names)})" if table.names and len(table.names) < 12 else ""
@@ -383,8 +383,6 @@ class PlannedRows:
         self.plan, self.layout = plan_table(table, request, source, normals, stamped=stamped)
         self.shape = self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
         self.naming = Naming(table, self.layout, request.for_kind(self.shape.kind), self.shape)
-        if request.gathered is not None:
-            request.gathered.stamped |= bool(usual)
         self.state = State()
         self.mended, self.off = 0, 0.0
 
@@ -462,7 +460,7 @@ class TableRows(PlannedRows):
         cells = table.split(text[:torn])
         if self.request.offset_ns and layout.time is not None:
             cells = table.split(self._at_other_times(text[:torn], cells, self.request.offset_ns))
-        block = table_block(table, layout, cells, self.naming, self.request)
+        block = table_block(table, layout, cells, self.naming, some_static=self.request.rows.some_static)
         run = self.ran(block)
         faults = run.faults()
         if torn is not None:

@@ -92,7 +92,7 @@ def plan_table(
         poses = _find(table, request, source)
     on_earth = bool(poses) and poses[0].position is not None and place_of(poses[0].position.unit) is not None
     is_point = request.operation.turns and poses and poses[0].rotation is None
-    passes = not (request.operation.moves or request.results.all_numbers or is_point or request.gathered)
+    passes = not (request.operation.moves or request.results.all_numbers or is_point)
     if request.rows.poses == 1 and not on_earth and passes and request.keeps_position:
         poses = [_without_position(poses[0], request, table, source)]
     if wrong := next((each.wrong for pose in poses for each in pose if each and each.wrong), ""):
@@ -152,6 +152,7 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
     asked, specs, width = request.rows, request.rows.columns, table.width
     if not asked.poses:
         return []
+    apart = None if asked.apart is None else _place(asked.apart, table.called, source)
     if specs and len(specs) != asked.poses:
         raise Misused(f"--columns is given {len(specs)} times, for {asked.poses} poses in a row")
     if specs or not table.names:
@@ -163,7 +164,8 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
         from frametool.stream.earth_columns import chosen_pose
 
         return [chosen_pose(spec, table.names, width, request) for spec in specs]
-    names = ["" if name == asked.extra_column or may_be_uncertain(name) else name for name in table.names]
+    ours = [None if at == apart or name == asked.extra_column else name for at, name in enumerate(table.names)]
+    names = ["" if name is None or may_be_uncertain(name) else name for name in ours]
     six = header.find_six(names, asked.kind if asked.kind in SIX else "")
     if asked.kind in SIX and six is None:
         wanted = " ".join(six_names(asked.kind))
@@ -275,20 +277,19 @@ def _place(name: str, names: Sequence[str], source: str) -> int:
 def _stamp_columns(
     table: Table, request: Request, places: Sequence[int], frames: Sequence[int], source: str, *, stamped: bool
 ) -> tuple[int | None, int | None]:
-    """Find the column of stamps, or of weights, by its name or number, and that of the nanoseconds of such stamps.
+    """Find the column of stamps by its name or number, and that of the nanoseconds of such stamps.
 
     Where all numbers are wanted it may be one that no option names.
     """
     name = request.timed.name if request.timed else request.rows.extra_column
     if name is not None:
         time = _place(name, table.called, source)
-        if request.gathered is None:  # else it is a weight
-            try:
-                readers.in_nanoseconds(table.name(time))
-            except ValueInvalid as error:
-                raise Misused(str(error), source=source, line=1) from None
+        try:
+            readers.in_nanoseconds(table.name(time))
+        except ValueInvalid as error:
+            raise Misused(str(error), source=source, line=1) from None
         return time, nanoseconds_beside(table.names, time) if table.names else None
-    if not (stamped and request.results.all_numbers):
+    if not (stamped and request.results.all_numbers) or request.rows.timeless:
         return None, None
     usual, below = stamp_places(table.names)
     if not (table.names or request.rows.columns) and min(places, default=0) == 1:

@@ -28,32 +28,31 @@ from frametool.geometry.transform import Rotation
 from frametool.grammar.edges import Answers, Diagnostics, Names
 from frametool.grammar.pose_algebra import sample_stamps
 from frametool.grammar.readers import in_nanoseconds, stamp_column, stamp_places
-from frametool.grammar.result import Result, Style
+from frametool.grammar.result import Style
 from frametool.ros.messages import body_of
 from frametool.stream.as_poses import FormatConverter
-from frametool.stream.faults import BadRows, Outcome, run
+from frametool.stream.faults import BadRows
+from frametool.stream.gathering import POSITION, gathered, posed
 from frametool.stream.header import listed
 from frametool.stream.record_stream import run_records
 from frametool.stream.request import Operation, Request, RowOptions
-from frametool.stream.rows import RowPoses, block_of, objects, plain_cells
 from frametool.stream.rows import read_stamps as read_columns
 from frametool.stream.table import open_table
 from frametool.text.spans import without_quotes
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Sequence
     from typing import TypeAlias
 
     from frametool.fit.comparison import Comparison
     from frametool.frames.buffer import TransformBuffer
     from frametool.geometry.transform import Transform
     from frametool.grammar.edges import Report
-    from frametool.stream.record_results import BlockResults
+    from frametool.stream.rows import RowPoses
     from frametool.text.lines import ByteStream
 
     TrajectoryLike: TypeAlias = Trajectory | str | PathLike[str]
 
-POSITION = 3  # numbers
 RECORDINGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
 TREE = rb"""(?m)^[^\S\n]*+(?:---\s*+)?+(?:\{\s*+)?+["']?(?:frames|transforms|angles)["']?\s*:"""  # of a tree
 
@@ -201,40 +200,6 @@ def _stamps_of(path: str, fmt: str = "", topics: Sequence[str] = (), *, is_tree:
     return found
 
 
-def gathered(steps: Iterable[tuple[RowPoses | None, Outcome]], bad: BadRows, columns: Sequence[str] = ()) -> RowPoses:
-    """Return all results of a stream as one block with their lines from 1, and some of its other columns as values.
-
-    steps: what became of each block, and what is reported about it
-    Bad rows go to `bad`.  Raises FormatError if no row is left.
-    """
-    blocks: list[RowPoses] = []
-
-    def outcomes() -> Iterator[Outcome]:
-        line = 1
-        for poses, outcome in steps:
-            if poses is not None and len(poses.numbers):
-                blocks.append(poses._replace(lines=poses.lines + line))
-            line += outcome.lines
-            yield outcome
-
-    run(outcomes(), lambda _: None, bad)
-    if not blocks:
-        raise FormatError("no poses or points in it", source=bad.source)
-    stamps = [each.stamps_ns for each in blocks if each.stamps_ns is not None]
-    if len(stamps) not in (0, len(blocks)):
-        raise FormatError("some poses have a stamp and some have none", source=bad.source)
-    parents = [*chain.from_iterable(each.for_each(each.parents) for each in blocks)]
-    names = [*chain.from_iterable(each.for_each(each.names) for each in blocks)]
-    extras = {
-        name: objects(chain.from_iterable(plain_cells(each.extras[name]) for each in blocks))
-        for name in columns if all(name in each.extras for each in blocks)
-    }  # fmt: skip
-    return RowPoses(
-        np.concatenate([each.numbers for each in blocks]), np.concatenate(stamps) if stamps else None,
-        np.concatenate([each.lines for each in blocks]), parents, names, extras,
-    )  # fmt: skip
-
-
 def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows, asked: Request) -> Trajectory:
     """Gather the rows of a table, of columns of numbers, or of a file that lists poses."""
     counts = bool(FORMATS[fmt].rows.counted)
@@ -246,44 +211,28 @@ def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows, asked: R
     if len(named) > 1:
         some = ", ".join(f"{parent}:{name}" for parent, name in sorted(named, key=str)[:3])
         raise ValueInvalid(f"{file.name}: poses of several frames ({some} ..); name one: {file.name}:TARGET:SOURCE")
-    if poses.numbers.shape[1] not in (POSITION, 7):
-        raise FormatError("rotations without positions are no trajectory", source=file.name)
     if counts and not own.stamps:
         poses = poses._replace(stamps_ns=None)
-    found = _trajectory(poses, *own.names(WORLD, BODY))
+    found = _trajectory(poses, file.name, *own.names(WORLD, BODY))
     return found if "arrays" in FORMATS[fmt].reads else found._replace(lines=poses.lines)
 
 
 def _of_records(file: InputFile, fmt: str, bad: BadRows, asked: Request, body: str = BODY) -> Trajectory:
     """Gather records: poses, or points, with their stamps."""
     outcomes = run_records(cast("ByteStream", file.stream), fmt, asked, source=file.name, style=Style("tum"))
-    steps = ((each.results and _posed(each.results, file.name), each) for each in outcomes)
-    made = _trajectory(gathered(steps, bad), WORLD, body)
+    made = _trajectory(gathered(posed(outcomes, file.name), bad), file.name, WORLD, body)
     return made._replace(world=Names().bare(made.world))
 
 
-def _posed(results: BlockResults, source: str) -> RowPoses | None:
-    """Return the results of some records as poses; rotations are nan where one has none."""
-    if (found := results.posed()) is not None:
-        return found
-    values = [*results.in_order()]
-    made = [each for each in values if isinstance(each, Result) and each.pose.position is not None]
-    if len(made) != len(values):
-        raise FormatError("a trajectory is made of poses, or of points with stamps", source=source)
-    if all(each.pose.rotation is not None for each in made):
-        return block_of(made) if made else None
-    found = block_of([Result(each.pose._replace(rotation=each.pose.components[3:]), each.extras) for each in made])
-    found.numbers[:, POSITION:] = np.nan
-    return found
-
-
-def _trajectory(poses: RowPoses, world: str, body: str) -> Trajectory:
+def _trajectory(poses: RowPoses, source: str, world: str, body: str) -> Trajectory:
     """Return poses or points as a trajectory; world, body: the names where they have none, or several."""
+    if np.isnan(poses.numbers[:, 0]).any():
+        raise FormatError("rotations without positions are no trajectory", source=source)
     named = {*zip(poses.parents, poses.names, strict=True)}
     parent, name = named.pop() if len(named) == 1 else (None, None)
     positions, turns = poses.numbers[:, :POSITION], poses.numbers[:, POSITION:]
-    turned = turns.shape[1] > 0 and not np.isnan(turns).any()
-    return Trajectory(poses.stamps_ns, positions, turns if turned else None, parent or world, name or body)
+    has_turns = not np.isnan(turns).any()
+    return Trajectory(poses.stamps_ns, positions, turns if has_turns else None, parent or world, name or body)
 
 
 def _of_tree(

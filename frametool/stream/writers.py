@@ -22,19 +22,20 @@ from frametool.errors import ValueInvalid, listing, warn
 from frametool.formats.rows import pose_rows
 from frametool.formats.rows.csv import cell, cells_of, quoted, row
 from frametool.formats.rows.pose_rows import IMAGE, MOST_NAMED, NUMBER, RowForm, image_name, is_turned, rows_of, turned
-from frametool.formats.table import FORMATS
+from frametool.formats.table import FORMATS, holds_arrays, is_recording, is_trajectory
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import arrays, floats, quaternion, rigid
 from frametool.grammar.pose import SCALE
 from frametool.grammar.readers import EARTH_FRAMES
 from frametool.grammar.result import Result, Style
-from frametool.stream.record_results import BlockResults, Documents, csv_rows
+from frametool.stream.record_results import BlockResults, Documents, ResultWriter, blocks_of, csv_rows
 from frametool.stream.request import target_of
 from frametool.stream.row_layout import AS_READ, POSE, SIX, Const, In, Out, Piece
 from frametool.stream.rows import (
     RowPoses,
     assemble,
     block_of,
+    block_of_points,
     constant,
     kept,
     objects,
@@ -56,16 +57,18 @@ LEARNED = ("csv", "json", "yaml")
 LOSABLE = ("names of frames", "stamps")
 
 
-class PoseWriter:
+class PoseWriter(ResultWriter):
     """Write blocks of poses, points, vectors, twists or wrenches one after the other: what all such writers know.
 
+    kind, placed, extras: what a row is, whether poses have positions, and the names of more numbers with each
     target: which numbers of a result are written
     """
 
-    def __init__(self, style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> None:
-        """Take the style and what a row is, with the numbers that come with each; placed: poses have a position."""
-        self.style, self.kind, self.extras, self.placed = style, kind, tuple(extras), placed or kind != POSE
-        self.target = target_of(style, kind, placed=self.placed)
+    def __init__(self, style: Style, first: RowPoses) -> None:
+        """Take the style, and of the first block what a row is."""
+        self.style, self.kind, self.extras = style, first.kind, first.more
+        self.placed = first.placed or first.kind != POSE
+        self.target = target_of(style, first.kind, placed=self.placed)
 
     def columns(self, block: RowPoses) -> Components:
         """Return the numbers of a block as columns; poses that are not placed are at 0."""
@@ -86,10 +89,10 @@ class PoseWriter:
 class SingleWriter(PoseWriter):
     """Write blocks of poses, points or vectors as the format does for single results."""
 
-    def __init__(self, style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> None:
-        """Take the style and what a row is; raises ValueInvalid for what the format does not hold."""
-        super().__init__(style, kind, extras, placed=placed)
-        if kind in SIX:
+    def __init__(self, style: Style, first: RowPoses) -> None:
+        """Take the style and the first block; raises ValueInvalid for what the format does not hold."""
+        super().__init__(style, first)
+        if (kind := first.kind) in SIX:
             raise ValueInvalid(f"{style.format} is not written of rows of a {kind}; write csv, json or yaml")
         if kind != POSE and "points" not in FORMATS[style.format].writes:
             raise ValueInvalid(f"{style.format} holds poses; a {kind} has no rotation")
@@ -104,7 +107,7 @@ class SingleWriter(PoseWriter):
         self.settle(block)
         self.dropped |= dict.fromkeys((*self.extras, *block.extras))
         refuse_scale_in(self.style.format, self.dropped)
-        results = values_of(block, self.kind, self.extras, self.target.place, placed=self.placed)
+        results = values_of(block, self.target.place)
         module: Any = import_module(FORMATS[self.style.format].writer)
         write: Callable[[Sequence[Any], Style], str] = module.write_poses if self.kind == POSE else module.write_points
         if self.first is None:
@@ -126,9 +129,9 @@ class SingleWriter(PoseWriter):
 class TextWriter(SingleWriter):
     """Write blocks of poses in a format that says what its rows are."""
 
-    def __init__(self, style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> None:
-        """Take the style and what a row is; raises ValueInvalid for notations that the format does not have."""
-        super().__init__(style, kind, extras, placed=placed)
+    def __init__(self, style: Style, first: RowPoses) -> None:
+        """Take the style and the first block; raises ValueInvalid for notations that the format does not have."""
+        super().__init__(style, first)
         if any(each.spec != "quaternion" for each in style.notations):
             raise ValueInvalid(f"{style.format} writes rotations in its own way; leave --to out")
         self.fixed = rows_of(style.format) or RowForm(())
@@ -202,9 +205,9 @@ class TextWriter(SingleWriter):
 class RowsWriter(PoseWriter):
     """Write blocks of poses, points or vectors as CSV, JSON or YAML; rows that are alike are written together."""
 
-    def __init__(self, style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> None:
-        """Take the style and what a row is."""
-        super().__init__(style, kind, extras, placed=placed)
+    def __init__(self, style: Style, first: RowPoses) -> None:
+        """Take the style and the first block."""
+        super().__init__(style, first)
         self.documents = None if style.format == "csv" else Documents(style)
         self.names: dict[str, None] = {}  # of the columns of a table: those of the first rows
         self.empty: RowPoses | None = None  # a block without rows says what columns there are
@@ -233,7 +236,7 @@ class RowsWriter(PoseWriter):
             scalars = {leaf_mark(at): cells for at, cells in enumerate(some.extras.values())}
             alike = [AlikeRows(self._marked(some), rows, values, some._replace(extras=scalars))]
         others = kept(block, singles) if len(singles) < len(alone) else block
-        made = values_of(others, self.kind, self.extras, self.target.place, placed=self.placed) if len(singles) else ()
+        made = values_of(others, self.target.place) if len(singles) else ()
         results = BlockResults(alike, [*zip(singles.tolist(), made, strict=True)])
         if self.documents is not None:
             return self.documents.of_block(results)
@@ -264,7 +267,7 @@ class RowsWriter(PoseWriter):
             names=block.names if len(block.names) == 1 else [NAME],
             extras={name: objects([Verbatim(leaf_mark(at))]) for at, name in enumerate(block.extras)},
         )  # fmt: skip
-        (value,) = values_of(one, self.kind, self.extras, place, placed=self.placed)
+        (value,) = values_of(one, place)
         return Marked(value, columns, len(numbers))
 
 
@@ -282,8 +285,76 @@ def refuse_scale_in(fmt: str, extra: Iterable[str]) -> None:
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
     """Return the text of single poses in a format that says what its rows are."""
-    writer = TextWriter(style)
-    return b"".join((writer.of_block(block_of(list(results))), *writer.end())).decode()
+    writer = Blocks(style)
+    return b"".join((*map(writer.of_block, blocks_of(results)), *writer.end())).decode()
+
+
+def writer_for(style: Style, first: RowPoses) -> PoseWriter:
+    """Return what writes blocks in the format of a style: text, columns of numbers, or messages of a recording."""
+    if holds_arrays(style.format):
+        from frametool.stream.array_writer import ArrayWriter
+
+        return ArrayWriter(style, first)
+    if is_recording(style.format):
+        from frametool.stream.recording_writer import RecordingWriter
+
+        return RecordingWriter(style, first)
+    text = TextWriter if rows_of(style.format) else SingleWriter
+    return (RowsWriter if style.format in LEARNED else text)(style, first)
+
+
+class Blocks(ResultWriter):
+    """Write blocks of things of one kind, those of the first block, in the format of a style."""
+
+    def __init__(self, style: Style) -> None:
+        """Begin without any."""
+        self.style = style
+        self.writer: PoseWriter | None = None
+
+    def of_block(self, block: RowPoses | BlockResults) -> bytes:
+        """Return the text of a block of poses, or of results, many together."""
+        posed = block if isinstance(block, RowPoses) else block.posed()
+        if posed is None:
+            return b"".join(self._write(self._block(values)) for values in block.together())  # type: ignore[union-attr]
+        if self.writer is not None and posed.placed > self.writer.placed:
+            posed = posed._replace(numbers=posed.numbers[:, 3:], placed=False)
+        return self._write(posed)
+
+    def end(self) -> Iterator[bytes]:
+        """Yield what comes behind the last."""
+        if self.writer is None:
+            self._write(block_of([]))
+        yield from self.writer.end()  # type: ignore[union-attr]
+
+    def _write(self, block: RowPoses) -> bytes:
+        if self.writer is None:
+            self.writer = writer_for(self.style, block)
+        elif block.kind != self.writer.kind:
+            kinds = f"{self.writer.kind} and {block.kind}"
+            raise ValueInvalid(f"{self.style.format} holds things of one kind, found {kinds}")
+        return self.writer.of_block(block)
+
+    def _block(self, values: list[Value]) -> RowPoses:
+        """Return results as a block; what has no rotation is a point, but for the poses of a trajectory."""
+        fmt = self.style.format
+        found = values if is_trajectory(fmt) else [*map(_as_point, values)]
+        points = [each for each in found if not isinstance(each, Result)]
+        if is_trajectory(fmt) and (points or any(each.pose.rotation is None for each in found)):  # type: ignore[union-attr]
+            raise ValueInvalid("a trajectory holds poses; a point has no rotation")
+        if points:
+            if len(points) < len(found):
+                raise ValueInvalid(f"{fmt} holds things of one kind, found poses among others")
+            return block_of_points(points)
+        are_turns = holds_arrays(fmt) and all(each.pose.position is None for each in found)  # type: ignore[union-attr]
+        return block_of(found, placed=not are_turns if self.writer is None else self.writer.placed)  # type: ignore[arg-type]
+
+
+def _as_point(value: Value) -> Value:
+    """Take a result without a rotation for a point."""
+    if not isinstance(value, Result) or value.pose.rotation is not None or value.pose.position is None:
+        return value
+    named = {"name": value.pose.name, "frame": value.pose.parent, "point": list(value.pose.position)}
+    return {key: each for key, each in named.items() if each is not None} | value.extras
 
 
 # --- rows that are written alike: as lines of CSV or JSON, as documents of YAML, as values, and as poses ---
@@ -472,5 +543,4 @@ class AlikeRows(NamedTuple):
         parents, names = (self._said(each) for each in (value.pose.parent, value.pose.name))
         parents, names = (each[:1] if len({*each}) == 1 else each for each in (parents, names))
         extras = {key: objects(self._said(each)) for key, each in value.extras.items() if key != "stamp_ns"}
-        lines = np.arange(len(self.places))
-        return RowPoses(self.numbers[:, :7] + 0.0, self.block.stamps_ns, lines, parents, names, extras)
+        return RowPoses(self.numbers[:, :7] + 0.0, self.block.stamps_ns, self.places, parents, names, extras)

@@ -152,6 +152,21 @@ def test_bad_rows_are_skipped_and_counted(run: Run) -> None:
     assert json.loads(outcome.out)["xyz"] == [2.0, 2.0, 3.0]
 
 
+TAKEN = {
+    ("--weights", "seen.weight"): '{"xyz": [0,0,0], "seen": {"weight": 1}}\n{"xyz": [4,0,0], "seen": {"weight": 3}}\n',
+    ("--by", "name"): '{"name": "a", "xyz": [3,0,0]}\n{"name": "b", "xyz": [1,0,0]}\n{"name": "a", "xyz": [3,0,0]}\n',
+    ("--weights", "w"): "x,y,z,w\n0,0,0,1\n4,0,0,3\n",
+    ("--weights", "4"): "0,0,0,1\n4,0,0,3\n",
+}
+
+
+@pytest.mark.parametrize("asked", TAKEN)
+def test_a_weight_or_label_is_a_column_a_key_or_a_name(run: Run, asked: tuple[str, str]) -> None:
+    more = ("--no-header", "--columns", "1-3") if asked[1] == "4" else ()
+    found = json.loads(run("mean", *asked, *more, "-f", "json", stdin=TAKEN[asked]).out.splitlines()[0])
+    assert found["xyz"] == [3.0, 0.0, 0.0]
+
+
 VECTORS = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.3, -2.0, 5.0], [1e-9, 1.0, 0.0], [-3.0, 0.1, 0.2], [1e200, 1e200, 0.0]]
 
 

@@ -35,6 +35,7 @@ SPELLINGS: dict[str, tuple[dict[str, Any], dict[str, Any], list[float]]] = {
     "rows": ({"covariance": np.reshape(WHOLE, (6, 6)).tolist()}, {}, WHOLE),
     "keys of sigmas": (MIXED, MIXED, DIAGONAL),
     "keys of entries": (dict(zip(NAMES, WHOLE, strict=True)), {}, WHOLE),
+    "one column": ({"sigma_xyz": 0.02}, {"sigma_xyz": 0.02}, [0.0004 * (i == j < 3) for i in range(6) for j in range(6)]),
     "sigmas": ({"sigma": {"xyz": SIGMAS[:3], "rpy": SIGMAS[3:]}}, SIGMA_CELLS, DIAGONAL),
 }
 EXACT, UNSURE = json.dumps(OTHER), json.dumps(OTHER | {"covariance": DIAGONAL})

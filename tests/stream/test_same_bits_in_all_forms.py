@@ -79,7 +79,8 @@ def test_any_form_becomes_any_other_with_the_same_bits(moved: Callable[[str, str
 
 @pytest.mark.parametrize("form", ["csv", "json"])
 def test_blocks_whose_rows_all_name_one_frame_each_name_their_own(form: str) -> None:
-    writer = RowsWriter(Style(form, (notation("quaternion"),)))
-    texts = [writer.of_block(block_of([Result(Pose.of(NOWHERE, None, frame))] * 2)).decode() for frame in ("map", "odom")]
+    blocks = [block_of([Result(Pose.of(NOWHERE, None, frame))] * 2) for frame in ("map", "odom")]
+    writer = RowsWriter(Style(form, (notation("quaternion"),)), blocks[0])
+    texts = [writer.of_block(block).decode() for block in blocks]
     assert ["map" in text for text in texts] == [True, False]
     assert ["odom" in text for text in texts] == [False, True]

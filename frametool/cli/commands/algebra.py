@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import reduce
+from functools import partial, reduce
 from typing import Any
 
 import click
@@ -197,33 +197,32 @@ def mean_command(inputs: Inputs) -> int:
     numbers are those of the plain mean. Weights are in proportion to 1 / variance.
     """
     task, weights, by, robust = Task(inputs, "poses"), inputs.weights, inputs.by, inputs.robust
-    from frametool.stream.gathering import Gathered, means_of
-    from frametool.stream.record_values import read_poses
+    from frametool.stream.gathering import MeanRows, means_of
 
     arguments, status, numbers = inputs.poses, 0, None
-    gathered = Gathered(named=robust, by=by)
-    request = task.request(extra_column=by or weights, gathered=gathered)
+    rows = MeanRows(weights, by)
+    request = task.request(kind="pose", apart=rows.key, timeless=True)
     bare, is_inverse = poses.without_inverse(arguments[0]) if len(arguments) == 1 else ("", False)
     if bare == "-" or (bare and not task.path and not poses.is_pasted(bare, task.notation)):
         task.path, arguments = task.path if bare == "-" else bare, ()
         request = request.of_inverses() if is_inverse else request
     if not arguments:
-        status = task.run(request)
+        status = task.run(request, rows)
     else:
         refuse(by is not None, "--by is of rows; POSEs have no column")
         task.only_arguments(arguments)
         for number, each in enumerate(arguments, 1):
             name = f"argument {number}" if poses.is_inline(each) else each
-            gathered.add(list(poses.read_with(each, request, read_poses)), name)
+            list(poses.read_with(each, request, partial(rows.add, name=name)))
         with misuse("--weights of POSEs are numbers: "):
             numbers = None if weights is None else [parse_number(text.strip()) for text in weights.split(",")]
-        if numbers is not None and len(numbers) != len(gathered.transforms):
-            raise click.UsageError(f"--weights are {len(numbers)}, the poses {len(gathered.transforms)}")
-    if gathered.uncertain:
+        if numbers is not None and len(numbers) != len(rows.named):
+            raise click.UsageError(f"--weights are {len(numbers)}, the poses {len(rows.named)}")
+    if rows.uncertain:
         warn("covariances left out: mean's is that of the rows")
-    if gathered.stamped:
+    if rows.stamped:
         warn("stamps left out: a mean is of no one time")
-    found = [*means_of(gathered, numbers, robust=robust)]
+    found = [*means_of(rows, numbers, robust=robust)]
     task.output.values([mean for mean, _ in found])
     say_first([line for _, lines in found for line in lines], MOST, "poses left out", warn, warn)
     return status
