@@ -40,7 +40,7 @@ from frametool.grammar.result import Style
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, BadRow, Fault, Outcome
 from frametool.stream.record_results import written_by
-from frametool.stream.request import Request, RowOptions
+from frametool.stream.request import NO_STAMPS, SOME, Request, RowOptions
 from frametool.stream.row_layout import POINT, POSE, Shape, Target
 from frametool.stream.rows import NO_ROWS, NO_STAMP, Block, RowPoses, kept, spans_of
 from frametool.stream.table import PlannedRows, TableRows
@@ -158,7 +158,7 @@ class FormatConverter:
                 poses = poses._replace(parents=EARTH_FRAMES[:1])
             if file:
                 poses = poses._replace(stamps_ns=np.array(file.between(before, count), np.int64))
-            elif fmt.counted and poses.stamps_ns is None and not self.request.rows.timeless:
+            elif fmt.counted and poses.stamps_ns is None and self.request.rows.stamps != NO_STAMPS:
                 poses = poses._replace(stamps_ns=np.arange(before, count) * BILLION)
             yield poses._replace(stamps_ns=self._held(poses.stamps_ns, fmt)), outcome
         if file:
@@ -169,7 +169,7 @@ class FormatConverter:
     def _held(self, stamps_ns: Ints | None, fmt: Rows) -> Ints | None:
         """Return stamps, unless they only count and the other format has no place for them: they are not lost then."""
         counts, other = bool(fmt.counted) and not self.answers.stamps, self.style.format
-        are_lost = self.request.rows.timeless or is_recording(other) or FORMATS[other].rows.counted
+        are_lost = self.request.rows.stamps == NO_STAMPS or is_recording(other) or FORMATS[other].rows.counted
         return None if counts and are_lost else stamps_ns
 
     def _columns(self, stream: ByteStream) -> Iterator[Step]:
@@ -266,7 +266,7 @@ def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
     fmt = FORMATS[file.format].rows
     if what := not_text(file.head()):
         raise FormatError(what, source=file.name)
-    request = Request(rows=RowOptions(normalize=options.normalize, some_static=True))
+    request = Request(rows=RowOptions(normalize=options.normalize, stamps=SOME))
     converter = FormatConverter(file.format, request, file.name, answers=options.answers)
     named, line, count = dict[int, str](), 0, 0
     for block, outcome in converter.steps(cast("ByteStream", file.stream)):

@@ -35,7 +35,7 @@ from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream import row_layout
 from frametool.stream.faults import ZONES, RowNote
 from frametool.stream.record import STALE, Record, find_records, key_path, pose_of, value_at
-from frametool.stream.request import Request, RowOptions
+from frametool.stream.request import NO_STAMPS, Request, RowOptions
 from frametool.stream.row_layout import FLAT, LEAVES_PLANE, PARTS, POSE, ROTATION, VECTOR, Target, checked_rotation
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
         stamp = record.stamps[:2]
     elif timed is not None and operation.formula is not None and not operation.shown:
         stamp = (path_of(),)
-    elif (key := request.rows.extra_column) is not None:
+    elif (key := request.rows.extra_column) is not None and request.rows.stamps != NO_STAMPS:
         stamp = (not key and record.stamps[:2]) or (path_of((key,)) if key else path_of(),)
     elif request.pose_from_frame is not None:
         edge = request.pose_from_frame(record.parent.text)

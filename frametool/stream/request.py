@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
 START, PREVIOUS, VELOCITIES = "start", "previous", "velocities"  # what a row is compared with that comes before it
 PAIR = "pair"  # the two poses of a row
+ALL, SOME, NO_STAMPS = "all", "some", "none"
 
 
 class Formula:
@@ -144,7 +145,7 @@ class Operation(NamedTuple):
         if passes or shape.kind not in (POSE, POINT, VECTOR):
             return ()
         sizes = {*map(len, filter(None, (self.left, *self.right, self.fixed)))}
-        if SCALED in sizes or shape.has_scale or self.reads_scale(shape):
+        if SCALED in sizes or (1 in shape.covariance and not shape.sigma) or self.reads_scale(shape):
             return () if self.moves else (SCALE,)
         of_position = shape.kind == POSE and 9 in shape.covariance and not shape.rewritten  # it stays what it is
         if of_position or not (self.uncertain or shape.covariance or UNCERTAIN in sizes):
@@ -159,7 +160,7 @@ class Operation(NamedTuple):
         A scale that comes with it says it already.
         """
         return self.multiples and shape.notation is not None and (
-            shape.notation.representation.whole is not None and not shape.has_scale
+            shape.notation.representation.whole is not None and (1 not in shape.covariance or bool(shape.sigma))
         )
 
     def result_kind(self, kind: str) -> str:
@@ -360,8 +361,7 @@ class RowOptions(NamedTuple):
     degrees: whether bare angles are in degrees; normalize: take any non-zero quaternion
     columns: which columns are ours, one entry a pose; frames: columns that name a row's frame
     extra_column: the column or key of a stamp that is read with the pose; "" is the usual stamp
-    apart: a column that is no number of the pose; timeless: stamps are not read, unless they are asked for
-    some_static: the stamp of a row may be empty
+    stamps: ALL rows have stamps where one has, or SOME; NO_STAMPS are read: then the extra column holds something else
     frame_is_counter: a decimal `frame` is a counter, because no frame is called so
     """
 
@@ -375,9 +375,7 @@ class RowOptions(NamedTuple):
     columns: tuple[str, ...] = ()
     frames: tuple[str, ...] = ()
     extra_column: str | None = None
-    apart: str | None = None
-    timeless: bool = False
-    some_static: bool = False
+    stamps: str = ALL
     frame_is_counter: bool = True
 
 

@@ -61,7 +61,7 @@ class Shape(NamedTuple):
     notation: that of the rotation; degrees: whether its angles are degrees
     whole: the numbers are those of a whole pose
     inverse: what is written is the inverse
-    covariance: how many numbers each of the covariances has that come last; one is a scale
+    covariance: how many numbers each of the covariances has that come last; one that is no sigma is a scale
     rewritten: the first of them has no place of its own in the result, which names its entries anew
     sigma: of six independent axes, the place of each one's number among these, -1 for 0, and its unit
     radians_at: which of the rotation's numbers are radians where the others are degrees
@@ -103,11 +103,6 @@ class Shape(NamedTuple):
             return len(self.joined.columns) if self.joined else 6
         rotation = len(self.notation.representation.columns) if self.notation else 0
         return rotation + count_of(self.unit)
-
-    @property
-    def has_scale(self) -> bool:
-        """Return True if a scale comes with it."""
-        return 1 in self.covariance and not self.sigma
 
     @property
     def place(self) -> Place | None:

@@ -26,7 +26,7 @@ from frametool.grammar.readers import EARTH_FRAMES, NORMALS, in_nanoseconds, sta
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import STOP, Fault, Outcome, RowNote
 from frametool.stream.header import has_pose_column, listed
-from frametool.stream.request import VELOCITIES
+from frametool.stream.request import SOME, VELOCITIES
 from frametool.stream.row_layout import NORMAL, POSE, RATE, Shape
 from frametool.stream.rows import (
     Block,
@@ -460,7 +460,7 @@ class TableRows(PlannedRows):
         cells = table.split(text[:torn])
         if self.request.offset_ns and layout.time is not None:
             cells = table.split(self._at_other_times(text[:torn], cells, self.request.offset_ns))
-        block = table_block(table, layout, cells, self.naming, some_static=self.request.rows.some_static)
+        block = table_block(table, layout, cells, self.naming, some_static=self.request.rows.stamps == SOME)
         run = self.ran(block)
         faults = run.faults()
         if torn is not None:

@@ -13,7 +13,7 @@ from frametool.grammar.readers import AXES_KEY, may_be_uncertain, nanoseconds_be
 from frametool.stream import header, row_layout
 from frametool.stream.evaluate import Plan
 from frametool.stream.header import XYZ, PoseColumns, has_pose_column, listed, named_pose, row_shape, wholes_of
-from frametool.stream.request import PAIR, PLAIN, Request
+from frametool.stream.request import NO_STAMPS, PAIR, PLAIN, Request
 from frametool.stream.row_layout import POINT, POSE, SIX, Const, In, Piece, Shape, Target, Word, place_of, six_names
 from frametool.text.numbers import number_or_none
 
@@ -152,7 +152,8 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
     asked, specs, width = request.rows, request.rows.columns, table.width
     if not asked.poses:
         return []
-    apart = None if asked.apart is None else _place(asked.apart, table.called, source)
+    other = asked.extra_column if asked.stamps == NO_STAMPS else None
+    apart = None if other is None else _place(other, table.called, source)
     if specs and len(specs) != asked.poses:
         raise Misused(f"--columns is given {len(specs)} times, for {asked.poses} poses in a row")
     if specs or not table.names:
@@ -281,6 +282,8 @@ def _stamp_columns(
 
     Where all numbers are wanted it may be one that no option names.
     """
+    if request.rows.stamps == NO_STAMPS:
+        return None, None
     name = request.timed.name if request.timed else request.rows.extra_column
     if name is not None:
         time = _place(name, table.called, source)
@@ -289,7 +292,7 @@ def _stamp_columns(
         except ValueInvalid as error:
             raise Misused(str(error), source=source, line=1) from None
         return time, nanoseconds_beside(table.names, time) if table.names else None
-    if not (stamped and request.results.all_numbers) or request.rows.timeless:
+    if not (stamped and request.results.all_numbers):
         return None, None
     usual, below = stamp_places(table.names)
     if not (table.names or request.rows.columns) and min(places, default=0) == 1:

@@ -16,7 +16,7 @@ from frametool.errors import warn
 from frametool.grammar.pose import LEFT_OUT, Pose
 from frametool.grammar.result import Result
 from frametool.stream.faults import MOST
-from frametool.stream.request import PREVIOUS, START, VELOCITIES, Operation, Request, RowOptions
+from frametool.stream.request import NO_STAMPS, PREVIOUS, START, VELOCITIES, Operation, Request, RowOptions
 from frametool.stream.row_layout import VECTOR
 from frametool.text.numbers import parse_fractions, parse_number
 
@@ -201,7 +201,7 @@ def mean_command(inputs: Inputs) -> int:
 
     arguments, status, numbers = inputs.poses, 0, None
     rows = MeanRows(weights, by)
-    request = task.request(kind="pose", apart=rows.key, timeless=True)
+    request = task.request(kind="pose", extra_column=rows.key, stamps=NO_STAMPS)
     bare, is_inverse = poses.without_inverse(arguments[0]) if len(arguments) == 1 else ("", False)
     if bare == "-" or (bare and not task.path and not poses.is_pasted(bare, task.notation)):
         task.path, arguments = task.path if bare == "-" else bare, ()
