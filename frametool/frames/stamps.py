@@ -187,6 +187,6 @@ def stamp_text(written: str, stamp_ns: int, *, in_ns: int) -> str:
         decimals = f"{below:0{len(str(in_ns)) - 1}d}".rstrip("0") if below else ""
         return f"{'-' * (stamp_ns < 0)}{whole}" + f".{decimals}" * bool(below)
     seconds, _, decimals = format_stamp(stamp_ns).partition(".")
-    wanted = 0 if bare.endswith("s") or "e" in bare.lower() else len(bare.partition(".")[2])
+    wanted = 0 if bare.endswith("s") or ":" in bare or "e" in bare.lower() else len(bare.partition(".")[2])
     decimals = decimals.rstrip("0").ljust(wanted, "0")
     return f"{seconds}.{decimals}" if decimals else seconds

@@ -398,6 +398,12 @@ def test_time_offset_first_begins_at_zero(run: Run, name: str, text: str) -> Non
         assert done.out.startswith("0.000000000 "), done.err
 
 
+def test_iso_stamps_that_move_become_seconds_with_their_own_decimals(run: Run) -> None:
+    text = "t,x,y,z\n2024-05-01T12:00:00Z,1,2,3\n2024-05-01T14:00:01.5+02:00,1,2,3\n"
+    done = run("apply", "--transform", "{xyz: [1, 0, 0]}", "--time-offset", "first", stdin=text)
+    assert done.out == "t,x,y,z\n0,2.0,2.0,3.0\n1.5,2.0,2.0,3.0\n", done.err
+
+
 def test_time_offset_first_counts_for_trees(run: Run) -> None:
     moving = "{name: base, parent: map, samples: [{stamp: 7, xyz: [0, 0, 0]}, {stamp: 9, xyz: [4, 0, 0]}]}"
     done = run("lookup", "m.yaml", "map", "base", "--at", "1", "--time-offset", "first", files={"m.yaml": moving})
