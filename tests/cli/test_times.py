@@ -399,9 +399,9 @@ def test_time_offset_first_begins_at_zero(run: Run, name: str, text: str) -> Non
 
 
 def test_iso_stamps_that_move_become_seconds_with_their_own_decimals(run: Run) -> None:
-    text = "t,x,y,z\n2024-05-01T12:00:00Z,1,2,3\n2024-05-01T14:00:01.5+02:00,1,2,3\n"
-    done = run("apply", "--transform", "{xyz: [1, 0, 0]}", "--time-offset", "first", stdin=text)
-    assert done.out == "t,x,y,z\n0,2.0,2.0,3.0\n1.5,2.0,2.0,3.0\n", done.err
+    text = "t,x,y,yaw\n2024-05-01T12:00:00Z,1,2,0\n2024-05-01T14:00:01.5+02:00,1,2,0\n"
+    done = run("invert", "--time-offset", "first", stdin=text)
+    assert done.out == "t,x,y,yaw\n0,-1.0,-2.0,0.0\n1.5,-1.0,-2.0,0.0\n", done.err
 
 
 def test_time_offset_first_counts_for_trees(run: Run) -> None:
