@@ -32,7 +32,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 def run(arguments: list[str]) -> int:
     """Run one command; whatever goes wrong becomes one line on stderr and an exit code."""
-    from frametool.cli.commands import TROUBLE, answered, called
+    from frametool.cli.commands import TROUBLE, answer
     from frametool.cli.signals import die_of
     from frametool.cli.sink import TROUBLES, discard, say, say_error, say_warning, wants_json, words_of
     from frametool.errors import FrametoolError, heard_by
@@ -51,7 +51,7 @@ def run(arguments: list[str]) -> int:
     try:
         with heard_by(say_warning):
             try:
-                status = answered(lambda: called(arguments), arguments)
+                status = answer(arguments)
             except KeyboardInterrupt:
                 status = INTERRUPTED
             except FrametoolError as error:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 NEGATIVE = r"(?i)-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translation:|Rotation:|Pose \[)|--\s)"
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
 EVERYTHING = "frametool.everything"  # a key in a context's `meta`
-INPUTS = "frametool.inputs"  # the key in a context's `meta`
+INPUTS = "frametool.inputs"  # another
 # the value of an option of several values in a command without it
 WITHOUT = {"input_formats": (), "topics": (), "joints": (), "joint_files": (), "named_frames": (), "messages": ()}
 # options that any way may ignore: they are about what is said, not about what is done
@@ -330,17 +330,17 @@ def together(*options: Adds) -> Adds:
 
 
 class WithHelp(click.Command):
-    """A command with -h, --help and --help-all.
+    """A command with one -h and --help, and --help-all.
 
     own: the options that it is about although they have a heading elsewhere
     lists: writes a list before the exit codes, for --help-all with all its meanings
     """
 
     def __init__(self, *args: Any, own: Sequence[str] = (), lists: Lists | None = None, **kwargs: Any) -> None:
-        """Add --help-all, which click does not know; of options with one name the first counts, as a command's own."""
-        super().__init__(*args, **kwargs)
+        """Add the helps, which are the same for all; of options with one name the first counts, as a command's own."""
+        super().__init__(*args, add_help_option=False, **kwargs)
         names = {name: each for each in reversed(self.params) for name in each.opts}
-        self.params = [*dict.fromkeys(names[each.opts[-1]] for each in self.params), HELP_ALL]
+        self.params = [*dict.fromkeys(names[each.opts[-1]] for each in self.params), HELP_ALL, HELP_OPTION]
         self.own, self.lists = own, lists
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -361,10 +361,6 @@ class WithHelp(click.Command):
                     formatter.write_dl(rows)
         if isinstance(self, click.Group):
             self.format_commands(ctx, formatter)
-
-    def get_help_option(self, ctx: click.Context) -> click.Option | None:  # noqa: ARG002 - click's signature
-        """Return the one help option."""
-        return HELP_OPTION
 
 
 class Command(WithHelp):

@@ -150,16 +150,32 @@ group = Group("group", help=HELP, params=[
 ])  # fmt: skip
 
 
-def called(arguments: list[str]) -> object:
-    """Call a command and return its result.
+def answer(
+    words: Sequence[str], parent: click.Context | None = None, prepare: Callable[[click.Context], None] | None = None
+) -> int:
+    """Call a command and return its exit status; raise FrametoolError for all that a user did wrong.
 
     Not by click's own `main`, which writes to stderr at Ctrl-C and turns a closed pipe into status 1.
+    parent: a context of the group, which the lines of a batch share
+    prepare: is shown the command's context before it runs
     """
-    if instruction := os.environ.get(COMPLETION):
-        return _completed(instruction, " ".join(arguments))
-    width = 100 if sys.stdout.isatty() else 80
-    with group.make_context("frametool", arguments, obj=(*arguments,), max_content_width=width) as ctx:
-        return group.invoke(ctx)
+    result, width = None, 100 if sys.stdout.isatty() else 80
+    try:
+        if instruction := os.environ.get(COMPLETION):
+            return _completed(instruction, " ".join(words))
+        name, *rest = ("frametool", *words) if parent is None else words
+        command = group if parent is None else group.get_command(parent, name)
+        with command.make_context(name, rest, parent, obj=(*words,), max_content_width=width) as ctx:
+            if prepare:
+                prepare(ctx)
+            result = command.invoke(ctx)
+    except click.exceptions.Exit as end:
+        return end.exit_code
+    except click.ClickException as error:
+        from frametool.cli.options import usage_sentence
+
+        raise Misused(usage_sentence(error, words)) from None
+    return result if isinstance(result, int) else 0
 
 
 SCRIPTS = os.path.join(os.path.dirname(os.path.dirname(__file__)), "completions")  # of shells; the wheel installs them
@@ -190,31 +206,3 @@ def _completed(wanted: str, line: str) -> int:
     with writing(None) as write:
         write(text)
     return 0
-
-
-def called_in(
-    parent: click.Context, words: Sequence[str], prepare: Callable[[click.Context], None] | None = None
-) -> object:
-    """Call the command that words begin with, in a context of the group that is there.
-
-    parent: context of the group
-    prepare: is shown the command's context before it runs
-    """
-    name, *rest = words
-    with group.get_command(parent, name).make_context(name, rest, parent=parent, obj=(*words,)) as ctx:
-        if prepare:
-            prepare(ctx)
-        return ctx.command.invoke(ctx)
-
-
-def answered(call: Callable[[], object], arguments: Sequence[str]) -> int:
-    """Return the status of a call of a command; raise FrametoolError for all that a user did wrong."""
-    try:
-        result = call()
-    except click.exceptions.Exit as end:
-        return end.exit_code
-    except click.ClickException as error:
-        from frametool.cli.options import usage_sentence
-
-        raise Misused(usage_sentence(error, arguments)) from None
-    return result if isinstance(result, int) else 0

@@ -23,7 +23,7 @@ import click
 
 from frametool import cli
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, say_if_typed
-from frametool.cli.commands import TROUBLE, answered, called, called_in, group
+from frametool.cli.commands import TROUBLE, answer, group
 from frametool.cli.sink import PLACES, TROUBLES, say_error, wants_json, words_of
 from frametool.documents.source import ReadCache, opened
 from frametool.errors import FileProblem, FrametoolError, Misused, ValueInvalid, alternatives
@@ -269,11 +269,10 @@ class CommandBatch:
             raise Misused(REFUSED[words[0]])
         self.context.meta.clear()
         if not name:
-            is_own = words[0].startswith("-")  # an option of frametool itself
-            return answered(lambda: called(words) if is_own else called_in(self.context, words), words)
+            return answer(words, None if words[0].startswith("-") else self.context)  # an option of frametool itself
         held = BytesIO()
         with streams(sys.stdin, writer(held)):
-            status = answered(lambda: called_in(self.context, words, partial(print_as_json, name)), words)
+            status = answer(words, self.context, partial(print_as_json, name))
         if status in FINISHED:
             text = held.getvalue().decode()
             if (lines := text.count("\n")) != 1:
