@@ -42,15 +42,14 @@ OF_MESSAGES = ("quiet", "verbose")
 class Inputs:
     """The arguments and options of a command, by the names of its parameters; to read one is to ask for it.
 
-    idle: the options that were passed and that nobody has asked for yet, each as it is called
+    idle: the options that were passed and that nobody has asked for yet
     reads_trees: whether files of frames are opened: --in is then about these too
     earth: what the options say of places on the Earth, made when first needed
     """
 
-    def __init__(self, values: dict[str, Any], idle: dict[str, str] | None = None) -> None:
+    def __init__(self, values: dict[str, Any], idle: dict[Any, Option]) -> None:
         """Keep the values, and the options that were passed."""
-        self._values = values
-        self.idle = {} if idle is None else idle
+        self._values, self.idle = values, idle
         self.reads_trees = False
         self.earth: Earth | None = None
 
@@ -91,7 +90,7 @@ class Inputs:
         """Raise a usage error for options that were passed and that nobody has asked for."""
         if self.idle:
             has = "has" if len(self.idle) == 1 else "have"
-            raise click.UsageError(f"{', '.join(self.idle.values())} {has} no effect here")
+            raise click.UsageError(f"{', '.join(each.opts[-1] for each in self.idle.values())} {has} no effect here")
 
 
 class Option(click.Option):
@@ -138,21 +137,13 @@ def misuse(where: str = "") -> Iterator[None]:
         raise click.UsageError(f"{where}{error}") from None
 
 
-def inputs() -> Inputs:
-    """Return the inputs of the running command; where none runs, nothing is set but --quiet."""
-    context = click.get_current_context(silent=True)
-    if context is None:
-        return Inputs({"quiet": True})
-    return context.meta.get(INPUTS) or Inputs(context.params)
-
-
-def asking(kind: type[Record], options: Mapping[str, Sequence[str]]) -> type[Record]:
+def asking(inputs: Inputs, kind: type[Record], options: Mapping[str, Sequence[str]]) -> type[Record]:
     """Return a kind of record whose fields, where they hold something, count options as asked for when looked at."""
 
     def look_at(record: Record, name: str) -> Any:
         value = kind.__getattribute__(record, name)
         if value and name in options:
-            inputs().ask(*options[name])
+            inputs.ask(*options[name])
         return value
 
     return type(kind.__name__, (kind,), {"__getattribute__": look_at, "__slots__": ()})
@@ -338,7 +329,8 @@ class WithHelp(click.Command):
 
     def __init__(self, *args: Any, own: Sequence[str] = (), lists: Lists | None = None, **kwargs: Any) -> None:
         """Add the helps, which are the same for all; of options with one name the first counts, as a command's own."""
-        super().__init__(*args, add_help_option=False, **kwargs)
+        super().__init__(*args, **kwargs)
+        self.add_help_option = False
         names = {name: each for each in reversed(self.params) for name in each.opts}
         self.params = [*dict.fromkeys(names[each.opts[-1]] for each in self.params), HELP_ALL, HELP_OPTION]
         self.own, self.lists = own, lists
@@ -385,10 +377,11 @@ class Command(WithHelp):
             args = [f" {each}" if _is_negative(each) and each not in options else each for each in args]
         if "inv" in args:
             args = _joined(args, ctx, always=self.name in OF_POSES)
-        for name, value in pairwise(args):
-            if value in OPTIONAL.get(name, ()) and not ctx.resilient_parsing:
-                raise click.UsageError(f"{name} {value} is gone: {name}={value}", ctx)
-        args = [f"{each}={OPTIONAL[each][0]}" if each in OPTIONAL else each for each in args]
+        if not OPTIONAL.keys().isdisjoint(args):
+            for name, value in pairwise(args):
+                if value in OPTIONAL.get(name, ()) and not ctx.resilient_parsing:
+                    raise click.UsageError(f"{name} {value} is gone: {name}={value}", ctx)
+            args = [f"{each}={OPTIONAL[each][0]}" if each in OPTIONAL else each for each in args]
         passed: dict[Any, Option] = {}
         for each in () if ctx.resilient_parsing else self.make_parser(ctx).parse_args(args=[*args])[2]:
             if isinstance(each, Option):
@@ -396,14 +389,17 @@ class Command(WithHelp):
                     raise click.UsageError(f"{each.opts[-1]} appears twice; only one can be used", ctx)
                 passed[each.name] = each
         rest = super().parse_args(ctx, args)
-        ctx.meta[INPUTS] = Inputs(ctx.params, {at: one.opts[-1] for at, one in passed.items() if at not in OF_MESSAGES})
         for option in passed.values():
-            if others := [passed[other].opts[-1] for other in option.excludes if other in passed]:
-                raise click.UsageError(f"{option.opts[-1]} and {others[0]} exclude each other", ctx)
+            for other in option.excludes:
+                if other in passed:
+                    raise click.UsageError(f"{option.opts[-1]} and {passed[other].opts[-1]} exclude each other", ctx)
             if option.requires and passed.keys().isdisjoint(option.requires):
                 known = {each.name: each.opts[-1] for each in self.params}
                 choices = " or ".join(known[needed] for needed in option.requires if needed in known)
                 raise click.UsageError(f"{option.opts[-1]} needs {choices}", ctx)
+        for name in OF_MESSAGES:
+            passed.pop(name, None)
+        ctx.meta[INPUTS] = Inputs(ctx.params, passed)
         return rest
 
     def invoke(self, ctx: click.Context) -> Any:

@@ -6,11 +6,12 @@ Also takes the places out of what --to and --from name.
 from __future__ import annotations
 
 import re
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import asking, inputs, misuse, refuse
+from frametool.cli.command import asking, misuse, refuse
 from frametool.documents.source import Source
 from frametool.errors import FormatError, warn
 from frametool.geometry.conventions import world_of
@@ -23,33 +24,33 @@ from frametool.grammar.readers import Misfit, Reading, tell
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.cli.command import Inputs
     from frametool.geometry.types import Vector
 
 FIRST = "first"
-SaidEarth = asking(Earth, {"origin": ("origin",), "axes": ("local_axes",), "zone": ("zone",)})
+ASKED = {"origin": ("origin",), "axes": ("local_axes",), "zone": ("zone",)}  # field of Earth -> options
 
 
-def earth() -> Earth:
+def earth(said: Inputs) -> Earth:
     """Return what the options say; raises click.UsageError for what is no place and no zone."""
-    said = inputs()
     if said.earth is None:
         zone, origin = said.peek("zone"), said.peek("origin")
         with misuse("--zone: "):
             number = None if zone is None else zone_number(zone)
-        place = None if origin is None else _origin(origin)
-        said.earth = SaidEarth(place, said.peek("local_axes") or "", number)
+        place = None if origin is None else _origin(said, origin)
+        said.earth = asking(said, Earth, ASKED)(place, said.peek("local_axes") or "", number)
     return said.earth
 
 
-def _origin(text: str) -> Origin:
+def _origin(said: Inputs, text: str) -> Origin:
     """Read --origin: a place, numbers of lat, lon, alt, or the first position."""
     if text == FIRST:
-        return Origin(tell=_tell)
+        return Origin(tell=partial(_tell, said))
     from frametool.documents.document import parse_documents
 
     numbers = re.split(r"\s*,\s*|\s+", text.strip())
     if text[:1] != "{" and len(numbers) in (2, 3):
-        text = mapping_of(numbers, LLA)
+        text = mapping_of(said, numbers, LLA)
     source = Source("--origin", text)
     reading = Reading(source)
     try:
@@ -65,30 +66,30 @@ def _origin(text: str) -> Origin:
     return Origin((lat, lon, alt))
 
 
-def _tell(place: Vector) -> None:
+def _tell(said: Inputs, place: Vector) -> None:
     lat, lon, alt = place
-    inputs().note(f"origin: lat {lat!r}, lon {lon!r}, alt {alt!r}, the first position")
+    said.note(f"origin: lat {lat!r}, lon {lon!r}, alt {alt!r}, the first position")
     if lat == lon == 0.0:
         warn("the first position is lat 0, lon 0, as receivers write that have no fix; --origin PLACE names another")
 
 
-def places_of(notations: Sequence[Notation]) -> tuple[tuple[Notation, ...], Place | None]:
+def places_of(said: Inputs, notations: Sequence[Notation]) -> tuple[tuple[Notation, ...], Place | None]:
     """Part what --to names into rotations, and how positions are written; raises ValueInvalid for --to enu alone."""
     names = [each.representation.name for each in notations if each.representation.is_place]
     rest = tuple(each for each in notations if not each.representation.is_place)
-    place = Place.written(names, earth()) if names else None
-    if inputs().peek("origin") == FIRST and not (place and place.is_local):
+    place = Place.written(names, earth(said)) if names else None
+    if said.peek("origin") == FIRST and not (place and place.is_local):
         raise click.UsageError("--origin first has no effect here: it is where --to enu, or ned, begins")
-    world = place.axes if place else world_of(inputs().peek("world") or inputs().peek("all_axes") or "")
+    world = place.axes if place else world_of(said.peek("world") or said.peek("all_axes") or "")
     return tuple(each.in_world(world) for each in rest), place
 
 
-def mapping_of(texts: Sequence[str], name: str) -> str:
+def mapping_of(said: Inputs, texts: Sequence[str], name: str) -> str:
     """Write bare numbers of a place as the mapping that says the same; raises click.UsageError for another count."""
     from frametool.documents.writers import dump_json
 
     row, arithmetic = POSITIONS[name], kernels(name)
-    zoned = name == UTM and len(texts) == 3 and earth().zone is not None
+    zoned = name == UTM and len(texts) == 3 and earth(said).zone is not None
     fields = row.names[zoned:]
     if not (arithmetic.least or len(fields)) - zoned <= len(texts) <= len(fields):
         raise click.UsageError(f"{name} has {len(row.names)} numbers ({' '.join(row.names)}); found {len(texts)}")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import Inputs, Text, inputs, misuse, option, refuse, say_if_typed, together
+from frametool.cli.command import Inputs, Text, misuse, option, refuse, say_if_typed, together
 from frametool.cli.sink import encoded
 from frametool.errors import SHOWN, FormatError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
@@ -191,12 +191,12 @@ reading_options = together(
 )  # fmt: skip
 
 
-def input_formats(*, streams: bool = False) -> tuple[list[str], str]:
+def input_formats(inputs: Inputs, *, streams: bool = False) -> tuple[list[str], str]:
     """Return the formats that --in names for files of frames, in their order, and the format of the stream.
 
     streams: there is a stream; its format is the last one that can be streamed, "" if there is none
     """
-    formats = list(inputs().input_formats)
+    formats = list(inputs.input_formats)
     streamed = [at for at, fmt in enumerate(formats) if streams and not {*STREAMED}.isdisjoint(FORMATS[fmt].reads)]
     of_stream = formats.pop(streamed[-1]) if streamed else ""
     return formats, of_stream

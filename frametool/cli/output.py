@@ -104,7 +104,7 @@ class Output:
         if inputs.peek("origin") is not None or any(each.representation.on_earth for each in notations):
             from frametool.cli.earth import places_of
 
-            notations, place = places_of(notations)
+            notations, place = places_of(inputs, notations)
         self.notations: tuple[Notation, ...] = notations
         self._format_is_default = not (self.chosen or otherwise)
         fmt = self.chosen or otherwise or ("text" if self.path is None and sys.stdout.isatty() else "yaml")

@@ -50,11 +50,10 @@ _ROWS = together(
     _of_rows("--columns NAME,..", "pose columns by name or number, once per pose; or one key of records, a.b",
              options.COLUMN, multiple=True),
     _of_rows("--keep", "append result columns, keep the input's"),
-    _of_rows("--prefix TEXT", "prefix of the result's column names", options.utf8, default=""),
+    _of_rows("--prefix TEXT", "prefix of the result's column names", options.utf8),
     _of_rows("--on-error", "bad rows", ON_ERROR, default=STOP),
     _of_rows("--max-errors N", "report at most N bad rows, but count all", click.IntRange(0), default=MOST),
-    _of_rows("--no-header", "table without a header; columns are numbered", name="header",
-             callback=lambda _context, _option, chosen: not chosen),
+    _of_rows("--no-header", "table without a header; columns are numbered"),
     option("--quiet", "suppress progress and notes on files", under="Files"),
     options.verbose_option,
 )  # fmt: skip
@@ -92,7 +91,7 @@ class Task:
         self.paths: Sequence[str] = path if isinstance(path, tuple) else () if path is None else (path,)
         self.path: str | None = self.paths[0] if self.paths and self.paths[0] != "-" else None
         # an option may say that the stream is a table
-        self._is_table = any(map(inputs.peek, ("columns", "keep", "prefix"))) or inputs.peek("header") is False
+        self._is_table = any(map(inputs.peek, ("columns", "keep", "prefix", "no_header")))
         notations: Any = inputs.peek("from_rep") or (None,)
         refuse(len(notations) > 1, "--from takes one representation")
         self.notation: Any = notations[0]
@@ -160,7 +159,7 @@ class Task:
 
         bad, row = self.policy(self.name, "row"), 1
         request = Request(on_error=self.inputs.on_error, results=ResultOptions(by_default=True))
-        for made in FormatConverter(fmt, request, self.name, Style("csv", ()), answers()).outcomes(opened):
+        for made in FormatConverter(fmt, request, self.name, Style("csv", ()), answers(self.inputs)).outcomes(opened):
             bad.take([fault._replace(line=fault.line + row) for fault in made.faults])
             row += made.lines
             if made.text:
@@ -192,7 +191,7 @@ class Task:
 
     def chosen_format(self) -> str:
         """Return the format that --in names for the stream, "" if it names none."""
-        others, fmt = options.input_formats(streams=True)
+        others, fmt = options.input_formats(self.inputs, streams=True)
         if others and not self.inputs.reads_trees:
             both = f"--in {others[0]} and --in {fmt}: there is one stream"
             streams = ", ".join(readers(*options.STREAMED))
@@ -313,14 +312,14 @@ class Task:
             target = chosen or (fmt if "poses" in FORMATS[fmt].writes and not output.notations else "csv")
             no_stream = f"--format {target} is for single results and records, not for a stream of {fmt}"
             refuse(target not in FORMATS, no_stream)
-            request = request.with_results(by_default=not output.notations)
-            converted = FormatConverter(fmt, request, self.name, output.style.changed(format=target), answers())
-            return converted.outcomes(stream, header=self.inputs.header), target, converted.tally
+            request, style = request.with_results(by_default=not output.notations), output.style.changed(format=target)
+            converted = FormatConverter(fmt, request, self.name, style, answers(self.inputs))
+            return converted.outcomes(stream, header=not self.inputs.no_header), target, converted.tally
         if fmt in RECORDS:
             return *self._records(stream, fmt, request, chosen or ""), None
         from frametool.stream.table import run_table
 
-        return run_table(stream, fmt, request, source=self.name, header=self.inputs.header), fmt, None
+        return run_table(stream, fmt, request, source=self.name, header=not self.inputs.no_header), fmt, None
 
     def _steps(self, stream: Any, fmt: str, request: Request) -> Iterator[Step]:
         """Return what becomes of each block as poses that are not written."""
@@ -332,7 +331,8 @@ class Task:
         request = request.with_results(by_default=True, notations=())
         if fmt in RECORDS:
             return posed(run_records(stream, fmt, request, source=self.name, style=AS_VALUES), self.name)
-        return FormatConverter(fmt, request, self.name, AS_VALUES, answers()).steps(stream, header=self.inputs.header)
+        converter = FormatConverter(fmt, request, self.name, AS_VALUES, answers(self.inputs))
+        return converter.steps(stream, header=not self.inputs.no_header)
 
     def _records(self, stream: Any, fmt: str, request: Request, chosen: str) -> tuple[Generator[Outcome], str]:
         """Write the results of records in place, or in a format that was chosen."""
@@ -376,7 +376,7 @@ class Task:
         if is_table and output.chosen not in RECORDS and adds and alone:
             request = request.with_results(keep=inputs.keep)
         if (is_table or request.operation.only_adds) and alone:
-            request = request.with_results(prefix=inputs.prefix)
+            request = request.with_results(prefix=inputs.prefix or "")
         if request.rows.poses:
             inputs.ask("from_rep", *FORMATS[fmt].required_options)
             request = request.with_rows(columns=inputs.columns)
@@ -407,7 +407,7 @@ class Task:
         if says_earth := bool(style.place or self.place or inputs.says_earth()):
             from frametool.cli.earth import earth
 
-            asked["earth"] = earth()
+            asked["earth"] = earth(inputs)
         asked = {
             "given": self.notation, "given_place": self.place, "degrees": style.degrees, "normalize": self.normalize,
             "offset_ns": 0 if inputs.reads_trees else inputs.time_offset or 0, "window": self.window, **asked,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import Text, asking, inputs, refuse, refuse_two_readers, say_if_typed
+from frametool.cli.command import Inputs, Text, asking, refuse, refuse_two_readers, say_if_typed
 from frametool.cli.options import input_formats, tree_on_the_line
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.sink import say
@@ -32,11 +32,12 @@ if TYPE_CHECKING:
 ASKED_OUTSIDE = ("time_offset", "frames", "camera_axes")
 ANSWERED: dict[str, tuple[str, ...]] = {name: (name,) for name in Answers._fields if name not in ASKED_OUTSIDE}
 ANSWERED["order"] = "order", "from_rep"
-SaidAnswers = asking(Answers, ANSWERED)
 OF_FILES = (*Answers._fields, "named_frames", "from_rep", "input_formats", "topics", "quiet", "verbose")
 
 
-def load_tree(argument: str, more: Sequence[str] = (), *, streams: bool = False, drawings: bool = False) -> Frames:
+def load_tree(
+    inputs: Inputs, argument: str, more: Sequence[str] = (), *, streams: bool = False, drawings: bool = False
+) -> Frames:
     """Read the tree of an argument and merge further files into it; say what files of other formats were taken for.
 
     streams: `--in` is about what is streamed wherever that can be
@@ -44,12 +45,11 @@ def load_tree(argument: str, more: Sequence[str] = (), *, streams: bool = False,
     """
     from frametool.formats.load import Rules  # not every command that may read trees does
 
-    passed = inputs()
-    rules = Rules(bool(passed.moving), passed.cache, bool(passed.normalize))
-    return _load((argument, *more), rules, streams=streams, drawings=drawings and not more)[0]
+    rules = Rules(bool(inputs.moving), inputs.cache, bool(inputs.normalize))
+    return _load(inputs, (argument, *more), rules, streams=streams, drawings=drawings and not more)[0]
 
 
-def load_sides(a: Sequence[str], b: Sequence[str], *, normalize: bool) -> list[tuple[Frames, dict[str, EdgePlace]]]:
+def load_sides(inputs: Inputs, a: Sequence[str], b: Sequence[str]) -> list[tuple[Frames, dict[str, EdgePlace]]]:
     """Read two trees that will be compared, each of several files, as `load_tree` does; with each frame's place."""
     from frametool.formats.load import Rules
 
@@ -58,12 +58,13 @@ def load_sides(a: Sequence[str], b: Sequence[str], *, normalize: bool) -> list[t
     sides: list[tuple[Frames, dict[str, EdgePlace]]] = []
     for arguments, behind in ((a, 0), (b, len(a))):
         earth = next((name for name in EARTH_FRAMES if sides and name in sides[0][0].frames), "")
-        sides.append(_load(arguments, Rules(normalize=normalize, earth=earth), placed=True, behind=behind, of=count))
+        rules = Rules(normalize=bool(inputs.normalize), earth=earth)
+        sides.append(_load(inputs, arguments, rules, placed=True, behind=behind, of=count))
     return sides
 
 
 def _load(
-    arguments: Sequence[str], rules: Rules, *, placed: bool = False, **how: Any
+    inputs: Inputs, arguments: Sequence[str], rules: Rules, *, placed: bool = False, **how: Any
 ) -> tuple[Frames, dict[str, EdgePlace]]:
     """Merge files into a tree; in a batch only if they have changed since they were read.  Also: each frame's place.
 
@@ -72,54 +73,54 @@ def _load(
     """
     from frametool.formats.load import load_sources
 
-    passed = inputs()
-    idle = {*passed.idle}
+    idle = {*inputs.idle}
 
     def read() -> tuple[tuple[Frames, dict[str, EdgePlace]], set[str]]:
-        files = opened(arguments, **how)
+        files = opened(inputs, arguments, **how)
         places: dict[str, EdgePlace] = {}
         tree = load_sources(files, rules, places if placed else None)
         if tree.moves:
-            passed.ask("time_offset")
-        state(files)
-        return (tree, places), idle - passed.idle.keys()
+            inputs.ask("time_offset")
+        state(inputs, files)
+        return (tree, places), idle - inputs.idle.keys()
 
     context = click.get_current_context(silent=True)
     cache = None if context is None else context.find_object(ReadCache)
     if cache is None:
         return read()[0]
-    passed.reads_trees = True
+    inputs.reads_trees = True
     named = [each if is_inline(each) else tree_file(each) for each in arguments]
-    key = tuple(named), f"{rules!r} {how} {[passed.peek(name) for name in OF_FILES]}"
+    key = tuple(named), f"{rules!r} {how} {[inputs.peek(name) for name in OF_FILES]}"
     paths = [each for each in named if not is_inline(each) and os.path.exists(each)]
     found, asked = cache.read(key, paths, sum(map(len, {*named} - {*paths})), read)
-    passed.ask(*asked)
+    inputs.ask(*asked)
     return found
 
 
-def lookups_in(tree: Frames, *, carried: bool) -> Lookups:
+def lookups_in(inputs: Inputs, tree: Frames, *, carried: bool) -> Lookups:
     """Return the look-ups of a command; report covariances that are not wanted."""
     unused = tree.covariances and not carried
-    inputs().note(f"sigmas of {bare(tree.name)} not used (--covariance)" if unused else None)
+    inputs.note(f"sigmas of {bare(tree.name)} not used (--covariance)" if unused else None)
     return Lookups(tree, carried=carried)
 
 
-def state(files: Sequence[FrameFile]) -> None:
+def state(inputs: Inputs, files: Sequence[FrameFile]) -> None:
     """Report on stderr what files that were read were taken for: those of other formats than the own one, with -v all.
 
     Where one of them names a topic, --topic has an effect.
     """
     for file in files:
         if file.topics.counts or file.topics.seen:
-            inputs().ask("topics")
-        if inputs().verbose:
+            inputs.ask("topics")
+        if inputs.verbose:
             say(f"{file.name}: {FORMATS[file.format].summary}")
-        inputs().note(file.tally.assumed and f"{file.name}: {file.tally.assumed}")
+        inputs.note(file.tally.assumed and f"{file.name}: {file.tally.assumed}")
 
 
 def opened(
-    arguments: Sequence[str], *, streams: bool = False, behind: int = 0, of: int | None = None, drawings: bool = False
-) -> list[FrameFile]:
+    inputs: Inputs, arguments: Sequence[str], *, streams: bool = False, behind: int = 0, of: int | None = None,
+    drawings: bool = False,
+) -> list[FrameFile]:  # fmt: skip
     """Open trees and recordings: files, `-` for standard input, `.` for FRAMETOOL_TREE, or trees written inline.
 
     streams: as `load_tree` has it
@@ -131,9 +132,8 @@ def opened(
 
     refuse_two_readers(arguments)
     say_if_typed("-" if "-" in arguments else "")
-    chosen = inputs()
-    chosen.reads_trees = True
-    formats, named = input_formats(streams=streams)[0], [*chosen.peek("named_frames")]
+    inputs.reads_trees = True
+    formats, named = input_formats(inputs, streams=streams)[0], [*inputs.peek("named_frames")]
     reads = ("tree", "drawing") if drawings else ("tree",)
     if other := [fmt for fmt in formats if {*reads}.isdisjoint(FORMATS[fmt].reads)]:
         raise click.UsageError(f"--in {other[0]}: no frames are read from that; `frametool formats` lists what is")
@@ -141,12 +141,12 @@ def opened(
     for option, values in (("--in", formats), ("--frames", named)):
         more = f"{option} appears {len(values)} times for {files} file{'s' * (files != 1)}"
         refuse(not streams and len(values) > files, more)
-    format_of_next, general = iter(formats[behind:] or formats), answers()
+    format_of_next, general = iter(formats[behind:] or formats), answers(inputs)
     found = opened_together(
         FrameFile.inline(source_of(each))
         if is_inline(each)
         else FrameFile(
-            tree_file(each), fmt=next(format_of_next, None), topics=chosen.peek("topics"), answers=general, reads=reads
+            tree_file(each), fmt=next(format_of_next, None), topics=inputs.peek("topics"), answers=general, reads=reads
         )
         for each in arguments
     )
@@ -159,22 +159,23 @@ def opened(
     for file, names in zip(found if len(named) == files else lacking, named[behind:] or named, strict=False):
         file.answers = file.answers._replace(frames=names)
     left_open = {option for file in found for option in file.required_options}
-    chosen.ask(*["named_frames"] * bool(lacking), *{"camera_axes"} & left_open)
+    inputs.ask(*["named_frames"] * bool(lacking), *{"camera_axes"} & left_open)
     return found
 
 
-def answers() -> Answers:
+def answers(inputs: Inputs) -> Answers:
     """Return what the options say about all files whose format leaves it open; no joint has two values."""
-    chosen, joints = inputs(), dict[str, str]()
-    for text in chosen.peek("joints"):
+    joints: dict[str, str] = {}
+    for text in inputs.peek("joints"):
         name, _, value = text.partition("=")
         refuse(not (name and value), f"--joint takes NAME=VALUE, found {shown(text)}")
         refuse(name in joints, f"--joint {shown(name)} has two values, {joints.get(name)} and {value}; leave one out")
         joints[name] = value
-    named = {name: chosen.peek(name) for name in Answers._fields if name not in ("joints", "frames")}
-    notations = chosen.peek("from_rep")
+    named = {name: inputs.peek(name) for name in Answers._fields if name not in ("joints", "frames")}
+    notations = inputs.peek("from_rep")
     named["order"] = named["order"] or next((each.spec for each in notations or () if each.spec in ORDERS), "")
-    return SaidAnswers(joints=joints, **{name: value for name, value in named.items() if value})
+    said = asking(inputs, Answers, ANSWERED)
+    return said(joints=joints, **{name: value for name, value in named.items() if value})
 
 
 def tree_file(argument: str) -> str:
@@ -191,7 +192,7 @@ def _offer_frames(ctx: click.Context, _incomplete: str) -> Mapping[str, str] | N
     named = tree_on_the_line(ctx)
     if named is None and "arguments" in ctx.params:
         return None
-    return dict.fromkeys(load_tree(named or ".", ctx.params.get("more") or ()).frames, "")
+    return dict.fromkeys(load_tree(Inputs(ctx.params, {}), named or ".", ctx.params.get("more") or ()).frames, "")
 
 
 FRAME = Text(offers=_offer_frames)

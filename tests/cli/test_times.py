@@ -191,7 +191,7 @@ def test_the_machine_forms_of_echo_do_not_wait_for_the_end() -> None:
 
     for form in ("json", "yaml", "csv", "ros2"):
         computed = 0
-        pieces = Output(Inputs({"format_name": form}), "poses")._batches(results())  # noqa: SLF001 - what `pieces` writes
+        pieces = Output(Inputs({"format_name": form}, {}), "poses")._batches(results())  # noqa: SLF001 - what `pieces` writes
         for _ in range(20):
             next(pieces)
         assert computed <= 20 * 256

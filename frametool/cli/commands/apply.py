@@ -17,22 +17,21 @@ from frametool.cli.poses import inline_misuse, is_inline, is_pasted, one_pose, p
 from frametool.cli.sink import say_warning, writing
 from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in
 from frametool.documents.source import InputFile, Source
-from frametool.errors import FormatError, FrametoolError, FrametoolWarning, ValueInvalid, heard_by, shown, warn
+from frametool.errors import FormatError, FrametoolError, ValueInvalid, heard_by, shown, warn
 from frametool.formats.table import FORMATS, holds_arrays, writers
 from frametool.frames.stamps import format_stamp
 from frametool.geometry.rigid import EXACT, UNCERTAIN
 from frametool.geometry.uncertainty import warn_if_wide
 from frametool.grammar.edges import Diagnostics
 from frametool.grammar.readers import EARTH_FRAMES
-from frametool.stream.faults import BadRows, Fault, run
-from frametool.stream.request import COMBINED, Operation, Request, RowOptions
+from frametool.stream.faults import Fault, run
+from frametool.stream.request import COMBINED, Operation, Request, RowOptions, Timed
 from frametool.text.numbers import NotFinite, parse_length
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from frametool.explain.derive import WrittenPose
-    from frametool.frames.lookups import Frames
     from frametool.geometry.types import Components
     from frametool.grammar.result import Style
     from frametool.recordings.messages import PointCloud
@@ -50,119 +49,111 @@ PLACES: dict[str, Callable[[PointCloud], str]] = {
 _WRITTEN = f"formats: {', '.join(writers('arrays'))}"
 
 
-class BagOfClouds:
-    """The clouds of a bag that -i names, and the files that they become."""
+def bag_of_clouds(task: streaming.Task) -> Callable[[Way], int]:
+    """Return what moves the clouds of the bag that -i names and writes each into its file; it returns the exit status.
 
-    def __init__(self, task: streaming.Task) -> None:
-        """Open the bag and choose its topics; of --topic, what names no clouds is left to the tree."""
-        from frametool.recordings.messages import cloud_topics
-        from frametool.recordings.read import opened_recording
+    Of --topic, what names no clouds is left to the tree.
+    """
+    from frametool.recordings.messages import cloud_topics, read_clouds
+    from frametool.recordings.read import opened_recording
+    from frametool.stream.column_stream import moved_cloud
 
-        self.task, self.path, inputs = task, task.name, task.inputs
-        self.output, chosen = task.output, inputs.topics
-        inputs.ask("input_path")
-        is_one = self.output.path in (None, "-") or not holds_arrays(self.output.chosen or "")
-        refuse(is_one, f"each cloud of a bag is a file: -o 'scan_{{stamp_ns}}.pcd'; {_WRITTEN}")
-        self.tally, self.names = Diagnostics(), dict[str, int]()
-        with ExitStack() as opened:
-            self.reader = opened.enter_context(opened_recording(self.path, self.tally))
-            self.topics = cloud_topics(self.reader, chosen)
-            self.opened = opened.pop_all()
-        clouds = {topic.strip("/") for topic in self.topics}
-        inputs.leave(topics=tuple(topic for topic in chosen if topic.strip("/") not in clouds))
+    inputs, output, path, chosen = task.inputs, task.output, task.name, task.inputs.topics
+    inputs.ask("input_path")
+    is_one = output.path in (None, "-") or not holds_arrays(output.chosen or "")
+    refuse(is_one, f"each cloud of a bag is a file: -o 'scan_{{stamp_ns}}.pcd'; {_WRITTEN}")
+    tally, names = Diagnostics(), dict[str, int]()
+    with ExitStack() as opening:
+        reader = opening.enter_context(opened_recording(path, tally))
+        topics = cloud_topics(reader, chosen)
+        opened = opening.pop_all()
+    clouds = {topic.strip("/") for topic in topics}
+    inputs.leave(topics=tuple(topic for topic in chosen if topic.strip("/") not in clouds))
 
-    def run(self, way: Way) -> int:
-        """Move and write cloud after cloud; return the exit status."""
-        from frametool.recordings.messages import read_clouds
+    def write_one(cloud: PointCloud, pose: Components) -> int:
+        texts = {place: re.sub(r"[/\0]|^\.+", "_", text(cloud)) for place, text in PLACES.items()}  # no other folder
+        name = re.sub(r"\{(\w+)\}", lambda found: texts.get(found[1], found[0]), str(output.path))
+        if name in names:
+            both = f"messages {names[name]} and {cloud.number} would both become {shown(name)}"
+            raise FormatError(f"{both}; put {{stamp_ns}} or {{number}} into its name", source=path)
+        style = output.style.changed(format=output.chosen or "")
+        with writing(name, force=output.force) as write:
+            for outcome in moved_cloud(cloud, pose, style, path):
+                for fault in outcome.faults:
+                    raise FormatError(f"message {cloud.number}: point {fault.line + 1}: {fault.reason}", source=path)
+                write(outcome.text)
+        names[name] = cloud.number
+        return len(cloud.rows)
 
-        bad = self.task.policy(self.path, "message")
-        self.task.inputs.refuse_idle()
+    def move_all(way: Way) -> int:
+        bad = task.policy(path, "message")
+        inputs.refuse_idle()
         count = points = 0
         once: Any = cache(say_warning)
-        with self.opened, heard_by(once):
-            for cloud in read_clouds(self.reader, self.topics, self.tally):
+        with opened, heard_by(once):
+            for cloud in read_clouds(reader, topics, tally):
                 count += 1
                 if isinstance(cloud, FormatError):
                     bad.take([Fault(cloud.line, "", cloud.message)])
+                    continue
+                try:
+                    pose = way.from_frame(cloud.frame or None, cloud.stamp_ns)
+                except FrametoolError as error:
+                    bad.take([Fault(cloud.number, "", error)])
                 else:
-                    points += self._write(cloud, way, bad)
-            for finding in self.tally.findings():
-                once(f"{self.path}: {finding.message}", finding.rule, FrametoolWarning)
+                    points += write_one(cloud, pose)
+            for finding in tally.findings():
+                once(f"{path}: {finding.message}", finding.rule)
         if not count:
-            raise FormatError(f"no messages on {', '.join(self.topics)}", source=self.path)
-        files = f"{len(self.names)} file{'s' * (len(self.names) != 1)} ({', '.join(self.topics)})"
-        self.task.inputs.note(f"{self.path}: {points} points{way.into}, metres, in {files}")
+            raise FormatError(f"no messages on {', '.join(topics)}", source=path)
+        files = f"{len(names)} file{'s' * (len(names) != 1)} ({', '.join(topics)})"
+        inputs.note(f"{path}: {points} points{way.into}, metres, in {files}")
         return bad.finish(count)
 
-    def _write(self, cloud: PointCloud, way: Way, bad: BadRows) -> int:
-        """Write one cloud; return how many points it has, 0 where the message is bad."""
-        from frametool.stream.column_stream import moved_cloud
-
-        try:
-            pose = way.from_frame(cloud.frame or None, cloud.stamp_ns)
-        except FrametoolError as error:
-            bad.take([Fault(cloud.number, "", error)])
-            return 0
-        texts = {place: re.sub(r"[/\0]|^\.+", "_", text(cloud)) for place, text in PLACES.items()}  # no other folder
-        name = re.sub(r"\{(\w+)\}", lambda found: texts.get(found[1], found[0]), str(self.output.path))
-        if name in self.names:
-            both = f"messages {self.names[name]} and {cloud.number} would both become {shown(name)}"
-            raise FormatError(f"{both}; put {{stamp_ns}} or {{number}} into its name", source=self.path)
-        style = self.output.style.changed(format=self.output.chosen or "")
-        with writing(name, force=self.output.force) as write:
-            for outcome in moved_cloud(cloud, pose, style, self.path):
-                for fault in outcome.faults:
-                    reason = f"message {cloud.number}: point {fault.line + 1}: {fault.reason}"
-                    raise FormatError(reason, source=self.path)
-                write(outcome.text)
-        self.names[name] = cloud.number
-        return len(cloud.rows)
+    return move_all
 
 
-class SeveralClouds:
-    """Clouds of several -i that become one: each is expressed in a frame of its own, or all in SOURCE."""
+def several_clouds(task: streaming.Task) -> Callable[[Way], int]:
+    """Return what makes one cloud of those of several -i, each expressed in a frame of its own, or all in SOURCE.
 
-    def __init__(self, task: streaming.Task) -> None:
-        """Take --frames and the --in of clouds; the tree may not have them too.  Raises click.UsageError."""
-        self.task, inputs = task, task.inputs
-        self.paths: Sequence[str] = inputs.input_path
-        others = [path for path in self.paths if path == "-" or streaming.is_bag(path)]
-        refuse(others, f"-i {''.join(others[:1])}: several -i are files of one cloud each")
-        refuse(not holds_arrays(task.output.chosen or ""), f"several clouds become one: -o all.ply, or -f; {_WRITTEN}")
-        formats = inputs.input_formats
-        named = [fmt for fmt in formats if "arrays" in FORMATS[fmt].reads]
-        self.formats = options.for_each(named, len(self.paths))
-        self.frames = [*chain.from_iterable(inputs.named_frames)]
-        inputs.leave(input_formats=[fmt for fmt in formats if fmt not in named], named_frames=())
+    Takes --frames and the --in of clouds, which the tree may not have too.
+    """
+    from frametool.formats.detect import detect
+    from frametool.stream.column_stream import OtherColumns
 
-    def run(self, way: Way) -> int:
-        """Move all and write them as one; return the exit status."""
-        from frametool.formats.detect import detect
-        from frametool.stream.column_stream import OtherColumns
+    inputs, output, paths = task.inputs, task.output, task.inputs.input_path
+    others = [path for path in paths if path == "-" or streaming.is_bag(path)]
+    refuse(others, f"-i {''.join(others[:1])}: several -i are files of one cloud each")
+    refuse(not holds_arrays(output.chosen or ""), f"several clouds become one: -o all.ply, or -f; {_WRITTEN}")
+    given, count = inputs.input_formats, len(paths)
+    named = [fmt for fmt in given if "arrays" in FORMATS[fmt].reads]
+    formats, frames = options.for_each(named, count), [*chain.from_iterable(inputs.named_frames)]
+    inputs.leave(input_formats=[fmt for fmt in given if fmt not in named], named_frames=())
 
-        count, frames, output, on_error = len(self.paths), self.frames, self.task.output, self.task.inputs.on_error
-        is_open = way.has_source == bool(frames) or len(frames) not in (0, count)
+    def move_all(way: Way) -> int:
+        is_open, on_error = way.has_source == bool(frames) or len(frames) not in (0, count), inputs.on_error
         refuse(is_open, f"name SOURCE, the frame of all clouds, or --frames A,B with one for each of the {count}")
         with ExitStack() as opened:
             planned = []
-            for path, named, frame in zip(self.paths, self.formats, frames or [""] * count, strict=True):
+            for path, chosen, frame in zip(paths, formats, frames or [""] * count, strict=True):
                 file = InputFile(path)
                 opened.callback(file.close)
-                fmt = named or detect(file.head(), "records", "rows", "arrays", name=path)
+                fmt = chosen or detect(file.head(), "records", "rows", "arrays", name=path)
                 if "arrays" not in FORMATS[fmt].reads:
                     hint = f"make one of it: frametool convert -i {path} -o NEW.pcd"
                     raise FormatError(f"{FORMATS[fmt].summary}, no cloud; {hint}", source=path)
                 operation = Operation(left=way.from_frame(frame or None, None), moves=True)
                 planned.append((streaming.open_columns(file, fmt), Request(operation, on_error=on_error), path))
-            merged = OtherColumns(planned, output.style)
-            status = 0
+            merged, status = OtherColumns(planned, output.style), 0
             with writing(output.path, force=output.force) as write:
-                for at, path in enumerate(self.paths):
-                    policy = self.task.policy(path, "row")
+                for at, path in enumerate(paths):
+                    policy = task.policy(path, "row")
                     status = max(status, run(merged.outcomes(at), write, policy, lambda _rows, _size: None))
         froms = f", from {', '.join(frames)}" if frames else ""
-        self.task.inputs.note(f"{count} clouds{way.into} as one{froms}; metres")
+        inputs.note(f"{count} clouds{way.into} as one{froms}; metres")
         return status
+
+    return move_all
 
 
 CHOICES = ("point", "vector", "pose", "twist", "wrench")
@@ -203,23 +194,23 @@ def apply_command(inputs: Inputs) -> int:
     """
     task = streaming.Task(inputs, "points", "trajectory")
     output, plan = task.output, task.plan
-    clouds: BagOfClouds | SeveralClouds | None = None
+    move_clouds: Callable[[Way], int] | None = None
     if len(task.paths) > 1:
-        clouds = SeveralClouds(task)
+        move_clouds = several_clouds(task)
     elif task.path and streaming.is_bag(task.path) and (holds_arrays(output.chosen or "") or task.messages() is None):
-        clouds = BagOfClouds(task)  # whose messages are no records
+        move_clouds = bag_of_clouds(task)  # whose messages are no records
     way = Way(task) if inputs.pose is not None else TreeWay(task, numbers=bool(task.place))
     rest, is_stream = way.rest, way.is_stream
-    if clouds is not None:
+    if move_clouds is not None:
         is_more = way.uncertain or not is_stream or plan is not None
         refuse(is_more, "clouds are moved whole, without records, --covariance or --explain")
-        return clouds.run(way)
+        return move_clouds(way)
     kinds, count = inputs.kinds, len(inputs.peek("columns"))
     counts = f"--as appears {len(kinds)} times, --columns {count} times; each --columns has its own"
     refuse(len(kinds) not in (0, 1, count), counts)
     kind = kinds[0] if len(kinds) == 1 else None
     if plan is not None:
-        records = list(sources_of(rest, kind))
+        records = list(sources_of(inputs, rest, kind))
         refuse(is_stream or len(records) != 1, f"a stream, or several records; {streaming.ONE_RECORD}")
         return _derived(task, plan, way, records[0], kind or "")
     request = way.request(kind=kind or "")
@@ -232,7 +223,7 @@ def apply_command(inputs: Inputs) -> int:
         task.only_arguments(rest)
         if task.place:
             inputs.ask("from_rep")
-        output.values(values_of(list(sources_of(rest, kind, task.place)), request, output))
+        output.values(values_of(list(sources_of(inputs, rest, kind, task.place)), request, output))
     if isinstance(way, TreeWay):  # what was taken for granted
         inputs.note(way.lookups.granted())
     else:
@@ -268,9 +259,10 @@ class Way:
     counters: whether no frame has a number for its name
     rest: the arguments that are records; is_stream: whether a stream takes their place
     into: in which frame records are then expressed, for messages
+    timed: what moves each at its own time, unless all move at one
     """
 
-    tree: Frames | None = None
+    timed: Timed | None = None
     has_source = counters = True
 
     def __init__(self, task: streaming.Task) -> None:
@@ -293,7 +285,7 @@ class Way:
         return self.pose.placed
 
     def request(self, formula: Formula | None = None, **asked: Any) -> Request:
-        """Return how records move: from one frame or each from its own, all alike or each at its own time.
+        """Return how records move: from one frame or each from its own.
 
         asked: more of the request
         """
@@ -303,7 +295,7 @@ class Way:
         left = self.from_frame(None) if has_source and not time_column else None
         return self.task.request(
             operation=Operation(left=left, moves=True, uncertain=self.uncertain, formula=formula),
-            frames=() if has_source else (frame_column or "",), frame_is_counter=self.counters,
+            frames=() if has_source else (frame_column or "",), frame_is_counter=self.counters, timed=self.timed,
             pose_from_frame=self.from_frame, rename=None if formula else lambda _parent, name: (self.target, name),
             **asked,
         )  # fmt: skip
@@ -311,8 +303,6 @@ class Way:
 
 class TreeWay(Way):
     """Move by the look-ups of a tree."""
-
-    tree: Frames
 
     def __init__(self, task: streaming.Task, *, numbers: bool) -> None:
         """Take tree, target and, if one is named, source from the arguments.
@@ -324,19 +314,23 @@ class TreeWay(Way):
         arguments = inputs.arguments
         refuse(len(arguments) < 2, "name TREE and TARGET, or give --transform")
         is_named = len(arguments) > 2 and not is_record(arguments[2]) and not (numbers and begins_number(arguments[2]))
-        named = arguments[2:3] if is_named else ()
-        self.rest = arguments[2 + len(named) :]
-        self.is_stream = self.rest in ((), ("-",))
-        self.tree = tree = load_tree(arguments[0], inputs.more, streams=self.is_stream)
-        self.lookups = lookups_in(tree, carried=self.uncertain)
+        self.rest = arguments[2 + is_named :]
+        self.is_stream, self.has_source = self.rest in ((), ("-",)), is_named
+        self.tree = tree = load_tree(inputs, arguments[0], inputs.more, streams=self.is_stream)
+        self.lookups = lookups_in(inputs, tree, carried=self.uncertain)
         self.target: str = frame_name(arguments[1], tree)
         self.into = f" in {self.target}"
-        self.source = next((frame_name(each, tree) for each in named), None)
+        self.source = frame_name(arguments[2], tree) if is_named else None
         if not {self.target, self.source or self.target} <= set(tree.frames):
             tree.lookup(self.target, self.source or self.target)  # raises, and names the nearest frames
-        self.has_source, self.in_time = bool(named), self.at is None
-        self.counters = not any(frame.isdecimal() for frame in tree.frames)
+        self.counters = not any(map(str.isdecimal, tree.frames))
         self._called: dict[str, str] = {}  # so that a leading / is reported once
+        if self.at is None:
+            self.timed = Timed(
+                (self.is_stream and inputs.time_column) or "", self.at_times, self.from_frame,
+                width=UNCERTAIN if self.uncertain else EXACT,
+                moves=lambda own: tree.latest(self.target, self.start(own)) is not None,
+            )  # fmt: skip
 
     def start(self, own: str | None) -> str:
         """Return the frame that records come from: SOURCE, or the one that they name."""
@@ -348,22 +342,11 @@ class TreeWay(Way):
 
     def from_frame(self, own: str | None, own_ns: int | None = None) -> Components:
         """Return what moves records from a frame, at the one time of all, at theirs, or the latest."""
-        return self.lookups.one(self.target, self.start(own), own_ns if self.in_time else options.at_ns(self.at))
+        return self.lookups.one(self.target, self.start(own), own_ns if self.at is None else options.at_ns(self.at))
 
     def at_times(self, own: str | None, times_ns: Any) -> Components:
         """Return columns of the same; nan where there is no data."""
         return self.lookups.many(self.target, self.start(own), times_ns)
-
-    def request(self, formula: Formula | None = None, **asked: Any) -> Request:
-        """Return how records move, unless all move at one time each at its own."""
-        from frametool.stream.request import Timed
-
-        timed = None if not self.in_time else Timed(
-            (self.is_stream and self.task.inputs.time_column) or "", self.at_times, self.from_frame,
-            width=UNCERTAIN if self.uncertain else EXACT,
-            moves=lambda own: self.tree.latest(self.target, self.start(own)) is not None,
-        )  # fmt: skip
-        return super().request(formula, timed=timed, **asked)
 
 
 def _settled(own: str | None, source: str | None) -> str | None:
@@ -389,12 +372,12 @@ def _is_apart(argument: str) -> bool:
     return not argument or is_record(argument) or (not begins_number(argument) and is_pasted(argument))
 
 
-def sources_of(arguments: Sequence[str], kind: str | None, place: str = "") -> Iterator[str | Source]:
+def sources_of(inputs: Inputs, arguments: Sequence[str], kind: str | None, place: str = "") -> Iterator[str | Source]:
     """Yield the texts of records: bare numbers in threes become points, the rest is unchanged."""
     if place and not any(map(is_record, arguments)):
         from frametool.cli.earth import mapping_of
 
-        yield mapping_of(arguments, place)
+        yield mapping_of(inputs, arguments, place)
         return
     for are_apart, group in groupby(arguments, _is_apart):
         texts = list(group)

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 LIKE_A_FILE = r"(?!row\.)[^\s(){}\[\]*<>\"']*\.[A-Za-z]\w*"
 
 
-def file_named_in(text: str, scope: Scope) -> Term | None:
+def file_named_in(inputs: Inputs, text: str, scope: Scope) -> Term | None:
     """Bind the name of `NAME=FILE` to what the file, or `-`, holds, and return it; None for everything else.
 
     What looks like the name of a file is read as one, and refused if there is none.  Raises FileProblem, FormatError.
@@ -69,7 +69,7 @@ def file_named_in(text: str, scope: Scope) -> Term | None:
     if found is None:
         from frametool.formats.load import load_sources
 
-        tree = load_sources([source]) if source and path == "-" else load_tree(path, streams=True)
+        tree = load_sources([source]) if source and path == "-" else load_tree(inputs, path, streams=True)
         found = term_of(name, tree)
     scope.names[name] = found._replace(text=name)
     return scope.names[name]
@@ -77,10 +77,10 @@ def file_named_in(text: str, scope: Scope) -> Term | None:
 
 def _offer_words(ctx: click.Context, incomplete: str) -> Mapping[str, str]:
     """Offer what its last word may become."""
-    scope, trees = Scope(), ctx.params.get("trees")
-    scope.tree = load_tree(trees[0], trees[1:]) if trees else None
+    scope, trees, inputs = Scope(), ctx.params.get("trees"), Inputs(ctx.params, {})
+    scope.tree = load_tree(inputs, trees[0], trees[1:]) if trees else None
     for each in ctx.params.get("arguments") or ():
-        file_named_in(each, scope)
+        file_named_in(inputs, each, scope)
     cut = max(incomplete.rfind(mark) for mark in BETWEEN_WORDS) + 1
     before, word = incomplete[:cut], incomplete[cut:]
     return dict.fromkeys((before + each for each in completions(scope, word, before)), "")
@@ -222,7 +222,7 @@ def calculate_lines(stream: Task, scope: Scope) -> int:
 LONGEST_HISTORY = 1000  # lines
 
 
-def talk(scope: Scope, output: Output) -> int:
+def talk(inputs: Inputs, scope: Scope, output: Output) -> int:
     """Answer lines until Ctrl-D; errors go on, Ctrl-C forgets the line."""
     refuse(output.path is not None, "-o FILE is for expressions on the command line or in a pipe, not for the prompt")
     prompt = "> " if sys.stdout.isatty() else ""
@@ -230,29 +230,22 @@ def talk(scope: Scope, output: Output) -> int:
         while True:
             try:
                 line = input(prompt)
-                if line.strip() in ("exit", "quit"):
+                if (word := line.strip()) in ("exit", "quit"):
                     return 0
-                if line.strip():
-                    _answer(line, scope, output)
+                if word == "help":
+                    show(topic("calc"), paged=False)
+                elif word and file_named_in(inputs, line, scope) is None:
+                    output.pieces(value_texts([evaluate_line(read_line(line), scope)], output.style))
             except EOFError:
                 if prompt:
                     tell("")
                 return 0
             except KeyboardInterrupt:
                 tell("")
-
-
-def _answer(line: str, scope: Scope, output: Output) -> None:
-    """Print the value of a line, or what is wrong with it."""
-    try:
-        if line.strip() == "help":
-            show(topic("calc"), paged=False)
-        elif file_named_in(line, scope) is None:
-            output.pieces(value_texts([evaluate_line(read_line(line), scope)], output.style))
-    except click.UsageError as error:
-        tell(f"frametool: {error.format_message()}")
-    except FrametoolError as error:
-        say_error(error, in_json=False)
+            except click.UsageError as error:
+                tell(f"frametool: {error.format_message()}")
+            except FrametoolError as error:
+                say_error(error, in_json=False)
 
 
 @contextmanager
@@ -333,21 +326,21 @@ def calc_command(inputs: Inputs) -> int:
     if inputs.says_earth():
         from frametool.cli.earth import earth
 
-        scope.earth = earth()
+        scope.earth = earth(inputs)
     alone = () if inputs.arguments == ("-",) else inputs.arguments  # a lone - is standard input, read in any case
-    texts = [text.strip() for text in alone if file_named_in(text, scope) is None]
+    texts = [text.strip() for text in alone if file_named_in(inputs, text, scope) is None]
     named = [(read_text(each[1:]) if each.startswith("@") else each).strip() for each in inputs.expressions]
     lines = [read_line(text) for text in (*texts, *named)]
     if inputs.trees:
-        scope.tree = load_tree(inputs.trees[0], inputs.trees[1:], streams=True)
+        scope.tree = load_tree(inputs, inputs.trees[0], inputs.trees[1:], streams=True)
     elif os.environ.get("FRAMETOOL_TREE"):  # read where a bare look-up asks for it
         asks = any(branch.kind == "lookup" and not branch.value[1] for line in lines for branch in walk(line.tree))
-        scope.tree = load_tree(".", streams=True) if asks or not lines else None
+        scope.tree = load_tree(inputs, ".", streams=True) if asks or not lines else None
     if not lines:
         inputs.ask("origin", "local_axes", "zone")  # whatever comes
         refuse(task.path is not None, "-i FILE needs an expression over row")
         is_prompt = sys.stdin is not None and sys.stdin.isatty()
-        return talk(scope, output) if is_prompt else calculate_lines(task, scope)
+        return talk(inputs, scope, output) if is_prompt else calculate_lines(task, scope)
     if task.path is not None or any(mentions_row(line.tree) for line in lines):
         return task.run(_over_rows(lines, len(texts), scope, task))
     values = ((line, evaluate_line(line, scope)) for line in lines)
@@ -371,7 +364,7 @@ def _over_rows(lines: Sequence[Line], behind: int, scope: Scope, task: Task) -> 
     formula = RowExpressions(results, [line for line in lines if line not in results], scope, task.output.style)
     formula.check((inputs.kind,) if inputs.kind else ("pose", "point", "vector"))
     timed = Timed.of_rows(inputs.time_column or "") if formula.needs_time else None
-    counters = not any(frame.isdecimal() for _, tree in formula.scope.trees for frame in tree.frames)
+    counters = not any(any(map(str.isdecimal, tree.frames)) for _, tree in formula.scope.trees)
     return task.request(
         operation=Operation(moves=True, formula=formula), timed=timed, earth=formula.scope.earth,
         kind=inputs.kind or "", frame_is_counter=counters,

@@ -68,24 +68,24 @@ def check_command(inputs: Inputs) -> int:
     if inputs.each:  # that a file holds no frames, or is of an unknown format, is a warning
         for number, name in enumerate(files):
             try:
-                recordings = opened([name], behind=number, of=len(files))
+                recordings = opened(inputs, [name], behind=number, of=len(files))
             except FormatError as error:
                 findings.append(Finding("no-frames", error.message, error.source, error.line or 1, 1))
             else:
                 findings += check(recordings, normalize=normalize, others=True)
-                state(recordings)
+                state(inputs, recordings)
     else:
         count = len(files) + len(measured)
         rows: list[Measurement] = []
         if measured:
             from frametool.stream.measurements import read_measurements
 
-            recordings = opened(measured, behind=len(files), of=count)
+            recordings = opened(inputs, measured, behind=len(files), of=count)
             rows = read_measurements(recordings, normalize=normalize)
-            state(recordings)
-        recordings = opened(files, of=count)
+            state(inputs, recordings)
+        recordings = opened(inputs, files, of=count)
         findings = _with_loops(recordings, rows, inputs.tolerance, normalize=normalize)
-        state(recordings)
+        state(inputs, recordings)
     text = WRITERS[fmt](findings)
     with writing(None) as write:
         is_seen = fmt == "text" and sys.stdout.isatty()
@@ -152,7 +152,7 @@ def diff_command(inputs: Inputs) -> int:
     """
     output = Output(inputs, "report", otherwise="text")
     sides = (inputs.a, *inputs.with_a), (inputs.b, *inputs.with_b)
-    (one, of_one), (other, of_other) = load_sides(*sides, normalize=inputs.normalize)
+    (one, of_one), (other, of_other) = load_sides(inputs, *sides)
     start = inputs.seen_from and frame_name(inputs.seen_from, one)
     comparison = diff(one, other, at_ns=options.at_ns(inputs.at), seen_from=start, tolerance=inputs.tolerance)
     inputs.note(*comparison.notes)
@@ -211,11 +211,11 @@ def monitor_command(inputs: Inputs) -> int:
     frames = inputs.frames
     refuse(len(frames) not in (0, 2), f"name TARGET and SOURCE, or neither; found {len(frames)} frames")
     output = Output(inputs, "report")
-    files = opened((inputs.recording, *inputs.more))
+    files = opened(inputs, (inputs.recording, *inputs.more))
     clashes: list[FormatError] = []
     report = monitor(files, *frames, normalize=inputs.normalize, clashing=clashes.append)
     inputs.ask("time_offset")
-    state(files)
+    state(inputs, files)
     tell = partial(say_error, in_json=output.chosen == "json")
     say_first(clashes, MOST_TOLD, "frames come by two topics", tell)
     if any(abs(each["delay_max_s"] or 0.0) > YEAR_S for each in report):

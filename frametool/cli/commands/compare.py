@@ -30,7 +30,10 @@ if TYPE_CHECKING:
     from frametool.fit.comparison import Comparison, Delta, Limit
     from frametool.frames.trajectory import Trajectory
 
-AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+UP = {
+    "x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0),
+    "-x": (-1.0, 0.0, 0.0), "-y": (0.0, -1.0, 0.0), "-z": (0.0, 0.0, -1.0),
+}  # fmt: skip
 ALIGN = ("se3", "sim3", "yaw", "origin", "origin+scale", "none")
 
 
@@ -47,14 +50,6 @@ def _read_offset(text: str) -> tuple[int | str, float | None]:
 def _read_limit(text: str) -> tuple[bool, int]:
     """Read `12.5` on the reference's clock, or `+5s` after the first pair."""
     return (True, options.read_span(text[1:])) if text.startswith("+") else (False, parse_stamp(text))
-
-
-def _read_up(text: str) -> tuple[float, float, float]:
-    sign, name = (-1.0, text[1:]) if text.startswith("-") else (1.0, text.removeprefix("+"))
-    if name not in AXES:
-        raise ValueInvalid(f"{shown(text)} is no axis; write x, y, z, -x, -y or -z")
-    x, y, z = (sign * part + 0.0 for part in AXES[name])
-    return x, y, z
 
 
 def read_delta(text: str, *units: str) -> Delta:
@@ -84,7 +79,7 @@ pairing_options = together(
     option("--align FIT", ", ".join(ALIGN).replace("se3", "se3 (default)", 1), ALIGN),
     option("--align-first N|10s|5m", "fit to the first pairs only", lambda text: read_delta(text, "frames", "s", "m")),
     option("--tie-first", "with se3, sim3, yaw: first positions coincide"),
-    option("--up AXIS", "up axis of REF's world: z, -y ..  [default: z]", _read_up),
+    option("--up AXIS", "up axis of REF's world: z, -y ..  [default: z]", (*UP,)),
 )
 trajectory_options = together(
     option("--on-error", "bad rows", (STOP, "skip"), default=STOP, under="Rows"), options.reading_options
@@ -289,7 +284,7 @@ def trajectory(inputs: Inputs, argument: str, fmt: str = "", on_error: str = STO
         made.append(BadRows(name, on_error, tell=partial(say_error, in_json=False)))
         return made[-1]
 
-    known = answers()
+    known = answers(inputs)
     found = read_trajectory(
         argument, fmt=fmt, topics=inputs.topics, answers=known._replace(time_offset=0), policy=policy,
         normalize=bool(inputs.normalize),
@@ -314,8 +309,10 @@ def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Com
     if "offset" in passed:
         passed["offset"], limit = passed["offset"]
         passed |= {} if limit is None else {"offset_limit_s": limit}
+    if "up" in passed:
+        passed["up"] = UP[passed["up"]]
     if "mount" in passed:
-        passed["mount"] = _mount(passed["mount"])
+        passed["mount"] = _mount(inputs, passed["mount"])
     chosen, formats = base.changed(**passed), options.for_each(inputs.input_formats, 1 + len(ests))
     reference, ref_name, skipped = trajectory(inputs, ref, formats[0], inputs.on_error)
     found = []
@@ -328,7 +325,7 @@ def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Com
     return found, skipped
 
 
-def _mount(text: str) -> Any:
+def _mount(inputs: Inputs, text: str) -> Any:
     """Read the mount: auto, a pose, or FILE:BODY:POINT, the pose of a point on a body of a tree."""
     if text == "auto":
         return text
@@ -341,7 +338,7 @@ def _mount(text: str) -> Any:
 
     file, names = split_name(text)
     refuse(len(names) != 2, f"--mount {shown(text)}: a pose, auto, or FILE:BODY:POINT")
-    return load_tree(file).lookup(names[0], names[1])
+    return load_tree(inputs, file).lookup(names[0], names[1])
 
 
 def write_trajectory(output: Output, found: Trajectory) -> None:

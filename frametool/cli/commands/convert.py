@@ -71,7 +71,7 @@ def convert_command(inputs: Inputs) -> int:
     if is_numbers and request.rows.given_place:
         from frametool.cli.earth import mapping_of
 
-        values, is_numbers = (mapping_of(values, request.rows.given_place),), False
+        values, is_numbers = (mapping_of(inputs, values, request.rows.given_place),), False
     bare, is_inverse = poses.without_inverse(values[0]) if len(values) == 1 and not is_numbers else ("", False)
     if bare == "-" or (bare and not task.path and task.has_table(bare)):
         refuse(task.plan, f"{values[0]} is a stream; {ONE_RECORD}")

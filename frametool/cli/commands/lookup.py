@@ -108,8 +108,8 @@ def lookup_command(inputs: Inputs) -> int:
         fmt = output.chosen if by_row else output.style.format
         has_none = not (fmt in (None, "text", *WITH_COVARIANCE) or holds_arrays(fmt))
         refuse(has_none, f"{fmt} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")
-    tree = load_tree(inputs.tree, inputs.more, streams=by_row)
-    lookups, at = lookups_in(tree, carried=covariance), options.at_ns(inputs.at)
+    tree = load_tree(inputs, inputs.tree, inputs.more, streams=by_row)
+    lookups, at = lookups_in(inputs, tree, carried=covariance), options.at_ns(inputs.at)
     if by_row:
         status = _by_row(task, lookups, target, source)
         inputs.note(lookups.granted())
@@ -226,7 +226,7 @@ def echo_command(inputs: Inputs) -> int:
     refuse(start is not None and stop is not None and start > stop, "--start is after --stop")
     out = Output(inputs, "poses", otherwise=None if inputs.output else "text")
     refuse(out.style.place and out.style.format == "text", "tf2_echo's blocks have x, y, z; give -f yaml, json or csv")
-    frames = load_tree(inputs.tree, inputs.more)
+    frames = load_tree(inputs, inputs.tree, inputs.more)
     target, source = frame_name(target, frames), frame_name(source, frames)
     out.take_axes_in(frames, source)
     if frames.covariances:
@@ -284,15 +284,16 @@ def fk_command(inputs: Inputs) -> int:
     from frametool.stream.formulas import JointRows, names_in
     from frametool.stream.request import Operation
 
-    (file,) = opened((inputs.tree,), streams=True)
+    (file,) = opened(inputs, (inputs.tree,), streams=True)
     robot, posture = robot_of(file)
     rows = JointRows(robot, posture, frame_name(inputs.base, robot), frame_name(inputs.tip, robot))
     with stream.opened() as source:
         begin = source.peek()
         fmt = stream.format_of(begin)
         refuse(holds_arrays(fmt), f"rows of joints are a table of text, records or messages, not {fmt}")
-        names = names_in(begin, fmt, stream.name, "a key for each joint, or JointState messages", header=inputs.header)
+        wanted, header = "a key for each joint, or JointState messages", not inputs.no_header
+        names = names_in(begin, fmt, stream.name, wanted, header=header)
         rows.bind(names, stream.name, fixed=frozenset(file.answers.joints))
         file.tally.assumed = ""  # rows say where each joint on the way is
-        state([file])
+        state(inputs, [file])
         return stream.run(stream.request(operation=Operation(moves=True, formula=rows), poses=0))

@@ -102,7 +102,7 @@ def project_command(inputs: Inputs) -> int:
     take = None if overlay is None else overlay.take
     name, ranged = task.camera_name, bool(inputs.ranged)
     seen = PixelsOfPoints(task.camera, inputs.first_pixel, name=name, ranged=ranged, take=take)
-    status = task.finish(task.adds(seen), () if task.is_stream else [*apply.sources_of(task.rest, None)], seen)
+    status = task.finish(task.adds(seen), () if task.is_stream else [*apply.sources_of(inputs, task.rest, None)], seen)
     if overlay is not None:
         with writing(overlay.path, force=inputs.force) as write:
             write(overlay.drawn())
@@ -166,7 +166,7 @@ class CameraTask(Task):
         else:
             if output.style.format == "text":
                 output.style = output.style.changed(format="yaml")
-            request = request.with_results(prefix=self.inputs.prefix)
+            request = request.with_results(prefix=self.inputs.prefix or "")
             output.values(values_of(records, request, output))
         if (self.is_stream or seen.lost) and (summary := seen.summary()):
             is_wrong = seen.is_mostly_behind and not self.inputs.camera_axes
@@ -228,10 +228,7 @@ def unproject_command(inputs: Inputs) -> int:
         task.way = GroundWay(task.way, inputs.ground, task.camera_name)
     target = "" if task.way is None else task.way.target
     seen = PointsOfPixels(task.camera, inputs.first_pixel, columns, far=far, height=height, into=into, target=target)
-    request = task.adds(seen, poses=0)
-    if request.timed is not None and height is not None:
-        request = request._replace(timed=request.timed._replace(width=2 * EXACT))
-    return task.finish(request, records, seen)
+    return task.finish(task.adds(seen, poses=0), records, seen)
 
 
 class GroundWay(apply.TreeWay):
@@ -242,10 +239,12 @@ class GroundWay(apply.TreeWay):
         vars(self).update(vars(way))
         ground = frame_name(ground, self.tree)
         self.pairs = ((self.target, ground), (ground, frame_name(camera, self.tree)))
+        if self.timed is not None:
+            self.timed = self.timed._replace(many=self.at_times, one=self.from_frame, width=2 * EXACT)
 
     def from_frame(self, _own: str | None, own_ns: int | None = None) -> Components:
         """Return both at a time, or at the latest that both have."""
-        stamp_ns, tree = own_ns if self.in_time else options.at_ns(self.at), self.tree
+        stamp_ns, tree = own_ns if self.at is None else options.at_ns(self.at), self.tree
         if stamp_ns is None:
             stamp_ns = min((each for pair in self.pairs if (each := tree.latest(*pair)) is not None), default=None)
         return tuple(part for pair in self.pairs for part in tree.lookup(*pair, stamp_ns).components)
@@ -269,7 +268,8 @@ def _columns(task: CameraTask, records: Sequence[Source]) -> Sequence[str]:
     else:
         task.read_clouds_as_rows()
         begin = task.opened().peek()
-        names = names_in(begin, task.format_of(begin, is_table=True), task.name, WANTED, header=inputs.header)
+        fmt = task.format_of(begin, is_table=True)
+        names = names_in(begin, fmt, task.name, WANTED, header=not inputs.no_header)
     if inputs.peek("columns"):
         columns: Sequence[str] = [each.strip() for each in inputs.columns[0].split(",")]
         refuse(len(columns) not in (2, 3), "--columns names those of u and v, and of a depth if there is one")

@@ -85,7 +85,7 @@ def record_command(inputs: Inputs) -> int:
         if new in (read, *read.parents) or read in new.parents:  # a file, its folder, or what is in that: data would go
             changes = f"would change {printable(each)}, which is read; give another name"
             raise FileProblem(f"{printable(place)}: {changes}")
-    tally, edges = Diagnostics(), load_tree(more[0], more[1:]) if more else None
+    tally, edges = Diagnostics(), load_tree(inputs, more[0], more[1:]) if more else None
     if edges is not None and (resting := [name for *_, names in edges.robots for name in names]):
         raise BadAnswer(f"joints without a value would be static: {listing(resting)}; --joint NAME=VALUE gives it")
     if edges is not None and edges.covariances:

@@ -38,9 +38,9 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
     from frametool.fit.measured_tree import parted, solve_tree
     from frametool.stream.measurements import read_measurements, without
 
-    recordings = opened(files)
+    recordings = opened(inputs, files)
     rows = read_measurements(recordings, normalize=inputs.normalize)
-    state(recordings)
+    state(inputs, recordings)
     for each in recordings:
         own = [row for row in rows if parted(row.place)[0] == each.name]
         first = f": {own[0].parent}<-{own[0].child} .." if own else ""
@@ -48,7 +48,7 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
         inputs.note(f"{each.name}: {count}, each the pose of child in parent{first}")
     rows, fixed = without(rows, inputs.without), None
     if inputs.fix:
-        fixed = load_tree(inputs.fix[0], inputs.fix[1:])
+        fixed = load_tree(inputs, inputs.fix[0], inputs.fix[1:])
         if moving := next((track.child for track in fixed.tracks() if not track.is_static), None):
             raise ValueInvalid(f"{fixed.name}: {shown(moving)} moves; fixed frames must be static (tree --at TIME)")
         if not {*fixed.frames} & (measured := {name for row in rows for name in row[:2]}):
@@ -159,7 +159,7 @@ def solved_points(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solu
 
     policy = partial(BadRows, tell=partial(say_error, in_json=False))
     named = zip(files, options.for_each(inputs.input_formats, 2), strict=True)
-    a, b = (read_points(file, fmt=fmt, answers=answers(), policy=policy) for file, fmt in named)
+    a, b = (read_points(file, fmt=fmt, answers=answers(inputs), policy=policy) for file, fmt in named)
     found_names = (a.frame, b.frame) if a.frame and b.frame and a.frame != b.frame else ("A", "B")
     names = target, source = tuple(inputs.names or found_names)
     pairs = matched(a, b)

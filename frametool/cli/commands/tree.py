@@ -54,7 +54,7 @@ def tree_command(inputs: Inputs) -> None:
     place, drawn = output.style.place, output.style.format in ("yaml", "json", "text", "dot", "mermaid")
     is_unsaid = place is not None and (not drawn or place.origin is not None)
     refuse(is_unsaid, f"--to {place and place.name}: trees say places by lla or utm, in yaml, json, text and drawings")
-    frames = load_tree(inputs.tree, inputs.more, drawings=True)
+    frames = load_tree(inputs, inputs.tree, inputs.more, drawings=True)
     stamp = options.at_ns(inputs.at)
     output.tree(frames if stamp is None else frames.tree_at(stamp), inputs.color)
 
@@ -87,7 +87,7 @@ def static_command(inputs: Inputs) -> None:
         arguments = re.sub(r"\\\s", " ", arguments[0]).split()  # in quotes
     if not flags and len(arguments) == 1:
         output = Output(inputs, "tree", otherwise="static2")
-        tree = load_tree(arguments[0])
+        tree = load_tree(inputs, arguments[0])
         if tree.moves:
             raise ValueInvalid(moving_frames(track.child for track in tree.tracks() if not track.is_static))
         output.tree(tree)
@@ -158,7 +158,7 @@ def view_command(inputs: Inputs) -> None:
     overlay, eye = inputs.overlay, inputs.peek("eye") if chosen == "glb" else inputs.eye  # a glb is seen from anywhere
     refuse(overlay and (source or not target), "--overlay takes two trees: frametool view AFTER BEFORE --overlay")
     refuse(inputs.path_only and not (target and source), "--path draws the way between TARGET and SOURCE; name both")
-    frames = load_tree(tree, inputs.more)
+    frames = load_tree(inputs, tree, inputs.more)
     from frametool.view.scene import FrameScene
 
     ends = {} if overlay else {"target": target, "source": source}
@@ -170,7 +170,7 @@ def view_command(inputs: Inputs) -> None:
         say(f"note: no data of {listing(gone, 5)} at {format_stamp(scene.at_ns or 0)}: not drawn, nor what hangs there")
     before = None
     if overlay:
-        before = FrameScene(load_tree(str(target)), at_ns=scene.at_ns, fixed=scene.fixed, ground=scene.ground)
+        before = FrameScene(load_tree(inputs, str(target)), at_ns=scene.at_ns, fixed=scene.fixed, ground=scene.ground)
     if chosen == "text" and output is None:
         color = inputs.color
         if sys.stdout.isatty():
@@ -218,7 +218,7 @@ def _content(
 
         return write_page(
             scene, title=title, file=tree, eye=eye, other=before, other_title=other, sliders=sliders,
-            solids=_solids(tree) if scene.tree.robots and not before else (),
+            solids=_solids(inputs, tree) if scene.tree.robots and not before else (),
         )  # fmt: skip
     if fmt == "glb":
         from frametool.view.exports import write_glb
@@ -239,13 +239,13 @@ def _content(
     return write_picture(still, f".{fmt}")
 
 
-def _solids(tree: str) -> list[Solid]:
+def _solids(inputs: Inputs, tree: str) -> list[Solid]:
     """Return the solids of a robot's file, and say which are not drawn as they are; its frames were read before."""
     from frametool.formats.robots.model import read_solids
 
     if not os.path.isfile(tree_file(tree)):
         return []
-    (file,) = opened([tree])
+    (file,) = opened(inputs, [tree])
     with closing(file):
         try:
             solids = read_solids(file, file.format)
