@@ -86,11 +86,10 @@ class Inputs:
         for text in () if self.quiet else filter(None, texts):
             say(text)
 
-    def refuse_idle(self) -> None:
-        """Raise a usage error for options that were passed and that nobody has asked for."""
-        if self.idle:
-            has = "has" if len(self.idle) == 1 else "have"
-            raise click.UsageError(f"{', '.join(each.opts[-1] for each in self.idle.values())} {has} no effect here")
+    def refuse_idle(self, *names: str) -> None:
+        """Raise a usage error for options that were passed and that nobody has asked for, or for these of them."""
+        if idle := [option.opts[-1] for name, option in self.idle.items() if not names or name in names]:
+            raise click.UsageError(f"{', '.join(idle)} {'has' if len(idle) == 1 else 'have'} no effect here")
 
 
 class Option(click.Option):

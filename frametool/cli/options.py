@@ -197,9 +197,10 @@ def input_formats(inputs: Inputs, *, streams: bool = False) -> tuple[list[str], 
     streams: there is a stream; its format is the last one that can be streamed, "" if there is none
     """
     formats = list(inputs.input_formats)
-    streamed = [at for at, fmt in enumerate(formats) if streams and not {*STREAMED}.isdisjoint(FORMATS[fmt].reads)]
-    of_stream = formats.pop(streamed[-1]) if streamed else ""
-    return formats, of_stream
+    for at in reversed(range(len(formats) * streams)):
+        if not {*STREAMED}.isdisjoint(FORMATS[formats[at]].reads):
+            return formats, formats.pop(at)
+    return formats, ""
 
 
 def for_each(formats: Sequence[str], files: int) -> list[str]:

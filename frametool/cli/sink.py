@@ -279,7 +279,7 @@ def say_warning(message: str, rule: str = "") -> None:
     say(f"warning: {message}")
 
 
-def say_error(error: FrametoolError, *, in_json: bool, fate: str = "") -> None:
+def say_error(error: FrametoolError, *, in_json: bool = False, fate: str = "") -> None:
     """Write an error: as a sentence with the source line, or as one object of its kind, its message and its fields.
 
     The place of an object is the line of a batch, if one runs; its own place is then under `input`.

@@ -135,8 +135,9 @@ def opened(
     inputs.reads_trees = True
     formats, named = input_formats(inputs, streams=streams)[0], [*inputs.peek("named_frames")]
     reads = ("tree", "drawing") if drawings else ("tree",)
-    if other := [fmt for fmt in formats if {*reads}.isdisjoint(FORMATS[fmt].reads)]:
-        raise click.UsageError(f"--in {other[0]}: no frames are read from that; `frametool formats` lists what is")
+    for fmt in formats:
+        is_other = {*reads}.isdisjoint(FORMATS[fmt].reads)
+        refuse(is_other, f"--in {fmt}: no frames are read from that; `frametool formats` lists what is")
     files = of or len(arguments)
     for option, values in (("--in", formats), ("--frames", named)):
         more = f"{option} appears {len(values)} times for {files} file{'s' * (files != 1)}"
@@ -150,7 +151,11 @@ def opened(
         )
         for each in arguments
     )
-    lacking = [file for file in found if "frames" in file.required_options]
+    lacking = []
+    for file in found:
+        left_open = file.required_options
+        lacking += [file] * ("frames" in left_open)
+        inputs.ask(*{"camera_axes"} & {*left_open})
     if len(named) not in (0, 1, len(lacking), files):
         close_all(found)
         raise click.UsageError(f"--frames appears {len(named)} times, {len(lacking)} of the files need names")
@@ -158,8 +163,7 @@ def opened(
         lacking = [file for file in lacking if "rows" in FORMATS[file.format].reads] or lacking
     for file, names in zip(found if len(named) == files else lacking, named[behind:] or named, strict=False):
         file.answers = file.answers._replace(frames=names)
-    left_open = {option for file in found for option in file.required_options}
-    inputs.ask(*["named_frames"] * bool(lacking), *{"camera_axes"} & left_open)
+    inputs.ask(*["named_frames"] * bool(lacking))
     return found
 
 
@@ -171,11 +175,14 @@ def answers(inputs: Inputs) -> Answers:
         refuse(not (name and value), f"--joint takes NAME=VALUE, found {shown(text)}")
         refuse(name in joints, f"--joint {shown(name)} has two values, {joints.get(name)} and {value}; leave one out")
         joints[name] = value
-    named = {name: inputs.peek(name) for name in Answers._fields if name not in ("joints", "frames")}
-    notations = inputs.peek("from_rep")
-    named["order"] = named["order"] or next((each.spec for each in notations or () if each.spec in ORDERS), "")
-    said = asking(inputs, Answers, ANSWERED)
-    return said(joints=joints, **{name: value for name, value in named.items() if value})
+    named: dict[str, Any] = {"joints": joints}
+    for each in inputs.peek("from_rep") or ():
+        if each.spec in ORDERS:
+            named["order"] = each.spec
+    for name in Answers._fields:
+        if name not in ("joints", "frames") and (value := inputs.peek(name)):
+            named[name] = value
+    return asking(inputs, Answers, ANSWERED)(**named)
 
 
 def tree_file(argument: str) -> str:

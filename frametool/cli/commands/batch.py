@@ -67,7 +67,7 @@ def run(
                     words = split(command, _no_value) if isinstance(command, str) else [*map(str, command)]
                     status = cli.run(words[words[:1] == ["frametool"] :])
                 except Misused as error:
-                    say_error(error, in_json=False)
+                    say_error(error)
                     status = error.exit_code
             data = out.getvalue()
     return Ran(data, errors.getvalue().decode(), status, written)

@@ -245,7 +245,7 @@ def talk(inputs: Inputs, scope: Scope, output: Output) -> int:
             except click.UsageError as error:
                 tell(f"frametool: {error.format_message()}")
             except FrametoolError as error:
-                say_error(error, in_json=False)
+                say_error(error)
 
 
 @contextmanager

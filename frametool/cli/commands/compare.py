@@ -281,7 +281,7 @@ def trajectory(inputs: Inputs, argument: str, fmt: str = "", on_error: str = STO
     made: list[BadRows] = []
 
     def policy(name: str) -> BadRows:
-        made.append(BadRows(name, on_error, tell=partial(say_error, in_json=False)))
+        made.append(BadRows(name, on_error, tell=say_error))
         return made[-1]
 
     known = answers(inputs)

@@ -114,10 +114,10 @@ def cookbook(words: tuple[str, ...]) -> str:
     return answers + (f"{_titles('Also in', inside)}\n" if inside else "") + files
 
 
-def _commands(ctx: click.Context) -> dict[str, click.Command]:
-    """Return all commands and subcommands by their names."""
+def _commands(ctx: click.Context, names: Iterable[str] = COMMANDS) -> dict[str, click.Command]:
+    """Return commands and their subcommands by their names."""
     found: dict[str, click.Command] = {}
-    for name in COMMANDS:
+    for name in filter(COMMANDS.__contains__, names):
         found[name] = group.get_command(ctx, name)
         found |= {f"{name} {inner}": each for inner, each in getattr(found[name], "commands", {}).items()}
     return found
@@ -211,7 +211,7 @@ def help_command(ctx: click.Context, inputs: Inputs) -> None:
     """
     words = inputs.words
     name = " ".join(words)
-    named = _commands(ctx).get(name) if words[:1] and words[0] in COMMANDS else None
+    named = _commands(ctx, words[:1]).get(name)
     from frametool.documents.writers import dump_json
 
     if inputs.fmt == "json":

@@ -20,6 +20,7 @@ from frametool.geometry.rigid import EXACT, UNCERTAIN
 from frametool.grammar import pose_algebra as algebra
 from frametool.grammar.edges import stop
 from frametool.grammar.pose import LEFT_OUT
+from frametool.grammar.readers import EARTH_FRAMES
 from frametool.stream.faults import NULL, SKIP, RowsSkipped
 
 if TYPE_CHECKING:
@@ -170,6 +171,10 @@ def _by_row(task: Task, lookups: algebra.Lookups, target: str | None, source: st
     for name, column, called in ((target, columns[0], "TARGET"), (source, columns[1], "SOURCE")):
         refuse((name is None) == (column is None), f"name {called} or its column, one of the two")
     fixed_target, fixed_source = (name and frame_name(name, tree) for name in (target, source))
+    if place is not None:
+        from frametool.grammar.place import check_in_ecef
+
+        check_in_ecef(fixed_target or EARTH_FRAMES[0], place)
     frames = tuple(each for each in columns if each is not None)
     at = None if inputs.time_column else options.at_ns(inputs.at)
 
@@ -182,8 +187,6 @@ def _by_row(task: Task, lookups: algebra.Lookups, target: str | None, source: st
     def edge_of(names: str | None, own: int | None = at) -> Components:
         ends = ends_of(names)
         if place is not None:
-            from frametool.grammar.place import check_in_ecef
-
             check_in_ecef(ends[0], place)
         return lookups.one(*ends, own)
 

@@ -122,9 +122,8 @@ class CameraTask(Task):
         self.rest: tuple[str, ...] = inputs.arguments
         _, colon, name = (inputs.camera or "").rpartition(":")
         self.camera_name = name if colon and not is_inline(inputs.camera) else ""
-        # the first argument is a tree if it is no number and no record, or one that is written inline
-        inner = [each for each in self.rest[:2] if not (is_record(each) or begins_number(each))]
-        if inputs.camera is None or (inner and (inner[0] == self.rest[0] or inner == [self.rest[1]])):
+        # two numbers or records have no tree before them; one of both may be a tree that is written inline
+        if inputs.camera is None or not all(is_record(each) or begins_number(each) for each in self.rest[:2]):
             *before, _ = names = named.split()
             if len(self.rest) < len(names) or begins_number(self.rest[0]):
                 raise click.UsageError(f"name {', '.join(before)} and CAMERA, or give --camera FILE[:NAME]")

@@ -92,7 +92,7 @@ def record_command(inputs: Inputs) -> int:
         warn(f"{copy}: covariances left out")
     inputs.ask(*["normalize"] * bool(more or into))
     on_error = inputs.on_error if into else STOP
-    bad = BadRows(path, on_error, tell=lambda error: say_error(error, in_json=False), counted="message")
+    bad = BadRows(path, on_error, tell=say_error, counted="message")
     request = (edges, inputs.replace, without_slash(into or ""), topics, inputs.between, normalize)
     quiet, force = inputs.quiet, inputs.force
     inputs.refuse_idle()

@@ -85,6 +85,11 @@ output_options = together(  # what is shown of a run
 )  # fmt: skip
 
 
+def _paced(start: float) -> Watch:
+    """Return what keeps simulated time from running ahead of the clock."""
+    return lambda step: sleep(max(0.0, step.t_ns / BILLION - (monotonic() - start)))
+
+
 def show_run(inputs: Inputs, scene: Scene, *, leaders: bool = False) -> None:
     """Run a scene to its end, show of it what the options say, and sum it up on stderr.
 
@@ -94,13 +99,13 @@ def show_run(inputs: Inputs, scene: Scene, *, leaders: bool = False) -> None:
     plot, view, force = inputs.plot, inputs.view, inputs.force
     output: str | None = None if inputs.output == "-" else inputs.output
     refuse(reach < 0.0, f"--reach must be 0 or more, found {reach:g}")
-    if live and not (sys.stdout.isatty() or sys.stderr.isatty()):
-        raise click.UsageError("--live draws in a terminal, and neither stdout nor stderr is one; see --plot")
+    seen = live and (sys.stdout.isatty() or sys.stderr.isatty())
+    refuse(live and not seen, "--live draws in a terminal, and neither stdout nor stderr is one; see --plot")
     files = [*filter(None, (output, plot, view))]
     refuse(len({*map(os.path.realpath, files)}) < len(files), "the same file: --output, --plot or --view")
     for path in files:
         refuse_existing(path, force=force)
-        if path != "-" and not os.path.isdir(os.path.dirname(path) or "."):
+        if not os.path.isdir(os.path.dirname(path) or "."):
             raise FileProblem(f"{path}: no directory {os.path.dirname(path)}")
     summary, interrupted = RunSummary(scene, reach), False
     # what is written after the run, by file: what watches the steps, and what then makes the content
@@ -109,20 +114,17 @@ def show_run(inputs: Inputs, scene: Scene, *, leaders: bool = False) -> None:
         from frametool.view.exports import run_picture
         from frametool.view.pictures import require_matplotlib, write_picture
 
-        if (suffix := suffix_of(plot)) == ".png":
+        if suffix_of(plot) == ".png":
             require_matplotlib()
         watch_run, drawn = run_picture(scene)
-        pictures[plot] = watch_run, lambda: write_picture(drawn(), suffix)
+        pictures[plot] = watch_run, lambda: write_picture(drawn(), suffix_of(plot))
     if view:
         from frametool.view.exports import run_page
 
         pictures[view] = run_page()
     try:
         with ExitStack() as stack:  # closes what the steps go to
-            watchers: list[Watch] = [summary.watch]
-            if inputs.realtime or live:
-                start = monotonic()  # simulated time does not run ahead of the clock
-                watchers.append(lambda step: sleep(max(0.0, step.t_ns / BILLION - (monotonic() - start))))
+            watchers: list[Watch] = [summary.watch, *[_paced(monotonic())] * bool(inputs.realtime or live)]
             if live:
                 from frametool.view.terminal import Screen
 
@@ -131,12 +133,14 @@ def show_run(inputs: Inputs, scene: Scene, *, leaders: bool = False) -> None:
                 stack.enter_context(screen.live)
             watchers.append(screen.watch if live else event_log(say))
             if output is not None or not (live and sys.stdout.isatty()):
-                several = leaders or emit == "poses" or len(scene.followers) > 1
-                records_of = step_writer(emit, style, leaders=leaders, labelled=several)
+                inputs.ask("precision")
+                several = emit == "poses" or len(scene.followers) > 1
+                records_of = step_writer(emit, style, leaders=leaders, labelled=leaders or several)
                 write = stack.enter_context(writing(output, force=force))
                 # each record at once, so that a reader at the other end of a pipe sees it
                 watchers.append(lambda step: [write(text) for text in records_of(step)])
             watchers += [watch for watch, _ in pictures.values()]
+            inputs.refuse_idle()
             for step in simulate(scene):
                 for watch in watchers:
                     watch(step)

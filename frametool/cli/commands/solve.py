@@ -41,6 +41,7 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
     recordings = opened(inputs, files)
     rows = read_measurements(recordings, normalize=inputs.normalize)
     state(inputs, recordings)
+    inputs.refuse_idle("topics")
     for each in recordings:
         own = [row for row in rows if parted(row.place)[0] == each.name]
         first = f": {own[0].parent}<-{own[0].child} .." if own else ""
@@ -157,7 +158,7 @@ def solved_points(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solu
     from frametool.fit.calibration import solve_points
     from frametool.stream.samples import matched, read_points
 
-    policy = partial(BadRows, tell=partial(say_error, in_json=False))
+    policy = partial(BadRows, tell=say_error)
     named = zip(files, options.for_each(inputs.input_formats, 2), strict=True)
     a, b = (read_points(file, fmt=fmt, answers=answers(inputs), policy=policy) for file, fmt in named)
     found_names = (a.frame, b.frame) if a.frame and b.frame and a.frame != b.frame else ("A", "B")
