@@ -43,13 +43,16 @@ class Inputs:
     """The arguments and options of a command, by the names of its parameters; to read one is to ask for it.
 
     idle: the options that were passed and that nobody has asked for yet
+    peek: returns a value that is looked at and not used
     reads_trees: whether files of frames are opened: --in is then about these too
     earth: what the options say of places on the Earth, made when first needed
     """
 
     def __init__(self, values: dict[str, Any], idle: dict[Any, Option]) -> None:
         """Keep the values, and the options that were passed."""
+        values |= WITHOUT | values
         self._values, self.idle = values, idle
+        self.peek: Callable[[str], Any] = values.get
         self.reads_trees = False
         self.earth: Earth | None = None
 
@@ -58,11 +61,7 @@ class Inputs:
         if name.startswith("_"):
             raise AttributeError(name)
         self.idle.pop(name, None)
-        return self._values.get(name, WITHOUT.get(name))
-
-    def peek(self, name: str) -> Any:
-        """Return a value that is looked at and not used."""
-        return self._values.get(name, WITHOUT.get(name))
+        return self._values.get(name)
 
     def ask(self, *names: str) -> None:
         """Count options as asked for."""
@@ -76,10 +75,6 @@ class Inputs:
     def but(self, **values: Any) -> Inputs:
         """Return these inputs with other values."""
         return Inputs(self._values | values, self.idle)
-
-    def says_earth(self) -> bool:
-        """Return True if an option says something of places on the Earth."""
-        return any(map(self.peek, ("origin", "local_axes", "zone")))
 
     def note(self, *texts: str | None) -> None:
         """Report how the input is taken, unless --quiet; what is empty is no report."""
@@ -383,7 +378,7 @@ class Command(WithHelp):
             args = [f"{each}={OPTIONAL[each][0]}" if each in OPTIONAL else each for each in args]
         passed: dict[Any, Option] = {}
         for each in () if ctx.resilient_parsing else self.make_parser(ctx).parse_args(args=[*args])[2]:
-            if isinstance(each, Option):
+            if isinstance(each, Option) and each.name not in OF_MESSAGES:
                 if each.name in passed and not (each.multiple or each.is_flag):
                     raise click.UsageError(f"{each.opts[-1]} appears twice; only one can be used", ctx)
                 passed[each.name] = each
@@ -396,8 +391,6 @@ class Command(WithHelp):
                 known = {each.name: each.opts[-1] for each in self.params}
                 choices = " or ".join(known[needed] for needed in option.requires if needed in known)
                 raise click.UsageError(f"{option.opts[-1]} needs {choices}", ctx)
-        for name in OF_MESSAGES:
-            passed.pop(name, None)
         ctx.meta[INPUTS] = Inputs(ctx.params, passed)
         return rest
 

@@ -46,6 +46,7 @@ def read_names(text: str, spec: str = "") -> tuple[str, ...]:
 
 
 FULL = -1  # digits: as many as the number has
+OF_EARTH = ("origin", "local_axes", "zone")  # what is said of places on the Earth
 
 
 def _read_notations(text: str) -> tuple[Notation, ...]:

@@ -71,7 +71,7 @@ def rejoined(values: Sequence[str]) -> tuple[str, ...]:
     is_apart = len(values) > 1 and (
         any(value[-1:] == "," for value in values[:-1])
         or (values[0][:1] in ("[", "(") and values[0].count("[") > values[0].count("]"))
-        or (re.fullmatch(r"[-+\d.eE*ijk ]+", text) is not None and any(each in text for each in "ijk"))
+        or re.fullmatch(r"(?=.*[ijk])[-+\d.eE*ijk ]+", text) is not None
     )
     return (text,) if is_apart else tuple(values)
 

@@ -404,7 +404,7 @@ class Task:
                 bare = without_inverse(text)[0].strip()
                 if not (bare.startswith("{") and ":" in bare):  # whose keys say what its numbers are
                     inputs.ask("from_rep")
-        if says_earth := bool(style.place or self.place or inputs.says_earth()):
+        if says_earth := bool(style.place or self.place or any(map(inputs.peek, options.OF_EARTH))):
             from frametool.cli.earth import earth
 
             asked["earth"] = earth(inputs)
@@ -427,15 +427,20 @@ class Task:
         if any(isinstance(each, str) and os.path.exists(each) for each in arguments):
             self.inputs.ask("input_formats")
 
+    def streamed(self, arguments: Sequence[str], request: Request) -> Request | None:
+        """Return what is asked of the stream, where it, a table or its inverse is the argument; else None."""
+        bare, is_inverse = without_inverse(arguments[0]) if arguments else ("-", False)
+        if len(arguments) > 1 or (bare != "-" and (self.path or not self.has_table(bare))):
+            return None
+        return request.of_inverses() if is_inverse else request
+
     def answer(self, argument: str | Source, request: Request, timed: dict[str, Any] | None = None) -> int:
         """Write the results of the records of one argument: inline, a file, or the stream of the command.
 
         timed: the stamp of a single result, {} for none, where it is not that of its record
         """
-        if isinstance(argument, str):
-            bare, is_inverse = without_inverse(argument)
-            if bare == "-" or self.has_table(bare):
-                return self.run(request.of_inverses() if is_inverse else request)
+        if isinstance(argument, str) and (streamed := self.streamed([argument], request)):
+            return self.run(streamed)
         self.only_arguments([argument])
         values = values_of([argument], request, self.output)
         if timed is not None:

@@ -153,9 +153,8 @@ def opened(
     )
     lacking = []
     for file in found:
-        left_open = file.required_options
-        lacking += [file] * ("frames" in left_open)
-        inputs.ask(*{"camera_axes"} & {*left_open})
+        lacking += [file] * ("frames" in file.required_options)
+        inputs.ask(*{"camera_axes"}.intersection(file.required_options))
     if len(named) not in (0, 1, len(lacking), files):
         close_all(found)
         raise click.UsageError(f"--frames appears {len(named)} times, {len(lacking)} of the files need names")

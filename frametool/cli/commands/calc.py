@@ -16,7 +16,7 @@ from frametool.calc.functions import ANGLES, FUNCTIONS, LIST, NUMBER, POINT, POS
 from frametool.calc.parser import RADIAN, Line, mentions_row, walk
 from frametool.cli.command import Command, Inputs, Text, argument, command_named, option, refuse
 from frametool.cli.commands.help import topic
-from frametool.cli.options import COLUMN, pose_result_options, reading_options
+from frametool.cli.options import COLUMN, OF_EARTH, pose_result_options, reading_options
 from frametool.cli.poses import source_of
 from frametool.cli.sink import say_error, show, tell
 from frametool.cli.streaming import Task, stream_options
@@ -323,7 +323,7 @@ def calc_command(inputs: Inputs) -> int:
     task = Task(inputs, "points")
     output = task.output
     scope = Scope(degrees=inputs.deg, normalize=inputs.normalize)
-    if inputs.says_earth():
+    if any(map(inputs.peek, OF_EARTH)):
         from frametool.cli.earth import earth
 
         scope.earth = earth(inputs)
@@ -337,7 +337,7 @@ def calc_command(inputs: Inputs) -> int:
         asks = any(branch.kind == "lookup" and not branch.value[1] for line in lines for branch in walk(line.tree))
         scope.tree = load_tree(inputs, ".", streams=True) if asks or not lines else None
     if not lines:
-        inputs.ask("origin", "local_axes", "zone")  # whatever comes
+        inputs.ask(*OF_EARTH)  # whatever comes
         refuse(task.path is not None, "-i FILE needs an expression over row")
         is_prompt = sys.stdin is not None and sys.stdin.isatty()
         return talk(inputs, scope, output) if is_prompt else calculate_lines(task, scope)

@@ -72,14 +72,12 @@ def convert_command(inputs: Inputs) -> int:
         from frametool.cli.earth import mapping_of
 
         values, is_numbers = (mapping_of(inputs, values, request.rows.given_place),), False
-    bare, is_inverse = poses.without_inverse(values[0]) if len(values) == 1 and not is_numbers else ("", False)
-    if bare == "-" or (bare and not task.path and task.has_table(bare)):
-        refuse(task.plan, f"{values[0]} is a stream; {ONE_RECORD}")
-        values, request = ("-",), request.of_inverses() if is_inverse else request
     is_alone = operation.turns and not values and (task.plan or not task.has_input())
-    if not (is_numbers or ((values or is_alone) and all(map(poses.is_inline, values)))):
-        request = request.with_results(unwrap=inputs.unwrap)
-    if values == ("-",) or not (values or is_alone):
+    streamed = None if is_numbers or is_alone else task.streamed(values, request)
+    if streamed or not (is_numbers or all(map(poses.is_inline, values))):
+        request = (streamed or request).with_results(unwrap=inputs.unwrap)
+    if streamed:
+        refuse(task.plan, f"{''.join(values)} is a stream; {ONE_RECORD}")
         return task.run(request)
     task.only_arguments(values)
     results: list[Any]
