@@ -9,6 +9,7 @@ import os
 import sys
 from importlib import import_module
 from itertools import chain, islice
+from operator import attrgetter
 from os.path import splitext
 from typing import TYPE_CHECKING, Any
 
@@ -101,7 +102,7 @@ class Output:
             refuse_suffix(self.path)
         self.chosen = named or (table.by_name(self.path, table.writers(*what)) if self.path is not None else None)
         notations, place = inputs.notations or (), None
-        if inputs.peek("origin") is not None or any(each.representation.on_earth for each in notations):
+        if inputs.peek("origin") is not None or any(map(attrgetter("representation.on_earth"), notations)):
             from frametool.cli.earth import places_of
 
             notations, place = places_of(inputs, notations)

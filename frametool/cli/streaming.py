@@ -90,6 +90,7 @@ class Task:
         path = inputs.peek("input_path")
         self.paths: Sequence[str] = path if isinstance(path, tuple) else () if path is None else (path,)
         self.path: str | None = self.paths[0] if self.paths and self.paths[0] != "-" else None
+        self.name: str = self.path or "stdin"  # as messages call the stream
         # an option may say that the stream is a table
         self._is_table = any(map(inputs.peek, ("columns", "keep", "prefix", "no_header")))
         notations: Any = inputs.peek("from_rep") or (None,)
@@ -186,7 +187,7 @@ class Task:
                         return False
             except (OSError, ValueError):  # it cannot be read, or its format is unknown
                 return False
-        self.path = argument
+        self.path = self.name = argument
         return True
 
     def chosen_format(self) -> str:
@@ -197,11 +198,6 @@ class Task:
             streams = ", ".join(readers(*options.STREAMED))
             raise click.UsageError(both if fmt else f"--in {others[0]} is not streamed; streams are {streams}")
         return fmt
-
-    @property
-    def name(self) -> str:
-        """Return what messages call the stream."""
-        return self.path or "stdin"
 
     def run(self, request: Request, rows: MeanRows | None = None) -> int:
         """Run the stream and return its exit status; the error that ends it says what to do.

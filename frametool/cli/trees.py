@@ -186,11 +186,9 @@ def answers(inputs: Inputs) -> Answers:
 
 def tree_file(argument: str) -> str:
     """Return the file that an argument denotes."""
-    if argument != ".":
-        return argument
-    if named := os.environ.get("FRAMETOOL_TREE"):
-        return named
-    raise click.UsageError("TREE is . but FRAMETOOL_TREE is not set; name a file")
+    named = os.environ.get("FRAMETOOL_TREE") if argument == "." else argument
+    refuse(argument == "." and not named, "TREE is . but FRAMETOOL_TREE is not set; name a file")
+    return named or ""
 
 
 def _offer_frames(ctx: click.Context, _incomplete: str) -> Mapping[str, str] | None:

@@ -204,7 +204,9 @@ def mean_command(inputs: Inputs) -> int:
     request = task.request(kind="pose", extra_column=rows.key, stamps=NO_STAMPS)
     bare, is_inverse = poses.without_inverse(arguments[0]) if len(arguments) == 1 else ("", False)
     if bare == "-" or (bare and not task.path and not poses.is_pasted(bare, task.notation)):
-        task.path, arguments = task.path if bare == "-" else bare, ()
+        arguments = ()
+        if bare != "-":
+            task.path = task.name = bare
         request = request.of_inverses() if is_inverse else request
     if not arguments:
         status = task.run(request, rows)

@@ -226,7 +226,7 @@ def echo_command(inputs: Inputs) -> int:
     echo /tf` printed (help recordings).
     """
     target, source, start, stop, limit = inputs.target, inputs.source, inputs.start, inputs.stop, inputs.limit
-    refuse(start is not None and stop is not None and start > stop, "--start is after --stop")
+    options.window_of(inputs)  # refuses a start after the stop
     out = Output(inputs, "poses", otherwise=None if inputs.output else "text")
     refuse(out.style.place and out.style.format == "text", "tf2_echo's blocks have x, y, z; give -f yaml, json or csv")
     frames = load_tree(inputs, inputs.tree, inputs.more)
