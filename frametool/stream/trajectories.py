@@ -207,10 +207,6 @@ def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows, asked: R
     request = asked._replace(operation=Operation(moves=True), rename=lambda parent, name: (parent, name))
     converter = FormatConverter(fmt, request, file.name, Style("tum"), own)
     poses = gathered(converter.steps(cast("ByteStream", file.stream)), bad)
-    named = {*zip(poses.parents, poses.names, strict=True)}
-    if len(named) > 1:
-        some = ", ".join(f"{parent}:{name}" for parent, name in sorted(named, key=str)[:3])
-        raise ValueInvalid(f"{file.name}: poses of several frames ({some} ..); name one: {file.name}:TARGET:SOURCE")
     if counts and not own.stamps:
         poses = poses._replace(stamps_ns=None)
     found = _trajectory(poses, file.name, *own.names(WORLD, BODY))
@@ -225,14 +221,20 @@ def _of_records(file: InputFile, fmt: str, bad: BadRows, asked: Request, body: s
 
 
 def _trajectory(poses: RowPoses, source: str, world: str, body: str) -> Trajectory:
-    """Return poses or points as a trajectory; world, body: the names where they have none, or several."""
+    """Return poses or points as a trajectory; world, body: the names where they have none.
+
+    Raises ValueInvalid for those of several frames.
+    """
     if np.isnan(poses.numbers[:, 0]).any():
         raise FormatError("rotations without positions are no trajectory", source=source)
-    named = {*zip(poses.parents, poses.names, strict=True)}
-    parent, name = named.pop() if len(named) == 1 else (None, None)
+    named = {(parent or world, name or body) for parent, name in zip(poses.parents, poses.names, strict=True)}
+    if len(named) > 1:
+        some = ", ".join(f"{parent}:{name}" for parent, name in sorted(named)[:3])
+        raise ValueInvalid(f"{source}: poses of several frames ({some} ..); name one: {source}:TARGET:SOURCE")
+    ((parent, name),) = named or {(world, body)}
     positions, turns = poses.numbers[:, :POSITION], poses.numbers[:, POSITION:]
     has_turns = not np.isnan(turns).any()
-    return Trajectory(poses.stamps_ns, positions, turns if has_turns else None, parent or world, name or body)
+    return Trajectory(poses.stamps_ns, positions, turns if has_turns else None, parent, name)
 
 
 def _of_tree(

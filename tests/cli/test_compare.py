@@ -425,3 +425,12 @@ def test_what_cannot_be_written_is_refused_in_one_line(run: Run) -> None:
     assert (done.status, "--rows are written as csv, json or yaml, not as markdown" in done.err) == (2, True)
     listed = run("calc", "row.x", "-i", "images.txt", files={"images.txt": "1 1 0 0 0 1 2 3 1 a.png\n\n"})
     assert (listed.status, "colmap lists poses and has no columns; convert it to csv first" in listed.err) == (1, True)
+
+
+@pytest.mark.parametrize("form", ["csv", "json", "yaml"])
+def test_poses_of_several_bodies_are_no_trajectory_in_any_form(run: Run, form: str) -> None:
+    rows = "".join(f"{at},{name},{at},0,{name == 'b':d},0,0,0,1\n" for at in range(4) for name in "ab")
+    files = {"two": run("convert", "-f", form, stdin=f"t,name,x,y,z,qx,qy,qz,qw\n{rows}").out}
+    done = run("resample", "two", "--rate", "1", files=files)
+    told = "two: poses of several frames (world:a, world:b ..); name one: two:TARGET:SOURCE"
+    assert (done.status, done.out, done.err) == (1, "", f"frametool: {told}\n")
