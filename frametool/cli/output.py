@@ -38,11 +38,11 @@ if TYPE_CHECKING:
 def _place(fmt: str, output: str | None) -> str:
     """Return where a recording is written; raises UsageError where it cannot be."""
     if output is None or output == "-":
-        raise UsageError(f"{fmt} is no text; give -o {'FOLDER' if table.is_folder(fmt) else 'FILE'}")
+        raise UsageError(f"{fmt} is no text; give -o {'FOLDER' if fmt in table.FOLDERS else 'FILE'}")
     suffixes = table.FORMATS[fmt].suffixes
-    if table.is_folder(fmt) and output.endswith(suffixes):
+    if fmt in table.FOLDERS and output.endswith(suffixes):
         raise UsageError(f"-o {output}: a ROS 2 bag is written as a folder of MCAP; give -f {fmt} -o FOLDER")
-    named = None if table.is_folder(fmt) else table.by_name(output, table.writers("recording"))
+    named = None if fmt in table.FOLDERS else table.by_name(output, table.writers("recording"))
     if named not in (None, fmt):
         raise UsageError(f"-o {output} is the name of {named}, -f says {fmt}; give -o NEW{suffixes[0]}")
     return output
@@ -109,9 +109,9 @@ class Output:
         self.notations: tuple[Notation, ...] = notations
         self._format_is_default = not (self.chosen or otherwise)
         fmt = self.chosen or otherwise or ("text" if self.path is None and sys.stdout.isatty() else "yaml")
-        self.holds_arrays = table.holds_arrays(fmt)
+        self.holds_arrays = table.holds(fmt, "arrays")
         self.is_trajectory = table.is_trajectory(fmt)  # of the poses of one frame over time
-        self._in_blocks = self.is_trajectory or self.holds_arrays or table.is_recording(fmt)
+        self._in_blocks = self.is_trajectory or self.holds_arrays or table.holds(fmt, "recording")
         self.holds_all = self._in_blocks or fmt == "csv"  # rows, of which there may be many
         if self.holds_arrays and self.path is None and sys.stdout.isatty():
             raise ValueInvalid(f"{fmt} is no text for a terminal; give -o FILE, or pipe it")
@@ -122,7 +122,7 @@ class Output:
             full=digits is not None, keep_sign=bool(inputs.keep_sign),
             screen=self.chosen in (None, "text") and self.path is None and sys.stdout.isatty(),
         ).changed(place=place)  # fmt: skip
-        if table.is_recording(fmt):
+        if table.holds(fmt, "recording"):
             folder = folder_of(_place(fmt, self.path))
             frames = inputs.recorded_frames or next(iter(inputs.named_frames), ())
             is_pair = len(frames) in (0, 2) and len({*frames}) == len(frames)
@@ -232,7 +232,7 @@ class Output:
         for what, held in (("covariances", tree.covariances), ("intrinsics of cameras", tree.cameras)):
             if held and self.style.format not in ("yaml", "json", "text"):
                 warn(f"{self.style.format}: {what} left out")
-        if table.is_recording(self.style.format):
+        if table.holds(self.style.format, "recording"):
             self.pieces(self._module("").tree_pieces(tree, self.style))
             return
         holds_samples = "trajectory" in self._writes or (tree.moves and "poses" in self._writes)
@@ -277,7 +277,7 @@ class Output:
 
     def pieces(self, pieces: Iterable[str | bytes]) -> None:
         """Write text as it comes; into a file, whole or not at all."""
-        if not table.has_no_text(self.style.format):
+        if not table.holds(self.style.format, "arrays", "recording"):
             self._inputs.ask("precision")
         with self.opened() as write:
             for piece in pieces:
@@ -294,7 +294,7 @@ class Output:
 
     def opened(self) -> AbstractContextManager[Write]:
         """Open the place where results go."""
-        return writing(self.path, force=self.force, folder=table.is_folder(self.style.format))
+        return writing(self.path, force=self.force, folder=self.style.format in table.FOLDERS)
 
     def report_suffix(self, fmt: str = "") -> None:
         """Report the format of a file whose suffix names none, where none was chosen.

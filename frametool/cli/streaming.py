@@ -21,7 +21,7 @@ from frametool.cli.sink import say, say_error
 from frametool.documents.source import HEAD, InputFile, Source, has_line, has_record, opened
 from frametool.errors import FormatError, heard_by, warn
 from frametool.formats import table
-from frametool.formats.table import BAG, FORMATS, has_no_text, holds_arrays, is_trajectory, readers
+from frametool.formats.table import BAG, FORMATS, holds, is_trajectory, readers
 from frametool.grammar.result import Style
 from frametool.stream.faults import MOST, NULL, ON_ERROR, STOP, BadRow, BadRows, Outcome, run
 
@@ -148,7 +148,7 @@ class Task:
         begin, fmt = opened.peek(), "" if self.within else self.chosen_format()
         if not self.within and begin:
             fmt = fmt or by_sign(begin, *options.STREAMED, name=self.name) or ""
-        if holds_arrays(fmt):
+        if holds(fmt, "arrays"):
             from frametool.text.lines import Pieces
 
             self._opened, self.within = BufferedReader(Pieces(self._rows_of_cloud(fmt, opened), opened)), "csv"
@@ -225,7 +225,7 @@ class Task:
         from frametool.formats.detect import by_sign
 
         signed = fmt or by_sign(stream.peek(), *options.STREAMED, name=self.name) or ""
-        may_be_pasted = signed == "kitti" or not (is_trajectory(signed) or holds_arrays(signed))  # one row of a pose is
+        may_be_pasted = signed == "kitti" or not (is_trajectory(signed) or holds(signed, "arrays"))  # one row is a pose
         if may_be_pasted and not (fmt or is_table):
             pasted, stream = pasted_stream(stream, self.name, request, self.notation, self.place)
             if pasted is not None:
@@ -250,11 +250,11 @@ class Task:
 
             stream = at_other_times(stream, fmt, request.offset_ns)
         of_numbers = f"--time-offset is for text, {fmt} holds numbers; convert it to csv first"
-        refuse(request.offset_ns and holds_arrays(fmt), of_numbers)
+        refuse(request.offset_ns and holds(fmt, "arrays"), of_numbers)
         output.take_axes(FORMATS[fmt].rows.axes, request.operation)
         if is_trajectory(fmt) and not output.notations:
             request = request.with_results(notations=())  # its rows stay what they are
-        bad = self.policy(self.name, "row" if holds_arrays(fmt) else "line")
+        bad = self.policy(self.name, "row" if holds(fmt, "arrays") else "line")
         if rows is not None:
             outcomes, written, tally = rows.take(self._steps(stream, fmt, request), bad.place), "", None
         else:
@@ -293,9 +293,9 @@ class Task:
         from frametool.stream.row_layout import POSE, Shape
 
         output, chosen = self.output, self.output.chosen
-        if holds_arrays(fmt) and (chosen is None or holds_arrays(chosen)):
+        if holds(fmt, "arrays") and (chosen is None or holds(chosen, "arrays")):
             return self._columns(stream, fmt, request), fmt, None
-        listed = holds_arrays(fmt) or (is_trajectory(fmt) and not FORMATS[fmt].is_table)
+        listed = holds(fmt, "arrays") or (is_trajectory(fmt) and not FORMATS[fmt].is_table)
         is_kindred = chosen == "csv" and fmt in ("tsv", "semicolon")
         # a trajectory has no room for more columns, or for other ones
         no_room = output.is_trajectory and bool(request.extras(Shape(POSE)) or output.notations or output.style.place)
@@ -339,8 +339,8 @@ class Task:
             return run_records(stream, fmt, request, source=self.name), fmt
         if request.on_error == NULL and chosen not in ("csv", *RECORDS):
             raise click.UsageError(f"--on-error null: {chosen} cannot hold a row without a result; give skip")
-        request = request.with_results(by_default=has_no_text(chosen) and not self.output.notations)
-        if table.is_recording(chosen):
+        request = request.with_results(by_default=holds(chosen, "arrays", "recording") and not self.output.notations)
+        if table.holds(chosen, "recording"):
             request = request.with_results(place=None)  # a fix is made of ecef, unless of what was read
         outcomes = run_records(stream, fmt, request, source=self.name, style=self.output.style)
         return written_by(self.output.writer(), outcomes, request.on_error), chosen
@@ -378,7 +378,7 @@ class Task:
             request = request.with_rows(columns=inputs.columns)
         several = not is_table and "," in ",".join(request.rows.columns)
         refuse(several, "--columns names one key of records, as detections.pose")
-        if not has_no_text(output.chosen or fmt):
+        if not holds(output.chosen or fmt, "arrays", "recording"):
             inputs.ask("precision")
         place = output.style.changed(format=output.chosen or fmt).place
         return request._replace(on_error=inputs.on_error).with_results(place=place)

@@ -30,19 +30,17 @@ from __future__ import annotations
 
 import os
 import re
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import chain, repeat
 
 from frametool.documents.source import HEAD, LOOKED_AT, UTF16, not_text
 from frametool.errors import FormatError, NamedTuple, ValueInvalid, bare, first_of
-from frametool.formats.table import BAG, FORMATS, by_suffix, readers
+from frametool.formats.table import BAG, FOLDERS, FORMATS, by_suffix, readers
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from typing import Any, TypeAlias
-
-    Shows: TypeAlias = Callable[["Beginning", Any], bool]
+    from collections.abc import Callable, Iterable
+    from typing import Any
 
 
 class Beginning:
@@ -99,14 +97,14 @@ class Beginning:
         return found
 
     @cached_property
-    def yaml_keys(self) -> set[str]:
+    def yaml_keys(self) -> list[str]:
         """Return the words at the beginnings of lines that are followed by a colon."""
-        return {found[2] for found in re.finditer(rf"(?m)^{_YAML_KEY}(?=\s|$)", self.text)}
+        return re.findall(rf"(?m)^{_YAML_KEY}(?=\s|$)", self.text)
 
     @cached_property
-    def yaml_inner_keys(self) -> set[str]:
+    def yaml_inner_keys(self) -> list[str]:
         """Return the words after blanks, dashes or a brace at the beginning of a line that are followed by a colon."""
-        return {found[2] for found in re.finditer(rf"(?m)^(?:[ -]++|[\w./-]+: *(?=\{{))\{{?+ *+{_YAML_KEY}", self.text)}
+        return re.findall(rf"(?m)^(?:[ -]++|[\w./-]+: *(?=\{{))\{{?+ *+{_YAML_KEY}", self.text)
 
     @cached_property
     def value(self) -> Any:
@@ -139,18 +137,19 @@ class Beginning:
         return re.sub(r"(?s)\A\s*(?:<[?!][^>]*>\s*)*", "", text) or " "
 
     @cached_property
-    def elements(self) -> list[str]:
-        """Return the names of the root element of XML and of its first child."""
-        return re.findall(r"<([\w.:-]+)", self.xml[:LOOKED_AT])[:2]
+    def root(self) -> str:
+        """Return the name of the root element of XML, if it is there."""
+        found = re.search(r"<([\w.:-]+)", self.xml[:LOOKED_AT])
+        return found[1] if found else ""
 
 
-_YAML_KEY = r"""(["']?)([A-Za-z_][\w./-]*)\1[ \t]*:"""
+_YAML_KEY = r"""["']?([A-Za-z_][\w./-]*)["']?[ \t]*:"""
 
 
 _NO_NAME = r"header|transform|pose|point|vector|twist|wrench|force|linear|angular|child_frame_id|name|parent|samples"
 
 
-def _are_poses(begin: Beginning, words: str) -> bool:
+def _are_poses(words: str, begin: Beginning) -> bool:
     """Return True for a map of names, or a list, whose entries are poses; the last one may be truncated."""
     if not (begin.yaml_keys or begin.text.lstrip().startswith("{")) or not isinstance(begin.value, dict):
         return False
@@ -173,41 +172,42 @@ def _are_poses(begin: Beginning, words: str) -> bool:
     return bool(entries) and not names and all(map(is_pose, entries))
 
 
-# kind -> a function that returns whether a beginning matches a sign, the strongest first
-_STRONG: dict[str, Shows] = {
-    "magic": lambda begin, what: re.match(what, begin.head, re.DOTALL) is not None,
-    "xml text": lambda begin, what: bool(begin.xml) and re.search(what, begin.xml) is not None,
-    "xml": lambda begin, what: begin.elements[:1] == [what],
-    "json path": lambda begin, what: _count(begin.json_paths, what) > 0,
-    "json key": lambda begin, what: what in begin.json_paths,
-    "own key": lambda begin, what: _count(begin.yaml_keys, what) > 0,
-    "yaml key": lambda begin, what: _count(begin.yaml_keys, what) > 0,
-    "yaml inner": lambda begin, what: _count(begin.yaml_inner_keys, what) > 0,
-    "text": lambda begin, what: re.search(what, begin.text) is not None,
-    "entries": _are_poses,
-    "line": lambda begin, what: re.match(what, begin.data_line) is not None,
-    "last": lambda begin, what: re.search(what, begin.text) is not None,
+def _is_key(pattern: str, keys: Iterable[str]) -> bool:
+    return any(map(re.compile(pattern).fullmatch, keys))
+
+
+# kind -> what is searched of a beginning, "" for all of it, and how a sign has to fit it; the strongest first
+_STRONG: dict[str, tuple[str, Callable[..., Any]]] = {
+    "magic": ("head", partial(re.match, flags=re.DOTALL)),
+    "xml text": ("xml", re.search),
+    "xml": ("root", re.fullmatch),
+    "json path": ("json_paths", _is_key),
+    "json key": ("json_paths", _is_key),
+    "own key": ("yaml_keys", _is_key),
+    "yaml key": ("yaml_keys", _is_key),
+    "yaml inner": ("yaml_inner_keys", _is_key),
+    "text": ("text", re.search),
+    "entries": ("", _are_poses),
+    "line": ("data_line", re.match),
+    "last": ("text", re.search),
 }
-_WEAK: dict[str, Shows] = {
-    "begin": lambda begin, what: re.match(what, begin.text) is not None,
-    "header": lambda begin, what: re.match(what, begin.first_line) is not None,
-}
+_WEAK: dict[str, tuple[str, Callable[..., Any]]] = {"begin": ("text", re.match), "header": ("first_line", re.match)}
+_KINDS = _STRONG | _WEAK
 
 
-def _count(keys: set[str], pattern: str) -> int:
-    return sum(re.fullmatch(pattern, key) is not None for key in keys)
-
-
-def _fitting(begin: Beginning, tests: dict[str, Shows], names: tuple[str, ...]) -> tuple[list[str], str]:
+def _fitting(begin: Beginning, kinds: Iterable[str], names: Iterable[str]) -> tuple[list[str], str]:
     """Return the formats that match a sign of the strongest matching kind, and that kind."""
-    for kind, shows in tests.items():
-        signs = ((name, *sign) for name in names for sign in (UNSUPPORTED.get(name) or FORMATS[name]).magic)
-        found = list(dict.fromkeys(name for name, of, what in signs if kind == of and shows(begin, what)))
-        if found and kind == "yaml key":  # weaker than nested keys
-            found += _fitting(begin, {"yaml inner": tests["yaml inner"]}, names)[0]
-        if found:
-            return list(dict.fromkeys(found)), kind
-    return [], ""
+    found: dict[str, str] = {}
+    for kind in kinds:
+        searched, fits = _KINDS[kind]
+        text = getattr(begin, searched) if searched else begin
+        for name in names if text else ():
+            for of, what in (UNSUPPORTED.get(name) or FORMATS[name]).magic:
+                if of == kind and name not in found and fits(what, text):
+                    found[name] = kind
+        if found and kind != "yaml key":  # which is as strong as nested keys
+            break
+    return [*found], next(iter(found.values()), "")
 
 
 def by_sign(head: bytes | Beginning, *reads: str, name: str = "") -> str | None:
@@ -238,8 +238,7 @@ def not_read(fmt: str, name: str) -> FormatError:
 
 def of_folder(path: str) -> str | None:
     """Return the format of a folder; None for a file, and for any other folder."""
-    signs = ((fmt, str(what)) for fmt, row in FORMATS.items() for kind, what in row.magic if kind == "folder")
-    return next((fmt for fmt, what in signs if os.path.exists(os.path.join(path, what))), None)
+    return next((fmt for fmt, what in FOLDERS.items() if os.path.exists(os.path.join(path, what))), None)
 
 
 def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty: str = "") -> str:
@@ -255,9 +254,9 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
     what = not_text(head)
     if what and "tree" not in reads:
         raise _no_text(what, name)
-    if "tree" in reads and begin.xml and (begin.elements or not by_suffix(name, readers(*reads))):
+    if "tree" in reads and begin.xml and (begin.root or not by_suffix(name, readers(*reads))):
         raise _unknown(begin, *reads, name=name)
-    if others := _fitting(begin, {"magic": _STRONG["magic"]}, readers("arrays"))[0]:
+    if others := _fitting(begin, ("magic",), readers("arrays"))[0]:
         message = f"{FORMATS[others[0]].summary}: no frames in it; frametool convert and apply read it"
         raise FormatError(message, source=name or "stdin")
     if fmt := by_suffix(name, readers(*reads)):
@@ -322,7 +321,7 @@ def _unknown(begin: Beginning, *reads: str, name: str) -> FormatError:
     if begin.xml:
         likely = tuple(fmt for fmt in likely if any(kind.startswith("xml") for kind, _ in FORMATS[fmt].magic))
         what = f"XML without an element{f' in its first {HEAD >> 10} KiB' * (len(begin.head) >= HEAD)}"
-        what = f"XML with the root element {bare(begin.elements[0])}" if begin.elements else what
+        what = f"XML with the root element {bare(begin.root)}" if begin.root else what
     named = f"formats: {first_of(likely, _MOST_NAMED)}" if likely else "none of those read here is XML"
     return FormatError(
         f"cannot detect the format of {what}; {named}; `frametool formats` lists all, --in FORMAT sets one",

@@ -63,10 +63,10 @@ class FrameFile(InputFile):
         answers: options for what the format does not specify.  reads: restricts the formats, as in the table.
         Raises FileProblem.
         """
-        folder = found if (found := of_folder(str(path))) and fmt in (None, "", found) else None
-        if not (fmt or folder) and os.path.isdir(path):
+        folder = os.path.isdir(path) and of_folder(str(path))
+        if folder is None and not fmt:
             raise FileProblem(f"{path}: is a directory; name a file in it, or the folder of a bag, with metadata.yaml")
-        super().__init__(path, stream, folder=folder is not None)
+        super().__init__(path, stream, folder=bool(folder) and fmt in (None, "", folder))
         try:
             self.format = fmt or folder or detect(self.head(), *reads, name=self.path, empty="yaml")
         except BaseException:

@@ -408,6 +408,9 @@ FORMATS = {
 }
 
 
+FOLDERS = {name: str(what) for name, row in FORMATS.items() for kind, what in row.magic if kind == "folder"}
+
+
 def readers(*what: str) -> tuple[str, ...]:
     """Return the formats from which any of `tree`, `records` and `rows` is read."""
     return tuple(name for name, row in FORMATS.items() if not set(what).isdisjoint(row.reads))
@@ -423,24 +426,9 @@ def is_trajectory(name: str) -> bool:
     return name in FORMATS and "trajectory" in FORMATS[name].reads
 
 
-def holds_arrays(name: str) -> bool:
-    """Return True if a format holds columns of numbers and no text."""
-    return name in FORMATS and "arrays" in (*FORMATS[name].reads, *FORMATS[name].writes)
-
-
-def is_recording(name: str) -> bool:
-    """Return True if a format is written as a recording of messages."""
-    return name in FORMATS and "recording" in FORMATS[name].writes
-
-
-def has_no_text(name: str) -> bool:
-    """Return True if a format holds numbers, in columns or messages, without the notation of its input."""
-    return holds_arrays(name) or is_recording(name)
-
-
-def is_folder(name: str) -> bool:
-    """Return True if a format is written as a folder of files."""
-    return is_recording(name) and any(kind == "folder" for kind, _ in FORMATS[name].magic)
+def holds(name: str | None, *what: str) -> bool:
+    """Return True if any of these is read from a format or written in it: `arrays`, a `recording`; neither is text."""
+    return name in FORMATS and not {*what}.isdisjoint(FORMATS[name].reads + FORMATS[name].writes)
 
 
 def by_name(path: str | None, names: tuple[str, ...]) -> str | None:

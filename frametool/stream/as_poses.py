@@ -31,7 +31,7 @@ import numpy as np
 from frametool.documents.source import InputFile, not_text
 from frametool.errors import FormatError, Misused, ValueInvalid, warn
 from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, describe
-from frametool.formats.table import FORMATS, Rows, is_recording, is_trajectory
+from frametool.formats.table import FORMATS, Rows, holds, is_trajectory
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Answers, Diagnostics, EdgeColumns, Options, Topics, stop
@@ -169,7 +169,7 @@ class FormatConverter:
     def _held(self, stamps_ns: Ints | None, fmt: Rows) -> Ints | None:
         """Return stamps, unless they only count and the other format has no place for them: they are not lost then."""
         counts, other = bool(fmt.counted) and not self.answers.stamps, self.style.format
-        are_lost = self.request.rows.stamps == NO_STAMPS or is_recording(other) or FORMATS[other].rows.counted
+        are_lost = self.request.rows.stamps == NO_STAMPS or holds(other, "recording") or FORMATS[other].rows.counted
         return None if counts and are_lost else stamps_ns
 
     def _columns(self, stream: ByteStream) -> Iterator[Step]:
@@ -202,7 +202,7 @@ class FormatConverter:
     def _with_place(self, poses: RowPoses) -> RowPoses:
         """Add to points of the Earth their lat, lon and alt as they were read, where these are written again."""
         place, inputs = self.shape.place, self.rows.inputs
-        is_written = is_recording(self.style.format) or self.style.place
+        is_written = holds(self.style.format, "recording") or self.style.place
         if not is_written or place is None or place.name != "lla" or not self.request.operation.keeps_frames:
             return poses
         inputs[:, np.isnan(poses.numbers[:, 0])] = np.nan

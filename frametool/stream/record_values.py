@@ -27,7 +27,7 @@ from frametool.documents.document import (
 )
 from frametool.documents.source import Source, Verbatim
 from frametool.errors import Finding, FormatError, FrametoolError, Misused, NamedTuple, ValueInvalid, shown, warn
-from frametool.formats.table import is_recording
+from frametool.formats.table import holds
 from frametool.geometry import floats
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.readers import Misfit, NotARotation, Path, Reading, in_nanoseconds, stamp_column, tell
@@ -429,7 +429,7 @@ def _result(node: Node, unit: Path, made: Answer, request: Request, fmt: str) ->
 
         named.pop(seen_from, None)  # which the place says itself
         place = point_entry(entry.parent, parts[:3], target.place, getattr(parts, "read", None))
-    if is_recording(fmt) and operation.keeps_frames:
+    if holds(fmt, "recording") and operation.keeps_frames:
         place |= _place_as_read(node.at(record.path[len(unit) :]), record)
     return named | place | said
 

@@ -22,7 +22,7 @@ from frametool.errors import ValueInvalid, listing, warn
 from frametool.formats.rows import pose_rows
 from frametool.formats.rows.csv import cell, cells_of, quoted, row
 from frametool.formats.rows.pose_rows import IMAGE, MOST_NAMED, NUMBER, RowForm, image_name, is_turned, rows_of, turned
-from frametool.formats.table import FORMATS, holds_arrays, is_recording, is_trajectory
+from frametool.formats.table import FORMATS, holds, is_trajectory
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import arrays, floats, quaternion, rigid
 from frametool.grammar.pose import SCALE
@@ -291,11 +291,11 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
 
 def writer_for(style: Style, first: RowPoses) -> PoseWriter:
     """Return what writes blocks in the format of a style: text, columns of numbers, or messages of a recording."""
-    if holds_arrays(style.format):
+    if holds(style.format, "arrays"):
         from frametool.stream.array_writer import ArrayWriter
 
         return ArrayWriter(style, first)
-    if is_recording(style.format):
+    if holds(style.format, "recording"):
         from frametool.stream.recording_writer import RecordingWriter
 
         return RecordingWriter(style, first)
@@ -345,7 +345,7 @@ class Blocks(ResultWriter):
             if len(points) < len(found):
                 raise ValueInvalid(f"{fmt} holds things of one kind, found poses among others")
             return block_of_points(points)
-        are_turns = holds_arrays(fmt) and all(each.pose.position is None for each in found)  # type: ignore[union-attr]
+        are_turns = holds(fmt, "arrays") and all(each.pose.position is None for each in found)  # type: ignore[union-attr]
         return block_of(found, placed=not are_turns if self.writer is None else self.writer.placed)  # type: ignore[arg-type]
 
 

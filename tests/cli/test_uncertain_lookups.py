@@ -16,7 +16,7 @@ from console import ROOT
 
 from frametool.cli.commands.lookup import WITH_COVARIANCE
 from frametool.formats.rows import csv as csv_form
-from frametool.formats.table import holds_arrays, writers
+from frametool.formats.table import holds, writers
 from frametool.grammar.covariance import columns
 from frametool.grammar.result import Style
 from frametool.view import text as text_for_people
@@ -141,7 +141,7 @@ def test_no_digits_of_a_covariance_are_dropped(run: Run) -> None:
 @pytest.mark.parametrize("form", writers("poses"))
 def test_a_form_has_a_place_for_covariances_or_says_so(form: str, run: Run) -> None:
     done = run("lookup", "robot.yaml", "map", "tool", "--covariance", "-f", form, "-o", "out", files=FILES)
-    if form in (*WITH_COVARIANCE, "text") or holds_arrays(form):
+    if form in (*WITH_COVARIANCE, "text") or holds(form, "arrays"):
         assert (done.status, done.err.splitlines()[0][: len(INDEPENDENT)]) == (0, INDEPENDENT)
     else:
         assert done.status == 2

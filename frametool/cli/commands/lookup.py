@@ -15,7 +15,7 @@ from frametool.cli.sink import say_error
 from frametool.cli.streaming import EXPLAIN, Task, stream_options
 from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, opened, state
 from frametool.errors import FrametoolError, NoDataAt, UnknownFrame, warn
-from frametool.formats.table import holds_arrays
+from frametool.formats.table import holds
 from frametool.geometry.rigid import EXACT, UNCERTAIN
 from frametool.grammar import pose_algebra as algebra
 from frametool.grammar.edges import stop
@@ -107,7 +107,7 @@ def lookup_command(inputs: Inputs) -> int:
     if covariance := inputs.covariance:
         refuse(output.style.place, "--covariance is along the axes of ecef; leave --to PLACE out")
         fmt = output.chosen if by_row else output.style.format
-        has_none = not (fmt in (None, "text", *WITH_COVARIANCE) or holds_arrays(fmt))
+        has_none = not (fmt in (None, "text", *WITH_COVARIANCE) or holds(fmt, "arrays"))
         refuse(has_none, f"{fmt} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")
     tree = load_tree(inputs, inputs.tree, inputs.more, streams=by_row)
     lookups, at = lookups_in(inputs, tree, carried=covariance), options.at_ns(inputs.at)
@@ -293,7 +293,7 @@ def fk_command(inputs: Inputs) -> int:
     with stream.opened() as source:
         begin = source.peek()
         fmt = stream.format_of(begin)
-        refuse(holds_arrays(fmt), f"rows of joints are a table of text, records or messages, not {fmt}")
+        refuse(holds(fmt, "arrays"), f"rows of joints are a table of text, records or messages, not {fmt}")
         wanted, header = "a key for each joint, or JointState messages", not inputs.no_header
         names = names_in(begin, fmt, stream.name, wanted, header=header)
         rows.bind(names, stream.name, fixed=frozenset(file.answers.joints))

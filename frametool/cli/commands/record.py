@@ -12,7 +12,7 @@ from frametool.cli.sink import say_error, writing
 from frametool.cli.trees import FRAME, load_tree, tree_file, without_slash
 from frametool.errors import BadAnswer, FileProblem, FormatError, ValueInvalid, listing, printable, shown, warn
 from frametool.formats.load import FrameFile
-from frametool.formats.table import FORMATS, is_folder, is_recording, writers
+from frametool.formats.table import FOLDERS, FORMATS, holds, writers
 from frametool.frames.stamps import parse_time
 from frametool.grammar.edges import Diagnostics
 from frametool.stream.faults import ON_ERROR, STOP, BadRows
@@ -75,7 +75,7 @@ def record_command(inputs: Inputs) -> int:
         raise FileProblem("stdin: a recording cannot be read from a pipe; name its file")
     source = FrameFile(path)
     source.close()
-    if not is_recording(source.format):
+    if not holds(source.format, "recording"):
         hint = "frametool tree, convert and lookup write one: -o NEW.mcap"
         raise FormatError(f"{FORMATS[source.format].summary}: no recording of messages; {hint}", source=path)
     copy, place = copied_as(source.format, path, inputs.output, inputs.format_name)
@@ -96,7 +96,7 @@ def record_command(inputs: Inputs) -> int:
     request = (edges, inputs.replace, without_slash(into or ""), topics, inputs.between, normalize)
     quiet, force = inputs.quiet, inputs.force
     inputs.refuse_idle()
-    with writing(place, force=force, folder=is_folder(copy)) as write, opened_recording(path, tally) as opened:
+    with writing(place, force=force, folder=copy in FOLDERS) as write, opened_recording(path, tally) as opened:
         run = RecordRun(opened, bad, *request)
         with progress_bar(None, quiet=quiet, counted="messages") as advance:
             for piece in run.pieces(copy, folder_of(place), advance):
