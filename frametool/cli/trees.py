@@ -128,7 +128,7 @@ def opened(
     of: so many files there are in all
     drawings: files without poses are taken too
     """
-    from frametool.formats.load import FrameFile, close_all, opened_together
+    from frametool.formats.load import FrameFile, opened_together
 
     refuse_two_readers(arguments)
     say_if_typed("-" if "-" in arguments else "")
@@ -156,7 +156,8 @@ def opened(
         lacking += [file] * ("frames" in file.required_options)
         inputs.ask(*{"camera_axes"}.intersection(file.required_options))
     if len(named) not in (0, 1, len(lacking), files):
-        close_all(found)
+        for file in found:
+            file.close()
         raise click.UsageError(f"--frames appears {len(named)} times, {len(lacking)} of the files need names")
     if len(named) == 1:  # for poses that have no names at all, rather than for names that others go without saying
         lacking = [file for file in lacking if "rows" in FORMATS[file.format].reads] or lacking

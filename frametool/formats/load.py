@@ -7,15 +7,13 @@ TransformBuffer once something moves.  This module does not know the formats the
 from __future__ import annotations
 
 import os
-import re
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 from functools import partial
 from importlib import import_module
 from io import BytesIO
 from itertools import islice
-from operator import gt, lt
+from operator import attrgetter, gt, lt
 from os import PathLike
-from types import MappingProxyType
 from typing import Any, BinaryIO
 
 from frametool import errors
@@ -45,7 +43,6 @@ if TYPE_CHECKING:
 class FrameFile(InputFile):
     """A file of frames and its format."""
 
-    cameras: Mapping[str, Camera] = MappingProxyType({})  # in a frametool tree, by their frames
     reader: Any = None  # takes the file and Options and yields edges; None is that of the format
 
     def __init__(
@@ -124,10 +121,6 @@ class FrameFile(InputFile):
             yield from found
         finally:
             self.close()
-        if "records" in FORMATS[self.format].reads and re.search(r"""\bcamera["']?:""", self.text):
-            from frametool.formats.cameras import cameras_of
-
-            self.cameras = {name: make() for name, make in cameras_of(self).items()}
         if missing := self.topics.missing():
             report(FormatError(missing, source=self.name))
         if tell:
@@ -148,27 +141,25 @@ class FrameFile(InputFile):
 
 def opened_together(files: Iterable[FrameFile]) -> list[FrameFile]:
     """Open files one after another; if one cannot be opened, close the others."""
+    found: list[FrameFile] = []
     with ExitStack() as opened:
-        found = [opened.enter_context(closing(file)) for file in files]
+        for file in files:
+            opened.callback(file.close)
+            file.siblings = found
+            found.append(file)
         opened.pop_all()
-    for file in found:
-        file.siblings = found
     return found
-
-
-def close_all(files: Iterable[Source | FrameFile]) -> None:
-    """Close files that were not read."""
-    for file in files:
-        if isinstance(file, FrameFile):
-            file.close()
 
 
 def refuse_unknown_joints(files: Sequence[FrameFile]) -> None:
     """Raise the error for a joint in options or files that no file has, once all were read."""
-    asked = [file.answers for file in files if file.answers.joints or file.answers.joint_files]
-    robots = [file.tally for file in files if file.tally.robot is not None]
-    if asked and not robots:
-        option = "--joint" if asked[0].joints else "--joints"
+    option, robots = "", list[Diagnostics]()
+    for file in files:
+        if file.answers.joints or file.answers.joint_files:
+            option = option or ("--joint" if file.answers.joints else "--joints")
+        if file.tally.robot is not None:
+            robots.append(file.tally)
+    if option and not robots:
         raise errors.BadAnswer(f"{option}: there are no joints in {', '.join(file.name for file in files)}")
     for name, error in robots[0].unknown_joints.items() if robots else ():
         if all(name in robot.unknown_joints for robot in robots):
@@ -205,6 +196,7 @@ class TreeBuilder:
         self._moves: set[str] = set()
         self._late: set[str] = set()  # children with a warning that their samples go back in time
         self.covariances: dict[str, Components] = {}  # child -> the covariance of its edge
+        self.cameras: dict[str, Camera] = {}  # by their frames
 
     def one_name(self, frame: str) -> str:
         """Return a name; for the Earth's frame that of its two names which was used first."""
@@ -220,6 +212,8 @@ class TreeBuilder:
         """
         edge, components = place.edge, place.edge.components
         parent, child = edge.parent and self.one_name(edge.parent), self.one_name(edge.child)
+        if edge.camera is not None and edge.camera.mapping() != self.cameras.setdefault(child, edge.camera).mapping():
+            warn(f"{place.file.name}: {errors.bare(child)}: other numbers come later; the first ones hold")
         if parent == child and edge.parent != edge.child:
             if any(components[:6]):
                 what = "'earth' and 'ecef' are one frame, this edge puts one elsewhere in the other; rename one"
@@ -426,10 +420,10 @@ def load_sources(
 
     places: is filled with the place where each frame was first defined
     """
-    builder = TreeBuilder(", ".join(source.name for source in sources), rules)
+    files = [FrameFile.inline(source) if isinstance(source, Source) else source for source in sources]
+    builder = TreeBuilder(", ".join(map(attrgetter("name"), files)), rules)
     try:
         with paused_collector():
-            files = [FrameFile.inline(source) if isinstance(source, Source) else source for source in sources]
             for file in files:
                 piece = None
                 for piece in file.pieces(normalize=builder.rules.normalize):
@@ -442,14 +436,21 @@ def load_sources(
             refuse_unknown_joints(files)
             tree = builder.tree if builder.buffer is None else builder.settled(builder.buffer)
     finally:
-        close_all(sources)
+        for file in files:
+            file.close()
     tree.covariances |= builder.covariances
+    tree.cameras = builder.cameras
+    held, tree.robots = list[FrameFile](), []
     for file in files:
-        tree.camera_axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}
+        for frame, axes in file.tally.axes.items():
+            if axes:
+                tree.camera_axes[frame] = axes
         tree.drawn |= file.tally.drawn
-        tree.cameras = {**tree.cameras, **file.cameras}
-    tree.robots = [file.tally.robot for file in files if file.tally.robot is not None]
-    if held := [file for file in files if "cameras" in FORMATS[file.format].reads]:
+        if file.tally.robot is not None:
+            tree.robots.append(file.tally.robot)
+        if "cameras" in FORMATS[file.format].reads:
+            held.append(file)
+    if held:
         tree.read_cameras = partial(_read_cameras, tree, held)
     if places is not None:
         places |= {child: place for child, (_, _, place) in builder.first.items()}

@@ -13,6 +13,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
+    from frametool.geometry.camera import Camera
     from frametool.geometry.types import Components, Rigid
 
     Report = Callable[[FormatError], None]
@@ -29,6 +30,7 @@ class Edge(NamedTuple):
     path: in a document, the keys that lead to it from the top
     topic: the topic that it came by, if known
     covariance: 36 entries as in `geometry.uncertainty`, the same for all samples of a frame; None: exact
+    camera: that of the child, if its entry has one
     """
 
     parent: str | None
@@ -40,6 +42,7 @@ class Edge(NamedTuple):
     path: Path = ()
     topic: str = ""
     covariance: Components | None = None
+    camera: Camera | None = None
 
 
 class EdgeColumns(NamedTuple):

@@ -19,7 +19,7 @@ from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import Verbatim
 from frametool.errors import FormatError, ValueInvalid, alternatives, did_you_mean, first_of, shown, warn
 from frametool.fit.measured_tree import Measurement, solve_tree
-from frametool.formats.load import EdgePlace, FrameFile, close_all, lines_of, load
+from frametool.formats.load import EdgePlace, FrameFile, lines_of, load
 from frametool.formats.trees.tree_reader import MOST_KEYS, read_edges
 from frametool.frames.lookups import FrameTree, taken
 from frametool.geometry.transform import Transform
@@ -90,7 +90,8 @@ def read_measurements(
                 place = ":".join(str(part) for part in (file.name, row.line, column) if part)
                 found.append(row.measurement._replace(place=place))
     finally:
-        close_all(files)
+        for file in files:
+            file.close()
     return found
 
 

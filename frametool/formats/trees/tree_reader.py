@@ -174,10 +174,6 @@ def _pose(entry: dict[str, Any], reading: Reading, also: Collection[str]) -> Pos
     """Read the pose of an entry; axes next to samples are those of the samples."""
     if AXES_KEY in entry and "samples" in entry:
         entry = {key: value for key, value in entry.items() if key != AXES_KEY}
-    if "camera" in entry:
-        from frametool.geometry.camera import Camera
-
-        within(("camera",), Camera, **{"model": None, **within(("camera",), camera_fields, entry["camera"])})
     if not (POSE_KEYS.issuperset(entry) or LOOSE.isdisjoint(entry)):
         from frametool.grammar.pasted import read_loose_pose
 
@@ -220,11 +216,18 @@ def _edges(
     entry: dict[str, Any], pose: Pose, parent: str | None, child: str, path: Path, reading: Reading
 ) -> list[Edge]:
     """Return the edges of one entry: a static edge or one with a stamp, or the samples of a moving frame."""
+    camera = None
+    if "camera" in entry:
+        from frametool.geometry.camera import Camera
+
+        fields = within(("camera",), camera_fields, entry["camera"])
+        camera = within(("camera",), Camera, **{"model": None, **fields})
     if "samples" in entry:
-        return _samples(entry, pose, parent, child, path, reading)
+        first, *edges = _samples(entry, pose, parent, child, path, reading)
+        return [first._replace(camera=camera), *edges]
     if parent is not None and pose.position is None and pose.rotation is None:
         reading.note(f"frame {shown(child)} has neither position nor rotation: taken as the identity", rule="identity")
-    return [Edge(parent, child, pose.components, stamp_of(entry), path=path, covariance=pose.covariance)]
+    return [Edge(parent, child, pose.components, stamp_of(entry), path=path, covariance=pose.covariance, camera=camera)]
 
 
 def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[Edge]:
