@@ -30,14 +30,12 @@ _WHOLE = r"(?s)(?:[^\\]++|\\u[dD][89abAB]..\\u[dD][c-fC-F]..|(?!\\u[dD][89a-fA-F
 _BRACKETS = {"{": MAP, "[": LIST, "]": END, "}": END}
 
 
-class Document:
+class Document(NamedTuple):
     """One document of a text: its value, its index in the text (empty ones count), and the text."""
 
-    __slots__ = ("index", "source", "value")
-
-    def __init__(self, value: Any, index: int, source: Source) -> None:
-        """Store the three."""
-        self.value, self.index, self.source = value, index, source
+    value: Any
+    index: int  # type: ignore[assignment] # not of a tuple
+    source: Source
 
 
 def parse_documents(text: str, name: str, tags: Collection[str] = ()) -> list[Document]:

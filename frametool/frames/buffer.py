@@ -40,6 +40,11 @@ class TransformBuffer(Frames):
         super().__init__(name)
         self.keep_ns = keep_ns
 
+    @property
+    def moves(self) -> bool:  # type: ignore[override]
+        """Return True if any frame moves."""
+        return any(not track.is_static for track in self._tracks.values())
+
     def insert(
         self, parent: str, child: str, transform: Transform, stamp_ns: int | None = None, *,
         static: bool | None = None, covariance: Any = None,

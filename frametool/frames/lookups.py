@@ -49,6 +49,7 @@ class Frames:
     Times are integer nanoseconds; None is the latest.  Static frames have the same pose at all times.
     """
 
+    moves: bool  # whether any frame does
     at_ns: int | None = None  # the time of a tree that was extracted from moving frames
 
     cameras: Mapping[str, Camera] = MappingProxyType({})  # by frame, from `camera:` entries
@@ -95,11 +96,6 @@ class Frames:
     def roots(self) -> tuple[str, ...]:
         """Return the frames without a parent."""
         return tuple(frame for frame in self._frames if frame not in self._tracks)
-
-    @property
-    def moves(self) -> bool:
-        """Return True if any frame moves."""
-        return any(not track.is_static for track in self._tracks.values())
 
     def parent(self, frame: str, at_ns: int | None = None) -> str | None:
         """Return a frame's parent at a time, or the newest; None for a root or if it is not known."""
@@ -391,6 +387,8 @@ class FrameTree(Frames):
         tree.lookup("camera", "base")               # camera_from_base
         tree.add("ecef", "map", frametool.earth_pose(48.1, 11.5, 520.0))  # axes at a position on the Earth
     """
+
+    moves = False
 
     def __init__(self, name: str = "") -> None:
         """Create an empty tree; `name` is that of the source of the frames, for error messages."""

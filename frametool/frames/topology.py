@@ -261,15 +261,15 @@ class Query:
     def __init__(self, path: FramePath, tracks: Mapping[str, Track]) -> None:
         """Look up the edges of a path, and compose static ones that follow each other."""
         self.far = bool(path.to_target) and path.top in EARTH_FRAMES
-        self.to_target, self.to_source = list[Track](), list[Track]()
+        self.to_target, self.to_source, self.moving = list[Track](), list[Track](), list[MovingTrack]()
         for edges, pieces in ((path.to_target, self.to_target), (path.to_source, self.to_source)):
             for track in map(tracks.__getitem__, edges):
-                if track.is_static and pieces and pieces[-1].is_static:
+                if not track.is_static:
+                    self.moving.append(track)
+                elif pieces and pieces[-1].is_static:
                     pose = rigid.compose(*pieces.pop().components, *track.components)
-                    pieces.append(StaticTransform(track.child, "", pose))
-                else:
-                    pieces.append(track)
-        self.moving = [track for track in (*self.to_target, *self.to_source) if not track.is_static]
+                    track = StaticTransform(track.child, "", pose)  # noqa: PLW2901
+                pieces.append(track)
         self.fixed = None if self.moving else self.compose(attrgetter("components"))
 
     def compose(self, sample: Callable[[Track], Rigid | None]) -> Rigid | None:

@@ -10,6 +10,7 @@ from bisect import bisect_left, bisect_right
 from itertools import chain, islice, pairwise
 from operator import itemgetter
 
+from frametool.errors import NamedTuple
 from frametool.geometry import floats, rigid
 
 TYPE_CHECKING = False
@@ -52,19 +53,21 @@ class Packed:
         self.numbers.extend(chain.from_iterable(poses))
 
 
-class StaticTransform:
+class _Static(NamedTuple):
+    """The pose of a static frame: tx, ty, tz (metres), x, y, z, w."""
+
+    child: str
+    parent: str
+    components: Rigid
+
+
+class StaticTransform(_Static):
     """One pose, valid at all times."""
 
-    __slots__ = ("child", "components", "parent")
+    __slots__ = ()
     is_static: Literal[True] = True
     varies = False
-    count = 1
-
-    def __init__(self, child: str, parent: str, components: Rigid) -> None:
-        """Store the pose: tx, ty, tz (metres), x, y, z, w."""
-        self.child = child
-        self.parent = parent
-        self.components = components
+    count = 1  # type: ignore[assignment] # of samples
 
     def covers(self, at_ns: int) -> bool:  # noqa: ARG002 - any time
         """Return True: a static pose is valid at every time."""

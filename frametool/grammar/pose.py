@@ -185,8 +185,9 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
     if not (is_usual or NAMES.isdisjoint(mapping)):
         name, parent = _agreeing_name(mapping, readers.NAME_KEYS), _agreeing_name(mapping, readers.PARENT_NAMES)
     pose = Pose(position, rotation, name, parent, None, uncertain)
-    is_inverse = "inverse" in mapping and _read_choice("inverse", mapping["inverse"], "true", "false")
-    return inverted(pose) if is_inverse else pose
+    if (is_inverse := mapping.get("inverse", "false")) not in ("true", "false"):
+        raise Misfit(f"inverse must be true or false, found {kind(is_inverse)}", ("inverse",))
+    return inverted(pose) if is_inverse == "true" else pose
 
 
 def inverted(pose: Pose) -> Pose:
@@ -223,13 +224,9 @@ def _agreeing_name(mapping: dict[str, Any], keys: Sequence[str]) -> str | None:
 
 def read_angle_unit(value: Any) -> bool:
     """Read `angles: deg` or `angles: rad`; True for degrees."""
-    return _read_choice("angles", value, "deg", "rad")
-
-
-def _read_choice(key: str, value: Any, yes: str, no: str) -> bool:
-    if value not in (yes, no):
-        raise Misfit(f"{key} must be {yes} or {no}, found {kind(value)}", (key,))
-    return bool(value == yes)
+    if value not in ("deg", "rad"):
+        raise Misfit(f"angles must be deg or rad, found {kind(value)}", ("angles",))
+    return bool(value == "deg")
 
 
 def unknown_key(unknown: Sequence[str], hint: str) -> Misfit:
@@ -414,8 +411,21 @@ def read_spelled(
     notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading, *, check: bool = True
 ) -> WrittenRotation:
     """Read one text per component: a rotation, or the numbers of a whole pose; the rotation is checked."""
-    numbers, degrees = read_components(notation, texts, places, reading)
-    own, row, whole = numbers, notation.representation, notation.representation.whole
+    row, whole = notation.representation, notation.representation.whole
+    degrees = reading.degrees if notation.degrees is None else notation.degrees
+    try:
+        numbers = list(map(parse_number, texts))
+    except (ValueInvalid, TypeError):
+        numbers, degrees = _read_one_by_one(notation, texts, places, degrees=degrees, bare=reading.bare_numbers)
+    else:
+        if notation.degrees is None and not degrees and row.angles:
+            index = max(row.angles, key=lambda index: abs(numbers[index]))
+            if abs(numbers[index]) > TURN:
+                message = f"{row.name} {numbers[index]:g} is more than a full turn in radians; degrees?"
+                reading.note(f"{message} write {row.name}_deg", notation.spec, *places[index], rule="degrees")
+        if row.batch is not None:
+            numbers = as_meant(notation, numbers, texts, reading)
+    own: Sequence[float] = numbers
     position, rotation = None, IDENTITY
     if check and whole is not None and len(numbers) == len(whole.columns):
         end = len(numbers) - len(whole.tail)
@@ -437,26 +447,6 @@ def read_spelled(
     return WrittenRotation(position, rotation, notation, numbers, degrees, places)
 
 
-def read_components(
-    notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading
-) -> tuple[list[float], bool]:
-    """Read the components of a rotation; return them with the unit of the angles (True: degrees)."""
-    degrees = reading.degrees if notation.degrees is None else notation.degrees
-    try:
-        numbers = list(map(parse_number, texts))
-    except (ValueInvalid, TypeError):
-        return _read_one_by_one(notation, texts, places, degrees=degrees, bare=reading.bare_numbers)
-    if notation.degrees is None and not degrees and notation.representation.angles:
-        index = max(notation.representation.angles, key=lambda index: abs(numbers[index]))
-        if abs(numbers[index]) > TURN:
-            name = notation.representation.name
-            message = f"{name} {numbers[index]:g} is more than a full turn in radians; degrees? write {name}_deg"
-            reading.note(message, notation.spec, *places[index], rule="degrees")
-    if notation.representation.batch is None:
-        return numbers, degrees
-    return as_meant(notation, numbers, texts, reading), degrees
-
-
 FEW_DIGITS = "a rotation is off by {:.2g}, which its few digits explain, and was normalised"
 
 
@@ -468,9 +458,10 @@ def as_meant(notation: Notation, numbers: list[float], texts: Sequence[str], rea
     row, rule = notation.representation, notation.representation.batch
     if rule is None or rule.explained is None:
         return numbers
-    is_whole = row.whole is not None and len(numbers) == len(row.whole.columns)
-    at = list(row.whole.split(range(len(numbers)))[1]) if row.whole and is_whole else list(range(len(numbers)))
-    own = [numbers[index] for index in at]
+    at: Sequence[int] = range(len(numbers))
+    if row.whole is not None and len(numbers) == len(row.whole.columns):
+        at = row.whole.split(at)[1]
+    own = [*map(numbers.__getitem__, at)]
     off = rule.deviation(*own, floats) if len(own) == len(row.columns) else 0.0
     if not (off > quaternion.SILENT and rule.explained(own, [half_unit(texts[index]) for index in at], floats)):
         return numbers
@@ -516,17 +507,20 @@ def _with_unit(text: Any, notation: Notation | None) -> tuple[float, str | None]
 def _take_parts(notation: Notation, value: Any, parts: dict[str, int]) -> Spelled:
     """Read a mapping whose keys hold several numbers each, with `axes`, or `order` and `frame`, if axes are named."""
     named = notation.representation.axes == NAMED_AXES
-    keys = ", ".join(f"{key}: [..]" if count > 1 else f"{key}: 90deg" for key, count in parts.items())
-    expected = f"expected {{{'axes: rzyx, ' * named}{keys}}}"
-    if type(value) is not dict:
-        raise Misfit(f"{expected}, found {kind(value)}")
-    of_axes = () if not named else ("axes",) if value.keys().isdisjoint(("order", "frame")) else ("order", "frame")
-    if unknown := [key for key in value if key not in parts and key not in of_axes]:
-        raise Misfit(f"unknown key {shown(unknown[0])}; {expected}", (unknown[0],), key=True)
-    if missing := [key for key in (*of_axes, *parts) if key not in value]:
-        raise Misfit(f"missing {missing[0]}; {expected}")
-    if wrong := next((key for key in of_axes if type(value[key]) is not str), ""):
-        raise Misfit(f"expected {wrong} like {'intrinsic' if wrong == 'frame' else 'rzyx'}", (wrong,))
+    of_axes: tuple[str, ...] = ("axes",) * named
+    if named and type(value) is dict and not value.keys().isdisjoint(("order", "frame")):
+        of_axes = ("order", "frame")
+    if type(value) is not dict or value.keys() != {*of_axes, *parts}:
+        keys = ", ".join(f"{key}: [..]" if count > 1 else f"{key}: 90deg" for key, count in parts.items())
+        expected = f"expected {{{'axes: rzyx, ' * named}{keys}}}"
+        if type(value) is not dict:
+            raise Misfit(f"{expected}, found {kind(value)}")
+        if unknown := [key for key in value if key not in parts and key not in of_axes]:
+            raise Misfit(f"unknown key {shown(unknown[0])}; {expected}", (unknown[0],), key=True)
+        raise Misfit(f"missing {next(key for key in (*of_axes, *parts) if key not in value)}; {expected}")
+    for key in of_axes:
+        if type(value[key]) is not str:
+            raise Misfit(f"expected {key} like {'intrinsic' if key == 'frame' else 'rzyx'}", (key,))
     if of_axes:
         axes = value["axes"] if "axes" in value else axes_name(value["order"], value["frame"])
         notation = parse_notation(f"{notation.spec}:{axes}")

@@ -107,8 +107,10 @@ def result_at(
     entries: Iterable[float] | None = None,
 ) -> Result:  # fmt: skip
     """Return target_from_source as a result; a time of None has no effect.  entries: of its covariance."""
-    stamp = {} if at_ns is None else {"stamp_ns": at_ns}
-    return Result(Pose.of(components, source, target), {**stamp, **uncertain(entries)})
+    extras: dict[str, Any] = {} if at_ns is None else {"stamp_ns": at_ns}
+    if entries is not None:
+        extras |= uncertain(entries)
+    return Result(Pose.of(components, source, target), extras)
 
 
 def looked_up_across(
@@ -160,10 +162,11 @@ class Lookups:
 
     def result(self, target: str, source: str, at_ns: int | None) -> Result:
         """Look up at one time; None is the latest, and the result states it."""
-        at_ns = self.tree.latest(target, source) if at_ns is None else at_ns
+        at_ns = self.tree.latest(target, source) if at_ns is None and self.tree.moves else at_ns
         found = self.tree.lookup_components(target, source, at_ns)
-        entries = self.tree.carried(target, source, at_ns) if self.carried else None
-        return self._noted(result_at(found, target, source, at_ns, entries))
+        if not self.carried:
+            return result_at(found, target, source, at_ns)
+        return self._noted(result_at(found, target, source, at_ns, self.tree.carried(target, source, at_ns)))
 
     def results(
         self, target: str, source: str, times: Sequence[int], miss: Callable[[int], None] | None = None
@@ -177,7 +180,8 @@ class Lookups:
             found = self._columns(target, source, block, "nan" if miss else "raise")
             for at_ns, *row in zip(block, *(column.tolist() for column in found), strict=True):
                 if isfinite(row[6]):
-                    yield self._noted(result_at(row[:7], target, source, at_ns, row[7:] or None))
+                    result = result_at(row[:7], target, source, at_ns, row[7:] or None)
+                    yield self._noted(result) if self.carried else result
                 elif miss:
                     miss(at_ns)
 
@@ -202,9 +206,7 @@ class Lookups:
         return *poses, *carried_many(self.tree, target, source, times_ns, poses).T
 
     def _noted(self, result: Result) -> Result:
-        """Record a result with its covariance, if it has one."""
-        if not self.carried:
-            return result
+        """Record a result with its covariance."""
         from frametool.geometry.uncertainty import widest_turn
 
         target, source, found = result.pose.parent or "", result.pose.name or "", result.extras["covariance"]

@@ -8,6 +8,7 @@ a degree.
 
 from __future__ import annotations
 
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import NamedTuple, ValueInvalid, listing, shown, warn
@@ -87,15 +88,11 @@ class Style(NamedTuple):
         return repr(value + 0.0)
 
 
-class Result:
+class Result(NamedTuple):
     """A pose and further results (distance, angle, ..)."""
 
-    __slots__ = ("extras", "pose")
-
-    def __init__(self, pose: Pose, extras: dict[str, Any] | None = None) -> None:
-        """Store both."""
-        self.pose = pose
-        self.extras = extras or {}
+    pose: Pose
+    extras: dict[str, Any] = MappingProxyType({})  # type: ignore[assignment] # none
 
     def mapping(self, style: Style) -> dict[str, Any]:
         """Return the tree entry: name, parent, xyz, one key per representation, then the extras."""

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 TREE_KEYS = frozenset(("frames", "angles"))
 STAMP_KEYS = frozenset(("stamp", "stamp_ns"))
 TIMED = frozenset(("samples", "camera", *STAMP_KEYS))
+NESTED = TIMED | {"children"}
 XYZ = ("x", "y", "z")
 MOST_KEYS, MOST_CHARACTERS = 5, 80  # of a mapping in a message
 NO_NAME = "is in place of a frame's name: a root has no pose, its keys are its children"
@@ -90,8 +91,9 @@ def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
     elif type(value) is not dict:
         as_mapping(value, "a frame tree")
     elif "frames" in value:
-        if unknown := [key for key in value if key not in TREE_KEYS]:
-            raise Misfit(f"unknown key {shown(unknown[0])} next to frames; expected angles", (unknown[0],), key=True)
+        if not TREE_KEYS.issuperset(value):
+            unknown = next(key for key in value if key not in TREE_KEYS)
+            raise Misfit(f"unknown key {shown(unknown)} next to frames; expected angles", (unknown,), key=True)
         if "angles" in value:
             reading.degrees = read_angle_unit(value["angles"])
         frames = value["frames"]
@@ -135,7 +137,7 @@ def _below(root: str, children: Any, path: Path, reading: Reading) -> Iterator[E
                     raise Misfit(f"{shown(child)} {NO_NAME}", key=True)
                 if names := NAMES.intersection(as_mapping(said, f"the pose of frame {shown(child)}")):
                     raise Misfit(f"{min(names)} is defined by the nesting; remove it", (min(names),), key=True)
-                pose = _pose(said, reading, {"children", *TIMED})
+                pose = _pose(said, reading, NESTED)
                 yield from _edges(said, pose, _above(pose, parent, said), child, here, reading)
             except Misfit as misfit:
                 reading.refuse(misfit.below(*here))
