@@ -60,7 +60,7 @@ def bag_of_clouds(task: streaming.Task) -> Callable[[Way], int]:
 
     inputs, output, path, chosen = task.inputs, task.output, task.name, task.inputs.topics
     inputs.ask("input_path")
-    is_one = output.path in (None, "-") or not holds(output.chosen or "", "arrays")
+    is_one = output.path in (None, "-") or not holds(output.chosen, "arrays")
     refuse(is_one, f"each cloud of a bag is a file: -o 'scan_{{stamp_ns}}.pcd'; {_WRITTEN}")
     tally, names = Diagnostics(), dict[str, int]()
     with ExitStack() as opening:
@@ -124,7 +124,7 @@ def several_clouds(task: streaming.Task) -> Callable[[Way], int]:
     inputs, output, paths = task.inputs, task.output, task.inputs.input_path
     others = [path for path in paths if path == "-" or streaming.is_bag(path)]
     refuse(others, f"-i {''.join(others[:1])}: several -i are files of one cloud each")
-    refuse(not holds(output.chosen or "", "arrays"), f"several clouds become one: -o all.ply, or -f; {_WRITTEN}")
+    refuse(not holds(output.chosen, "arrays"), f"several clouds become one: -o all.ply, or -f; {_WRITTEN}")
     given, count = inputs.input_formats, len(paths)
     named = [fmt for fmt in given if "arrays" in FORMATS[fmt].reads]
     formats, frames = options.for_each(named, count), [*chain.from_iterable(inputs.named_frames)]
@@ -197,7 +197,7 @@ def apply_command(inputs: Inputs) -> int:
     move_clouds: Callable[[Way], int] | None = None
     if len(task.paths) > 1:
         move_clouds = several_clouds(task)
-    elif task.path and streaming.is_bag(task.path) and (holds(output.chosen or "", "arrays") or task.messages() is None):
+    elif task.path and streaming.is_bag(task.path) and (holds(output.chosen, "arrays") or task.messages() is None):
         move_clouds = bag_of_clouds(task)  # whose messages are no records
     way = Way(task) if inputs.pose is not None else TreeWay(task, numbers=bool(task.place))
     rest, is_stream = way.rest, way.is_stream
