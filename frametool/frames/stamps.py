@@ -49,7 +49,7 @@ def whole_stamp(stamp_ns: Any) -> int:
 def parse_stamp(text: str) -> int:
     """Read `12.5` (seconds), `500ms`, `12500000000ns` or `2024-05-01T12:00:00Z` as nanoseconds.
 
-    Digits below a nanosecond must be 0.
+    Fractions of a nanosecond are rounded, halves to even: programs that count time in floats print them.
 
     Raises ValueInvalid.
     """
@@ -71,10 +71,8 @@ def parse_stamp(text: str) -> int:
     shift = _BELOW[match[5]] - len(fraction) + exponent
     digits = int(whole + fraction)
     if shift < 0:
-        digits, lost = divmod(digits, int(10**-shift))
-        if lost:
-            raise ValueInvalid(f"{shown(text)} is finer than a nanosecond; round it")
-        shift = 0
+        digits, lost = divmod(digits, each := int(10**-shift))
+        digits, shift = digits + (2 * lost + digits % 2 > each), 0
     stamp_ns = digits * int(10**shift)
     return -stamp_ns if sign == "-" else stamp_ns
 

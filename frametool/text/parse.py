@@ -262,7 +262,7 @@ def parse_stamps(cells: Spans, *, in_ns: int) -> tuple[Ints, Flags]:
     whole, sure = _read_integer(data, points, points - starts)
     decimals = np.maximum(ends - points - 1, 0)
     digits, fine = _read_integer(data, ends, decimals)
-    finer = TENS.take(decimals - NINE, mode="clip")  # what is finer than a nanosecond must be 0
+    finer = TENS.take(decimals - NINE, mode="clip")  # what is finer than a nanosecond is not sure unless it is 0
     below = digits // finer * TENS.take(NINE - decimals, mode="clip")
     sure &= fine & (digits % finer == 0) & (ends - starts <= 8 * _STAMP_WORDS) & (ends - starts > (points < ends))
     is_whole = points == ends

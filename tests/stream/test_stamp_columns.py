@@ -33,6 +33,10 @@ def test_a_column_is_read_as_its_cells_are(cells: list[str], *, in_ns: bool) -> 
         ("1700000000123456789ns", 1_700_000_000_123_456_789),
         ("1.7e9", 1_700_000_000_000_000_000),
         ("0.000000001000", 1),
+        ("0.30000000000000004", 300_000_000),  # as Python prints 3 * 0.1
+        ("1.036220000000000030e-01", 103_622_000),  # as numpy.savetxt does
+        ("9.9999999995", 10_000_000_000),
+        ("0.0000000025", 2),
         ("-0.5", -500_000_000),
         (" 12. ", 12_000_000_000),
         ("9223372036.854775807", (1 << 63) - 1),
@@ -42,7 +46,7 @@ def test_no_nanosecond_is_lost(cell: str, stamp_ns: int) -> None:
     assert stamps_of([cell, "1"], in_ns=False) == [stamp_ns, 10**9]
 
 
-@pytest.mark.parametrize("cell", ["0.0000000001", "9223372036.854775808", "noon", "", "1_0", "0x1", "1.2.3", "nan", "."])
+@pytest.mark.parametrize("cell", ["9223372036.854775808", "noon", "", "1_0", "0x1", "1.2.3", "nan", "."])
 def test_what_is_no_time_is_named(cell: str) -> None:
     assert refused(["1.5", cell], in_ns=False) == [cell]
 
