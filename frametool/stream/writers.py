@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from frametool.documents.document import JSON_NUMBER
 from frametool.documents.source import Verbatim
 from frametool.documents.writers import dump_json
 from frametool.documents.writers import quoted as quoted_in_yaml
@@ -45,7 +46,7 @@ from frametool.stream.rows import (
     texts_of,
     values_of,
 )
-from frametool.text.spans import Floats, Ints, Spans, join
+from frametool.text.spans import Floats, Ints, Spans, join, without_quotes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -365,6 +366,9 @@ NUMBERS = (0.1370842961, -3.7208412957, 29.6518402397, 0.22360679774997896, -0.3
 MORE_NUMBERS = 0.7310585786300049
 STAMP_NS = 1234567890987654321
 PARENT, NAME = "@@parent@@", "@@name@@"
+# columns that are written as they are, or within quotes
+VALUES = re.compile(rb"(?:(?:%s|true|false)\n)*+" % JSON_NUMBER.encode())
+WORDS = re.compile(rb'(?:(?!(?:true|false)\n)[A-Za-z_][^"\\\x00-\x1f\x7f-\xff]*+(?<! )\n)*+')
 LEAF = re.compile(r"73105857(\d{7})")  # a whole number: in JSON it needs no quotes either
 
 
@@ -477,10 +481,16 @@ class AlikeRows(NamedTuple):
                 passes = self.marked.is_json
             if passes:
                 return cells, syntax.quote if quotes[mark] else ""
-        elif not isinstance(cells, Spans) and not is_cell:
-            return spans_of([syntax.write(value).encode() for value in plain_cells(cells)]), ""
         elif is_cell:
             return self._words(texts_of(cells), syntax), ""
+        elif not isinstance(cells, Spans):
+            return spans_of([syntax.write(value).encode() for value in plain_cells(cells)]), ""
+        else:
+            bare, size = without_quotes(cells), len(self.places)
+            lines = join([bare, constant(b"\n", size)])
+            for pattern, quote in ((VALUES, ""), (WORDS, syntax.quote)):
+                if lines.count(b"\n") == size and pattern.fullmatch(lines):
+                    return bare, quote
         return self._words(self._column(mark), syntax), ""
 
     def _words(self, values: Sequence[Any], syntax: Syntax) -> Spans:

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 # around every span this many bytes of `data` may be read, whatever they are: copies use whole windows
 MARGIN = 64
-# windows of one batch fit into the second-level cache
-_BATCH_BYTES = 1 << 17
+# windows of one batch fit into the second-level cache, unless a row has so many that their number costs more
+_BATCH_BYTES, _LEAST_ROWS = 1 << 17, 1 << 8
 _NOTHING_HIDDEN: Flags = np.empty(0, np.bool_)
 _CLOSING_QUOTE = re.compile(rb'(?:[^"]++|"")*+"')
 _NEWLINE, _RETURN, _QUOTE, _BLANK, _TAB = b'\n\r" \t'
@@ -71,10 +71,11 @@ def join(columns: Sequence[Spans]) -> bytes:
     longest = int(lengths.max(initial=1))
     width = min(-(-longest // 8) * 8, MARGIN)
     target = windows(out, width)
-    rows = max(1, _BATCH_BYTES // (width * places.shape[1]))
+    views = [windows(data, width) for data, _, _ in parts]
+    rows = max(_LEAST_ROWS, _BATCH_BYTES // (width * places.shape[1]))
     for first in range(0, len(places), rows):
         some = slice(first, first + rows)
-        gathered = [windows(data, width)[begin[some]] for data, begin, _ in parts]
+        gathered = [view[begin[some]] for view, (_, begin, _) in zip(views, parts, strict=True)]
         batch = gathered[0] if len(parts) == 1 else np.concatenate(gathered, axis=1)
         target[places[some].ravel()] = batch.ravel()
     column = 0

@@ -84,3 +84,16 @@ def test_blocks_whose_rows_all_name_one_frame_each_name_their_own(form: str) -> 
     texts = [writer.of_block(block).decode() for block in blocks]
     assert ["map" in text for text in texts] == [True, False]
     assert ["odom" in text for text in texts] == [False, True]
+
+
+COLUMNS = (
+    ["7", "-1.5e3", "true"], ["7", "007", " 8"], ["a b", "truer", "c,d"], ["a", "true", "n"], ["", "1", "2"], ["1\n2", "3", "4"], ["a\nb", "c", "d"],
+    ['a "b"', "c", "é"], ["a ", "b", "c"], ["null", "a", "b"],
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("cells", COLUMNS, ids=repr)
+def test_a_column_of_a_table_is_written_as_json_alike_in_many_rows_and_in_one(run: Callable[..., Any], cells: list[str]) -> None:
+    rows = ['1,2,3,"' + cell.replace('"', '""') + '"\n' for cell in cells]
+    many = run("convert", "-f", "json", stdin="x,y,z,more\n" + "".join(rows)).out
+    assert many == "".join(run("convert", "-f", "json", stdin=f"x,y,z,more\n{row}").out for row in rows)
