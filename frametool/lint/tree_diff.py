@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import FrametoolError, ValueInvalid, listing, shown
 from frametool.frames.stamps import format_stamp
-from frametool.frames.topology import Snapshot
+from frametool.frames.topology import Snapshot, motion
 from frametool.geometry import floats, rigid
 from frametool.geometry.transform import NEAR, NEAR_BY
 from frametool.text.numbers import parse_length, read_number_or_angle
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from frametool.frames.lookups import Frames
-    from frametool.frames.track import MovingTrack
     from frametool.geometry.camera import Camera
     from frametool.geometry.types import Rigid
 
@@ -297,7 +296,7 @@ class _Pair:
             return None
         found = Difference("samples", frame, one.parent, other.parent)
         if one.count != other.count or one.span != other.span:
-            return found._replace(note=f"{_covered(one)} in A, {_covered(other)} in B")
+            return found._replace(note=f"{motion(one)} in A, {motion(other)} in B")
         farthest = Apart(0.0, 0.0)
         at_ns = None
         for (stamp_a, parent_a, pose_a), (stamp_b, parent_b, pose_b) in zip(one.walk(), other.walk(), strict=True):
@@ -333,8 +332,3 @@ def _plain(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(map(_plain, value))}]"
     return f"{value:.12g}" if isinstance(value, float) else str(value)
-
-
-def _covered(track: MovingTrack) -> str:
-    first, last = map(format_stamp, track.span)
-    return f"{track.count} sample{'s' * (track.count != 1)} {first} .. {last}"

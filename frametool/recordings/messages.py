@@ -387,18 +387,6 @@ class RawTransform(NamedTuple):
     numbers: Rigid
     stamp: tuple[int, int]
 
-    @classmethod
-    def of(cls, message: Any, body: str = "") -> RawTransform:
-        """Return the contents of a TransformStamped, or of a pose over time, of a frame or of a body."""
-        if hasattr(message, "transform"):
-            body, moved, turned = message.child_frame_id, message.transform.translation, message.transform.rotation
-        else:
-            pose = getattr(message.pose, "pose", message.pose)
-            body = getattr(message, "child_frame_id", "") or body
-            moved, turned = pose.position, pose.orientation
-        stamp = message.header.stamp.sec, message.header.stamp.nanosec
-        return cls(message.header.frame_id, body, numbers_of(moved, turned), stamp)
-
 
 def numbers_of(moved: Any, turned: Any) -> Rigid:
     """Return the components of two parts of a message, a position and a quaternion."""
@@ -472,13 +460,20 @@ def raw_transforms(
 
 def _transforms(reader: RecordingReader, message: Recorded, number: int, answers: Answers) -> list[RawTransform]:
     """Return the transforms in a message, or the pose; raises FormatError for invalid bytes."""
-    channel = message.channel
+    channel, body, found = message.channel, body_of(message.channel.topic, answers), list[RawTransform]()
     try:
-        found = reader.types.read(channel, message.data)
+        contents = reader.types.read(channel, message.data)
     except ValueInvalid as error:
         raise FormatError(f"message {number} on {channel.topic}: {error}", source=reader.path) from None
-    parts = posed_messages(found, channel.type) if channel.type in POSES else found.transforms
-    return [RawTransform.of(each, body_of(channel.topic, answers)) for each in parts]
+    for each in posed_messages(contents, channel.type) if channel.type in POSES else contents.transforms:
+        if channel.type in POSES:
+            pose, child = getattr(each.pose, "pose", each.pose), getattr(each, "child_frame_id", "") or body
+            numbers = numbers_of(pose.position, pose.orientation)
+        else:
+            child, numbers = each.child_frame_id, numbers_of(each.transform.translation, each.transform.rotation)
+        stamp = each.header.stamp.sec, each.header.stamp.nanosec
+        found.append(RawTransform(each.header.frame_id, child, numbers, stamp))
+    return found
 
 
 def _columns(

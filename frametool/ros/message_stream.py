@@ -399,20 +399,17 @@ def edge_columns(
         raise ValueInvalid("an empty frame name")
     if problem := stamp_problem(max(seconds), max(nanoseconds), STAMPS[0]):  # none is below its range
         raise problem
-    rough = len(tally.rough)
-    try:
-        components = [unit_components(row, line, tally, normalize) for row, line in zip(rows, lines, strict=True)]
-    except ValueError:
-        del tally.rough[rough:]
-        raise
+    rough: list[int] = []
+    components = [unit_components(row, line, rough, normalize) for row, line in zip(rows, lines, strict=True)]
+    tally.rough += rough
     stamps_ns = [second * BILLION + part for second, part in zip(seconds, nanoseconds, strict=True)]
     return EdgeColumns(*names, stamps_ns, components, lines, topics, received_ns)
 
 
-def unit_components(numbers: Rigid, line: int, tally: Diagnostics, normalize: bool) -> Rigid:  # noqa: FBT001 - fast
+def unit_components(numbers: Rigid, line: int, rough: list[int], normalize: bool) -> Rigid:  # noqa: FBT001 - fast
     """Return tx, ty, tz, x, y, z, w with a unit quaternion; raises ValueInvalid for numbers that every reader refuses.
 
-    normalize: accept any non-zero quaternion.  The tally records the line of one that was off.
+    normalize: accept any non-zero quaternion.  rough: gets the line of one that was off.
     """
     tx, ty, tz, x, y, z, w = numbers
     squared = x * x + y * y + z * z + w * w
@@ -422,7 +419,7 @@ def unit_components(numbers: Rigid, line: int, tally: Diagnostics, normalize: bo
         off = abs(squared**0.5 - 1.0)
         if off <= quaternion.TOLERATED or (normalize and 0.0 < squared < INFINITE):
             if off > quaternion.SILENT and not normalize:
-                tally.rough.append(line)
+                rough.append(line)
             return tx, ty, tz, *quaternion.normalized(x, y, z, w, floats)
     problem = quaternion.complaint(x, y, z, w, normalize=normalize)
     raise problem or ValueInvalid("its position is not finite", rule="not-finite")

@@ -234,12 +234,12 @@ class RecordRun:
         folder: for temporary files while it is written
         Raises FormatError for a recording that is not whole, NoDataAt for a window without messages.
         """
-        reader, copied, humble = self.reader, self._messages(advance), typestore(ros1=False)
+        reader, copied = self.reader, self._messages(advance)
         files, channels, ros1, first = reader.files, reader.all, reader.is_ros1, next(copied, None)
         first_ns = first.log_ns if first else 0
         stamp_ns = first_ns if first_ns // BILLION <= SECONDS_ROS2[1] else 0
         for each in (one for one in channels if one.schema is None and one.type):
-            how, encoding, text = "copied without a definition", "", ""
+            how, encoding, text, humble = "copied without a definition", "", "", typestore(ros1=False)
             if each.type in humble.types:
                 how, encoding = "written as in ROS 2 Humble", "ros2msg"
                 text = humble.generate_msgdef(each.type, ros_version=2)[0]
@@ -346,7 +346,7 @@ class RecordRun:
             put(part.point, rigid.apply(*mover, *numbers))
             return
         pose = getattr(part.pose, "pose", part.pose)
-        found = unit_components(numbers_of(pose.position, pose.orientation), 0, self.tally, self.normalize)
+        found = unit_components(numbers_of(pose.position, pose.orientation), 0, self.tally.rough, self.normalize)
         tx, ty, tz, x, y, z, w = rigid.compose(*mover, *found)
         put(pose.position, (tx, ty, tz))
         put(pose.orientation, quaternion.unit(x, y, z, w, floats))

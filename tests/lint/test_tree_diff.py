@@ -222,8 +222,8 @@ def test_a_recording_that_only_differs_before_its_latest_differs() -> None:
 @pytest.mark.parametrize(
     ("other", "note"),
     [
-        (drive(1.0, until=4), "3 samples 0.000000000 .. 2.000000000 in A, 4 samples 0.000000000 .. 3.000000000 in B"),
-        (drive(1.0, stamps_from=1), "3 samples 0.000000000 .. 2.000000000 in A, 3 samples 0.000000001 .. 2.000000001 in B"),
+        (drive(1.0, until=4), "3 at 1 Hz, 0 .. 2 s in A, 4 at 1 Hz, 0 .. 3 s in B"),
+        (drive(1.0, stamps_from=1), "3 at 1 Hz, 0 .. 2 s in A, 3 at 1 Hz, 0.000000001 .. 2.000000001 s in B"),
     ],
 )
 def test_other_stamps_are_told(other: TransformBuffer, note: str) -> None:
