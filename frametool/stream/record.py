@@ -168,7 +168,8 @@ def _refuse(document: Any) -> None:
         if type(document) is list and document:
             raise _bare_numbers(document)
         raise Misfit(f"expected a pose like {{xyz: [x, y, z], rpy_deg: [..]}}, found {kind(document)}")
-    _refuse_typos(document, {*POINT_KEYS, *ROTATION_KEYS}, cutoff=0.6)
+    if "header" not in document:  # fields of another message are no misspelt keys
+        _refuse_typos(document, {*POINT_KEYS, *ROTATION_KEYS}, cutoff=0.6)
     wanted = "a point like {point: [x, y, z]} or a pose like {xyz: [..], rpy_deg: [..]}"
     raise Misfit(f"expected {wanted}, found the keys {first_of(list(document), MOST_KEYS, quote=shown)}")
 
@@ -240,7 +241,7 @@ def _refuse_half(value: dict[str, Any], found: Sequence[Holder], path: Path, sta
     header = value.get("header")
     is_message = type(header) is dict and "frame_id" in header
     if is_message and not found:
-        fields = first_of([key for key in value if key != "header"], MOST_KEYS, quote=shown)
+        fields = first_of([key for key in value if key != "header"] or ["header"], MOST_KEYS, quote=shown)
         raise Misfit(f"a message that cannot be moved whole: its fields are {fields}; see help records", path)
     used = {"header", *stays}.union(*(
         (*holder[len(path) :][:1], field, *covariance_keys(field)) for holder, field, _ in found

@@ -303,6 +303,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
         f"a message {NOT_WHOLE} 'height', 'width', 'encoding', 'is_bigendian', 'step', 'data'; see help records",
     ),
     "Range": ({"header": HEADER, "field_of_view": 0.1, "range": 2.0}, f"a message {NOT_WHOLE} 'field_of_view', 'range'; see help records"),
+    "a message cut off": ({"header": HEADER}, f"a message {NOT_WHOLE} 'header'; see help records"),
     "JointState": (
         {"header": HEADER, "name": ["a", "b", "c"], "position": [1.0, 2.0, 3.0], "velocity": [], "effort": []}, f"'name' {WHAT}",
     ),
@@ -324,6 +325,11 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "a covariance of three": ({"header": HEADER, "twist": {"twist": BOTH, "covariance": [1.0] * 9}}, "covariance has 9 numbers; 36 are needed (6x6, row-major: x y z, turns about X Y Z)"),
     "a covariance cut short": (MESSAGES["MagneticField"] | {"magnetic_field_covariance": [1.0]}, "covariance has 1 number; 9 are needed (3x3, row-major: x y z)"),
 }  # fmt: skip
+
+
+def test_fields_of_another_message_are_no_misspelt_keys_of_a_pose(run: Run) -> None:
+    done = run("convert", "-f", "csv", stdin=json.dumps({"header": HEADER, "point_step": 12, "row_step": 24, "data": [0]}) + "\n")
+    assert (done.status, done.err.partition("found ")[2]) == (1, "the keys 'header', 'point_step', 'row_step', 'data'\n")
 
 
 @pytest.mark.parametrize("way", WAYS)
