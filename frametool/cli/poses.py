@@ -13,7 +13,7 @@ from io import BufferedReader, BytesIO
 from typing import TYPE_CHECKING, Any
 
 from frametool.cli.command import misuse, refuse, refuse_two_readers, say_if_typed
-from frametool.documents.source import Pasted, Source, decode, read_text
+from frametool.documents.source import InputFile, Pasted, Source, decode
 from frametool.errors import FormatError, Misused, NamedTuple, ValueInvalid, heard_by, shown, warn
 from frametool.grammar.pose import Pose, pose_of_numbers
 from frametool.grammar.readers import NotARotation, Reading, stamp_column
@@ -153,13 +153,13 @@ def source_of(argument: str | Source) -> Source:
         return Source(INLINE, argument)
     if argument != "-":
         try:
-            return Source(argument, read_text(argument))
+            return Source(argument, InputFile(argument).text)
         except FormatError as error:
             from frametool.formats.detect import instead_of_text
 
             raise instead_of_text(error, argument) from None
     say_if_typed()
-    return Source("stdin", read_text("-"))
+    return Source("stdin", InputFile("-").text)
 
 
 def pose_source(argument: str | Source, request: Request) -> Source:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 import sys
+from itertools import chain, repeat
 from typing import TYPE_CHECKING, Any
 
 from frametool import sizes
@@ -18,7 +19,7 @@ from frametool.errors import FormatError, NamedTuple
 from frametool.text.numbers import odd_characters
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Sequence
 
     from frametool.documents.source import Event, Path
 
@@ -199,18 +200,27 @@ def refuse_alias(node: Node) -> None:
 
 def parse_nodes(text: str) -> list[Node]:
     """Return the trees of all documents of a text that `parse_documents` has read, without checks."""
+    return nodes_of(events_of(text))
+
+
+def nodes_of(events: Iterable[Event]) -> list[Node]:
+    """Return the trees of all documents; what the events leave open ends with them."""
     roots: list[Node] = []
     opened: list[tuple[Event, list[Node]]] = []  # lists and maps that are not complete yet, with their nodes
-    for event in events_of(text):
+    for event in chain(events, repeat((END, "", 0, 0, "", 0))):
         kind, word, start, end, style, column = event
         if kind not in (LEAF, END):
             opened.append((event, []))
             continue
         node = Node(start, end, word, quote=style, column=column)
         if kind == END:
+            if not opened:
+                break
             (kind, _, start, _, style, column), inner = opened.pop()
             pairs = zip(inner[::2], inner[1::2], strict=False)
-            value: Any = {key.value: (key, each) for key, each in pairs} if kind == MAP else inner
+            value: Any = inner
+            if kind == MAP:  # a key that is a list or a map is left to the parser
+                value = {key.value: (key, each) for key, each in pairs if isinstance(key.value, str)}
             if not style:  # without brackets it ends with its last value
                 end = inner[-1].end if inner else start
             node = Node(start, end, value, bool(style), column=column)

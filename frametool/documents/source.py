@@ -194,30 +194,6 @@ def has_record(begin: bytes) -> bool:
     return re.match(rb"\s*[{[].*[]}],?\s*\n|\s*[^\s{[].*\n(?:#.*\n)*[^#\n].*\n", data) is not None
 
 
-def read_text(path: str | PathLike[str], stream: BinaryIO | None = None) -> str:
-    """Read a file as text; otherwise as `read_bytes`.  Raises FormatError when it is not text, too."""
-    return decode(read_bytes(path, stream), "stdin" if str(path) == "-" else str(path))
-
-
-def read_bytes(path: str | PathLike[str], stream: BinaryIO | None = None) -> bytes:
-    """Read a file, or standard input for `-`; `stream` is an opened stream.
-
-    Raises FileProblem when it cannot be read, FormatError when it is too long.
-    """
-    name = "stdin" if str(path) == "-" else str(path)
-    stream = stream or opened(path)
-    try:
-        data = stream.read(sizes.MOST_CHARACTERS + 1)
-    except OSError as error:
-        raise FileProblem(f"{name}: {(error.strerror or str(error)).lower()}") from None
-    finally:
-        if name != "stdin":
-            stream.close()
-    if len(data) > sizes.MOST_CHARACTERS:
-        raise FormatError(f"longer than {sizes.MOST_CHARACTERS} bytes, the most in one file; split it", source=name)
-    return data
-
-
 def decode(data: bytes, name: str) -> str:
     """Decode bytes: UTF-8, or UTF-16 with a byte order mark; the mark is removed.
 
@@ -326,19 +302,41 @@ class InputFile:
         head: bytes = self.stream.peek(HEAD)[:HEAD]  # type: ignore[attr-defined]
         return head
 
+    def read(self) -> bytes:
+        """Read the whole file, and close it.
+
+        Raises FileProblem when it cannot be read, FormatError when it is too long.
+        """
+        try:
+            data = self.stream.read(sizes.MOST_CHARACTERS + 1)
+        except OSError as error:
+            raise FileProblem(f"{self.name}: {(error.strerror or str(error)).lower()}") from None
+        finally:
+            self.close()
+        if len(data) > sizes.MOST_CHARACTERS:
+            raise self.error(f"longer than {sizes.MOST_CHARACTERS} bytes, the most in one file; split it")
+        return data
+
     @cached_property
     def text(self) -> str:
-        """Return the whole text."""
-        return decode(read_bytes(self.path, self.stream), self.name)
+        """Return the whole text; raises FormatError when it is not text, too."""
+        return decode(self.read(), self.name)
 
     @property
     def source(self) -> Source:
         """Return the whole text with its name."""
         return Source(self.name, self.text)
 
-    def error(self, message: str, line: int = 0) -> FormatError:
-        """Return the error for a line, or for the whole file."""
-        return FormatError(message, source=self.name, line=line)
+    def error(
+        self, message: str, line: int = 0, column: int = 0, *, path: Path = (), kind: type[FormatError] = FormatError
+    ) -> FormatError:
+        """Return the error for a path from the top of a document, a line, a place in the text, or the whole file."""
+        if path:
+            from frametool.documents.document import format_error
+
+            return format_error(self.source, path, message, error=kind)
+        snippet = pointer(self.text.split("\n")[line - 1].rstrip("\r"), column) if column else ""
+        return kind(message, source=self.name, line=line, column=column, snippet=snippet)
 
     def close(self) -> None:
         """Close a file; standard input remains open."""

@@ -10,7 +10,7 @@ import re
 from typing import TYPE_CHECKING
 from xml.parsers import expat
 
-from frametool.documents.source import InputFile, Source, line_of, not_text, pointer, read_bytes
+from frametool.documents.source import InputFile, Source, line_of, not_text, pointer
 from frametool.errors import FormatError, NamedTuple, bare, shown
 from frametool.text.numbers import parse_number
 
@@ -117,7 +117,7 @@ def read_xml(file: InputFile, root: str = "", fmt: str = "") -> Element:
     root: its tag, if there is only one; fmt: the format's name, for a file with another root
     Raises FormatError if it is not XML, and for declarations of entities.
     """
-    xml = XmlFile(Source(file.name, ""), read_bytes(file.path, file.stream))
+    xml = XmlFile(Source(file.name, ""), file.read())
     top = Element(xml, "", {}, (0, 0, 0))  # above the root
     opened = [top]
     texts: list[list[str]] = [[]]

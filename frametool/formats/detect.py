@@ -31,7 +31,6 @@ from __future__ import annotations
 import os
 import re
 from functools import cached_property, partial
-from itertools import chain, repeat
 
 from frametool.documents.source import HEAD, LOOKED_AT, UTF16, not_text
 from frametool.errors import FormatError, NamedTuple, ValueInvalid, bare, first_of
@@ -90,10 +89,10 @@ class Beginning:
         inner: list[tuple[str, Any]] = [("", self.value)] if looks_like_json(self.text[:LOOKED_AT]) else []
         for path, value in inner:  # grows during the loop
             if isinstance(value, list):
-                inner += [(path, each) for each in value]
+                inner += [(path, each.value) for each in value]
             elif isinstance(value, dict):
                 found |= {path + key for key in value}
-                inner += [(f"{path}{key}/", each) for key, each in value.items()]
+                inner += [(f"{path}{key}/", each.value) for key, (_, each) in value.items()]
         return found
 
     @cached_property
@@ -108,25 +107,14 @@ class Beginning:
 
     @cached_property
     def value(self) -> Any:
-        """Return the first value of YAML or JSON as plain values, as far as the text is read; None if there is none."""
-        from frametool.documents.source import END, LEAF, MAP
+        """Return the first value of YAML or JSON, as far as the text is read, as `Node` has it; None if there is none.
+
+        Maps have pairs of nodes, lists have nodes.
+        """
+        from frametool.documents.document import nodes_of
         from frametool.documents.yaml import yaml_events
 
-        opened: list[tuple[Any, list[Any]]] = [("", [])]  # lists and maps, with their items
-        for kind, word, *_ in chain(yaml_events(self.text[:LOOKED_AT]), repeat((END, ""))):
-            if kind not in (LEAF, END):
-                opened.append((kind, []))
-                continue
-            value: Any = word
-            if kind == END:
-                if len(opened) == 1:
-                    break
-                begun, value = opened.pop()
-                if begun == MAP:
-                    pairs = zip(value[::2], value[1::2], strict=False)
-                    value = {key: each for key, each in pairs if isinstance(key, str)}
-            opened[-1][1].append(value)
-        return next(iter(opened[0][1]), None)
+        return next((node.value for node in nodes_of(yaml_events(self.text[:LOOKED_AT]))), None)
 
     @cached_property
     def xml(self) -> str:
@@ -153,23 +141,23 @@ def _are_poses(words: str, begin: Beginning) -> bool:
     """Return True for a map of names, or a list, whose entries are poses; the last one may be truncated."""
     if not (begin.yaml_keys or begin.text.lstrip().startswith("{")) or not isinstance(begin.value, dict):
         return False
-    top: dict[Any, Any] = {key: each for key, each in begin.value.items() if key != "angles"}
-    if len(top) == 1 and (inner := top.get("transforms", top.get("extrinsics"))):
-        top = dict(enumerate(inner)) if isinstance(inner, list) else inner if isinstance(inner, dict) else {}
+    top = {key: each.value for key, (_, each) in begin.value.items() if key != "angles"}
     entries = [*top.values()]
+    if len(top) == 1 and (inner := top.get("transforms", top.get("extrinsics"))):
+        top = inner if isinstance(inner, dict) else {}
+        entries = [each.value for each in (inner if isinstance(inner, list) else (node for _, node in top.values()))]
     if len(begin.text) > LOOKED_AT and len(entries) > 1:
         entries.pop()
 
     def is_pose(entry: Any) -> bool:
         if isinstance(entry, list):
-            return len(entry) == 7 and all(isinstance(each, str) for each in entry)
+            return len(entry) == 7 and all(isinstance(each.value, str) for each in entry)
         keys = set(entry) if isinstance(entry, dict) else set()
         is_message = "child_frame_id" in keys and not keys.isdisjoint(("timestamp", "stamp"))  # of Foxglove
         is_message = is_message or not keys.isdisjoint(("header", "transform"))
         return any(re.fullmatch(words, key) for key in keys) and not is_message
 
-    names = [key for key in top if isinstance(key, str) and re.fullmatch(f"{words}|{_NO_NAME}", key)]
-    return bool(entries) and not names and all(map(is_pose, entries))
+    return bool(entries) and not _is_key(f"{words}|{_NO_NAME}", top) and all(map(is_pose, entries))
 
 
 def _is_key(pattern: str, keys: Iterable[str]) -> bool:

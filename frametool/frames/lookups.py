@@ -209,8 +209,7 @@ class Frames:
         at_ns = self.latest(target, source) if at_ns is None else at_ns
         self.lookup_components(target, source, at_ns)  # raises if there are no data
         found = self.carried(target, source, at_ns)
-        edges = (self.covariances.get(track.child, ()) for track in self.way(target, source, at_ns))
-        warn_if_wide([found, *edges])
+        warn_if_wide([found])  # no edge is wider
         return [*found]
 
     def carried(

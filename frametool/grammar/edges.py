@@ -84,10 +84,10 @@ def stop(error: FormatError) -> None:
 class Names(dict[str, str]):
     """Frame names by their text: without quotes and one leading `/`; each is parsed once."""
 
-    def __init__(self) -> None:
-        """Create an empty table; `slashed` collects the names that began with `/`."""
+    def __init__(self, note: Callable[..., None] | None = None) -> None:
+        """Create an empty table; note: receives the warning about a name that began with `/`, as `Diagnostics.note`."""
         super().__init__()
-        self.slashed: list[str] = []
+        self._note = note
 
     def __missing__(self, text: str) -> str:
         """Parse a name; "" for a text that YAML takes for null, which is not a name."""
@@ -99,8 +99,8 @@ class Names(dict[str, str]):
         """Remove one leading `/`, as tf2 does, and record it."""
         if not is_slashed(name):
             return name
-        if name not in self.slashed:
-            self.slashed.append(name)
+        if self._note is not None:
+            self._note(slash_note(name), 1, "slash")
         return name[1:]
 
 
@@ -122,7 +122,7 @@ class Diagnostics:
         self.drawn: dict[str, str] = {}
         self.robot: tuple[Mapping[str, Any], list[Any], list[str]] | None = None
         self.unknown_joints: dict[str, FormatError] = {}
-        self.names = Names()
+        self.names = Names(self.note)
         self.noise: list[tuple[int, str]] = []
         self.projected = 0.0
         self.rough: list[int] = []
@@ -159,8 +159,6 @@ class Diagnostics:
         if self.others:
             kinds = ", ".join(f"{count} on {topic}" for topic, count in self.others.items())
             yield Finding("odd", f"messages without transforms were left out: {kinds}", line=1)
-        for name in self.names.slashed:
-            self.notes.setdefault(slash_note(name), Finding("slash", slash_note(name), line=1))
         yield from self.notes.values()
 
 

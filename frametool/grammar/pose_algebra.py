@@ -209,11 +209,9 @@ class Lookups:
         """Record a result with its covariance."""
         from frametool.geometry.uncertainty import widest_turn
 
-        target, source, found = result.pose.parent or "", result.pose.name or "", result.extras["covariance"]
-        new = {track.child for track in self.tree.way(target, source, result.extras.get("stamp_ns"))} - self.edges
-        self.edges |= new
-        edges = (self.tree.covariances.get(edge, ()) for edge in new)
-        self.widest = max((self.widest, found, *edges), key=widest_turn)
+        way = self.tree.way(result.pose.parent or "", result.pose.name or "", result.extras.get("stamp_ns"))
+        self.edges |= {track.child for track in way}
+        self.widest = max(self.widest, result.extras["covariance"], key=widest_turn)  # no edge is wider
         return result
 
     def granted(self) -> str:

@@ -25,7 +25,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import format_error, parse_documents
-from frametool.documents.source import Piece, Source, counted_from, error_at, read_text
+from frametool.documents.source import InputFile, Piece, Source, counted_from, error_at
 from frametool.documents.source import lines as pieces_of_lines
 from frametool.errors import FormatError, ValueInvalid, alternatives, shown
 from frametool.formats.detect import detect
@@ -435,7 +435,7 @@ def _leader(value: Any, source: Source, seed: int) -> MakeLeader:
     path = os.path.join(os.path.dirname(source.name), value)
     if not os.path.exists(path):
         raise Misfit(f"no file {path} and no leader {shown(value)}{alternatives(value, LEADERS, 'leaders')}")
-    return scripted(read_script(Source(path, read_text(path))))
+    return scripted(read_script(Source(path, InputFile(path).text)))
 
 
 def _call(value: Any) -> ServiceCall:

@@ -14,7 +14,7 @@ from hypothesis import strategies as some
 from frametool import sizes
 from frametool.documents import yaml as yaml_documents
 from frametool.documents.document import explain_scalar, format_error, locate_many, parse_documents, parse_nodes
-from frametool.documents.source import decode, read_text
+from frametool.documents.source import InputFile, decode
 from frametool.documents.writers import dump_json
 from frametool.errors import FileProblem, FormatError
 
@@ -118,7 +118,7 @@ def test_a_text_too_long_is_refused_before_it_is_read(tmp_path: Path, monkeypatc
     assert refusal("a" * 101) == "f: longer than 100 characters, the most in one file; split it"
     (tmp_path / "long.yaml").write_text("a" * 101)
     with pytest.raises(FormatError, match="longer than 100 bytes"):
-        read_text(tmp_path / "long.yaml")
+        InputFile(tmp_path / "long.yaml").read()
 
 
 @pytest.mark.parametrize("text", ["1," * 31, "- 1\n" * 31])
@@ -309,11 +309,11 @@ def test_other_bytes_are_refused_with_their_place(data: bytes) -> None:
 
 def test_a_file_that_cannot_be_read_is_a_file_problem(tmp_path: Path) -> None:
     with pytest.raises(FileProblem, match="no such file"):
-        read_text(tmp_path / "none.yaml")
+        InputFile(tmp_path / "none.yaml").read()
     with pytest.raises(FileProblem, match="is a directory"):
-        read_text(tmp_path)
+        InputFile(tmp_path).read()
     with pytest.raises(FileProblem, match="no file name"):
-        read_text("a\0b")
+        InputFile("a\0b").read()
 
 
 @pytest.mark.parametrize(

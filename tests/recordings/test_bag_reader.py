@@ -170,9 +170,9 @@ def test_transforms_that_lie_alike_are_the_same_edges_one_by_one(
             sent.append(Sent("/tf_static", *made.transforms(("map", "odom", STILL, START)), START + at * 1000 + 8))
     path = str(write(tmp_path / ("run.bag" if form == "bag" else "run"), form, sent))
 
-    def edges_and_notes() -> tuple[list[Edge], list[Any], list[str]]:
+    def edges_and_notes() -> tuple[list[Edge], list[Any]]:
         file = FrameFile(path)
-        return [*file.edges(tell=False)], [*file.tally.findings()], file.tally.names.slashed
+        return [*file.edges(tell=False)], [*file.tally.findings()]
 
     at_once = edges_and_notes()
     monkeypatch.setattr("frametool.recordings.messages.alike", lambda *_: ())

@@ -21,7 +21,7 @@ from frametool.cli.poses import source_of
 from frametool.cli.sink import say_error, show, tell
 from frametool.cli.streaming import Task, stream_options
 from frametool.cli.trees import load_tree
-from frametool.documents.source import HEAD, decode, opened, read_text
+from frametool.documents.source import HEAD, InputFile, decode, opened
 from frametool.errors import FrametoolError, ValueInvalid, printable
 from frametool.formats.rows.csv import write_poses as write_rows
 from frametool.formats.table import FORMATS, is_trajectory
@@ -329,7 +329,7 @@ def calc_command(inputs: Inputs) -> int:
         scope.earth = earth(inputs)
     alone = () if inputs.arguments == ("-",) else inputs.arguments  # a lone - is standard input, read in any case
     texts = [text.strip() for text in alone if file_named_in(inputs, text, scope) is None]
-    named = [(read_text(each[1:]) if each.startswith("@") else each).strip() for each in inputs.expressions]
+    named = [(InputFile(each[1:]).text if each.startswith("@") else each).strip() for each in inputs.expressions]
     lines = [read_line(text) for text in (*texts, *named)]
     if inputs.trees:
         scope.tree = load_tree(inputs, inputs.trees[0], inputs.trees[1:], streams=True)

@@ -20,7 +20,7 @@ from frametool.cli.poses import inline_misuse, source_of
 from frametool.cli.signals import STATE
 from frametool.cli.sink import refuse_existing, say, writing
 from frametool.cli.streaming import explain_option, significant
-from frametool.documents.source import Source, read_text
+from frametool.documents.source import InputFile, Source
 from frametool.errors import FileProblem, alternatives, shown
 from frametool.frames.stamps import BILLION
 from frametool.sim import turtle as drivers
@@ -212,7 +212,7 @@ def follow(inputs: Inputs) -> None:
         if not os.path.exists(argument) and not os.path.splitext(argument)[1]:
             known = alternatives(argument, drivers.LEADERS, "leaders")
             raise click.UsageError(f"no leader {shown(argument)}{known}, or a file")
-        leader = drivers.scripted(read_script(Source(argument, read_text(argument))))
+        leader = drivers.scripted(read_script(Source(argument, InputFile(argument).text)))
     if inputs.explain_step is None:
         show_run(inputs, scene_of(inputs, leader))
         return

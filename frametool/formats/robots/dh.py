@@ -21,7 +21,6 @@ from frametool.errors import FormatError, Unanswered, ValueInvalid, did_you_mean
 from frametool.formats.robots.joints import JointState
 from frametool.formats.robots.model import Joint, Link
 from frametool.formats.rows.csv import LineCell, split_line
-from frametool.formats.trees.tree_reader import line_error
 from frametool.geometry import euler, floats, rigid
 from frametool.grammar.readers import Path, kind
 from frametool.text.numbers import LENGTHS, NotFinite, parse_angle, parse_length, parse_number
@@ -214,10 +213,10 @@ def _of_lines(file: InputFile) -> Iterator[tuple[list[Item], Fail, int]]:
         if line.lstrip().startswith("#"):
             continue
         words = _split(line)
-        fail = partial(line_error, file, number, 1)
+        fail = partial(file.error, line=number, column=1)
         if len(words) != len(header):
             raise fail(f"expected {len(header)} cells, found {len(words)}")
-        places = (partial(line_error, file, number, word.column) for word in words)
+        places = (partial(file.error, line=number, column=word.column) for word in words)
         yield [(name, word.text, place) for name, word, place in zip(header, words, places, strict=True)], fail, number
 
 

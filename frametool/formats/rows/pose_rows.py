@@ -34,8 +34,8 @@ from importlib import import_module
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.document import format_error, parse_documents
-from frametool.documents.source import InputFile, lines, read_text
+from frametool.documents.document import parse_documents
+from frametool.documents.source import InputFile, lines
 from frametool.errors import FormatError, NamedTuple, ValueInvalid, listing, shown
 from frametool.formats.table import FORMATS, Rows
 from frametool.frames.stamps import BILLION, format_stamp, parse_stamp, whole_stamp
@@ -163,7 +163,7 @@ class StampFile:
         """Read the file; raises FileProblem, FormatError."""
         self.path = path
         self.stamps: list[int] = []
-        for number, line in enumerate(read_text(path).splitlines(), 1):
+        for number, line in enumerate(InputFile(path).text.splitlines(), 1):
             bare = line.strip()
             if bare and not bare.startswith("#"):
                 try:
@@ -250,7 +250,7 @@ def blocks(file: InputFile, options: Options, *, named: bool = True) -> Iterator
         columns = np.array([row.numbers for row in some], np.float64).T
         found = read_rotations(notation(spec.rotation), list(columns[3:]), normalize=options.normalize)
         for at, reason in sorted(found.reasons.items()):
-            options.report(error_at(file, some[at], reason))
+            options.report(file.error(reason, some[at].line, path=some[at].path))
         if spec.rotation == "matrix":
             options.tally.projected = max(options.tally.projected, found.off)
         else:
@@ -260,7 +260,8 @@ def blocks(file: InputFile, options: Options, *, named: bool = True) -> Iterator
             poses = rigid.inverse(*poses)
         for row in some if stamps is None else ():
             if row.number >= NUMBERED:
-                raise error_at(file, row, f"{row.number} is too large to count seconds; give --stamps FILE")
+                what = f"{row.number} is too large to count seconds; give --stamps FILE"
+                raise file.error(what, row.line, path=row.path)
         before, count = count, count + len(some)
         times = stamps.between(before, count) if stamps else [row.number * BILLION for row in some]
         good = [at for at in range(len(some)) if at not in found.reasons]
@@ -268,13 +269,6 @@ def blocks(file: InputFile, options: Options, *, named: bool = True) -> Iterator
     if stamps:
         stamps.finish(count, file.name)
     describe(options, spec, count, named=named)
-
-
-def error_at(file: InputFile, row: Written, message: str) -> FormatError:
-    """Return the error for a pose of a file."""
-    if row.path:
-        return format_error(file.source, row.path, message)
-    return file.error(message, row.line)
 
 
 def text_lines(file: InputFile) -> Iterator[tuple[int, str]]:

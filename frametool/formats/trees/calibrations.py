@@ -64,7 +64,7 @@ from frametool.documents.source import InputFile
 from frametool.documents.writers import flow, quoted
 from frametool.errors import BadAnswer, FormatError, Unanswered, ValueInvalid, bare, listing, shown, warn
 from frametool.formats.trees.matrix_files import FRAME_KEYS, MATRIX, Meaning, Stated, directed, edges_of, meaning_of
-from frametool.formats.trees.tree_reader import XYZ, document_edges, line_error, named
+from frametool.formats.trees.tree_reader import XYZ, document_edges, named
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge, Options
@@ -351,7 +351,7 @@ def kitti_lines(file: InputFile, options: Options) -> dict[str, KittiLine]:
         if not problem and len(numbers) != expected:
             column, problem = words[0].start() + 1, f"{name}: expected {expected} numbers, found {len(numbers)}"
         if problem:
-            options.report(line_error(file, line, column, problem))
+            options.report(file.error(problem, line, column))
         else:
             found[name] = KittiLine(line, tuple(numbers), [word[0] for word in words])
     return found
@@ -380,7 +380,7 @@ def _read_kitti(file: InputFile, options: Options) -> Iterator[Edge]:
             words = [text for at, text in enumerate(texts) if len(texts) == 9 or at % 4 < 3]
             rotation = read_spelled(MATRIX, words, [()] * 9, reading).rotation
         except ValueInvalid as error:
-            raise line_error(file, line, 1, f"{turn}: {error}") from None
+            raise file.error(f"{turn}: {error}", line, 1) from None
         for note in reading.notes:
             options.tally.note_each(f"{turn}: {note.message}", line, note.rule)
         pose = (x, y, z, *rotation)
@@ -392,7 +392,7 @@ def _read_kitti(file: InputFile, options: Options) -> Iterator[Edge]:
             fx, _, cx, px, _, fy, cy, py, _, _, _, pz = known.numbers
             for focal in (fx, fy):
                 if not focal > 0.0:
-                    raise line_error(file, known.line, 1, f"P{index}: the focal length {focal:g} is not positive")
+                    raise file.error(f"P{index}: the focal length {focal:g} is not positive", known.line, 1)
             centre = 0.0 - (px - cx * pz) / fx, 0.0 - (py - cy * pz) / fy, 0.0 - pz
             found.append((f"cam0{rect}", f"cam{index}{rect}", (*centre, *rigid.IDENTITY[3:]), known.line))
     if not found:

@@ -16,7 +16,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import Document, locate_many, parse_documents
-from frametool.documents.source import InputFile, Source, pointer
 from frametool.errors import Finding, FormatError, alternatives, bare, first_of, shown
 from frametool.frames.stamps import parse_stamp
 from frametool.geometry.rigid import IDENTITY
@@ -29,6 +28,8 @@ from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+
+    from frametool.documents.source import InputFile, Source
 
     Take = Callable[[Any, Reading], Iterable[Edge]]
 
@@ -320,12 +321,6 @@ def named(fields: dict[str, Any], key: str) -> str:
     if name is None:
         raise Misfit(f"missing {key}")
     return name
-
-
-def line_error(file: InputFile, line: int, column: int, message: str) -> FormatError:
-    """Return the error for a place in a text that is read line by line."""
-    text = file.text.split("\n")[line - 1].rstrip("\r")
-    return FormatError(message, source=file.name, line=line, column=column, snippet=pointer(text, column))
 
 
 def document_edges(file: InputFile, options: Options, take: Take, tags: Collection[str] = ()) -> Iterator[Edge]:
