@@ -182,10 +182,6 @@ def pose_source(argument: str | Source, request: Request) -> Source:
         if not count:
             raise FormatError("--time-offset has no effect: no timestamps in it", source=source.name)
         source = Source(source.name, text)
-    if source.name != INLINE and source.text.lstrip().startswith("<"):
-        from frametool.formats.detect import refuse_robots
-
-        refuse_robots(source.text.encode(), source.name)
     points = request.operation.moves
     return rewritten(source, request.rows.given, normalize=request.rows.normalize, points=points) or source
 

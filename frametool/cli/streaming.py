@@ -204,12 +204,11 @@ class Task:
 
         rows: takes the results, which are not written then
         """
-        from frametool.formats.detect import refuse_robots, with_hint
+        from frametool.formats.detect import with_hint
 
         self.inputs.ask("input_path", "on_error", "max_errors")
         with self.opened() as source:
             head = source.peek()
-            refuse_robots(head, self.name)
             try:
                 return self._run_opened(source, request, rows)
             except FormatError as error:

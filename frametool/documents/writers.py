@@ -38,7 +38,7 @@ def dump_yaml(value: Any, number: Callable[[float], str] = repr) -> str:
     """
     if (line := _one_line(value, number)) is not None and not (type(value) is dict and value):
         return f"{line}\n"
-    return "".join(f"{line}\n" for line in _block(value, number))
+    return "\n".join(_block(value, number)) + "\n"
 
 
 def flow(value: Any, number: Callable[[float], str] = repr) -> str:
@@ -87,9 +87,11 @@ def _escape(match: re.Match[str]) -> str:
 def _one_line(value: Any, number: Callable[[float], str]) -> str | None:
     """Write a scalar, an empty or leaf list, or a small map of numbers; None for what needs a block."""
     if isinstance(value, dict):
-        fit = (isinstance(each, (int, float, Verbatim)) and len(key) <= _LONGEST_KEY for key, each in value.items())
-        if len(value) > _WIDEST_FLOW_MAP or not all(fit):
+        if len(value) > _WIDEST_FLOW_MAP:
             return None
+        for key, each in value.items():
+            if not isinstance(each, (int, float, Verbatim)) or len(key) > _LONGEST_KEY:
+                return None
     elif isinstance(value, (list, tuple)) and any(isinstance(each, (dict, list, tuple)) for each in value):
         return None
     return flow(value, number)

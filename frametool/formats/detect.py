@@ -318,15 +318,8 @@ def _unknown(begin: Beginning, *reads: str, name: str) -> FormatError:
     )
 
 
-_ROBOT = rb"\s*(?:<\?xml\b|<!--|<(?:robot|sdf|mujoco|launch|opencv_storage)\b)"
 _FRAMES_KEY = r"""(?m)^[^\S\n]*+(?:---\s*+)?(?:\{\s*+)?["']?frames["']?\s*+:"""  # of frametool trees
 _MESSAGES = ("echo", "jsonl", "calls", "csv1", "csv2")  # formats that are read as poses too
-
-
-def refuse_robots(text: bytes, name: str) -> None:
-    """Raise FormatError for XML of a robot or a launch file where a single pose is expected."""
-    if re.match(_ROBOT, text) and (error := _points_to_lookup(text, name)):
-        raise error
 
 
 def with_hint(error: FormatError, text: bytes, name: str, *, chosen: bool = False) -> FormatError:

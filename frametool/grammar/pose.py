@@ -262,9 +262,8 @@ def pose_of_numbers(texts: Sequence[str], default: Notation | None, reading: Rea
         return Pose(*read_spelled(rep, texts, readers.INDICES, reading)[:2])
     if len(texts) not in rep.counts:
         raise ValueInvalid(f"{rep.counted}; found {len(texts)}")
-    x, y, z = map(parse_length, texts[:-size] or ("0", "0", "0"))
-    rotation = read_spelled(rep, texts[-size:], readers.INDICES, reading).rotation
-    return Pose((x, y, z) if len(texts) > size else None, rotation)
+    position: Any = tuple(map(parse_length, texts[:-size])) or None
+    return Pose(position, read_spelled(rep, texts[-size:], readers.INDICES, reading).rotation)
 
 
 def matrix_pose(rows: Sequence[Sequence[str]], rep: Notation, *, stated: bool = False) -> dict[str, Any] | None:

@@ -134,9 +134,11 @@ def _below(root: str, children: Any, path: Path, reading: Reading) -> Iterator[E
             here = reading.here = (*path, child)
             try:
                 said = {} if entry is None else entry
-                if child in POSE_KEYS and type(said) is not dict:
-                    raise Misfit(f"{shown(child)} {NO_NAME}", key=True)
-                if names := NAMES.intersection(as_mapping(said, f"the pose of frame {shown(child)}")):
+                if type(said) is not dict:
+                    if child in POSE_KEYS:
+                        raise Misfit(f"{shown(child)} {NO_NAME}", key=True)
+                    as_mapping(said, f"the pose of frame {shown(child)}")  # raises
+                if names := NAMES.intersection(said):
                     raise Misfit(f"{min(names)} is defined by the nesting; remove it", (min(names),), key=True)
                 pose = _pose(said, reading, NESTED)
                 yield from _edges(said, pose, _above(pose, parent, said), child, here, reading)
