@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from frametool.stream.record_results import BlockResults, ResultWriter
     from frametool.stream.record_values import Value
     from frametool.stream.request import Operation
-    from frametool.stream.writers import Blocks
 
 
 def _place(fmt: str, output: str | None) -> str:
@@ -109,11 +108,11 @@ class Output:
         self.notations: tuple[Notation, ...] = notations
         self._format_is_default = not (self.chosen or otherwise)
         fmt = self.chosen or otherwise or ("text" if self.path is None and sys.stdout.isatty() else "yaml")
-        self.holds_arrays = table.holds(fmt, "arrays")
+        holds_arrays = table.holds(fmt, "arrays")
         self.is_trajectory = table.is_trajectory(fmt)  # of the poses of one frame over time
-        self._in_blocks = self.is_trajectory or self.holds_arrays or table.holds(fmt, "recording")
+        self._in_blocks = self.is_trajectory or holds_arrays or table.holds(fmt, "recording")
         self.holds_all = self._in_blocks or fmt == "csv"  # rows, of which there may be many
-        if self.holds_arrays and self.path is None and sys.stdout.isatty():
+        if holds_arrays and self.path is None and sys.stdout.isatty():
             raise ValueInvalid(f"{fmt} is no text for a terminal; give -o FILE, or pipe it")
         usual = () if fmt in ("text", "dot", "mermaid") else QUATERNION  # drawings choose their own
         digits = inputs.peek("precision")
@@ -146,28 +145,23 @@ class Output:
 
     def values(self, values: Iterable[Value]) -> None:
         """Write results: poses as poses; points, vectors and messages as the mappings they are."""
-        writer = self._writer()
-        if isinstance(writer, AllTogether):
-            texts = map(writer.of, [values])
-        else:
-            from frametool.stream.record_results import blocks_of
+        if not self._in_blocks:
+            self.text(self.text_of([*values]))
+            return
+        from frametool.stream.record_results import blocks_of
 
-            texts = map(writer.of_block, blocks_of(values))
-        self.pieces(filter(None, chain(texts, writer.end())))
+        writer = self.writer()
+        self.pieces(filter(None, chain(map(writer.of_block, blocks_of(values)), writer.end())))
 
-    def _writer(self) -> Blocks | AllTogether:
-        """Return what writes results; stop where the format has no place for latitude and longitude."""
+    def _refuse_places(self) -> None:
+        """Stop where the format has no place for latitude and longitude."""
         if self.style.place is not None and self.style.format not in WITH_PLACES:
             names = ", ".join(each.name for each in (self.style.place, *self.style.place.more))
             raise ValueInvalid(f"{self.style.format} has no place for {names}; write csv, json, yaml or text")
-        if not self._in_blocks:
-            return AllTogether(self)
-        from frametool.stream.writers import Blocks
 
-        return Blocks(self.style)
-
-    def text_of(self, found: list[Value]) -> tuple[str, set[str]]:
-        """Return the text of all results, and the keys of what they say besides."""
+    def text_of(self, found: list[Value]) -> str:
+        """Return the text of all results; name what they say besides where the format has no place for it."""
+        self._refuse_places()
         poses = [each for each in found if isinstance(each, Result)]
         if len(poses) < len(found) and self.style.format != "csv":
             if self.style.format in table.FORMATS and "points" not in self._writes:
@@ -177,16 +171,20 @@ class Output:
             # for a person one a line, but what has more than three numbers as a mapping
             is_plain = all(any(isinstance(each.get(kind), list) for kind in ("point", "vector")) for each in mappings)
             text_module = "frametool.view.text" if is_plain else table.FORMATS["yaml"].writer
-            return self._module(text_module).write_points(mappings, self.style), {*chain.from_iterable(placed)}
-        keys = {key for each in poses for key in each.said(self.style)}
-        if len(poses) > 1 or "covariance" in keys:
-            self._shorten()
-        if "scale" in keys:
-            from frametool.stream.writers import refuse_scale_in
+            text, others = self._module(text_module).write_points(mappings, self.style), {*chain.from_iterable(placed)}
+        else:
+            keys = {key for each in poses for key in each.said(self.style)}
+            if len(poses) > 1 or "covariance" in keys:
+                self._shorten()
+            if "scale" in keys:
+                from frametool.stream.writers import refuse_scale_in
 
-            refuse_scale_in(self.style.format, keys)
-        text = self._module("frametool.view.text").write_poses(found, self.style)
-        return text, {*chain.from_iterable(each.extras for each in poses)}
+                refuse_scale_in(self.style.format, keys)
+            text = self._module("frametool.view.text").write_poses(found, self.style)
+            others = {*chain.from_iterable(map(attrgetter("extras"), poses))}
+        if self.style.format not in WITH_PLACES and (others := others - {"stamp_ns", "point", "vector", "frame"}):
+            warn(f"{self.style.format}: {listing(others)} left out")
+        return str(text)
 
     def _shorten(self) -> None:
         """Show poses on a terminal by quaternion and rpy only, where no representation is asked for."""
@@ -196,6 +194,7 @@ class Output:
     def poses_as_they_come(self, results: Iterator[Result]) -> None:
         """Write poses that have the same keys, in batches."""
         self._shorten()
+        self._refuse_places()
         if self._in_blocks:
             self.values(results)
         else:
@@ -219,9 +218,14 @@ class Output:
         """Return what writes the results of a stream of records."""
         from frametool.stream.record_results import CsvTable, Documents
 
+        self._refuse_places()
         if self.style.format in ("csv", "json", "yaml"):
             return CsvTable(self.style) if self.style.format == "csv" else Documents(self.style)
-        return self._writer()
+        if not self._in_blocks:
+            return AllTogether(self)
+        from frametool.stream.writers import Blocks
+
+        return Blocks(self.style)
 
     def tree(self, tree: Frames, color: str = "auto") -> None:
         """Write a tree; on a terminal in colour, or as `color` says; in a format made of poses with every sample."""
@@ -321,19 +325,11 @@ class AllTogether:
         """Begin without any."""
         self.output, self.values = output, list[Any]()
 
-    def of(self, values: Iterable[Value]) -> bytes:
-        """Keep some results; nothing is written."""
-        self.values += values
+    def of_block(self, block: BlockResults) -> bytes:
+        """Keep those of a block of records; nothing is written."""
+        self.values += block.in_order()
         return b""
 
-    def of_block(self, block: BlockResults) -> bytes:
-        """Keep those of a block of records."""
-        return self.of(block.in_order())
-
     def end(self) -> Iterator[bytes]:
-        """Yield the text of all, and name what they say besides where the format has no place for it."""
-        text, keys = self.output.text_of(self.values)
-        yield encoded(self.output.shown(text))
-        fmt, others = self.output.style.format, keys - {"stamp_ns", "point", "vector", "frame"}
-        if others and fmt not in ("text", "yaml", "json", "csv"):
-            warn(f"{fmt}: {listing(others)} left out")
+        """Yield the text of all."""
+        yield encoded(self.output.shown(self.output.text_of(self.values)))

@@ -238,8 +238,8 @@ class Task:
             fmt = self.format_of(stream.peek(), is_table=is_table)
             if self.inputs.verbose:
                 say(f"{self.name}: read as {fmt} ({FORMATS[fmt].summary})")
-        if fmt == "kitti" and self.notation and not self.chosen_format():
-            fmt = "columns"  # --from says what the numbers are, and nothing of pictures
+            if fmt == "kitti" and self.notation:
+                fmt = "columns"  # --from says what the numbers are, and nothing of pictures
         if output.chosen is None and (output.path or "").endswith(".bin") and not fmt.endswith("-bin"):
             raise click.UsageError(f"-o {output.path} does not name its format; give -f kitti-bin or nuscenes-bin")
         refuse(looks_up and fmt in RECORDS, f"frames are looked up for the rows of a table, not of {fmt}")
