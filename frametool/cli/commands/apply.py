@@ -208,16 +208,16 @@ def apply_command(inputs: Inputs) -> int:
     kinds, count = inputs.kinds, len(inputs.peek("columns"))
     counts = f"--as appears {len(kinds)} times, --columns {count} times; each --columns has its own"
     refuse(len(kinds) not in (0, 1, count), counts)
-    kind = kinds[0] if len(kinds) == 1 else None
+    kind = kinds[0] if len(kinds) == 1 else ""
     if plan is not None:
         records = list(sources_of(inputs, rest, kind))
         refuse(is_stream or len(records) != 1, f"a stream, or several records; {streaming.ONE_RECORD}")
-        return _derived(task, plan, way, records[0], kind or "")
-    request = way.request(kind=kind or "")
+        return _derived(task, plan, way, records[0], kind)
+    request = way.request(kind=kind)
     status = 0
     if is_stream:
         if count > 1:
-            request = request.with_rows(poses=count, kinds=kinds if len(kinds) == count else (kind or "",) * count)
+            request = request.with_rows(poses=count, kinds=kinds if len(kinds) == count else (kind,) * count)
         status = task.run(request)
     else:
         task.only_arguments(rest)
@@ -372,7 +372,7 @@ def _is_apart(argument: str) -> bool:
     return not argument or is_record(argument) or (not begins_number(argument) and is_pasted(argument))
 
 
-def sources_of(inputs: Inputs, arguments: Sequence[str], kind: str | None, place: str = "") -> Iterator[str | Source]:
+def sources_of(inputs: Inputs, arguments: Sequence[str], kind: str = "", place: str = "") -> Iterator[str | Source]:
     """Yield the texts of records: bare numbers in threes become points, the rest is unchanged."""
     if place and not any(map(is_record, arguments)):
         from frametool.cli.earth import mapping_of
@@ -384,7 +384,7 @@ def sources_of(inputs: Inputs, arguments: Sequence[str], kind: str | None, place
         if are_apart:
             yield from filter(None, texts)
             continue
-        if kind not in (None, "point", "vector"):
+        if kind not in ("", "point", "vector"):
             raise click.UsageError(f"a {kind} is a mapping, e.g. '{{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}}'")
         try:
             numbers = [parse_length(text) for text in texts]

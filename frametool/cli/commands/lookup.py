@@ -137,8 +137,7 @@ def _many(task: Task, lookups: algebra.Lookups, target: str, source: str) -> int
     inputs, tree, window = task.inputs, lookups.tree, task.window
     times, skipped = inputs.times, Skipped(in_json=task.output.chosen == "json")
     skip = times is not None and inputs.on_error == SKIP
-    is_null = times is not None and inputs.on_error == NULL
-    refuse(is_null, "--on-error null is for tables; with --times it is stop or skip")
+    refuse(times and inputs.on_error == NULL, "--on-error null is for tables; with --times it is stop or skip")
     report = skipped.add if skip else stop
     asked = algebra.sample_stamps(tree, target, source) if times is None else options.read_times(times, report)
     if window is not None:

@@ -102,7 +102,7 @@ def project_command(inputs: Inputs) -> int:
     take = None if overlay is None else overlay.take
     name, ranged = task.camera_name, bool(inputs.ranged)
     seen = PixelsOfPoints(task.camera, inputs.first_pixel, name=name, ranged=ranged, take=take)
-    status = task.finish(task.adds(seen), () if task.is_stream else [*apply.sources_of(inputs, task.rest, None)], seen)
+    status = task.finish(task.adds(seen), () if task.is_stream else [*apply.sources_of(inputs, task.rest)], seen)
     if overlay is not None:
         with writing(overlay.path, force=inputs.force) as write:
             write(overlay.drawn())
