@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frametool.errors import FormatError, ValueInvalid, did_you_mean, shown
+from frametool.errors import FormatError, ValueInvalid, did_you_mean, first_of, shown
 from frametool.geometry.transform import Transform
 from frametool.grammar.covariance import is_sigma
 from frametool.grammar.pose import Pose
@@ -122,7 +122,6 @@ class MeanRows(Gathered):
         super().__init__()
         self.key, self.by = by or weights, by
         self.uncertain = self.stamped = False
-        self.frame: str | None = None  # that of the Earth, where rows are placed there
         self.extra: list[Any] = []
         self.named: list[str] = []
         self.place: Callable[[int], str] = str
@@ -150,7 +149,6 @@ class MeanRows(Gathered):
         with_each = (*rows.extras, *rows.more)
         self.uncertain |= any(re.fullmatch("sigma|c11|.*covariance", key) or is_sigma(key) for key in with_each)
         self.stamped |= rows.stamps_ns is not None or stamp_column(with_each) is not None
-        self.frame = next((name for name in rows.parents if name in EARTH_FRAMES), self.frame)
         if self.key is None or self.named:
             return step
         values, reasons = self._values(rows, self.key)
@@ -205,6 +203,9 @@ def means_of(rows: MeanRows, values: list[float] | None, *, robust: bool) -> Ite
     poses = Transform.of(*np.where(np.isnan(numbers), NOWHERE, numbers).T.copy())
     extra = np.concatenate(rows.extra) if rows.extra else None
     lines = np.concatenate([each.lines for each in rows.blocks])
+    parents = [*chain.from_iterable(each.for_each(each.parents) for each in rows.blocks)]
+    names = [*chain.from_iterable(each.for_each(each.names) for each in rows.blocks)]
+    counted = {each for each in {*parents} if each is None or each.isdecimal()}  # which are no frames
     rows_of: dict[str, Any] = {}
     if by is not None:
         if extra is None:
@@ -213,6 +214,9 @@ def means_of(rows: MeanRows, values: list[float] | None, *, robust: bool) -> Ite
             rows_of.setdefault(label, []).append(row)
     weights = None if by is not None else extra if values is None else values
     for label, at in (rows_of or {"": range(len(poses))}).items():
+        frames, bodies = {parents[row] for row in at} - counted, {names[row] for row in at}
+        if len(frames) > 1 and not frames.issubset(EARTH_FRAMES):
+            raise ValueInvalid(f"the poses are in {first_of(sorted(map(str, frames)), 3)}; use one frame for all")
         found = solve_mean(poses[at] if rows_of else poses, weights=weights, robust=robust)
         (metres, radians), (farthest, widest), covariance = found.rms, found.most, found.covariance
         extras: dict[str, Any] = {} if by is None else {by: label}
@@ -236,4 +240,5 @@ def means_of(rows: MeanRows, values: list[float] | None, *, robust: bool) -> Ite
                 extras |= {"std_angle": angle, "std_angle_deg": degrees(angle)}
             extras |= uncertain((covariance if turned else covariance[:3, :3]).ravel().tolist())
         position, rotation = pose.position if placed else None, pose.rotation if turned else None
-        yield Result(Pose(position, rotation, None, rows.frame), extras), left_out
+        body = bodies.pop() if len(bodies) == 1 else None
+        yield Result(Pose(position, rotation, body, next(iter(frames), None)), extras), left_out

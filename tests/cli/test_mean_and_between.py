@@ -349,3 +349,19 @@ def test_frames_names_are_labels_too(run: Run, count: int) -> None:
     lines = ('{"xyz": [1, 2, 3], "name": "a"}\n{"xyz": [1, 2, 5], "name": "b"}\n{"xyz": [3, 2, 3], "name": "a"}\n') * count
     found = [json.loads(line) for line in run("mean", "-", "--by", "name", "-f", "json", stdin=lines).out.splitlines()]
     assert [(each["name"], each["count"], each["xyz"]) for each in found] == [("a", 2 * count, [2.0, 2.0, 3.0]), ("b", count, [1.0, 2.0, 5.0])]
+
+
+@pytest.mark.parametrize("form", ["csv", "json", "arguments"])
+def test_a_mean_is_in_the_frame_that_all_poses_are_in(run: Run, form: str) -> None:
+    def mean(*parents: str, by: bool = False) -> Outcome:
+        poses = [f'{{"parent": "{parent}", "name": "{name}", "xyz": [1, 2, {at}]}}'
+                 for at, parent in enumerate(parents) for name in "ab"]  # fmt: skip
+        text = run("convert", "-f", form, stdin="\n".join(poses)).out if form != "arguments" else ""
+        return run("mean", *(poses * (not text)), *["--by", "name"] * by, "-f", "json", stdin=text)
+
+    assert mean("w", "w").out.startswith('{"parent": "w", "xyz": [1.0, 2.0, 0.5]')
+    apart = mean("w", "v")
+    assert (apart.status, "the poses are in v, w; use one frame for all" in apart.err) == (1, True)
+    if form != "arguments":
+        names = [(found["name"], found["parent"]) for found in map(json.loads, mean("w", "w", by=True).out.splitlines())]
+        assert names == [("a", "w"), ("b", "w")]
