@@ -328,7 +328,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
 
 
 def test_fields_of_another_message_are_no_misspelt_keys_of_a_pose(run: Run) -> None:
-    done = run("convert", "-f", "csv", stdin=json.dumps({"header": HEADER, "point_step": 12, "row_step": 24, "data": [0]}) + "\n")
+    done = run("convert", "-f", "tum", stdin=json.dumps({"header": HEADER, "point_step": 12, "row_step": 24, "data": [0]}) + "\n")
     assert (done.status, done.err.partition("found ")[2]) == (1, "the keys 'header', 'point_step', 'row_step', 'data'\n")
 
 
