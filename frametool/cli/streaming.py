@@ -297,7 +297,8 @@ class Task:
         listed = holds(fmt, "arrays") or (is_trajectory(fmt) and not FORMATS[fmt].is_table)
         is_kindred = chosen == "csv" and fmt in ("tsv", "semicolon")
         # a trajectory has no room for more columns, or for other ones
-        no_room = output.is_trajectory and bool(request.extras(Shape(POSE)) or output.notations or output.style.place)
+        asked = output.notations or output.style.place
+        no_room = output.is_trajectory and bool(asked or request.operation.extras(Shape(POSE)))
         turns = output.style.axes and not output.notations and is_turned(output.style.changed(format=chosen or fmt))
         converts = not (is_kindred or fmt in RECORDS) and (chosen not in (None, fmt) or no_room or turns)
         if listed or converts:

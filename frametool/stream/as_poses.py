@@ -41,7 +41,7 @@ from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, BadRow, Fault, Outcome
 from frametool.stream.record_results import written_by
 from frametool.stream.request import NO_STAMPS, SOME, Request, RowOptions
-from frametool.stream.row_layout import POINT, POSE, Shape, Target
+from frametool.stream.row_layout import POINT, POSE, Shape
 from frametool.stream.rows import NO_ROWS, NO_STAMP, Block, RowPoses, kept, spans_of
 from frametool.stream.table import PlannedRows, TableRows
 from frametool.stream.writers import LEARNED, Blocks
@@ -123,7 +123,7 @@ class FormatConverter:
             steps = self._columns(stream) if "arrays" in FORMATS[self.fmt].reads else self._listed(stream)
         for poses, outcome in steps:
             kind, prefix = self.request.operation.result_kind(self.shape.kind), self.request.results.prefix
-            more = tuple(prefix + name for name in self.request.extras(self.shape))
+            more = tuple(prefix + name for name in self.request.operation.extras(self.shape))
             yield poses._replace(kind=kind, placed=self.placed, more=more), outcome
 
     def _begin(self, rows: PlannedRows, line: int = 0) -> None:
@@ -230,7 +230,7 @@ class FormatConverter:
         edge_of = request.pose_from_frame if request.operation.moves and timed else None
         bare = request._replace(timed=timed if timed and timed.name else None)
         bare = bare.with_rows(extra_column=None).with_results(unwrap=False)
-        target = Target(1.0, ((QUATERNION, False),), keep_sign=True)
+        target = Shape(POSE, notation=QUATERNION, keep_sign=True)
         plan = Plan((self.shape,), (target,), bare, ("x", "y", "z", *QUATERNION.columns), edge_of=edge_of)
         rename = request.renaming or (lambda parent, name: (parent, name))
         for each in module.blocks(file, options._replace(report=report), named=False):
@@ -274,9 +274,9 @@ def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
             rows, line = converter.rows, 1
             if converter.shape.kind != POSE:  # positions on the Earth
                 raise FormatError(NO_ROTATION.format(rows.columns), source=file.name, line=1)
-            named = {role: rows.table.name(at) for role, at in enumerate(rows.naming.places) if at is not None}
+            named = {role: rows.table.name(at) for role, at in enumerate(rows.layout.named) if at is not None}
             lacking = ", ".join(name for role, name in enumerate(("parent", "name")) if role not in named)
-            if lacking and rows.layout.time is None and not (fmt.counted or options.answers.stamps):
+            if lacking and not rows.layout.times and not (fmt.counted or options.answers.stamps):
                 wanted = "frames that stand still have parent and name, one that moves stamp or stamp_ns"
                 missing = f"no column {lacking} nor stamp among {rows.columns}; {wanted}, or --stamps FILE"
                 raise FormatError(missing, source=file.name, line=1)
@@ -293,7 +293,7 @@ def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
             static, moving = (kept(block, np.flatnonzero(each)) for each in (bare, ~bare))
             parts = [static._replace(stamps_ns=None), moving]
             if len(named) < 2:
-                column = rows.table.name(cast("int", rows.layout.time))
+                column = rows.table.name(rows.layout.times[0])
                 faults += [Fault(line + at, column, "no stamp") for at in parts.pop(0).lines.tolist()]
         for fault in [*faults, *nameless.values()]:
             options.report(BadRow(fault, str(fault.reason), source=file.name))

@@ -23,9 +23,10 @@ from frametool.grammar.readers import NORMALS, in_nanoseconds
 from frametool.stream.array_writer import DOUBLE, ColumnsWriter
 from frametool.stream.faults import SKIP, STOP, Outcome
 from frametool.stream.request import VELOCITIES, Operation, Request
+from frametool.stream.row_layout import Out, Word
 from frametool.stream.rows import Block, RowPoses, coded_texts, is_typed, objects, taken
 from frametool.stream.table import PlannedRows, Table
-from frametool.stream.table_plan import Fixed, Kept, Named, New
+from frametool.stream.table_plan import Kept, Named, New
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Sequence
@@ -46,11 +47,11 @@ class ColumnRows(PlannedRows):
     def __init__(self, file: ColumnFile, request: Request, source: str) -> None:
         """Plan the rows; raises FormatError or Misused as for a table of the same columns."""
         self.file = file
-        self.source = source
         names = file.names
-        table = Table(b",", names, file.width, header=tuple(quoted(name).encode() for name in names or ()))
+        header = tuple(quoted(name).encode() for name in names or ())
+        table = Table(b",", names, file.width, header=header, source=source, normals=file.vectors)
         try:  # `t` or `time` of a cloud is what its sensor counts, in whatever unit
-            super().__init__(table, request, source, file.vectors, stamped=not file.vectors)
+            super().__init__(table._replace(stamped=not file.vectors), request)
         except FormatError as error:
             error.line = 0  # the names of columns are in no line here
             raise
@@ -59,9 +60,9 @@ class ColumnRows(PlannedRows):
                 raise Misused(f"column {table.name(place)} holds no numbers", source=source)
         self.narrow: dict[int, Kind] = {}  # numbers that are rounded to fewer digits than they are computed with
         for column in () if request.results.all_numbers else self.layout.columns:  # all of them are written as doubles
-            if isinstance(column, New) and not column.words:
-                kind = self._kind_of(column)
-                self.narrow |= {column.number: kind} if kind.itemsize < DOUBLE.itemsize else {}
+            if isinstance(column, New) and isinstance(column.piece, Out):
+                kind = self._kind_of(column.name)
+                self.narrow |= {column.piece.first: kind} if kind.itemsize < DOUBLE.itemsize else {}
 
     def out_columns(self, *, named: bool = False) -> list[OutColumn]:
         """Return the columns of the output; what is read as float32 is written so, what is new is a double.
@@ -75,28 +76,31 @@ class ColumnRows(PlannedRows):
         for at, column in enumerate(self.layout.columns, 1):
             place = column.place if isinstance(column, (Kept, Named)) else None
             kind = self.file.kinds[column.place] if isinstance(column, Kept) else None
-            if isinstance(column, New) and not column.words:
-                kind = self._kind_of(column)
-            if names or isinstance(column, Fixed):
-                name = names[place] if names and place is not None else column.name  # type: ignore[union-attr]
-            elif isinstance(column, New) and column.number < len(usual):
-                name = usual[column.number]
+            new = column.piece if isinstance(column, New) else None
+            if isinstance(column, New) and isinstance(new, Out):
+                kind = self._kind_of(column.name)
+            if isinstance(column, New) and (names or not isinstance(new, Out)):
+                name = column.name
+            elif names and place is not None:
+                name = names[place]
+            elif isinstance(new, Out) and new.first < len(usual):
+                name = usual[new.first]
             else:
                 name = ours.get(-1 if place is None else place, f"column_{at}")
             found.append(OutColumn(name * bool(names or named), kind, place if isinstance(column, Kept) else None))
         return found
 
-    def _kind_of(self, column: New) -> Kind:
+    def _kind_of(self, name: str) -> Kind:
         """Return the type of a result's numbers: that of the column it replaces; raises Misused for integers."""
         names, kinds = self.table.names, self.file.kinds
         kind: Kind | None = DOUBLE
         if names is None and getattr(kinds[0], "kind", "") in FLOATS:  # an array of one type
             kind = kinds[0]
-        elif names and column.name in names:
-            kind = kinds[names.index(column.name)]
+        elif names and name in names:
+            kind = kinds[names.index(name)]
         if kind is None or kind.kind not in FLOATS:
-            whole = f"column {column.name} holds {kind}, where the result would be rounded"
-            raise Misused(f"{whole}; --keep puts it beside, -f csv writes text", source=self.source)
+            whole = f"column {name} holds {kind}, where the result would be rounded"
+            raise Misused(f"{whole}; --keep puts it beside, -f csv writes text", source=self.table.source)
         return kind
 
     def of_batch(self, batch: Batch) -> tuple[Ints, Floats]:
@@ -106,7 +110,7 @@ class ColumnRows(PlannedRows):
         shapes = zip(absent, self.plan.shapes, strict=False)
         empty = [flags for flags, shape in shapes if shape.notation or every]
         gone = np.flatnonzero(np.logical_or.reduce(empty)) if np.any(empty) else None  # 0 is a point, but no rotation
-        frames, names, strays = self.naming.of_rows(batch.size, lambda place: coded_texts(batch.texts(place)))
+        frames, names, strays = self.names_of(batch.size, lambda place: coded_texts(batch.texts(place)))
         stamps, late = self._stamps(batch)
         block = Block(
             values, (), np.arange(batch.size), int, names=names, stamps=stamps, bad={**late, **strays, **bad},
@@ -118,9 +122,9 @@ class ColumnRows(PlannedRows):
                 run.refuse(~np.isfinite(run.results[:, number].astype(kind)), f"the result is too large for {kind}")
         first, targets = 0, self.plan.targets
         for flags, target in zip(absent, targets, strict=False):
-            last = first + target.size if len(targets) > 1 else None
+            last = first + target.own_size if len(targets) > 1 else None
             run.results[flags, first:last] = np.nan
-            first += target.size
+            first += target.own_size
         rows, numbers = run.settled()
         if self.request.on_error == STOP and run.reasons:
             stay = rows < min(run.reasons)
@@ -164,32 +168,33 @@ class ColumnRows(PlannedRows):
 
     def _stamps(self, batch: Batch) -> tuple[list[Any], dict[int, tuple[str, str]]]:
         """Read the stamps of rows, and which of them have none."""
-        place, below = self.layout.time, self.layout.below
-        if place is None:
+        times = self.layout.times
+        if not times:
             return [], {}
-        name = self.table.name(place)
-        times, reasons = batch.stamps(place, in_ns=in_nanoseconds(name))
-        if below is not None:
+        name = self.table.name(times[0])
+        stamps, reasons = batch.stamps(times[0], in_ns=in_nanoseconds(name))
+        for below in times[1:]:
             nanoseconds, more = batch.stamps(below, in_ns=1)
-            times, reasons = times + nanoseconds, {**more, **reasons}
-        return [times], {row: (name, reason) for row, reason in reasons.items()}
+            stamps, reasons = stamps + nanoseconds, {**more, **reasons}
+        return [stamps], {row: (name, reason) for row, reason in reasons.items()}
 
     def made(self, columns: Sequence[OutColumn], rows: Ints, numbers: Floats) -> list[Made]:
         """Return what is in the columns that are made, in their order."""
         made = []
         for column, target in zip(columns, self.layout.columns, strict=True):
-            if isinstance(target, New) and target.words:
-                codes = np.nan_to_num(numbers[:, target.number]).tolist()
-                made.append(Made([target.words[int(code)] for code in codes]))
-            elif isinstance(target, New):
+            new = target.piece if isinstance(target, New) else None
+            if isinstance(new, Word):
+                codes = np.nan_to_num(numbers[:, new.number]).tolist()
+                made.append(Made([new.words[int(code)] for code in codes]))
+            elif isinstance(new, Out):
                 with np.errstate(invalid="ignore"):
-                    values = numbers[:, target.number].astype(column.kind or DOUBLE)
+                    values = numbers[:, new.first].astype(column.kind or DOUBLE)
                 made.append(Made(values, not_finite(values)))
+            elif new is not None:
+                made.append(Made([new.text.decode()] * len(numbers)))
             elif isinstance(target, Named):
                 texts = [text or "" for text in self.run.block.names.texts(target.role, rows)]
                 made.append(Made(texts * (len(rows) if len(texts) == 1 else 1)))
-            elif isinstance(target, Fixed):
-                made.append(Made([target.word] * len(numbers)))
         return made
 
 
@@ -263,7 +268,7 @@ class OtherColumns:
 
 def _say_rounded(every: Sequence[ColumnRows]) -> None:
     """Warn of columns of fewer digits than results are computed with."""
-    begin = f"{every[0].source}: " if len(every) == 1 else ""
+    begin = f"{every[0].table.source}: " if len(every) == 1 else ""
     if kinds := sorted({kind.name for rows in every for kind in rows.narrow.values()}):
         warn(f"{begin}{', '.join(kinds)} columns are computed as float64 and rounded once")
 

@@ -55,6 +55,7 @@ if TYPE_CHECKING:
 
     from frametool.stream.record import Record
     from frametool.stream.request import Request
+    from frametool.stream.table import Table
     from frametool.text.spans import Floats
 
     Reader: TypeAlias = Callable[[str], float]
@@ -105,7 +106,7 @@ def _find(groups: Groups, earth: Earth, expected: str) -> PoseColumns | None:
         return PoseColumns(plain[0][1], None)
     degrees = not _in_radians(spot)
     heading = Notation(f"heading_{'deg' if degrees else 'rad'}", HEADING, NED, degrees=degrees)
-    return PoseColumns(plain[0][1], Columns((spot.place,), (spot.name,), notation=heading, degrees=(degrees,)))
+    return PoseColumns(plain[0][1], Columns((spot.place,), (spot.name,), notation=heading, said=(degrees,)))
 
 
 def _position(kind: str, spots: dict[str, NamedColumn], groups: Groups, earth: Earth) -> Columns | None:
@@ -317,20 +318,20 @@ def doubt_band(place: Place, columns: Sequence[Floats], line_of: Callable[[int],
 
 
 def settle(
-    request: Request, shapes: tuple[Shape, ...], names: Sequence[str], source: str, *, on_earth: bool
+    request: Request, shapes: tuple[Shape, ...], table: Table, *, on_earth: bool
 ) -> tuple[Request, tuple[Shape, ...]]:
     """Check what rows on the Earth need: axes for rotations, a height; and that the frame of places is the Earth's.
 
     Raises FormatError for a rotation whose axes nobody says, CalcError.
     """
-    operation, asked = request.operation, request.results
+    operation, asked, names = request.operation, request.results, table.names or ()
     if on_earth and (place := shapes[0].place) is not None:
         shape, earth = shapes[0], request.earth
         reads = operation.moves or not operation.keeps_frames or asked.place is not None or asked.all_numbers
         if shape.kind == VECTOR:
             raise Misused("a vector has no place on the Earth; leave --as vector out")
         if place.name in (LLA, UTM) and not {"alt", "msl"}.intersection(place.fields) and reads:
-            warn(f"{source}: {NO_ALT}")
+            warn(f"{table.source}: {NO_ALT}")
         if operation.keeps_frames and asked.place is None:
             bare = shape.notation is None and all(each.representation.name == "quaternion" for each in asked.notations)
             request = request.with_results(place=Place.written((ECEF,), Earth()), by_default=asked.by_default or bare)
@@ -339,12 +340,12 @@ def settle(
             if has_idle_axes and not (asked.all_numbers or any(map(may_be_uncertain, names))):
                 raise Misused("--local-axes has no effect: the rows have no rotation")
         elif shape.notation is None or not (place.axes or AXES in place.fields):
-            raise FormatError(UNSAID, source=source, line=1)
+            raise FormatError(UNSAID, source=table.source, line=1)
         else:  # a heading is one in the axes there
             level = shape.notation.representation is HEADING
             if level and place.axes == ECEF:
                 what = "a heading is clockwise from north, which axes ecef do not have"
-                raise FormatError(what, source=source, line=1)
+                raise FormatError(what, source=table.source, line=1)
             shapes = (shape._replace(unit=place._replace(level=level)),)
     is_formula = operation.formula is not None
     stays = not (is_formula or operation.moves)
@@ -357,7 +358,7 @@ def settle(
         if request.results.place is not None:
             check_in_ecef(frame, request.results.place)
     except ValueInvalid as error:
-        raise FormatError(str(error), source=source, line=1) from None
+        raise FormatError(str(error), source=table.source, line=1) from None
     return request, shapes
 
 

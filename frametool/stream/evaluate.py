@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from frametool.geometry.types import Components, Rigid
-    from frametool.stream.row_layout import Piece, Target
+    from frametool.stream.row_layout import Piece
 
 COLUMNS_REMEDY = "give --deg, or name the columns _deg"
 
@@ -50,7 +50,7 @@ class Plan(NamedTuple):
     """
 
     shapes: tuple[Shape, ...]
-    targets: tuple[Target, ...]
+    targets: tuple[Shape, ...]
     request: Request
     names: tuple[str, ...]
     pieces: tuple[Piece, ...] = ()

@@ -142,7 +142,7 @@ def with_scale(record: Record, value: Any, around: Path, request: Request) -> Re
 
 
 def covariance_columns(
-    table: Table, request: Request, shapes: tuple[Shape, ...], source: str
+    table: Table, request: Request, shapes: tuple[Shape, ...]
 ) -> tuple[tuple[int, ...], tuple[Shape, ...]]:
     """Find the columns of a covariance or of sigmas where they count; return their places and the shapes with them."""
     kinds = [shape.kind for shape in shapes]
@@ -153,25 +153,25 @@ def covariance_columns(
             message = f"the covariance is along {own.axes or 'the axes there'}, the result along {place.axes}"
             remedy = "" if own.axes else f", or say --local-axes {place.axes}"
             if found:
-                raise FormatError(f"{message}; leave its columns out{remedy}", source=source, line=1)
+                raise FormatError(f"{message}; leave its columns out{remedy}", source=table.source, line=1)
     if passes or not kinds or not {*PLACED}.issuperset(kinds):
         return (), shapes
     try:
         places, sigma = covariance.find_columns(table.names or (), 36 if POSE in kinds else 9)
     except NotARotation as error:
-        raise FormatError(str(error), source=source, line=1) from None
+        raise FormatError(str(error), source=table.source, line=1) from None
     shape = shapes[0]
     if own is not None:
         from frametool.stream.earth_columns import along
 
-        places, shape = along(own, shape, table.names or (), places, source)
+        places, shape = along(own, shape, table.names or (), places, table.source)
     if places and request.operation.formula is not None:
-        warn(f"{source}: {LEFT_OUT.format('calc')}", rule="left-out")
+        warn(f"{table.source}: {LEFT_OUT.format('calc')}", rule="left-out")
     if not places or request.operation.formula is not None:
         return (), shapes
     if len(shapes) != 1:
         message = "a covariance beside several poses in a row: whose it is nobody can tell"
-        raise FormatError(message, source=source, line=1)
+        raise FormatError(message, source=table.source, line=1)
     sigma = _with_unit(sigma, degrees=request.rows.degrees)
     return places, (shape._replace(covariance=(len(places),), rewritten=True, sigma=sigma),)
 

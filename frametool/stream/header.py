@@ -12,17 +12,17 @@ from copy import copy
 from functools import lru_cache
 from itertools import product
 from os.path import commonprefix
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FormatError, Misused, NamedTuple, ValueInvalid, alternatives, bare, first_of, shown
-from frametool.geometry.representations import NAMED, ROTATIONS, UPPER_ROWS, Notation, Representation
+from frametool.geometry.representations import NAMED, REPRESENTATIONS, ROTATIONS, UPPER_ROWS, Notation, Representation
 from frametool.geometry.representations import notation as parse_notation
 from frametool.grammar.readers import COLUMN_WORDS, NORMALS
 from frametool.stream.row_layout import POINT, POSE, SIX, TWIST, WRENCH, Shape, Unit, six_names
 from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS
 
 if TYPE_CHECKING:
-    from collections.abc import Container, Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from frametool.stream.request import Request
 
@@ -40,11 +40,29 @@ LETTERS = {
     TWIST: (("vx", "vy", "vz", "wx", "wy", "wz"),),
     WRENCH: ((*FORCES, "tx", "ty", "tz"), (*FORCES, "mx", "my", "mz")),
 }
-NO_UNIT = ("", "-", "1")
+NO_UNIT: dict[str, float | bool | None] = {"": None, "-": None, "1": None}
 MOST_SHOWN, MOST_LISTED = 8, 40  # columns in a message
 # behind an underscore: these are units of no length, and those are lengths that nobody should have to guess
 UNITS = re.compile(r"_(deg|rad|mm|cm|um|m)(?![^\W_])|_(km|in|ft|s)$")
+NO_LENGTHS = frozenset((*ANGLES, "s"))  # columns of these are no position
+OUR_UNITS = NO_LENGTHS.union(filter(None, LENGTHS))  # of no velocity and no force
 TOKEN = re.compile(r"[^\W_]+")
+
+
+class Units(NamedTuple):
+    """The units that the names of some columns may say: of what they are, and what each means."""
+
+    of: str
+    known: Mapping[str, float | bool | None]
+
+
+LENGTH = Units(f"of a length; known are {', '.join(filter(None, LENGTHS))}", LENGTHS)  # numbers a metre
+ANGLE = Units("of an angle; known are deg, rad", NO_UNIT | ANGLES)  # True: degrees
+NUMBER = Units("of a number that has none", NO_UNIT)
+UNITS_OF = {
+    row.name: tuple(ANGLE if at in row.angles else NUMBER for at in range(len(row.columns)))
+    for row in REPRESENTATIONS.values()
+}  # fmt: skip
 
 
 class Columns(NamedTuple):
@@ -53,12 +71,13 @@ class Columns(NamedTuple):
     places: where they are, in the order of their meaning; names: as the header writes them
     prefix, suffix: what surrounds the names
     unit: numbers a metre of a position
-    notation: that of a rotation; degrees: what the name of each of its numbers says (True, False, None: nothing)
+    notation: that of a rotation
+    said: for each word that was looked for what its unit means, None where it says none
+    units: those of the columns
     whole: the numbers of a whole pose
-    absent: which numbers of a position or a rotation have no column
+    absent: which words have no column
     kind: twist or wrench, of six columns
     wrong: what is wrong with the names, an error where the columns are used
-    spots: place and unit for each word that was looked for, None where it has no column
     """
 
     places: tuple[int, ...]
@@ -67,12 +86,12 @@ class Columns(NamedTuple):
     suffix: str = ""
     unit: Unit | None = None
     notation: Notation | None = None
-    degrees: tuple[bool | None, ...] = ()
+    said: tuple[float | bool | None, ...] = ()
+    units: tuple[str, ...] = ()
     whole: bool = False
     absent: tuple[int, ...] = ()
     kind: str = ""
     wrong: str = ""
-    spots: tuple[Spot | None, ...] = ()
 
     @property
     def shown(self) -> str:
@@ -96,17 +115,17 @@ class PoseColumns(NamedTuple):
 class Header:
     """The names of a table's columns, taken apart once: which words of ours each holds, and in which unit.
 
-    found: by word and affixes the first column of each unit
+    found: by affixes and word the first column of each unit
     """
 
     def __init__(self, names: Sequence[str]) -> None:
         """Look for the columns of all representations and positions in the names."""
         self.names = names
         self.count = Counter(names)
-        self.found: dict[str, dict[tuple[str, str], dict[str, Spot]]] = {}
+        self.found: dict[tuple[str, str], dict[str, dict[str, Spot]]] = {}
         self.affixes: dict[tuple[str, str], tuple[str, str]] = {}
         for place, name in enumerate(names):
-            own = name.lstrip("# ") if place == 0 else name
+            own = name.lstrip("#% ") if place == 0 else name
             bracket = re.search(BRACKETS, own)
             bare = own[: bracket.start()] if bracket else own
             folded = bare.lower() if bare.isascii() else bare
@@ -120,52 +139,62 @@ class Header:
                 key = folded[:start], folded[behind:]
                 self.affixes.setdefault(key, (bare[:start], bare[behind:]))
                 unit = _unit(bracket, said) or "rad" * word.startswith("rvec_")
-                by_key = self.found.setdefault(COLUMN_WORDS.get(word, word), {})
-                by_key.setdefault(key, {}).setdefault(unit, (place, unit))
+                words = self.found.setdefault(key, {})
+                words.setdefault(NAMES_OF[word], {}).setdefault(unit, (place, unit))
 
-    def match(self, base: Sequence[str], alike: Sequence[int] = (), *, partly: bool = False) -> Iterator[Columns]:
+    def match(self, base: Sequence[str], units: Sequence[Units], *, partly: bool = False) -> Iterator[Columns]:
         """Yield the columns that have all words of a base under common affixes; `partly` those that have just some.
 
-        alike: which of the words have a unit; columns of one unit belong together, and those of several only where
-        each word has one column.
+        units: those that each may have; columns of one unit belong together, and those of several only where each word
+        has one column.
         """
-        keys: dict[tuple[str, str], int] = {}
-        for word in reversed(base):
-            for key, spots in self.found.get(word, {}).items():
-                keys[key] = next(iter(spots.values()))[0]
-        for key in sorted(keys, key=keys.__getitem__):
-            words = [self.found.get(word, {}).get(key, {}) for word in base]
-            if all(words) == partly:
+        alike = [at for at, each in enumerate(units) if each is not NUMBER]
+        for key, found in self.found.items():
+            if found.keys().isdisjoint(base) or (found.keys() >= {*base}) == partly:
                 continue
-            units = [unit for unit in (words[alike[0]] if alike else ()) if all(unit in words[at] for at in alike)]
-            for unit in units or ("",):
-                yield self.columns([spots.get(unit) or next(iter(spots.values()), None) for spots in words], key)
+            words = [found.get(word, {}) for word in base]
+            shared = [unit for unit in (words[alike[0]] if alike else ()) if all(unit in words[at] for at in alike)]
+            for unit in shared or ("",):
+                yield self.columns([spots.get(unit) or next(iter(spots.values()), None) for spots in words], units, key)
 
-    def columns(self, spots: Sequence[Spot | None], key: tuple[str, str] = ("", "")) -> Columns:
-        """Name the columns that were found for some words under some affixes."""
-        places = tuple(spot[0] for spot in spots if spot)
-        names = tuple(map(self.names.__getitem__, places))
+    def columns(
+        self, spots: Sequence[Spot | None], units: Sequence[Units], key: tuple[str, str] = ("", "")
+    ) -> Columns:
+        """Name the columns that were found for some words under some affixes, and read their units."""
+        places, own = zip(*filter(None, spots), strict=True)
+        names, said, absent, wrong = tuple(map(self.names.__getitem__, places)), list[Any](), list[int](), ""
+        for at, (spot, (of, known)) in enumerate(zip(spots, units, strict=True)):
+            said.append(known.get(spot[1]) if spot else None)
+            if spot is None:
+                absent.append(at)
+            elif spot[1] not in known and not wrong:
+                wrong = f"column {shown(self.names[spot[0]])}: unknown unit {shown(spot[1])} {of}"
         most = max(names, key=self.count.__getitem__)
-        wrong = f"column {most} appears twice; choose by number with --columns" if self.count[most] > 1 else ""
-        return Columns(places, names, *self.affixes.get(key, key), wrong=wrong, spots=tuple(spots))
+        if self.count[most] > 1:
+            wrong = f"column {most} appears twice; choose by number with --columns"
+        affixes = self.affixes.get(key, key)
+        return Columns(places, names, *affixes, said=tuple(said), units=own, absent=tuple(absent), wrong=wrong)
 
     def is_plain(self, match: Columns) -> bool:
         """Return True if a column has the affixes of a position, or no affix: `yaw`, `pose.yaw`, and not `yaw_rate`."""
         key = match.prefix.lower(), match.suffix.lower()
-        return key == ("", "") or any(key in self.found.get(base[0], ()) for base in POSITIONS)
+        return key == ("", "") or not {base[0] for base in POSITIONS}.isdisjoint(self.found.get(key, ()))
 
 
 WORDS = {word for row in ROTATIONS.values() for word in (*row.columns, *row.names, *row.alone) if word}.union(
     *POSITIONS, *(row.whole.columns for row in ROTATIONS.values() if row.whole)
 )
+NAMES_OF = {word: word for word in WORDS} | COLUMN_WORDS  # what each word is called here
+NAMES_OF |= {name.replace("_", mark): name for kind in LETTERS for name in six_names(kind) for mark in "_./"}
+NAMES_OF |= {word: word for bases in LETTERS.values() for base in bases for word in base}
 BY_TOKEN: dict[str, list[str]] = {}
-for _word in sorted(WORDS.union(COLUMN_WORDS)):
-    BY_TOKEN.setdefault(_word.split("_")[0], []).append(_word)
+for _word in sorted(NAMES_OF):
+    BY_TOKEN.setdefault(re.split("[_./]", _word)[0], []).append(_word)
 
 
 def has_pose_column(names: Iterable[str]) -> bool:
     """Return True if one of some names is that of a column of a pose or a point."""
-    return bool(Header(list(names)).found)
+    return any(not WORDS.isdisjoint(words) for words in Header(list(names)).found.values())
 
 
 def find_positions(header: Header) -> list[Columns]:
@@ -173,28 +202,18 @@ def find_positions(header: Header) -> list[Columns]:
     named = {(match.prefix, match.suffix) for match in _named_maps(header)}
     found: dict[tuple[int, ...], Columns] = {}
     for base in POSITIONS:
-        for match in header.match(base, range(3)):
+        for match in header.match(base, (LENGTH,) * 3):
             is_other = (match.prefix, match.suffix) in named or match.prefix.lower().endswith(TURNED)
-            if not (is_other or any(spot and spot[1] and spot[1] in (*ANGLES, "s") for spot in match.spots)):
+            if not is_other and NO_LENGTHS.isdisjoint(match.units):
                 found.setdefault(match.places, _position(match))
     every = [*found.values()]
     return [each for each in every if any(word in each.prefix.lower() for word in TELLING)] or every
 
 
 def _position(columns: Columns) -> Columns:
-    """Read the units of a position's columns, of which one may be absent."""
-    columns = _with_unknown(columns, range(3), LENGTHS, f"of a length; known are {', '.join(filter(None, LENGTHS))}")
-    x, y, z = [LENGTHS.get(spot[1] if spot else "", 1.0) for spot in columns.spots]
+    """Take the units of a position's columns, of which one may be absent."""
+    x, y, z = [1.0 if said is None else said for said in columns.said]
     return columns._replace(unit=x if x == y == z else (x, y, z))
-
-
-def _with_unknown(columns: Columns, places: Iterable[int], known: Container[str], of: str) -> Columns:
-    """Store what is wrong where one of some columns has a unit that is not known."""
-    for at in places:
-        if (spot := columns.spots[at]) and spot[1] not in known:
-            name = columns.names[columns.places.index(spot[0])]
-            return columns._replace(wrong=f"column {shown(name)}: unknown unit {shown(spot[1])} {of}")
-    return columns
 
 
 def find_rotations(header: Header, expected: Notation | None) -> list[Columns]:
@@ -203,9 +222,9 @@ def find_rotations(header: Header, expected: Notation | None) -> list[Columns]:
     found: dict[frozenset[int], Columns] = {}  # qvec_w .. are found by either of two names
     for row in rows:
         named = _named_maps(header, bare=expected is not None) if row.shape == NAMED else ()
-        for match in (*header.match(row.columns, row.angles), *named):
+        for match in (*header.match(row.columns, UNITS_OF[row.name]), *named):
             found[frozenset(match.places)] = _rotation(match, row, expected)
-        for match in header.match(row.whole.columns) if row.whole else ():
+        for match in header.match(row.whole.columns, (NUMBER,) * len(row.whole.columns)) if row.whole else ():
             found[frozenset(match.places)] = _rotation(match, row, expected)._replace(whole=True, unit=1.0)
     spread = [(max(each.places) - min(each.places) - len(each.places), each) for each in found.values()]
     best: dict[int, int] = {}  # where several share a column, an axis with an angle and an angle_deg, the nearest
@@ -215,12 +234,13 @@ def find_rotations(header: Header, expected: Notation | None) -> list[Columns]:
     nearest = [each for size, each in spread if size <= min(map(best.__getitem__, each.places))]
     alone = list[Columns]()  # of columns that say one by themselves, where none of the others is there: `yaw`, `theta`
     for row in () if nearest else rows:
-        lone = [each for word in row.alone for each in header.match((word,), (0,)) if header.is_plain(each)]
+        last, units = len(row.columns) - 1, UNITS_OF[row.name]
+        words = [(*[""] * last, word) for word in row.alone]
+        lone = [each for base in words for each in header.match(base, units, partly=True) if header.is_plain(each)]
         if lone:
-            others = {each[2:4] for each in header.match(row.columns, partly=True) if any(each.spots[:-1])}  # affixes
-            rest = (None,) * (len(row.columns) - 1)
-            rotations = [each._replace(spots=(*rest, *each.spots)) for each in lone if each[2:4] not in others]
-            alone += [_rotation(each, row, expected) for each in rotations]
+            others = header.match(row.columns, units, partly=True)
+            affixes = {each[2:4] for each in others if {*each.absent} != {*range(last)}}
+            alone += [_rotation(each, row, expected) for each in lone if each[2:4] not in affixes]
     return nearest or alone
 
 
@@ -236,24 +256,18 @@ def _searched(expected: Notation | None) -> list[Representation]:
 def _named_maps(header: Header, *, bare: bool = False) -> Iterator[Columns]:
     """Yield the columns called as the keys of a map, x y z w: with affixes, or alone, or where they may be `bare`."""
     words = ROTATIONS["quaternion"].names
-    for match in header.match(words):
+    for match in header.match(words, UNITS_OF["quaternion"]):
         if bare or match.prefix or match.suffix or len(header.names) == len(words):
             yield match
 
 
 def _rotation(columns: Columns, row: Representation, expected: Notation | None) -> Columns:
-    """Read the units of a rotation's columns: those of angles, each as its name says."""
-    columns = columns._replace(spots=tuple(spot and (spot[0], spot[1].lower()) for spot in columns.spots))
-    numbers = {*range(len(columns.spots))}.difference(row.angles)
-    columns = _with_unknown(columns, numbers, NO_UNIT, "of a number that has none")
-    columns = _with_unknown(columns, row.angles, (*NO_UNIT, *ANGLES), "of an angle; known are deg, rad")
-    said = tuple(ANGLES.get(spot[1]) if spot and at in row.angles else None for at, spot in enumerate(columns.spots))
-    units = {said[at] for at in row.angles if columns.spots[at]}
+    """Take the notation that a rotation's columns say, with the unit of angles if they all have one."""
+    units = {columns.said[at] for at in row.angles if at not in columns.absent}
     suffix = "_deg" if units == {True} else "_rad" if units == {False} else ""
     axes = f":{expected.axes}" if expected is not None and expected.axes else ""
     notation = expected if expected and row.angles and not suffix else parse_notation(f"{row.name}{suffix}{axes}")
-    absent = tuple(at for at, spot in enumerate(columns.spots) if spot is None)
-    return columns._replace(notation=notation, degrees=said, absent=absent)
+    return columns._replace(notation=notation)
 
 
 def find_poses(names: Sequence[str], expected: Notation | None, count: int, source: str) -> list[PoseColumns]:
@@ -299,7 +313,7 @@ def plain_pose(names: tuple[str, ...], *, affixed: bool) -> PoseColumns:
     Raises ValueInvalid for several rotations or positions, and for a rotation that is there by half.
     """
     header, bare = copy(full := Header(names)), ("", "")
-    header.found = {word: {bare: spots[bare]} for word, spots in header.found.items() if bare in spots}
+    header.found = {bare: full.found.get(bare, {})}
     positions = find_positions(header) or (find_positions(full) if affixed else [])
     rotations = find_rotations(header, None) or (find_rotations(full, None) if affixed else [])
     for what, found in (("rotation", rotations), ("position", positions)):
@@ -315,11 +329,10 @@ def _half_position(header: Header, rotation: Columns) -> Columns | None:
     """Return x, y with a turn about z, a pose in the plane; other parts of a position are wrong if they are used."""
     affixes = ((rotation.prefix, rotation.suffix), ("", ""))
     for base in POSITIONS:
-        for match in header.match(base, partly=True):
-            if len(match.places) < len(base) - 1 or (match.prefix, match.suffix) not in affixes:
+        for match in header.match(base, (LENGTH,) * 3, partly=True):
+            if len(match.absent) > 1 or (match.prefix, match.suffix) not in affixes:
                 continue
-            at = match.spots.index(None)
-            columns = _position(match)._replace(absent=(at,))
+            (at,), columns = match.absent, _position(match)
             if not rotation.absent or base[at] != base[-1]:
                 missing = f"half a position: {columns.shown} without {match.prefix}{base[at]}{match.suffix}"
                 columns = columns._replace(wrong=f"{missing}; add what is missing, or choose with --columns")
@@ -335,20 +348,19 @@ def listed(names: Sequence[str]) -> str:
 def _half_rotation(header: Header, expected: Notation | None) -> str:
     """Return what is missing of a rotation that is there by half, or goes by other names; "" if absent."""
     for row in ROTATIONS.values() if expected is None else ():
-        if not row.searched and (match := next(header.match(row.columns), None)):
+        if not row.searched and (match := next(header.match(row.columns, UNITS_OF[row.name]), None)):
             return f"columns {match.shown} may be {row.name}; then add --from {row.spelling}"
     for match in _named_maps(header, bare=True) if expected is None else ():
         may_be = f"{match.shown} may be a quaternion or a point and a number"
         return f"{may_be}; add --from xyzw, or --columns with the three"
-    for match in header.match(XYZ) if expected is None else ():
+    for match in header.match(XYZ, (LENGTH,) * 3) if expected is None else ():
         if match.prefix.lower().endswith("rot_"):
             axes = "name them roll, pitch, yaw or rotvec_x, rotvec_y, rotvec_z"
             return f"columns {match.shown} do not say what they are; {axes}"
     for row in _searched(expected):
-        for match in header.match(row.columns, partly=True):
+        for match in header.match(row.columns, UNITS_OF[row.name], partly=True):
             if len(match.places) > 1 or (row.alone and header.is_plain(match)):
-                absent = [word for word, spot in zip(row.columns, match.spots, strict=True) if spot is None]
-                missing = ", ".join(f"{match.prefix}{word}{match.suffix}" for word in absent)
+                missing = ", ".join(f"{match.prefix}{row.columns[at]}{match.suffix}" for at in match.absent)
                 half = f"half a rotation: {match.shown} without {missing}"
                 return f"{half}; add what is missing, or choose with --columns"
     folded = {name.lower(): name for name in reversed(header.names)} if expected is None else {}
@@ -363,18 +375,13 @@ def _half_rotation(header: Header, expected: Notation | None) -> str:
     return ""
 
 
-def find_six(names: Sequence[str], kind: str) -> Columns | None:
-    """Find the columns of a twist or a wrench, by the words of its parts; by usual letters only where asked."""
-    if len(names) < 6:
-        return None
-    folded = [re.sub(r"[./]", "_", re.sub(BRACKETS, "", name).strip().lower()) for name in names]
-    kinds = [kind] if kind else LETTERS
-    for found, base in [(each, base) for each in kinds for base in (six_names(each), *LETTERS.get(kind, ()))]:
-        for prefix in [name.removesuffix(base[0]) for name in folded if re.fullmatch(f"(.*_)?{base[0]}", name)]:
-            wanted = [prefix + word for word in base]
-            if {*wanted} <= {*folded}:
-                places = tuple(map(folded.index, wanted))
-                return Columns(places, tuple(names[place] for place in places), kind=found)
+def find_six(header: Header, kind: str) -> Columns | None:
+    """Find the columns of a twist or a wrench, by the words of its parts, or by usual letters."""
+    for each in [kind] if kind else LETTERS:
+        for base in (six_names(each), *LETTERS.get(each, ())):
+            for match in header.match(base, (NUMBER,) * 6):
+                if not match.suffix and OUR_UNITS.isdisjoint(match.units):
+                    return match._replace(kind=each, wrong="")
     return None
 
 
@@ -396,7 +403,7 @@ def row_shape(pose: PoseColumns, request: Request) -> Shape:
         )
     notation = rotation.notation
     angles = notation.representation.angles
-    said = [notation.in_degrees(request.rows.degrees) if each is None else each for each in rotation.degrees]
+    said = [notation.in_degrees(request.rows.degrees) if each is None else each for each in rotation.said]
     degrees = any(said[at] for at in angles if at not in rotation.absent)
     radians_at = tuple(at for at in angles if degrees and not said[at])
     first = 0 if unit is None else len(XYZ)
@@ -420,9 +427,7 @@ def named_pose(spec: str, names: Sequence[str] | None, width: int, request: Requ
     count, rotation = _chosen_rotation(header, places, request.rows.given)
     if count == len(places):
         return PoseColumns(None, rotation)
-    match = _chosen(header, places[: len(places) - count])
-    absent = (2,) * (len(match.spots) < len(XYZ))
-    return PoseColumns(_position(match._replace(spots=(*match.spots, *[None] * len(absent)), absent=absent)), rotation)
+    return PoseColumns(_position(_chosen(header, places[: len(places) - count], (LENGTH,) * 3)), rotation)
 
 
 def wholes_of(expected: Notation | None) -> list[Notation]:
@@ -432,16 +437,17 @@ def wholes_of(expected: Notation | None) -> list[Notation]:
     return [parse_notation(row.name) for row in ROTATIONS.values() if row.whole]
 
 
-def _chosen(header: Header, places: Sequence[int]) -> Columns:
-    """Take columns as they were chosen, with the units that their names say."""
+def _chosen(header: Header, places: Sequence[int], units: Sequence[Units]) -> Columns:
+    """Take columns as they were chosen, with the units that their names say; the last may be absent."""
     names = [header.names[place] for place in places]
     said = [(re.search(BRACKETS, name), UNITS.match(name.lower(), max(name.rfind("_"), 0))) for name in names]
-    return header.columns([(place, _unit(*each)) for place, each in zip(places, said, strict=True)])
+    spots = [(place, _unit(*each)) for place, each in zip(places, said, strict=True)]
+    return header.columns([*spots, *[None] * (len(units) - len(spots))], units)
 
 
 def _unit(bracket: re.Match[str] | None, said: re.Match[str] | None) -> str:
     """Return the unit that is in brackets, else that behind an underscore."""
-    return bracket[1] if bracket else (said[1] or said[2]) if said else ""
+    return bracket[1].lower() if bracket else (said[1] or said[2]) if said else ""
 
 
 def _chosen_rotation(header: Header, places: Sequence[int], expected: Notation | None) -> tuple[int, Columns | None]:
@@ -458,14 +464,14 @@ def _chosen_rotation(header: Header, places: Sequence[int], expected: Notation |
     for notation in wholes_of(expected):
         row = notation.representation
         if row.whole and size == len(row.whole.columns):
-            found = _rotation(_chosen(header, places), row, expected)
+            found = _rotation(_chosen(header, places, (NUMBER,) * size), row, expected)
             return size, found._replace(whole=True, unit=1.0, notation=notation)
     if expected is None:
         raise Misused(f"--columns: {size} columns do not say what they are; add --from REP")
     if size not in expected.counts:
         raise Misused(f"--columns: {expected.counted}; found {size}")
-    size = len(expected.representation.columns)
-    return size, _rotation(_chosen(header, places[-size:]), expected.representation, expected)
+    row, size = expected.representation, len(expected.representation.columns)
+    return size, _rotation(_chosen(header, places[-size:], UNITS_OF[row.name]), row, expected)
 
 
 def places_named(spec: str, names: Sequence[str] | None, width: int) -> tuple[Sequence[str], list[int]]:

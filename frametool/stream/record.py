@@ -392,7 +392,7 @@ def _with_asked(record: Record, root: Any, request: Request) -> Record:
         record = record._replace(numbers=(*record.numbers, found), values=(*record.values, number))
     if operation.only_adds:
         holder = value_at(root, outermost(record.path))
-        for name in (*request.extras(record.shape), *(said.members if said and not said.replaces else ())):
+        for name in (*operation.extras(record.shape), *(said.members if said and not said.replaces else ())):
             if (key := request.results.prefix + name) in holder:
                 raise Misfit(f"key {shown(key)} is there already; take another name, or --prefix", record.path)
     return record._replace(shape=record.shape._replace(extra=len(operation.columns))) if operation.columns else record
@@ -580,13 +580,13 @@ def _flat_pose(value: dict[str, Any], rotations: list[str]) -> PoseColumns | Non
     is_flat = not (rotations or any(key in POINT_KEYS for key in value))
     if not (names or (is_flat and len(scalars) >= 6)):
         return None
-    from frametool.stream.header import Columns, PoseColumns, find_six, has_pose_column, plain_pose
+    from frametool.stream.header import Columns, Header, PoseColumns, find_six, has_pose_column, plain_pose
 
-    six = find_six(scalars, "") if is_flat else None
+    six = find_six(Header(scalars), "") if is_flat and len(scalars) >= 6 else None
     if six is not None and not has_pose_column(name for name in scalars if name not in six.names):
         return PoseColumns(six, None)
     if not rotations and set(names) == set(QUATERNION) and len(names) == len(value):
-        alone = Columns((0, 1, 2, 3), QUATERNION, notation=notation("quaternion"), degrees=(None,) * 4)
+        alone = Columns((0, 1, 2, 3), QUATERNION, notation=notation("quaternion"), said=(None,) * 4)
         return PoseColumns(None, alone)
     try:
         found = plain_pose(tuple(names), affixed=is_flat)

@@ -20,7 +20,8 @@ from frametool.grammar.readers import in_nanoseconds
 from frametool.grammar.result import Result, Style
 from frametool.stream.record_cuts import Cut, Template, names_of, plan_of
 from frametool.stream.record_values import MOST_ENTRIES, SPELLED, Answer, stamp_key, unit_of, values_of_unit
-from frametool.stream.row_layout import POINT, POSE, ROTATION, VECTOR, Target
+from frametool.stream.request import target_of
+from frametool.stream.row_layout import POINT, POSE, ROTATION, VECTOR, Shape
 from frametool.stream.rows import RowPoses, read_stamps
 from frametool.stream.writers import LEAF, MORE_NUMBERS, NAME, NUMBERS, PARENT, STAMP_NS, AlikeRows, Marked, leaf_mark
 from frametool.text.spans import MARGIN, Bytes, Spans
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from frametool.stream.evaluate import Plan, Run
     from frametool.stream.request import Request
 
-QUATERNIONS = ((notation("quaternion"), False),)
+QUATERNION = notation("quaternion")
 
 
 class RecordRows:
@@ -45,7 +46,7 @@ class RecordRows:
         if template in self._plans:
             return self._plans[template][0]
         plan = plan_of(template, self.request, yaml=self.is_yaml)._replace(pieces=())
-        entries, targets, found = template.entries, list[Target](), list[Marked]()
+        entries, targets, found = template.entries, list[Shape](), list[Marked]()
         # few plain numbers, and no place on the Earth
         is_plain = template.regular and len({entry.record.path for entry in entries}) == len(entries) <= MOST_ENTRIES
         is_simple = is_plain and not any(
@@ -95,20 +96,17 @@ class RecordRows:
             first += each.size
         return batches, left.intersection(run.rows.tolist())
 
-    def _target(self, own: Target, kind: str) -> Target:
+    def _target(self, own: Shape, kind: str) -> Shape:
         """Choose which numbers of a result are written."""
         if kind not in (POSE, ROTATION):
             return own
         if not own.notations:
-            return Target(1.0, ())
-        placed = own.unit is not None or own.whole
-        target = tuple((each, each.in_degrees(self.style.degrees)) for each in self.style.notations)
-        if self.style.format not in SPELLED or not target:
-            return Target(1.0, QUATERNIONS, keep_sign=True)
-        whole = placed and any(each.representation.whole for each, _ in target)
-        return Target(1.0 if placed and not whole else None, target, self.style.keep_sign, whole and len(target) == 1)
+            return Shape(POSE)
+        if self.style.format not in SPELLED or not self.style.notations:
+            return Shape(POSE, notation=QUATERNION, keep_sign=True)
+        return target_of(self.style, placed=own.unit is not None or own.whole)
 
-    def _marked(self, template: Template, at: int, target: Target) -> Marked | None:
+    def _marked(self, template: Template, at: int, target: Shape) -> Marked | None:
         """Return the result of an entry whose scalars are marks; None where it is not made of them alone."""
         entry, operation, style = template.entries[at], self.request.operation, self.style
         record, shape, is_spelled = entry.record, entry.record.shape, style.format in SPELLED

@@ -36,13 +36,14 @@ from frametool.stream import row_layout
 from frametool.stream.faults import ZONES, RowNote
 from frametool.stream.record import STALE, Record, find_records, key_path, pose_of, value_at
 from frametool.stream.request import NO_STAMPS, Request, RowOptions
-from frametool.stream.row_layout import FLAT, LEAVES_PLANE, PARTS, POSE, ROTATION, VECTOR, Target, checked_rotation
+from frametool.stream.row_layout import FLAT, LEAVES_PLANE, PARTS, POSE, ROTATION, VECTOR, checked_rotation
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from frametool.geometry.types import Components, Rigid
     from frametool.stream.request import Operation
+    from frametool.stream.row_layout import Shape
     from frametool.stream.splice import Edit
 
     Value = Result | dict[str, Any]
@@ -71,7 +72,7 @@ class Entry(NamedTuple):
     """
 
     record: Record
-    target: Target
+    target: Shape
     edge: Rigid | None
     stamp: tuple[Path, ...] = ()
     parent: str | None = None
@@ -382,7 +383,7 @@ def _of_several(node: Node, unit: Path, answers: list[Answer], request: Request)
     last = answers[-1].entry  # of the first, an orientation, nothing may be known: then it stays
     found = {"frame": last.parent} | _header_stamp(last.record) | _rest(node, unit, last.record)
     for each in answers:
-        record, numbers = each.entry.record, written(each)[: each.entry.target.size]
+        record, numbers = each.entry.record, written(each)[: each.entry.target.own_size]
         field = record.keys.position or record.keys.rotation
         if numbers:
             found.pop(field, None)
@@ -422,7 +423,7 @@ def _result(node: Node, unit: Path, made: Answer, request: Request, fmt: str) ->
         if operation.similar and isinstance(said.get(SCALE), float):
             pose = pose._replace(scale=said.pop(SCALE))
         return Result(pose, said)
-    values = written(made)[: target.size]
+    values = written(made)[: target.own_size]
     place: dict[str, Any] = dict(zip(PARTS.get(kind, (kind,)), (values[:3], values[3:]), strict=False)) if kind else {}
     if target.place is not None:
         from frametool.grammar.place import point_entry

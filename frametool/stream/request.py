@@ -14,7 +14,7 @@ from frametool.geometry.representations import HEADING, Notation, notation
 from frametool.geometry.rigid import EXACT, SCALED, UNCERTAIN
 from frametool.grammar.pose import SCALE, VELOCITY
 from frametool.stream.faults import STOP
-from frametool.stream.row_layout import MOVERS, POINT, POSE, RATE, SIX, TURNED, VECTOR, Shape, Target, Unit, Word
+from frametool.stream.row_layout import MOVERS, POINT, POSE, RATE, SIX, TURNED, VECTOR, Shape, Unit, Word
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -462,19 +462,19 @@ class Request(NamedTuple):
         """Return True if positions stay as they are written."""
         return self.operation.keeps_position and self.results.place is None
 
-    def target(self, shape: Shape) -> Target:
+    def target(self, shape: Shape) -> Shape:
         """Choose how results of things of a shape are written: as they were read unless set."""
-        asked, kind = self.results, self.operation.result_kind(shape.kind)
+        asked, kind, extras = self.results, self.operation.result_kind(shape.kind), self.operation.extras(shape)
+        in_place = () if shape.rewritten else shape.covariance
+        target = Shape(kind, None, covariance=in_place, extras=extras, keep_sign=asked.keep_sign)
         if kind != shape.kind:
             shape = Shape(kind, shape.unit or 1.0)
-        if not kind:
-            return Target(None, ())
-        if kind in SIX:
-            return Target(None, (), plain=True)
+        if not kind or kind in SIX:
+            return target
         if kind not in TURNED:
             if asked.place is not None and kind != POINT:
                 raise ValueInvalid(f"a {kind} has no place on the Earth; leave --to {asked.place.name} out")
-            return Target(self._unit(shape), (), three=True)
+            return target._replace(unit=self._unit(shape))
         operation, by_row = self.operation, bool(self.rows.frames) or self.timed is not None  # which moves each its way
         moves = (operation.left, *operation.right, operation.fixed)
         shifts = by_row or operation.formula is not None or any(pose is not None and any(pose[:3]) for pose in moves)
@@ -485,17 +485,21 @@ class Request(NamedTuple):
             has_none = shape.notation is None and not by_row and bool(operation.turns or not changed)
             stays = has_none and (asked.by_default or not asked.notations)
             notations = () if stays else asked.notations or (notation("quaternion"),)
-            written = tuple((each, each.in_degrees(self.rows.degrees)) for each in notations)
-            whole = there and len(notations) == 1 and notations[0].representation.whole is not None
-            target = Target(None, written, asked.keep_sign, whole)
+            if notations:
+                first, *more = [(each, each.in_degrees(self.rows.degrees)) for each in notations]
+                whole = there and not more and first[0].representation.whole is not None
+                target = target._replace(notation=first[0], degrees=first[1], more=tuple(more), whole=whole)
         else:
-            first = 3 * (placed and shape.unit is None and not shape.whole)  # a position comes in front
-            absent = tuple(at + first for at in shape.absent)
-            written = ((shape.notation, shape.degrees),)
-            target = Target(None, written, asked.keep_sign, shape.whole, radians_at=shape.radians_at, absent=absent)
-        is_matrix = len(written) == 1 and written[0][0].representation.whole is not None
-        scaled = is_matrix and self.operation.carried(shape) == (SCALE,)  # the scale of results is in the matrix
-        return target._replace(unit=(self._unit(shape) or 1.0) if placed and not target.whole else None, scaled=scaled)
+            ahead = 3 * (placed and shape.unit is None and not shape.whole)  # a position comes in front
+            absent = tuple(at + ahead for at in shape.absent)
+            target = target._replace(notation=shape.notation, degrees=shape.degrees, whole=shape.whole)
+            target = target._replace(radians_at=shape.radians_at, absent=absent)
+        unit = (self._unit(shape) or 1.0) if placed and not target.whole else None
+        is_matrix = target.notation and not target.more and target.notation.representation.whole is not None
+        if is_matrix and operation.carried(shape) == (SCALE,):  # the scale of results is in the matrix
+            extras = extras[:-1] if extras[-1:] == (SCALE,) else extras
+            return target._replace(unit=unit, scaled=True, extras=extras)
+        return target._replace(unit=unit)
 
     def _unit(self, shape: Shape) -> Unit | None:
         """Return how positions are written: as asked for, as they were read, or in metres, as those of places are."""
@@ -504,16 +508,6 @@ class Request(NamedTuple):
             return asked.place
         own = shape.unit if shape.place is None and not (asked.canonical and shape.unit) else 1.0
         return 1.0 if own is not None and asked.all_numbers and (asked.notations or shape.notation is None) else own
-
-    def extras(self, shape: Shape) -> tuple[str, ...]:
-        """Name the numbers that come with a result as columns or keys of their own."""
-        extras = self.operation.extras(shape)
-        return extras[:-1] if self.target(shape).scaled and extras[-1:] == (SCALE,) else extras
-
-    def result_size(self, shape: Shape, target: Target) -> int:
-        """Count the numbers of a result of a shape, with what comes with it."""
-        in_place = 0 if shape.rewritten else sum(shape.covariance)
-        return target.size + len(self.extras(shape)) + in_place
 
     def for_kind(self, kind: str) -> Request:
         """Return what is asked of rows of one kind: how an expression names its result depends on it."""
@@ -527,7 +521,7 @@ class Request(NamedTuple):
         return self.rows.frame_is_counter and frame.isdecimal()
 
 
-def target_of(style: Style, kind: str = POSE, *, placed: bool = True) -> Target:
+def target_of(style: Style, kind: str = POSE, *, placed: bool = True) -> Shape:
     """Return how results are written in a style; placed: poses have a position."""
     quaternions = notation("quaternion")
     asked = ResultOptions(style.notations or (quaternions,), keep_sign=style.keep_sign, place=style.place)

@@ -25,6 +25,7 @@ ATTITUDE = "attitude"  # a rotation of the frame itself, seen from a fixed world
 TURNED = (POSE, ROTATION, ATTITUDE)
 PARTS = {TWIST: ("linear", "angular"), WRENCH: ("force", "torque"), ACCEL: ("linear", "angular")}
 SIX = tuple(PARTS)  # two vectors, linear part first
+THREE = (POINT, VECTOR, NORMAL, RATE)
 MOVERS: dict[str, Callable[..., Components]] = {  # by a pose, whose seven numbers come first
     "": lambda *_: (),
     POINT: rigid.apply,
@@ -56,6 +57,7 @@ def six_names(kind: str) -> list[str]:
 class Shape(NamedTuple):
     """The numbers of a row in order: position (3, if any), then rotation (if any); or those of a whole matrix.
 
+    One shape is read, and one is written: the result.
     kind: point, vector, pose, rotation, attitude, twist, wrench or accel; "" for no numbers
     unit: how many of the position's numbers make a metre; None where there is no position
     notation: that of the rotation; degrees: whether its angles are degrees
@@ -65,8 +67,11 @@ class Shape(NamedTuple):
     rewritten: the first of them has no place of its own in the result, which names its entries anew
     sigma: of six independent axes, the place of each one's number among these, -1 for 0, and its unit
     radians_at: which of the rotation's numbers are radians where the others are degrees
-    absent: which numbers have no column and count as 0
+    absent: which numbers have no column and count as 0; of a result they have to be 0
     extra: how many numbers that an expression reads come last
+    more: of a result, the notations behind the first, with the unit of their angles (True: degrees)
+    extras: the names of the numbers that come with it
+    keep_sign: its quaternions keep their sign; scaled: its matrix is s R, of the scale that comes last
     """
 
     kind: str
@@ -81,6 +86,15 @@ class Shape(NamedTuple):
     radians_at: tuple[int, ...] = ()
     absent: tuple[int, ...] = ()
     extra: int = 0
+    more: tuple[tuple[Notation, bool], ...] = ()
+    extras: tuple[str, ...] = ()
+    keep_sign: bool = False
+    scaled: bool = False
+
+    @property
+    def notations(self) -> tuple[tuple[Notation, bool], ...]:
+        """Return all notations of the rotation, with the unit of their angles."""
+        return () if self.notation is None else ((self.notation, self.degrees), *self.more)
 
     @property
     def joined(self) -> Whole | None:
@@ -89,8 +103,8 @@ class Shape(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Count the numbers of a row."""
-        return self.own_size + sum(self.covariance) + self.extra
+        """Count the numbers of a row, or of a result with what comes with it."""
+        return self.own_size + sum(self.covariance) + self.extra + len(self.extras)
 
     @property
     def own_size(self) -> int:
@@ -101,8 +115,7 @@ class Shape(NamedTuple):
     def _full(self) -> int:
         if self.joined or self.kind in SIX:
             return len(self.joined.columns) if self.joined else 6
-        rotation = len(self.notation.representation.columns) if self.notation else 0
-        return rotation + count_of(self.unit)
+        return count_of(self.unit) + sum(len(each.representation.columns) for each, _ in self.notations)
 
     @property
     def place(self) -> Place | None:
@@ -129,12 +142,24 @@ class Shape(NamedTuple):
         """Return where in a row a number of the rotation is that has a column."""
         return self.rotation_at[index] if self.joined else self._there.index(index)
 
+    @property
+    def angles(self) -> list[bool | None]:
+        """Return whether each of the numbers is an angle in degrees; None where it is no angle."""
+        found: list[bool | None] = [None] * count_of(self.unit)
+        for notation, degrees in self.notations:
+            row = notation.representation
+            found += [degrees if at in row.angles else None for at in range(len(row.columns))]
+        for index in self.radians_at:
+            found[count_of(self.unit) + index] = False
+        return [each for place, each in enumerate(found) if place not in self.absent]
+
     def in_degrees(self, place: int) -> bool | None:
         """Return True if a row's number is an angle in degrees; None if it is no angle."""
-        angles = () if self.whole or self.notation is None else self.notation.representation.angles
-        if place >= self.own_size or self._there[place] not in angles:
-            return None
-        return self.degrees and self._there[place] not in self.radians_at
+        return dict(enumerate(self.angles)).get(place)
+
+    def angle_columns(self) -> list[tuple[int, float]]:
+        """Return which of the numbers are angles, each with the size of a full turn."""
+        return [(at, 360.0 if degrees else TURN) for at, degrees in enumerate(self.angles) if degrees is not None]
 
     def in_metres(self, place: int) -> bool:
         """Return True if a row's number is a length in metres, of a point, a vector or a position."""
@@ -187,32 +212,7 @@ class Shape(NamedTuple):
             full.insert(place, numbers[0] - numbers[0])
         return full
 
-
-class Target(NamedTuple):
-    """How results are written.
-
-    unit: of positions (None: not at all); notations: with the unit of their angles (True: degrees)
-    keep_sign: quaternions keep their sign; whole: the first notation carries the position
-    plain: the numbers of a twist or wrench as they are; three: those of a point or vector
-    radians_at: which of the first notation's numbers are radians where the others are degrees
-    absent: which numbers have no column; they have to be 0
-    scaled: the matrix is s R, of the scale that comes last
-    """
-
-    unit: Unit | None
-    notations: tuple[tuple[Notation, bool], ...]
-    keep_sign: bool = False
-    whole: bool = False
-    plain: bool = False
-    three: bool = False
-    radians_at: tuple[int, ...] = ()
-    absent: tuple[int, ...] = ()
-    scaled: bool = False
-
-    @property
-    def place(self) -> Place | None:
-        """Return how positions on the Earth are written, None where there are none."""
-        return place_of(self.unit)
+    # --- writing ---
 
     @property
     def position_columns(self) -> list[str]:
@@ -221,8 +221,8 @@ class Target(NamedTuple):
 
     def written(self, parts: Components, xp: Namespace) -> list[Any]:
         """Return all numbers of a result: those of the thing itself, then what comes with it as it is."""
-        own = 6 if self.plain else 3 if self.three or len(parts) == 3 else 7
-        full = self._full(parts[:own], xp, parts[-1] if self.scaled else None, getattr(parts, "read", None))
+        own = 6 if self.kind in SIX else 3 if self.kind in THREE else 7
+        full = self._all_written(parts[:own], xp, parts[-1] if self.scaled else None, getattr(parts, "read", None))
         if self.absent:
             full = [number for place, number in enumerate(full) if place not in self.absent]
         return [*full, *parts[own : len(parts) - self.scaled]]
@@ -231,12 +231,12 @@ class Target(NamedTuple):
         """Return the numbers of a result without a column, by name; a row where one is above FLAT is bad."""
         if not self.absent:
             return []
-        full, names = self._full(parts, xp), [*self.position_columns, *self.names]
+        full, names = self._all_written(parts, xp), [*self.position_columns, *self.names]
         return [(names[place], full[place]) for place in self.absent]
 
-    def _full(self, parts: Components, xp: Namespace, scale: Any = None, read: Spot | None = None) -> list[Any]:
+    def _all_written(self, parts: Components, xp: Namespace, scale: Any = None, read: Spot | None = None) -> list[Any]:
         """Return the numbers of a result: the position, then each notation's; or those of a whole matrix."""
-        if self.plain:
+        if self.kind in SIX:
             return list(parts)
         position: list[Any] = []
         if self.unit == 1.0:
@@ -246,7 +246,7 @@ class Target(NamedTuple):
             position = place.numbers(x, y, z, read)
         elif self.unit is not None:
             position = [part * unit for part, unit in zip(parts[:3], _each(self.unit), strict=True)]
-        if len(parts) == 3 or not self.notations:
+        if not self.notations:
             return position
         x, y, z, w = parts[3:7] if self.place is None else self.place.local(parts[0], parts[1], parts[2], parts[3:7])
         unit = quaternion.unit(x, y, z, w, xp)
@@ -256,8 +256,8 @@ class Target(NamedTuple):
         ]
         if scale is not None:
             written = [tuple(number * scale for number in written[0])]
-        if self.whole and (whole := self.notations[0][0].representation.whole):
-            return list(whole.join(parts[:3], written[0]))
+        if self.joined:
+            return list(self.joined.join(parts[:3], written[0]))
         turned = [number for numbers in written for number in numbers]
         for index in self.radians_at:
             turned[index] = turned[index] / TO_DEGREES
@@ -266,25 +266,9 @@ class Target(NamedTuple):
     @property
     def names(self) -> list[str]:
         """Name the numbers of all notations as columns; of a whole pose all of them."""
-        if self.whole and (whole := self.notations[0][0].representation.whole):
-            return list(whole.columns)
+        if self.joined:
+            return list(self.joined.columns)
         return [name for notation, degrees in self.notations for name in notation.columns_in(degrees=degrees)]
-
-    @property
-    def size(self) -> int:
-        """Count the numbers of a result."""
-        return 6 if self.plain else count_of(self.unit) + len(self.names) - len(self.absent)
-
-    def angle_columns(self) -> list[tuple[int, float]]:
-        """Return which of the numbers are angles, each with the size of a full turn."""
-        periods = [0.0] * count_of(self.unit)
-        for notation, degrees in self.notations:
-            row = notation.representation
-            periods += [(360.0 if degrees else TURN) * (at in row.angles) for at in range(len(row.columns))]
-        for index in self.radians_at:
-            periods[count_of(self.unit) + index] = TURN
-        there = [period for place, period in enumerate(periods) if place not in self.absent]
-        return [(place, period) for place, period in enumerate(there) if period]
 
     def locked(self, parts: Components) -> Any:
         """Return where Euler angles among the notations are not unique; None if there are none."""

@@ -21,7 +21,7 @@ from frametool.stream import row_layout
 from frametool.stream.faults import Fault
 from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ, outermost
 from frametool.stream.record_values import Answer, Entry, Outside, RecordText, json_documents, written
-from frametool.stream.row_layout import POSE, SIX, Const, IfLocked, In, Out, Piece, Renamed, Word, count_of, number_text
+from frametool.stream.row_layout import POSE, SIX, Const, IfLocked, In, Out, Piece, Renamed, Word, number_text
 from frametool.text.lines import with_edits
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class Splicer:
         """Return the edits, in no order."""
         shape, unit = self.record.shape, self.target.unit
         # a bare list stays one if the result has its numbers and no others
-        stays = bool(self.members) or ((unit is None or shape.unit is not None) and not self.request.extras(shape))
+        stays = bool(self.members) or ((unit is None or shape.unit is not None) and not self.target.extras)
         if self.request.operation.only_adds:
             self.behind[self.tail] += self._extras(0)
         else:
@@ -138,8 +138,8 @@ class Splicer:
         if target.scaled:
             self.dropped.update(keys.covariances)  # the matrix says the scale
         elif not shape.rewritten:
-            extras = len(self.request.extras(shape))
-            self._numbers(range(shape.own_size, shape.own_size + sum(shape.covariance)), target.size + extras)
+            own, extras = shape.own_size, len(target.extras)
+            self._numbers(range(own, own + sum(shape.covariance)), target.own_size + extras)
         if shape.kind in SIX:
             self._numbers(range(6), 0)
             return
@@ -165,7 +165,7 @@ class Splicer:
             slots = range(there, shape.own_size)
             at = keys.rotation
             if self._same_rotation() and None not in [self.slots[slot] for slot in slots]:
-                self._numbers(slots, self._rotation_at)
+                self._numbers(slots, self.target.position_size)
             else:
                 made = self._rotation()
                 if at:
@@ -175,13 +175,13 @@ class Splicer:
             at = at or keys.position
         else:
             self.dropped.update(keys.others)
-        self.behind[at or self.tail] += made + self._extras(target.size)
+        self.behind[at or self.tail] += made + self._extras(target.own_size)
 
     def _anew(self) -> None:
         """Write all members of a result in place of a bare list, or of what said what a record was."""
         target, keys = self.target, self.record.keys
         position = [self._place("xyz" if self.kind == POSE else self.kind)] if target.unit is not None else []
-        self.behind[self.tail] += [*position, *self._rotation(), *self._extras(target.size)]
+        self.behind[self.tail] += [*position, *self._rotation(), *self._extras(target.own_size)]
         self.dropped |= {keys.position, keys.rotation, *keys.others, *keys.members, *keys.flat}
         self.dropped |= {*STALE, "inverse", "angles"}
 
@@ -195,12 +195,6 @@ class Splicer:
             entry |= {AXES_KEY: place.axes}
         return self._member(entry, 0)
 
-    @property
-    def _rotation_at(self) -> int:
-        """Count the numbers of the result before those of its rotation."""
-        size = count_of(self.target.unit)
-        return size - sum(place < size for place in self.target.absent)
-
     def _rotation(self) -> list[Pieces]:
         """Write the rotation in all its notations, and the flag of a lock; nothing without a rotation."""
         notations = self.target.notations
@@ -208,7 +202,7 @@ class Splicer:
         style = Style("json", tuple(notation for notation, _ in notations), degrees=degrees)
         entry = Result(Pose(SAMPLE[:3] if self.target.whole else None, SAMPLE)).mapping(style)
         entry.pop("gimbal_lock", None)
-        made = self._member(entry, self._rotation_at)
+        made = self._member(entry, self.target.position_size)
         if any(notation.euler_axes for notation, _ in notations):
             flag = [Const(self.between.encode()), *self._member({"gimbal_lock": True}, 0)]
             made += tuple(IfLocked(piece.text) for piece in flag if isinstance(piece, Const))
@@ -218,7 +212,7 @@ class Splicer:
         """Return what comes with a result as members; one of the record that gives way to such a one is replaced."""
         said, prefix = self.request.operation.shown, self.request.results.prefix
         if said is None:
-            names = [prefix + name for name in self.request.extras(self.record.shape)]
+            names = [prefix + name for name in self.target.extras]
             return [self._member(with_entries(dict.fromkeys(names, 0.5)), first)] if names else []
         members = []
         for name, value in said.members.items():
@@ -381,7 +375,7 @@ def attempt(text: bytes, part: Part, line: int = 0, *, fmt: str, request: Reques
         edits, first = list[Edit](), 0
         for entry in () if request.results.canonical else found.entries:
             edits += Splicer(found.root, entry, request, json=found.json, first=first).run()
-            first += request.result_size(entry.record.shape, entry.target)
+            first += entry.target.size
         found.edits = list(dict.fromkeys(edits))  # a name that several records share changes once
     except Aliased as error:
         return fault_at(source, error.in_text(source.text))

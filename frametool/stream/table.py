@@ -26,8 +26,8 @@ from frametool.grammar.readers import EARTH_FRAMES, NORMALS, in_nanoseconds, sta
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import STOP, Fault, Outcome, RowNote
 from frametool.stream.header import has_pose_column, listed
-from frametool.stream.request import SOME, VELOCITIES
-from frametool.stream.row_layout import NORMAL, POSE, RATE, Shape
+from frametool.stream.request import SOME
+from frametool.stream.row_layout import NORMAL, POSE, RATE, Out, Shape
 from frametool.stream.rows import (
     Block,
     BlockNames,
@@ -40,7 +40,7 @@ from frametool.stream.rows import (
     taken,
     written,
 )
-from frametool.stream.table_plan import ADDED, Layout, Named, New, plan_table
+from frametool.stream.table_plan import Layout, Named, New, plan_table
 from frametool.text.lines import read_blocks, whole_lines, with_edits
 from frametool.text.spans import (
     MARGIN,
@@ -79,6 +79,8 @@ class Table(NamedTuple):
     names: of its columns, if it has any; width: how many cells a row has
     head: what comes before the header, or before the first row
     header: the raw text of the header's cells; title: its whole line; line_end: what ends it
+    source: what it is called
+    normals: the columns of vectors that turn with points; stamped: a column with the name of a stamp is one
     """
 
     delimiter: bytes
@@ -88,6 +90,9 @@ class Table(NamedTuple):
     header: tuple[bytes, ...] = ()
     title: bytes = b""
     line_end: bytes = b"\n"
+    source: str = ""
+    normals: Sequence[tuple[str, ...]] = NORMALS
+    stamped: bool = True
 
     def split(self, block: bytes) -> Cells:
         """Find the cells of a block."""
@@ -115,7 +120,7 @@ class Table(NamedTuple):
         if not (self.header or grown):
             return self.head
         own = self.header or [*map(self.cell, self.called)]
-        cells = [self.cell(each.name) if isinstance(each, ADDED) else own[each.place] for each in layout.columns]
+        cells = [self.cell(each.name) if isinstance(each, New) else own[each.place] for each in layout.columns]
         title = self.title if cells == [*self.header] else (self.delimiter or b" ").join(cells)
         return self.head + b"# " * (not self.header) + title + self.line_end
 
@@ -140,42 +145,35 @@ def open_table(
     line = rest[:end]
     if delimiter and torn_record(line, delimiter) is not None:
         raise FormatError(UNCLOSED, source=source, line=1)
-    cells = cells_of(line, delimiter)
-    named = _named_comment(comments, delimiter, len(cells), known) if header and comments else None
-    if not cells and not (delimiter and comments):
+    title = line.rstrip(b"\r\n")
+    bare = Table(delimiter, None, 0, mark + comments, source=source)
+    own = _titled(title, bare._replace(line_end=line[len(title) :] or b"\n"))
+    if not own.width and not (delimiter and comments):
         raise FormatError("no rows in it", source=source)
     count = 0  # of numbers
-    for cell in cells:
+    for name in own.names or ():
         with suppress(ValueError):
-            count += float(_unquoted(cell)) is not None
-    own = header and not (count == len(cells) if delimiter else count)
-    if named is not None and not (own and known([*map(_unquoted, cells)])):
-        return named._replace(head=mark + named.head), rest
-    if not own:
-        if header and not expected and delimiter and not row.columns and len(cells) != len(FORMATS["tum"].rows.columns):
-            raise FormatError("the first line holds numbers and no names; give --no-header", source=source, line=1)
-        return Table(delimiter, None, len(cells), mark + comments), rest
-    title = line.rstrip(b"\r\n")
-    names, line_end = tuple(map(_unquoted, cells)), line[len(title) :] or b"\n"
-    return Table(delimiter, names, len(cells), mark + comments, tuple(cells), title, line_end), rest[end:]
+            float(name)
+            count += 1
+    is_header = header and not (count == own.width if delimiter else count)
+    if header and comments.strip() and not (is_header and known(own.names or ())):  # the last comment may be one
+        text = comments.rstrip()
+        words = text[max(text.rfind(b"\n"), text.rfind(b"\r")) + 1 :].lstrip(b"# \t")
+        before, behind = mark + text[: len(text) - len(words)], comments[len(text) :]
+        above = _titled(words, own._replace(head=before, line_end=behind))
+        if above.width and own.width in (0, above.width) and known(above.names or ()):
+            return above, rest
+    if is_header:
+        return own, rest[end:]
+    if header and not expected and delimiter and not row.columns and own.width != len(FORMATS["tum"].rows.columns):
+        raise FormatError("the first line holds numbers and no names; give --no-header", source=source, line=1)
+    return bare._replace(width=own.width), rest
 
 
-def _named_comment(
-    comments: bytes, delimiter: bytes, width: int, known: Callable[[Sequence[str]], bool]
-) -> Table | None:
-    """Take the last comment for the header if it has a word for each column and they are known as names."""
-    lines = [line for line in comments.splitlines(keepends=True) if line.strip()]
-    if not lines:
-        return None
-    start = comments.rindex(lines[-1])
-    text = lines[-1].rstrip(b"\r\n")
-    words = text.lstrip(b"# \t")
-    cells = cells_of(words, delimiter)
-    names = tuple(map(_unquoted, cells))
-    if not cells or (width and len(cells) != width) or not known(names):
-        return None
-    before, behind = comments[: start + len(text) - len(words)], comments[start + len(text) :]
-    return Table(delimiter, names, len(cells), before, tuple(cells), words, behind)
+def _titled(title: bytes, table: Table) -> Table:
+    """Return a table with the names in a line; without any if there are none."""
+    cells = tuple(cells_of(title, table.delimiter))
+    return table._replace(names=tuple(map(_unquoted, cells)), width=len(cells), header=cells, title=title)
 
 
 def cells_of(line: bytes, delimiter: bytes) -> list[bytes]:
@@ -194,75 +192,7 @@ def _unquoted(cell: bytes) -> str:
     return text[1:-1].replace('""', '"') if len(text) > 1 and text[0] == text[-1] == '"' else text
 
 
-class Naming:
-    """What a run does with the names in a table; remembers the frame of the rows before."""
-
-    def __init__(self, table: Table, layout: Layout, request: Request, shape: Shape) -> None:
-        """Take from the request what it does to names; shape: what a row is."""
-        self.layout, self.table = layout, table
-        self.earth = EARTH_FRAMES[0] if shape.place is not None else None
-        self.places = (layout.frames[0] if layout.frames else None, layout.name) if request.rows.poses else (None, None)
-        named = self.places[self.places[0] is None]
-        self.column = "" if named is None else table.name(named)
-        may_count = layout.frames and table.name(layout.frames[0]) == COUNTER and COUNTER not in request.rows.frames
-        self.counts = request.counts if may_count else lambda _: False
-        self.rename = request.renaming
-        self.consecutive = request.operation.looks_back
-        self.before: str | None = None
-
-    def of_rows(self, size: int, column: Callable[[int], Coded]) -> tuple[Sequence[str | None], BlockNames, Bad]:
-        """Read the names of so many rows: return their frames, the names of the results, and the rows that do not fit.
-
-        column: returns the texts of a column
-        """
-        if self.places != (None, None) and size:
-            return self._renamed(size, column)
-        texts = [column(place).each() for place in self.layout.frames] if size else []
-        return [*map("\0".join, zip(*texts, strict=True))] or [self.earth], BlockNames(), {}
-
-    def _renamed(self, size: int, column: Callable[[int], Coded]) -> tuple[Sequence[str | None], BlockNames, Bad]:
-        """Read the names of rows that have columns of them, and rename them."""
-        none = Coded([""], np.zeros(size, np.int64))
-        parents, names = (none if place is None else column(place) for place in self.places)
-        count = len(names.texts)
-        found, of_row = np.unique(parents.codes * count + names.codes, return_inverse=True)
-        pairs = [(parents.texts[code // count], names.texts[code % count]) for code in found.tolist()]
-        results, lost = list(pairs), dict[int, str]()
-        bad: Bad = {}
-        for at, pair in enumerate(pairs):
-            is_counter = self.counts(pair[0])
-            try:
-                old = None if is_counter else pair[0] or None, pair[1] or None
-                new = old if self.rename is None else self.rename(*old)
-                results[at] = pair[0] if is_counter else new[0] or "", new[1] or ""
-            except FrametoolError as error:
-                bad |= dict.fromkeys(np.flatnonzero(of_row == at).tolist(), (self.column, error))
-            for place, name, result in zip(self.places, pair, results[at], strict=True):
-                if place is not None and name and not result:  # a cell named a frame, and the result does not
-                    lost.setdefault(int((of_row == at).argmax()), name)
-        for row, parent in enumerate(parents.each() if self.consecutive else ()):
-            self.before = parent if self.before is None else self.before
-            if parent != self.before:
-                bad[row] = self.column, f"given in another frame than {self.before!r}, as the rows before are"
-        known = [None if not text or self.counts(text) else text for text in parents.texts]
-        frames = [self.earth] if self.earth else [known[code] for code in parents.codes.tolist()]
-        return frames, BlockNames(pairs, results, of_row, dict(sorted(lost.items())[:1])), bad
-
-    def spans(self, cells: Cells, role: int, names: BlockNames) -> Spans:
-        """Write names as cells; one that does not change stays as it is written."""
-        place, of_row = self.places[role] or 0, names.of_row
-        new = spans_of([self.table.cell(result[role]) for result in names.results])
-        starts, ends = new.starts[of_row], new.ends[of_row]
-        pairs = zip(names.pairs, names.results, strict=True)
-        same = np.array([old[role] == result[role] for old, result in pairs])[of_row]
-        if not same.any():
-            return Spans(new.data, starts, ends)
-        data, behind = np.concatenate([new.data, cells.data]), len(new.data)
-        starts = np.where(same, cells.starts[:, place] + behind, starts)
-        return Spans(data, starts, np.where(same, cells.ends[:, place] + behind, ends))
-
-
-def as_trajectory(table: Table, fmt: str, request: Request, source: str) -> tuple[Table, Request]:
+def as_trajectory(table: Table, fmt: str, request: Request) -> tuple[Table, Request]:
     """Set the columns of a trajectory, unless --from or --columns do; eight numbers without names are TUM.
 
     Raises FormatError for a count of columns that the format does not have.
@@ -273,7 +203,7 @@ def as_trajectory(table: Table, fmt: str, request: Request, source: str) -> tupl
     if row.widths and table.width not in row.widths and (fmt == "kitti" or not names):
         counts = " or ".join(map(str, row.widths))
         line = table.head.count(b"\n") + 1
-        raise FormatError(f"expected {counts} numbers a line, found {table.width}", source=source, line=line)
+        raise FormatError(f"expected {counts} numbers a line, found {table.width}", source=table.source, line=line)
     if fmt not in ("kitti", "euroc"):
         tum = FORMATS["tum"].rows.columns
         columns = row.columns or (tum if table.width == len(tum) else ())
@@ -285,43 +215,12 @@ def as_trajectory(table: Table, fmt: str, request: Request, source: str) -> tupl
             names = (*names[:at], f"{names[at]} [ns]", *names[at + 1 :])  # whatever the file calls them
     bare, wanted = ([name.split("[")[0].strip() for name in each] for each in (names, ours))
     if missing := [name for name in wanted if name not in bare]:
-        raise FormatError(f"no column {', '.join(missing)}", source=source, line=1)
+        raise FormatError(f"no column {', '.join(missing)}", source=table.source, line=1)
     if asked.poses == 1:
         places = [bare.index(name) + 1 for name in wanted]
         chosen = ",".join(f"{place}-{place}" for place in places)  # ranges, because a column may be called 2
         request = request.with_rows(given=notation(row.rotation), columns=(chosen,))
     return table._replace(names=names), request
-
-
-def table_block(table: Table, layout: Layout, cells: Cells, naming: Naming, *, some_static: bool) -> Block:
-    """Find the rows of a block, their numbers, their names, and the stretches of text that pass."""
-    places = layout.places
-    is_run = places and places == tuple(range(places[0], places[0] + len(places)))  # then nothing is copied
-    own = slice(places[0], places[-1] + 1) if is_run else list(places)
-    numbers = Spans(cells.data, cells.starts[:, own], cells.ends[:, own])
-    if places and (cells.data == QUOTE).any():
-        numbers = without_quotes(numbers)
-    frames, names, bad = naming.of_rows(len(cells.rows), lambda place: coded(cells.column(place)))
-    parts = [
-        naming.spans(cells, each.role, names) if isinstance(each, Named)
-        else Spans(cells.data, _bounds(cells, each[0]), _bounds(cells, each[1]))
-        for each in layout.stretches
-    ]
-    times = [place for place in (layout.time, layout.below) if place is not None]
-    columns = [without_quotes(cells.column(place)) for place in times]
-    stamps, late = stamps_in(columns, table.name(times[0]), some_static=some_static) if times else (None, {})
-    unchanged, broken, before = [], [], cache(cells.lines_before)
-    if len(cells.rows) < len(cells.counts):
-        named = f" ({' '.join(table.names)})" if table.names and len(table.names) < 12 else ""
-        for line in cells.odd_lines().tolist():
-            raw = cells.line(line)
-            if cells.counts[line] == 0 or (cells.counts[line] == 1 and not raw.strip()):
-                unchanged.append((line, raw))
-            else:
-                reason = f"expected {table.width} cells{named}, found {int(cells.counts[line])}"
-                broken.append((line, Fault(int(before()[line]), "", reason, skipped=True)))
-    line_of = lambda row: int(before()[cells.rows[row]])  # noqa: E731
-    return Block(numbers, parts, cells.rows, line_of, unchanged, broken, names, [stamps], late | bad, frames=[frames])
 
 
 def _bounds(cells: Cells, at: int) -> Ints:
@@ -352,27 +251,21 @@ class PlannedRows:
     A request for all numbers makes poses of them; its notations say which numbers come out.
     off: how far the worst rotation was from one; mended: how many were normalised
     inputs: the numbers of the last rows that became poses as read, a row a column
+    before: the frame of the rows before
     unasked: the column of stamps that no option names
     """
 
-    def __init__(
-        self, table: Table, request: Request, source: str, normals: Sequence[tuple[str, ...]] = NORMALS, *,
-        stamped: bool = True,
-    ) -> None:  # fmt: skip
-        """Plan the rows of a table; raises FormatError or Misused where they do not fit what is asked for.
-
-        normals: the columns of vectors that turn with points; stamped: a column with the name of a stamp is one
-        """
+    def __init__(self, table: Table, request: Request) -> None:
+        """Plan the rows of a table; raises FormatError or Misused where they do not fit what is asked for."""
         timed, extra, operation = request.timed, request.rows.extra_column, request.operation
         usual = "" if (at := stamp_places(table.names)[0]) is None else table.name(at)
         is_cut = (request.window or request.offset_ns) and extra is None and not (timed and timed.name)
         lacks_name, self.unasked = extra == "" or is_cut, None
         of_formula = timed and not timed.name and operation.formula and not operation.shown
         if not usual and (lacks_name or of_formula):
-            who = "a velocity" if operation.of == VELOCITIES else "--start, --stop, --time-offset"
             known = f"; columns: {listing(table.names)}" if table.names else ""
             message = f"no column looks like stamps; name it with --time-column{known}"
-            raise Misused(f"{who if lacks_name else '@ row'}: {message}", source=source, line=1)
+            raise Misused(message, source=table.source, line=1)
         if lacks_name:
             request = request.with_rows(extra_column=usual)
         if timed is not None and not timed.name:
@@ -380,9 +273,11 @@ class PlannedRows:
             request = request._replace(timed=named if of_formula else None)
             self.unasked = named if usual and not of_formula else None
         self.table, self.request = table, request
-        self.plan, self.layout = plan_table(table, request, source, normals, stamped=stamped)
+        self.plan, self.layout = plan_table(table, request)
         self.shape = self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
-        self.naming = Naming(table, self.layout, request.for_kind(self.shape.kind), self.shape)
+        self.earth = EARTH_FRAMES[0] if self.shape.place is not None else None
+        self.rename = request.for_kind(self.shape.kind).renaming
+        self.before: str | None = None
         self.state = State()
         self.mended, self.off = 0, 0.0
 
@@ -390,6 +285,58 @@ class PlannedRows:
     def columns(self) -> str:
         """List the columns there are."""
         return listed(self.table.called)
+
+    def names_of(self, size: int, column: Callable[[int], Coded]) -> tuple[Sequence[str | None], BlockNames, Bad]:
+        """Read the names of so many rows: return their frames, the names of the results, and the rows that do not fit.
+
+        column: returns the texts of a column
+        """
+        if self.layout.named != (None, None) and size:
+            return self._renamed(size, column)
+        texts = [column(place).each() for place in self.layout.frames] if size else []
+        return [*map("\0".join, zip(*texts, strict=True))] or [self.earth], BlockNames(), {}
+
+    def _renamed(self, size: int, column: Callable[[int], Coded]) -> tuple[Sequence[str | None], BlockNames, Bad]:
+        """Read the names of rows that have columns of them, and rename them."""
+        none, rows = Coded([""], np.zeros(size, np.int64)), self.request.rows
+        called = next(self.table.name(place) for place in self.layout.named if place is not None)
+        parents, names = (none if place is None else column(place) for place in self.layout.named)
+        may_count, count = called == COUNTER and COUNTER not in rows.frames, len(names.texts)
+        counters = {text for text in parents.texts if may_count and self.request.counts(text)}
+        found, of_row = np.unique(parents.codes * count + names.codes, return_inverse=True)
+        pairs = [(parents.texts[code // count], names.texts[code % count]) for code in found.tolist()]
+        results, lost = list(pairs), dict[int, str]()
+        bad: Bad = {}
+        for at, pair in enumerate(pairs):
+            try:
+                old = None if pair[0] in counters else pair[0] or None, pair[1] or None
+                new = old if self.rename is None else self.rename(*old)
+                results[at] = pair[0] if pair[0] in counters else new[0] or "", new[1] or ""
+            except FrametoolError as error:
+                bad |= dict.fromkeys(np.flatnonzero(of_row == at).tolist(), (called, error))
+            for place, name, result in zip(self.layout.named, pair, results[at], strict=True):
+                if place is not None and name and not result:  # a cell named a frame, and the result does not
+                    lost.setdefault(int((of_row == at).argmax()), name)
+        for row, parent in enumerate(parents.each() if self.request.operation.looks_back else ()):
+            self.before = parent if self.before is None else self.before
+            if parent != self.before:
+                bad[row] = called, f"given in another frame than {self.before!r}, as the rows before are"
+        known = [None if not text or text in counters else text for text in parents.texts]
+        frames = [self.earth] if self.earth else [known[code] for code in parents.codes.tolist()]
+        return frames, BlockNames(pairs, results, of_row, dict(sorted(lost.items())[:1])), bad
+
+    def _name_spans(self, cells: Cells, role: int, names: BlockNames) -> Spans:
+        """Write names as cells; one that does not change stays as it is written."""
+        place, of_row = self.layout.named[role] or 0, names.of_row
+        new = spans_of([self.table.cell(result[role]) for result in names.results])
+        starts, ends = new.starts[of_row], new.ends[of_row]
+        pairs = zip(names.pairs, names.results, strict=True)
+        same = np.array([old[role] == result[role] for old, result in pairs])[of_row]
+        if not same.any():
+            return Spans(new.data, starts, ends)
+        data, behind = np.concatenate([new.data, cells.data]), len(new.data)
+        starts = np.where(same, cells.starts[:, place] + behind, starts)
+        return Spans(data, starts, np.where(same, cells.ends[:, place] + behind, ends))
 
     def ran(self, block: Block) -> Run:
         """Return what becomes of a block, with its warnings in order."""
@@ -410,20 +357,21 @@ class PlannedRows:
         """Return the results of some rows of a block as poses; column: returns the cells of one for all rows."""
         layout, block, plan = self.layout, run.block, self.plan
         self.inputs = np.reshape(run.columns, (len(run.columns), run.count))[:, rows]
-        used = {layout.time, layout.below, *layout.places, *self.naming.places}
+        used = {*layout.times, *layout.places, *layout.named}
         others = [place for place in range(self.table.width) if place not in used]
         extras = {self.table.name(place): taken(column(place), rows) for place in others}
         own = numbers.shape[1]
         if plan.shapes and plan.shapes[-1].kind in (NORMAL, RATE):  # vectors that turn along come last
             own -= 3 * (len(plan.targets) - 1)
-        extra = [each for each in layout.columns if isinstance(each, New) and each.number >= own]
-        extras |= {each.name: numbers[:, each.number] for each in extra}
-        stamps = None if layout.time is None else block.stamps[0][rows]
-        rename, earth = self.naming.rename, self.naming.earth
+        new = {each.name: each.piece for each in layout.columns if isinstance(each, New)}
+        numbered = {name: piece.first for name, piece in new.items() if isinstance(piece, Out)}
+        extras |= {name: numbers[:, at] for name, at in numbered.items() if at >= own}
+        stamps = block.stamps[0][rows] if layout.times else None
+        rename, earth = self.rename, self.earth
         unnamed = (earth, None) if rename is None else rename(earth, None)  # known of places, and of an expression
         parents, names = (
             [name] if place is None else block.names.texts(role, rows)
-            for role, (place, name) in enumerate(zip(self.naming.places, unnamed, strict=True))
+            for role, (place, name) in enumerate(zip(layout.named, unnamed, strict=True))
         )
         return RowPoses(numbers[:, :own], stamps, lines, parents, names, extras)
 
@@ -434,9 +382,7 @@ class TableRows(PlannedRows):
     texts: those of the blocks; taken, lines: how many bytes and lines the head had
     """
 
-    def __init__(
-        self, stream: ByteStream, fmt: str, request: Request, source: str, *, header: bool = True
-    ) -> None:
+    def __init__(self, stream: ByteStream, fmt: str, request: Request, source: str, *, header: bool = True) -> None:
         """Read the head of a table in a format, and plan its rows; raises FormatError or Misused."""
         delimiter = (FORMATS[fmt].rows.delimiter or "").encode()
         blocks, first = read_blocks(stream, whole=RecordEnds(delimiter) if delimiter else whole_lines), b""
@@ -448,7 +394,7 @@ class TableRows(PlannedRows):
             raise FormatError("nothing in it", source=source)
         known = request.rows.given or request.rows.given_place
         table, rest = open_table(first, fmt, header=header, source=source, expected=known)
-        super().__init__(*as_trajectory(table, fmt, request, source), source)
+        super().__init__(*as_trajectory(table, fmt, request))
         self.texts = chain((rest,) if rest else (), blocks)
         self.taken = len(first) - len(rest)
         self.lines = first.count(b"\n", 0, self.taken)
@@ -458,9 +404,9 @@ class TableRows(PlannedRows):
         table, layout = self.table, self.layout
         torn = torn_record(text, table.delimiter) if table.delimiter else None
         cells = table.split(text[:torn])
-        if self.request.offset_ns and layout.time is not None:
+        if self.request.offset_ns and layout.times:
             cells = table.split(self._at_other_times(text[:torn], cells, self.request.offset_ns))
-        block = table_block(table, layout, cells, self.naming, some_static=self.request.rows.stamps == SOME)
+        block = self.block_of(cells)
         run = self.ran(block)
         faults = run.faults()
         if torn is not None:
@@ -468,11 +414,43 @@ class TableRows(PlannedRows):
         rows = len(block.places) + len(block.broken)
         return run, Outcome(b"", faults, rows, text.count(b"\n"), len(run.mended), run.notes, len(text)), cells
 
+    def block_of(self, cells: Cells) -> Block:
+        """Find the rows of a block, their numbers, their names, and the stretches of text that pass."""
+        table, layout = self.table, self.layout
+        places = layout.places
+        is_run = places and places == tuple(range(places[0], places[0] + len(places)))  # then nothing is copied
+        own = slice(places[0], places[-1] + 1) if is_run else list(places)
+        numbers = Spans(cells.data, cells.starts[:, own], cells.ends[:, own])
+        if places and (cells.data == QUOTE).any():
+            numbers = without_quotes(numbers)
+        frames, names, bad = self.names_of(len(cells.rows), lambda place: coded(cells.column(place)))
+        parts = [
+            self._name_spans(cells, each.role, names) if isinstance(each, Named)
+            else Spans(cells.data, _bounds(cells, each[0]), _bounds(cells, each[1]))
+            for each in layout.stretches
+        ]
+        times = [without_quotes(cells.column(place)) for place in layout.times]
+        some_static = self.request.rows.stamps == SOME
+        name = table.name(layout.times[0]) if times else ""
+        stamps, late = stamps_in(times, name, some_static=some_static) if times else (None, {})
+        unchanged, broken, before = [], [], cache(cells.lines_before)
+        if len(cells.rows) < len(cells.counts):
+            named = f" ({' '.join(table.names)})" if table.names and len(table.names) < 12 else ""
+            for line in cells.odd_lines().tolist():
+                raw = cells.line(line)
+                if cells.counts[line] == 0 or (cells.counts[line] == 1 and not raw.strip()):
+                    unchanged.append((line, raw))
+                else:
+                    reason = f"expected {table.width} cells{named}, found {int(cells.counts[line])}"
+                    broken.append((line, Fault(int(before()[line]), "", reason, skipped=True)))
+        line_of = lambda row: int(before()[cells.rows[row]])  # noqa: E731
+        bad, stamped = late | bad, [stamps]
+        return Block(numbers, parts, cells.rows, line_of, unchanged, broken, names, stamped, bad, frames=[frames])
+
     def _at_other_times(self, text: bytes, cells: Cells, offset_ns: int) -> bytes:
         """Return rows with so much added to their stamps; what is no stamp stays and is reported when it is read."""
-        places = [place for place in (self.layout.time, self.layout.below) if place is not None]
-        columns = [without_quotes(cells.column(place)) for place in places]
-        in_ns = in_nanoseconds(self.table.name(places[0]))
+        columns = [without_quotes(cells.column(place)) for place in self.layout.times]
+        in_ns = in_nanoseconds(self.table.name(self.layout.times[0]))
         stamps, reasons = read_stamps(columns, in_ns=in_ns)
         edits = []
         for row in sorted({*range(len(stamps))} - {*reasons}):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
-from itertools import chain
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING, TypeAlias
 
 from frametool.errors import FormatError, Misused, NamedTuple, ValueInvalid, alternatives, shown
@@ -14,12 +14,13 @@ from frametool.stream import header, row_layout
 from frametool.stream.evaluate import Plan
 from frametool.stream.header import XYZ, PoseColumns, has_pose_column, listed, named_pose, row_shape, wholes_of
 from frametool.stream.request import NO_STAMPS, PAIR, PLAIN, Request
-from frametool.stream.row_layout import POINT, POSE, SIX, Const, In, Piece, Shape, Target, Word, place_of, six_names
+from frametool.stream.row_layout import POINT, POSE, SIX, Const, In, Out, Shape, Word, place_of, six_names
 from frametool.text.numbers import number_or_none
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
+    from frametool.stream.row_layout import Piece
     from frametool.stream.table import Table
 
 class Kept(NamedTuple):
@@ -29,43 +30,32 @@ class Kept(NamedTuple):
 
 
 class New(NamedTuple):
-    """A number of the result, under its name; words: those that it encodes."""
+    """A column of the result: its name, and a number, the word that it encodes, or the same text in every row."""
 
-    number: int
     name: str
-    words: tuple[str, ...] = ()
-
-
-class Fixed(NamedTuple):
-    """The same word in every row of the result, under a name."""
-
-    word: str
-    name: str
+    piece: Out | Word | Const
 
 
 class Named(NamedTuple):
-    """A frame's name in place of a column: the result's parent or what it is the pose of."""
+    """A frame's name in place of a column: the result's parent (role 0) or what it is the pose of (1)."""
 
     place: int
     role: int
 
 
-PARENT, NAME = 0, 1  # roles of names
-
-Column: TypeAlias = Kept | New | Fixed | Named
+Column: TypeAlias = Kept | New | Named
 # a stretch is what is between two bounds of a row, or a name that is written; bound 0 is the start of the line, cells
 # begin at 1, 3, .. and end at 2, 4, .., and the last is the end of the line
 Stretch: TypeAlias = tuple[int, int] | Named
-ADDED = (New, Fixed)  # no columns of the input
 
 
 class Layout(NamedTuple):
     """The columns of the output, and from where in a row its pieces come.
 
-    places: the columns our numbers are read from; time: that of the stamps; below: that of the
-        nanoseconds of stamps whose seconds are whole
+    places: the columns our numbers are read from
+    times: that of the stamps, and of the nanoseconds of stamps whose seconds are whole
     frames: those that name the frame a row is expressed in, for look-ups the two frames
-    name: the one that says what a row is the pose of
+    named: those of the parent and of the name of a row's pose
     stretches: the text that passes, and the names
     """
 
@@ -73,31 +63,27 @@ class Layout(NamedTuple):
     places: tuple[int, ...]
     frames: tuple[int, ...]
     stretches: tuple[Stretch, ...]
-    time: int | None = None
-    below: int | None = None
-    name: int | None = None
+    times: tuple[int, ...] = ()
+    named: tuple[int | None, int | None] = (None, None)
 
 
-def plan_table(
-    table: Table, request: Request, source: str, normals: Sequence[tuple[str, ...]], *, stamped: bool
-) -> tuple[Plan, Layout]:
+def plan_table(table: Table, request: Request) -> tuple[Plan, Layout]:
     """Choose the columns that are read and written; raises FormatError that names the columns there are.
 
     Where all numbers are wanted no text is put together.
-    normals: the columns of vectors that turn with points; stamped: a column with the name of a stamp is one
     """
     formula, poses, names = request.operation.formula, list[PoseColumns](), table.names or ()
     is_needed = formula is None or formula.reads_row or bool(request.rows.columns)
     with suppress(*() if is_needed else (FormatError,)):
-        poses = _find(table, request, source)
+        poses = _find(table, request)
     on_earth = bool(poses) and poses[0].position is not None and place_of(poses[0].position.unit) is not None
     is_point = request.operation.turns and poses and poses[0].rotation is None
     passes = not (request.operation.moves or request.results.all_numbers or is_point)
     if request.rows.poses == 1 and not on_earth and passes and request.keeps_position:
-        poses = [_without_position(poses[0], request, table, source)]
+        poses = [_without_position(poses[0], request, table)]
     if wrong := next((each.wrong for pose in poses for each in pose if each and each.wrong), ""):
-        raise FormatError(wrong, source=source, line=1)
-    asked = tuple(_place(name, table.called, source) for name in request.operation.columns)
+        raise FormatError(wrong, source=table.source, line=1)
+    asked = tuple(_place(name, table) for name in request.operation.columns)
     kinded = zip(poses, request.rows.kinds or (request.rows.kind,) * len(poses), strict=True)
     shapes = tuple(row_shape(pose, request.with_rows(kind=kind)) for pose, kind in kinded)
     if formula is not None:  # the numbers that it asks for come last
@@ -105,46 +91,46 @@ def plan_table(
     if on_earth or request.results.place is not None:
         from frametool.stream.earth_columns import readers_of, settle
 
-        request, shapes = settle(request, shapes, names, source, on_earth=on_earth)
+        request, shapes = settle(request, shapes, table, on_earth=on_earth)
     extra: tuple[int, ...] = ()
     if any(map(may_be_uncertain, names)):
         from frametool.stream.extra_numbers import covariance_columns
 
-        extra, shapes = covariance_columns(table, request, shapes, source)
+        extra, shapes = covariance_columns(table, request, shapes)
     request = request.for_kind(shapes[0].kind) if shapes else request
     places = *chain.from_iterable(pose.places for pose in poses), *extra
     if len({*places}) < len(places):
         twice = sorted({table.name(place) for place in places if places.count(place) > 1})
         raise Misused(f"--columns: {', '.join(twice)} appears twice")
     places += asked
-    for pose, kind in _turning_along(names, poses, request, normals, source):
+    for pose, kind in _turning_along(table, poses, request):
         poses, shapes, places = [*poses, pose], (*shapes, Shape(kind)), places + pose.places
     has_one = not shapes or request.operation.of == PAIR  # what becomes of a row is one thing
     targets = tuple(map(request.target, shapes[:1] or (Shape(POSE),) if has_one else shapes))
-    frames = _frame_columns(table, request, source, on_earth=on_earth)
-    stays = not request.rows.poses or (request.operation.moves and request.rename is None)
-    name = None if stays else _first_called(readers.NAME_KEYS, table)
+    frames = _frame_columns(table, request, on_earth=on_earth)
+    parent, name = frames[0] if frames and request.rows.poses else None, None
+    if request.rows.poses and not (request.operation.moves and request.rename is None):
+        name = _first_called(readers.NAME_KEYS, table)
     moves_each = on_earth or request.rows.frames or (frames and request.operation.moves)
-    edge_of = request.pose_from_frame if moves_each else None
     asked_at = range(shapes[0].own_size, shapes[0].size) if request.operation.shown else ()  # empty cells are not
     words, marked, staying = readers_of(shapes[0]) if on_earth else ({}, dict.fromkeys(asked_at, number_or_none), 0)
-    named = ({frames[0]: PARENT} if frames and request.rows.poses else {}) | ({} if name is None else {name: NAME})
     if on_earth and (position := poses[0].position):  # the status of a fix is read and stays as it is
         position = position._replace(places=position.places[: len(position.places) - staying])
         poses = [poses[0]._replace(position=position)]
-    written = _columns(table, poses, shapes, targets, request, named, extra)
+    written = _columns(table, poses, shapes, targets, request, (parent, name), extra)
     if table.header:
         refuse_repeated(written, names)
-    time, below = _stamp_columns(table, request, places, frames, source, stamped=stamped)
+    times = _stamp_columns(table, request, places, frames)
     pieces, stretches = ((), ()) if request.results.all_numbers else lay_out(written, table.width, table.delimiter)
-    layout = Layout(tuple(written), places, frames, stretches, time, below, name)
+    layout = Layout(tuple(written), places, frames, stretches, tuple(times), (parent, name))
     return Plan(
-        shapes, targets, request, tuple(map(table.name, places)), pieces, b"" if table.delimiter else b"nan", edge_of,
-        frame_column=table.name(frames[0]) if len(frames) == 1 else "", words=words, marked=marked,
+        shapes, targets, request, tuple(map(table.name, places)), pieces, b"" if table.delimiter else b"nan",
+        request.pose_from_frame if moves_each else None, table.name(frames[0]) if len(frames) == 1 else "",
+        words=words, marked=marked,
     ), layout  # fmt: skip
 
 
-def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
+def _find(table: Table, request: Request) -> list[PoseColumns]:
     """Find the columns of the poses, by --columns, by name, or by their number where there are no names.
 
     With a pose a twist is another column.
@@ -153,12 +139,12 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
     if not asked.poses:
         return []
     other = asked.extra_column if asked.stamps == NO_STAMPS else None
-    apart = None if other is None else _place(other, table.called, source)
+    apart = None if other is None else _place(other, table)
     if specs and len(specs) != asked.poses:
         raise Misused(f"--columns is given {len(specs)} times, for {asked.poses} poses in a row")
     if specs or not table.names:
         kinds = (asked.kinds if specs else ()) or (asked.kind,) * max(len(specs), 1)
-        specs = specs or (_by_width(width, request, source),)
+        specs = specs or (_by_width(table, request),)
         if not asked.given_place:
             chosen = zip(specs, kinds, strict=True)
             return [named_pose(spec, table.names, width, request, kind) for spec, kind in chosen]
@@ -167,11 +153,11 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
         return [chosen_pose(spec, table.names, width, request) for spec in specs]
     ours = [None if at == apart or name == asked.extra_column else name for at, name in enumerate(table.names)]
     names = ["" if name is None or may_be_uncertain(name) else name for name in ours]
-    six = header.find_six(names, asked.kind if asked.kind in SIX else "")
+    six = header.find_six(header.Header(names), asked.kind if asked.kind in SIX else "")
     if asked.kind in SIX and six is None:
         wanted = " ".join(six_names(asked.kind))
         found = f"no columns of a {asked.kind} ({wanted}) among: {listed(names)}; name them with --columns"
-        raise FormatError(found, source=source, line=1)
+        raise FormatError(found, source=table.source, line=1)
     others = ["" if six and place in six.places else name for place, name in enumerate(names)]
     if six is not None and (asked.kind in SIX or not has_pose_column(others)):
         return [PoseColumns(six, None)]
@@ -180,17 +166,17 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
     if asked.poses == 1 and (asked.given_place or any(map(readers.may_be_on_earth, names))):
         from frametool.stream.earth_columns import find_pose
 
-        if (pose := find_pose(others, request, source)) is not None:
+        if (pose := find_pose(others, request, table.source)) is not None:
             return [pose]
-    return header.find_poses(others, asked.given, asked.poses, source)
+    return header.find_poses(others, asked.given, asked.poses, table.source)
 
 
-def _by_width(width: int, request: Request, source: str) -> str:
+def _by_width(table: Table, request: Request) -> str:
     """Choose all columns of a table without names: a point, a whole pose, or what --from says, behind a stamp or not.
 
     "" for those of a place.
     """
-    asked, said = request.rows, request.rows.given
+    asked, said, width = request.rows, request.rows.given, table.width
     begin = int(width in (len(XYZ), *(each.counts[-1] for each in wholes_of(None))))
     if said is not None:
         begin = 1 if width in said.counts else 2 * (width - 1 in said.counts[1:])
@@ -200,45 +186,46 @@ def _by_width(width: int, request: Request, source: str) -> str:
         reason = f"{width} columns without names do not say what they are; give --from REP, or --columns"
         if asked.poses == 1 and said:
             reason = f"{said.counted}; found {width} columns without names; or give --columns"
-        raise FormatError(reason, source=source, line=1)
+        raise FormatError(reason, source=table.source, line=1)
     return "" if asked.given_place else f"{begin}-{width}"
 
 
-def _turning_along(
-    names: Sequence[str], poses: Sequence[PoseColumns], request: Request, normals: Sequence[tuple[str, ...]],
-    source: str,
-) -> list[tuple[PoseColumns, str]]:  # fmt: skip
+def _turning_along(table: Table, poses: Sequence[PoseColumns], request: Request) -> list[tuple[PoseColumns, str]]:
     """Find the vectors that turn along with the point or pose of a row, each with its kind."""
-    operation, known, kind = request.operation, {*names}, request.rows.kind
+    operation, names, kind = request.operation, table.names or (), request.rows.kind
     if not poses or request.rows.columns or operation.formula is not None:
         return []
-    there = [each for each in normals if known >= {*each}] if known >= {*XYZ} and kind in ("", POINT) else []
-    if there and operation.turns and (operation.left is not None or operation.mirrors):
-        named = ", ".join(map(" ".join, there))
-        raise Misused(f"{named} would keep to the old axes; --columns x,y,z turns the points alone, apply all of them")
-    found = [(tuple(map(names.index, each)), row_layout.NORMAL) for each in there if operation.moves]
+    found = list[tuple[tuple[int, ...], str]]()
+    for each in table.normals if kind in ("", POINT) else ():
+        if not {*names} >= {*XYZ, *each}:
+            continue
+        if operation.turns and (operation.left is not None or operation.mirrors):
+            remedy = "--columns x,y,z turns the points alone, apply all of them"
+            raise Misused(f"{' '.join(each)} would keep to the old axes; {remedy}")
+        if operation.moves:
+            found.append((tuple(map(names.index, each)), row_layout.NORMAL))
     if operation.turns or (operation.moves and re.search(r"(?i) (?:body[_.])?[vw]x\b", f" {' '.join(names)}")):
         from frametool.stream.extra_numbers import find_rates
 
-        found += find_rates(names, poses[0].places, operation, source)
+        found += find_rates(names, poses[0].places, operation, table.source)
     return [(PoseColumns(header.Columns(at, tuple(names[each] for each in at)), None), kind) for at, kind in found]
 
 
-def _without_position(pose: PoseColumns, request: Request, table: Table, source: str) -> PoseColumns:
+def _without_position(pose: PoseColumns, request: Request, table: Table) -> PoseColumns:
     """Leave the position to pass as it is where only the rotation is rewritten."""
     if pose.rotation is None and request.results.by_default:
         return pose
     if pose.rotation is None:
         wanted = "; give --from REP or --columns" if request.rows.given is None else ""
         found = f"no columns of a rotation among: {listed(table.called)}{wanted}"
-        raise FormatError(found, source=source, line=1)
+        raise FormatError(found, source=table.source, line=1)
     leaves_plane = pose.position and not pose.position.wrong and pose.position.absent and request.results.notations
     is_whole = len(request.results.notations) == 1 and request.results.notations[0].representation.whole is not None
     stays = not (is_whole or pose.rotation.whole or leaves_plane)
     return PoseColumns(None, pose.rotation) if stays else pose
 
 
-def _frame_columns(table: Table, request: Request, source: str, *, on_earth: bool) -> tuple[int, ...]:
+def _frame_columns(table: Table, request: Request, *, on_earth: bool) -> tuple[int, ...]:
     """Find the columns that name frames: for look-ups those named, else the one a row is expressed in."""
     asked = request.rows
     names = table.names or ()
@@ -247,11 +234,11 @@ def _frame_columns(table: Table, request: Request, source: str, *, on_earth: boo
     if not (asked.poses or asked.frames):
         return ()
     if asked.frames and asked.frames != ("",):
-        return tuple(_place(name, names, source) for name in asked.frames)
+        return tuple(_place(name, table) for name in asked.frames)
     found = _first_called(readers.PARENT_COLUMNS, table)
     if found is None and asked.frames:
         unsaid = "rows do not say their frame; name SOURCE, or give --frame-column; columns"
-        raise FormatError(f"{unsaid}: {', '.join(names)}", source=source, line=1)
+        raise FormatError(f"{unsaid}: {', '.join(names)}", source=table.source, line=1)
     return () if found is None else (found,)
 
 
@@ -264,8 +251,9 @@ def _first_called(names: Sequence[str], table: Table) -> int | None:
     return None
 
 
-def _place(name: str, names: Sequence[str], source: str) -> int:
+def _place(name: str, table: Table) -> int:
     """Return the place of a column; raises Misused for one that is not there, or twice."""
+    names, source = table.called, table.source
     if name not in names and names.count(bare := without_mark(name)) == 1:
         name = bare
     if name not in names:
@@ -275,38 +263,37 @@ def _place(name: str, names: Sequence[str], source: str) -> int:
     return names.index(name)
 
 
-def _stamp_columns(
-    table: Table, request: Request, places: Sequence[int], frames: Sequence[int], source: str, *, stamped: bool
-) -> tuple[int | None, int | None]:
+def _stamp_columns(table: Table, request: Request, places: Sequence[int], frames: Sequence[int]) -> list[int]:
     """Find the column of stamps by its name or number, and that of the nanoseconds of such stamps.
 
     Where all numbers are wanted it may be one that no option names.
     """
     if request.rows.stamps == NO_STAMPS:
-        return None, None
+        return []
     name = request.timed.name if request.timed else request.rows.extra_column
     if name is not None:
-        time = _place(name, table.called, source)
+        time = _place(name, table)
         try:
             readers.in_nanoseconds(table.name(time))
         except ValueInvalid as error:
-            raise Misused(str(error), source=source, line=1) from None
-        return time, nanoseconds_beside(table.names, time) if table.names else None
-    if not (stamped and request.results.all_numbers):
-        return None, None
+            raise Misused(str(error), source=table.source, line=1) from None
+        below = nanoseconds_beside(table.names, time) if table.names else None
+        return [time] if below is None else [time, below]
+    if not (table.stamped and request.results.all_numbers):
+        return []
     usual, below = stamp_places(table.names)
     if not (table.names or request.rows.columns) and min(places, default=0) == 1:
         usual = 0  # what is before the numbers that --from speaks of
-    return (None, None) if usual in frames else (usual, below)
+    return [] if usual in frames else [place for place in (usual, below) if place is not None]
 
 
 def _columns(
-    table: Table, poses: Sequence[PoseColumns], shapes: Sequence[Shape], targets: Sequence[Target], request: Request,
-    named: Mapping[int, int], covariance: Sequence[int],
+    table: Table, poses: Sequence[PoseColumns], shapes: Sequence[Shape], targets: Sequence[Shape], request: Request,
+    named: Sequence[int | None], covariance: Sequence[int],
 ) -> list[Column]:  # fmt: skip
     """Put results where they come from, number for number where these are the same; else to the first of their columns.
 
-    named: the columns of names and their roles.  Raises Misused for several that have other numbers.
+    named: the columns of the parent and the name.  Raises Misused for several that have other numbers.
     """
     columns: list[Column] = [Kept(place) for place in range(table.width)]
     operation, asked = request.operation, request.results
@@ -314,46 +301,46 @@ def _columns(
     if only_turned and asked.by_default and not (asked.all_numbers or targets[0].notations or asked.keep):
         return columns
     at: dict[int, list[Column]] = {place: [] for pose in poses for place in pose.places}
-    adds, ours = request.results.keep or request.operation.only_adds or not at, tuple(at)
-    for place, role in named.items() if not adds and request.renaming is not None else ():
-        at.setdefault(place, [Named(place, role)])
-    added: list[Column] = []
-    first = 0
+    adds, ours = asked.keep or operation.only_adds or not at, tuple(at)
+    for role, renamed in enumerate(named if request.renaming is not None and not adds else ()):
+        if renamed is not None:
+            at.setdefault(renamed, [Named(renamed, role)])
+    added, first = list[Column](), 0
     for number, target in enumerate(targets):
         pose = poses[number] if len(poses) == len(targets) else PoseColumns(None, None)  # of a pair
         shape, places = shapes[number] if shapes else Shape(POSE), pose.places or ours
         several = len(targets) > 1 and (request.rows.poses > 1 or number > 0)
-        first += request.result_size(shapes[number - 1], targets[number - 1]) if number else 0
-        notations = [each for each, _ in target.notations]
-        is_same = pose.rotation is not None and notations == [pose.rotation.notation]
-        position, rotation, extras = _new_columns(pose, target, request, shape, first, several=several, same=is_same)
+        is_same = pose.rotation is not None and [each for each, _ in target.notations] == [pose.rotation.notation]
+        position, rotation, extras = _new_columns(
+            pose, target, request, shape, first, table.delimiter or b" ", several=several, same=is_same
+        )
+        first += target.size
         # whether each number of the result stands where one of the input does
-        is_alike = not target.notations or shape.notation is None or is_same
-        is_alike = is_alike and (shape.unit is None) == (target.unit is None) and shape.place is target.place is None
-        is_alike = is_alike and len(shape.absent) == len(target.absent) and shape.whole == target.whole
-        in_place = is_alike and bool(pose.places)
-        if several and (not in_place or (request.results.notations and request.rows.poses > 1)):
+        read, written = ((each.unit is None, each.whole, len(each.absent)) for each in (shape, target))
+        in_place = bool(pose.places) and read == written and shape.place is target.place is None
+        in_place = in_place and (is_same or not target.notations or shape.notation is None)
+        if several and (not in_place or (asked.notations and request.rows.poses > 1)):
             raise Misused("several --columns are moved as they are written; for --to, or a rotation alone, give one")
         if adds:
             added += [*position, *rotation, *extras]
             continue
         if covariance and not number:  # its entries are the last numbers of the result
-            last = len(extras) - len(request.operation.carried(shape))
+            last = len(extras) - len(operation.carried(shape))
             at |= {place: extras[last:] if place == min(covariance) else [] for place in covariance}
             extras = extras[:last]
-        own, new, last = places, [*position, *rotation], max(places)  # what is behind the last one comes after it
+        parts: list[tuple[Sequence[int], list[Column]]]
         if not in_place and pose.position and pose.rotation and target.unit is not None:
-            own, last = pose.position.places, min(pose.rotation.places)
-            new = [*map(Kept, own), *position[len(own) :]] if only_turned else position
-            extras = [*rotation, *extras]
-        elif not in_place:
-            own, last = (min(places),), min(places)
-        for place, column in zip(own, new, strict=False):
-            at[place].append(column)
-        at[max(own)] += new[len(own) :]
-        at[last] += extras
+            places = pose.position.places
+            position = [*map(Kept, places), *position[len(places) :]] if only_turned else position
+            parts = [(places, position), ((min(pose.rotation.places),), [*rotation, *extras])]
+        else:
+            parts = [(places if in_place else (min(places),), [*position, *rotation, *extras])]
+        for own, new in parts:  # what is behind the last one comes after it
+            for place, column in zip(own, new, strict=False):
+                at[place].append(column)
+            at[max(own)] += new[len(own) :]
     if adds:  # behind those that stay, or in the place of those of their names
-        gives_way = (request.operation.shown or PLAIN).replaces
+        gives_way = (operation.shown or PLAIN).replaces
         more = {getattr(each, "name", at) if gives_way else at: each for at, each in enumerate(added)}
         mixed = [more.pop(name, kept) for name, kept in zip(table.called, columns, strict=True)]
         return [*mixed, *more.values()]
@@ -361,8 +348,9 @@ def _columns(
 
 
 def _new_columns(
-    pose: PoseColumns, target: Target, request: Request, shape: Shape, first: int, *, several: bool, same: bool
-) -> list[list[Column]]:
+    pose: PoseColumns, target: Shape, request: Request, shape: Shape, first: int, between: bytes,
+    *, several: bool, same: bool,
+) -> list[list[Column]]:  # fmt: skip
     """Name the numbers of a result, from the one at `first`: position, rotation, what else there is.
 
     several: it is one of several, so that its names are those of its columns
@@ -374,17 +362,19 @@ def _new_columns(
     if rotation and alone and same and rotation.whole == target.whole:
         turned = [prefix + name for name in rotation.names]
     moved = target.position_columns
-    if pose.position and (target.plain or (moved and alone and target.place == shape.place)):
+    if pose.position and (target.kind in SIX or (moved and alone and target.place == shape.place)):
         moved = list(pose.position.names)
-        if target.place is None and not (target.plain or target.absent):
+        if target.place is None and not (target.kind in SIX or target.absent):
             moved += [f"{pose.position.prefix}z{pose.position.suffix}"] * (len(moved) < len(XYZ))
     words = (request.operation.shown or target.place or PLAIN).words
-    names = [*(prefix + name for name in moved), *turned, *(prefix + name for name in request.extras(shape))]
-    new: list[Column] = [New(first + at, name, words.get(at, ())) for at, name in enumerate(names)]
-    begin, end = len(moved), len(moved) + len(turned)
+    names = [*(prefix + name for name in moved), *turned, *(prefix + name for name in target.extras)]
+    new: list[Column] = []
+    for at, name in enumerate(names, first):
+        new.append(New(name, Word(at, words[at]) if at in words else Out(at, at + 1, between)))
     axes: list[Column] = []
     if target.place is not None and turned and not (target.place == shape.place and AXES_KEY in target.place.fields):
-        axes = [Fixed(target.place.axes, prefix + AXES_KEY)]
+        axes = [New(prefix + AXES_KEY, Const(target.place.axes.encode()))]
+    begin, end = len(moved), len(moved) + len(turned)
     extra = [column for column, name in zip(new[end:], names[end:], strict=True) if name not in turned]
     return [[*new[:begin], *axes], new[begin:end], extra]
 
@@ -394,46 +384,41 @@ def _new_columns(
 
 def lay_out(columns: Sequence[Column], width: int, delimiter: bytes) -> tuple[tuple[Piece, ...], tuple[Stretch, ...]]:
     """Make the pieces of a row out of its columns, as few as can be: neighbours that pass are one stretch."""
-    between, line_end = delimiter or b" ", 2 * width + 1
     pieces: list[Piece] = []
     stretches: list[Stretch] = []
-    for at, column in enumerate(columns):
-        before = columns[at - 1] if at else None
-        kept, after = (before if isinstance(before, Kept) else None), columns[at + 1 : at + 2]
+
+    def keep(begin: int, end: int) -> None:
+        if pieces and isinstance(pieces[-1], In) and stretches[-1][1] == begin:
+            begin = stretches.pop()[0]
+        else:
+            pieces.append(In(len(stretches)))
+        stretches.append((begin, end))
+
+    for before, column in pairwise((None, *columns)):
         if isinstance(column, Kept):  # with what parts it from the column before, if there is one
-            begin, is_last = 2 * column.place + (not at and column.place > 0), column.place == width - 1
-            if kept and kept.place == column.place - 1:
-                begin = stretches.pop()[0]
-            else:
-                pieces.append(In(len(stretches)))
-            goes_on = is_last if not after else not (is_last or isinstance(after[0], Kept))
-            stretches.append((begin, 2 * column.place + 2 + goes_on))
+            keep(2 * column.place + (before is None and column.place > 0), 2 * column.place + 2)
             continue
-        run, words = pieces[-1] if pieces else None, column.words if isinstance(column, New) else ()
-        if isinstance(run, row_layout.Out) and isinstance(column, New) and run.last == column.number and not words:
-            pieces[-1] = run._replace(last=column.number + 1)
+        run, new = pieces[-1] if pieces else None, column.piece if isinstance(column, New) else None
+        if isinstance(run, Out) and isinstance(new, Out) and run.last == new.first:
+            pieces[-1] = run._replace(last=new.last)
             continue
-        if before and (kept is None or kept.place == width - 1):
-            pieces.append(Const(between))
-        if isinstance(column, Named):
+        if isinstance(before, Kept) and before.place < width - 1:  # with what is behind it
+            keep(2 * before.place + 2, 2 * before.place + 3)
+        elif before:
+            pieces.append(Const(delimiter or b" "))
+        if isinstance(column, New):
+            pieces.append(column.piece)
+        elif column is not None:
             pieces.append(row_layout.Instead(len(stretches), len(stretches) + 1))
             stretches += [(2 * column.place + 1, 2 * column.place + 2), column]
-        elif isinstance(column, Fixed):
-            pieces.append(Const(column.word.encode()))
-        elif words:
-            pieces.append(Word(column.number, words))
-        else:
-            pieces.append(row_layout.Out(column.number, column.number + 1, between))
-    if not stretches or stretches[-1][1] != line_end:
-        pieces.append(In(len(stretches)))
-        stretches.append((line_end - 1, line_end))
+    keep(2 * width, 2 * width + 1)
     return tuple(pieces), tuple(stretches)
 
 
 def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:
     """Raise Misused if a new column would be called as one that stays, or as another new one."""
-    new = [column.name for column in columns if isinstance(column, ADDED)]
-    kept = [names[column.place] for column in columns if not isinstance(column, ADDED)]
+    new = [column.name for column in columns if isinstance(column, New)]
+    kept = [names[column.place] for column in columns if not isinstance(column, New)]
     if len({*new}) < len(new):
         twice = sorted({name for name in new if new.count(name) > 1})
         if {"x", "y", "z"} <= {*twice}:

@@ -264,7 +264,7 @@ def test_other_rows_than_those_wanted_may_be_bad(run: Run) -> None:
     ("arguments", "stdin", "said"),
     [
         (["--start", "2", "--stop", "1"], "", "--start is after --stop"),
-        (["--start", "2"], "x,y,z,yaw\n1,2,3,4\n", "--start, --stop, --time-offset: no column looks like stamps"),
+        (["--start", "2"], "x,y,z,yaw\n1,2,3,4\n", "no column looks like stamps; name it with --time-column"),
         (["--time-offset", "1", "{xyz: [1, 2, 3]}"], "", "--time-offset has no effect: no timestamps in it"),
         (["--time-column", "t", "{xyz: [1, 2, 3]}"], "", "--time-column needs --time-offset or --start or --stop"),
     ],
