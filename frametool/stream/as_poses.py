@@ -226,11 +226,11 @@ class FormatConverter:
             report = lambda error: faults.append(Fault(max(error.line, 1) - 1, "", error.message))  # noqa: E731
         file, options = self._opened(stream)
         fmt: Rows = module.form_of(file, options)
-        self.placed, self.shape, state, timed = True, Shape(POSE, 1.0, QUATERNION), State(), request.timed
+        self.placed, self.shape, state, timed = True, Shape(POSE, 1.0, ((QUATERNION, False),)), State(), request.timed
         edge_of = request.pose_from_frame if request.operation.moves and timed else None
         bare = request._replace(timed=timed if timed and timed.name else None)
         bare = bare.with_rows(extra_column=None).with_results(unwrap=False)
-        target = Shape(POSE, notation=QUATERNION, keep_sign=True)
+        target = self.shape._replace(keep_sign=True)
         plan = Plan((self.shape,), (target,), bare, ("x", "y", "z", *QUATERNION.columns), edge_of=edge_of)
         rename = request.renaming or (lambda parent, name: (parent, name))
         for each in module.blocks(file, options._replace(report=report), named=False):

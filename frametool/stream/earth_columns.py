@@ -402,7 +402,7 @@ def placed_record(
     takes_points = operation.takes_points or operation.keeps_frames
     is_point = pose.rotation is None and request.rows.kind != POSE and takes_points
     numbers: tuple[float, ...] = pose.components[: 7 if pose.rotation is not None else 3]
-    shape = Shape(POINT if is_point else POSE, 1.0, None if pose.rotation is None else notation("quaternion"))
+    shape = Shape(POINT if is_point else POSE, 1.0, () if pose.rotation is None else ((notation("quaternion"), False),))
     if covariance and not is_point:  # of a pose whose turn is exact
         covariance = tuple(covariance[3 * i + j] if max(i, j) < 3 else 0.0 for i in range(6) for j in range(6))
     extra = covariance
@@ -412,7 +412,7 @@ def placed_record(
         else:
             reading.note(LEFT_OUT.format("a result at a place" if request.results.place else "this"), rule="left-out")
     if extra:
-        shape = shape._replace(covariance=(len(extra),), rewritten=True)
+        shape = shape._replace(covariance=(len(extra),), sigma=())
     keys = [*own, *used, *(key for key in (AXES_KEY, *COVARIANCE_KEYS) if key in value)]
     keys += ["header", *[FIX, FIX_TYPE] * bool(covariance)] if "header" in value else []
     stays = False

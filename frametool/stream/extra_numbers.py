@@ -126,7 +126,7 @@ def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Readi
         raise Misfit("a point does not turn; its sigma has xyz alone", (*path, covariance.SIGMA))
     entries = entries if size == len(entries) else covariance.of_position(entries)
     keys = record.keys._replace(others=(*record.keys.others, *(flat or (covariance.SIGMA,))))
-    record = record._replace(shape=record.shape._replace(rewritten=True), keys=keys)
+    record = record._replace(shape=record.shape._replace(sigma=()), keys=keys)
     return _with_numbers(record, covariance.SIGMA, [None] * size, entries)
 
 
@@ -173,7 +173,7 @@ def covariance_columns(
         message = "a covariance beside several poses in a row: whose it is nobody can tell"
         raise FormatError(message, source=table.source, line=1)
     sigma = _with_unit(sigma, degrees=request.rows.degrees)
-    return places, (shape._replace(covariance=(len(places),), rewritten=True, sigma=sigma),)
+    return places, (shape._replace(covariance=(len(places),), sigma=sigma),)
 
 
 def find_rates(

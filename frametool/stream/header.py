@@ -408,7 +408,7 @@ def row_shape(pose: PoseColumns, request: Request) -> Shape:
     radians_at = tuple(at for at in angles if degrees and not said[at])
     first = 0 if unit is None else len(XYZ)
     absent = (*(position.absent if position else ()), *(first + at for at in rotation.absent))
-    return Shape(POSE, unit, notation, degrees, rotation.whole, radians_at=radians_at, absent=absent)
+    return Shape(POSE, unit, ((notation, degrees),), rotation.whole, radians_at=radians_at, absent=absent)
 
 
 def named_pose(spec: str, names: Sequence[str] | None, width: int, request: Request, kind: str) -> PoseColumns:

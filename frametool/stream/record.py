@@ -395,7 +395,7 @@ def _with_asked(record: Record, root: Any, request: Request) -> Record:
         for name in (*operation.extras(record.shape), *(said.members if said and not said.replaces else ())):
             if (key := request.results.prefix + name) in holder:
                 raise Misfit(f"key {shown(key)} is there already; take another name, or --prefix", record.path)
-    return record._replace(shape=record.shape._replace(extra=len(operation.columns))) if operation.columns else record
+    return record._replace(shape=record.shape._replace(extras=operation.columns)) if operation.columns else record
 
 
 def _of_message(value: Any, path: Path, reading: Reading, request: Request, *, field: str, kind: str) -> Record:
@@ -701,7 +701,7 @@ def _with_rotation(
         above, has_all = (*record.path, *below), type(value) is not dict
         paths = tuple((*above, *each) if has_all or each[0] in value else None for each in places[: len(values)])
     # else the numbers say another unit than their key: the member is written anew
-    shape = record.shape._replace(kind=POSE, notation=notation, degrees=degrees, whole=whole)
+    shape = record.shape._replace(kind=POSE, notations=((notation, degrees),), whole=whole)
     keys, every = record.keys._replace(rotation=key), (*record.values, *values)
     return record._replace(shape=shape, numbers=record.numbers + paths, values=every, keys=keys)
 

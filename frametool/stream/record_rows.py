@@ -103,7 +103,7 @@ class RecordRows:
         if not own.notations:
             return Shape(POSE)
         if self.style.format not in SPELLED or not self.style.notations:
-            return Shape(POSE, notation=QUATERNION, keep_sign=True)
+            return Shape(POSE, notations=((QUATERNION, False),), keep_sign=True)
         return target_of(self.style, placed=own.unit is not None or own.whole)
 
     def _marked(self, template: Template, at: int, target: Shape) -> Marked | None:

@@ -485,17 +485,16 @@ class Request(NamedTuple):
             has_none = shape.notation is None and not by_row and bool(operation.turns or not changed)
             stays = has_none and (asked.by_default or not asked.notations)
             notations = () if stays else asked.notations or (notation("quaternion"),)
-            if notations:
-                first, *more = [(each, each.in_degrees(self.rows.degrees)) for each in notations]
-                whole = there and not more and first[0].representation.whole is not None
-                target = target._replace(notation=first[0], degrees=first[1], more=tuple(more), whole=whole)
+            whole = there and len(notations) == 1 and notations[0].representation.whole is not None
+            written = tuple((each, each.in_degrees(self.rows.degrees)) for each in notations)
+            target = target._replace(notations=written, whole=whole)
         else:
             ahead = 3 * (placed and shape.unit is None and not shape.whole)  # a position comes in front
             absent = tuple(at + ahead for at in shape.absent)
-            target = target._replace(notation=shape.notation, degrees=shape.degrees, whole=shape.whole)
-            target = target._replace(radians_at=shape.radians_at, absent=absent)
+            target = target._replace(notations=shape.notations, whole=shape.whole, absent=absent)
+            target = target._replace(radians_at=shape.radians_at)
         unit = (self._unit(shape) or 1.0) if placed and not target.whole else None
-        is_matrix = target.notation and not target.more and target.notation.representation.whole is not None
+        is_matrix = len(target.notations) == 1 and target.notations[0][0].representation.whole is not None
         if is_matrix and operation.carried(shape) == (SCALE,):  # the scale of results is in the matrix
             extras = extras[:-1] if extras[-1:] == (SCALE,) else extras
             return target._replace(unit=unit, scaled=True, extras=extras)
@@ -525,5 +524,5 @@ def target_of(style: Style, kind: str = POSE, *, placed: bool = True) -> Shape:
     """Return how results are written in a style; placed: poses have a position."""
     quaternions = notation("quaternion")
     asked = ResultOptions(style.notations or (quaternions,), keep_sign=style.keep_sign, place=style.place)
-    shape = Shape(kind, 1.0 if placed else None, quaternions if kind == POSE else None)
+    shape = Shape(kind, 1.0 if placed else None, ((quaternions, False),) if kind == POSE else ())
     return Request(rows=RowOptions(degrees=style.degrees), results=asked).target(shape)

@@ -60,41 +60,45 @@ class Shape(NamedTuple):
     One shape is read, and one is written: the result.
     kind: point, vector, pose, rotation, attitude, twist, wrench or accel; "" for no numbers
     unit: how many of the position's numbers make a metre; None where there is no position
-    notation: that of the rotation; degrees: whether its angles are degrees
+    notations: that of the rotation, with whether its angles are degrees; of a result there may be several
     whole: the numbers are those of a whole pose
     inverse: what is written is the inverse
-    covariance: how many numbers each of the covariances has that come last; one that is no sigma is a scale
-    rewritten: the first of them has no place of its own in the result, which names its entries anew
-    sigma: of six independent axes, the place of each one's number among these, -1 for 0, and its unit
+    covariance: how many numbers each of the covariances has that come last; one is a scale
+    sigma: of six independent axes, the place of each one's number among these, -1 for 0, and its unit; () for entries
+        that have no place of their own in the result, which names them anew; None for those that have
     radians_at: which of the rotation's numbers are radians where the others are degrees
     absent: which numbers have no column and count as 0; of a result they have to be 0
-    extra: how many numbers that an expression reads come last
-    more: of a result, the notations behind the first, with the unit of their angles (True: degrees)
     extras: the names of the numbers that come with it
     keep_sign: its quaternions keep their sign; scaled: its matrix is s R, of the scale that comes last
     """
 
     kind: str
     unit: Unit | None = 1.0
-    notation: Notation | None = None
-    degrees: bool = False
+    notations: tuple[tuple[Notation, bool], ...] = ()
     whole: bool = False
     inverse: bool = False
     covariance: tuple[int, ...] = ()
-    rewritten: bool = False
-    sigma: tuple[tuple[int, str], ...] = ()
+    sigma: tuple[tuple[int, str], ...] | None = None
     radians_at: tuple[int, ...] = ()
     absent: tuple[int, ...] = ()
-    extra: int = 0
-    more: tuple[tuple[Notation, bool], ...] = ()
     extras: tuple[str, ...] = ()
     keep_sign: bool = False
     scaled: bool = False
 
     @property
-    def notations(self) -> tuple[tuple[Notation, bool], ...]:
-        """Return all notations of the rotation, with the unit of their angles."""
-        return () if self.notation is None else ((self.notation, self.degrees), *self.more)
+    def notation(self) -> Notation | None:
+        """Return the notation of the rotation, of several the first."""
+        return self.notations[0][0] if self.notations else None
+
+    @property
+    def degrees(self) -> bool:
+        """Return True if its angles are degrees."""
+        return bool(self.notations) and self.notations[0][1]
+
+    @property
+    def rewritten(self) -> bool:
+        """Return True if the result names the entries of the first covariance anew."""
+        return self.sigma is not None
 
     @property
     def joined(self) -> Whole | None:
@@ -104,7 +108,7 @@ class Shape(NamedTuple):
     @property
     def size(self) -> int:
         """Count the numbers of a row, or of a result with what comes with it."""
-        return self.own_size + sum(self.covariance) + self.extra + len(self.extras)
+        return self.own_size + sum(self.covariance) + len(self.extras)
 
     @property
     def own_size(self) -> int:

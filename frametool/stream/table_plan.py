@@ -87,7 +87,7 @@ def plan_table(table: Table, request: Request) -> tuple[Plan, Layout]:
     kinded = zip(poses, request.rows.kinds or (request.rows.kind,) * len(poses), strict=True)
     shapes = tuple(row_shape(pose, request.with_rows(kind=kind)) for pose, kind in kinded)
     if formula is not None:  # the numbers that it asks for come last
-        shapes = ((shapes[0] if shapes else Shape("", None))._replace(extra=len(asked)),)
+        shapes = ((shapes[0] if shapes else Shape("", None))._replace(extras=formula.columns),)
     if on_earth or request.results.place is not None:
         from frametool.stream.earth_columns import readers_of, settle
 
