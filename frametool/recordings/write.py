@@ -48,13 +48,12 @@ _PROBE, _PROBE_NS = 1.2345678912345e-67, 1532698752_187654321  # numbers and a s
 
 
 class Kind(NamedTuple):
-    """One kind of message: its usual topic, its type, and the count of numbers per stamp.
+    """One kind of message, whose usual topic has its name: its type, and the count of numbers per stamp.
 
     each: of a list, the type of its items
     stays: it is latched, so that late subscribers get it too
     """
 
-    topic: str
     type: str
     numbers: int
     each: str = ""
@@ -63,12 +62,12 @@ class Kind(NamedTuple):
 
 STAMPED = "geometry_msgs/msg/TransformStamped"
 KINDS = {
-    "tf_static": Kind("/tf_static", TF, 7, STAMPED, stays=True),
-    "tf": Kind("/tf", TF, 7, STAMPED),
-    "pose": Kind("/pose", "geometry_msgs/msg/PoseStamped", 7),
-    "path": Kind("/path", "nav_msgs/msg/Path", 7, "geometry_msgs/msg/PoseStamped"),
-    "point": Kind("/point", "geometry_msgs/msg/PointStamped", 3),
-    "fix": Kind("/fix", "sensor_msgs/msg/NavSatFix", 3),
+    "tf_static": Kind(TF, 7, STAMPED, stays=True),
+    "tf": Kind(TF, 7, STAMPED),
+    "pose": Kind("geometry_msgs/msg/PoseStamped", 7),
+    "path": Kind("nav_msgs/msg/Path", 7, "geometry_msgs/msg/PoseStamped"),
+    "point": Kind("geometry_msgs/msg/PointStamped", 3),
+    "fix": Kind("sensor_msgs/msg/NavSatFix", 3),
 }
 
 
@@ -182,7 +181,7 @@ class RecordingFile:
     def channel(self, name: str, topic: str = "") -> Channel:
         """Return the channel of a kind of messages, by default on its usual topic."""
         if name not in self._numbers:
-            self._numbers[name] = new_channel(KINDS[name], topic or KINDS[name].topic, ros1=self.format == BAG1)
+            self._numbers[name] = new_channel(KINDS[name], topic or f"/{name}", ros1=self.format == BAG1)
             self.begin([self._numbers[name]])
         found: Channel = self._numbers[name]
         return found

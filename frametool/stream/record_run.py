@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options
+    from frametool.grammar.edges import EdgeColumns, Options
     from frametool.recordings.read import Channel, RecordingReader
 
     Advance = Callable[[int, int], None]  # takes the number of messages and bytes that were read
@@ -173,14 +173,13 @@ class RecordRun:
                 added[child] = edge
                 continue
             topics, on = Topics(), first_of([*known.topics], MOST_NAMED)
+            here = f"{path}, {on}"
             for problem in filter(None, (topics.conflict(topic, child) for topic in known.topics)):
                 raise BadTopology(problem, source=path, rule="two-topics")  # it comes from two robots
             if wrong := [other for other in known.parents if other != parent]:
-                raise two_parents(child, wrong[0], parent, (f"{path}, {on}", name))
+                raise two_parents(child, wrong[0], parent, (here, name))
             if known.varies and not any(topic.endswith(STATIC) for topic in known.topics):
-                raise static_and_moving(
-                    child, f": it moves in {shown(parent)} ({path}, {on}) and is static in it ({name})"
-                )
+                raise static_and_moving(child, f": it moves in {shown(parent)} ({here}) and is static in it ({name})")
             if not known.varies and is_same(known.numbers, edge.components):
                 self.same.append(edge)
                 continue
@@ -219,9 +218,10 @@ class RecordRun:
         if not more and not self.used:
             raise FormatError("no transforms in it; --with FILE brings some", source=self.reader.path)
 
-        def read(_: FrameFile, options: Options) -> Iterator[Edge]:
-            found = recorded_edges(self.reader, self.used, options)
-            yield from (edge for piece in found for edge in piece.edges() if edge.child not in children)
+        def read(_: FrameFile, options: Options) -> Iterator[Edge | EdgeColumns]:
+            for piece in recorded_edges(self.reader, self.used, options):
+                others = (edge for edge in piece.edges() if edge.child not in children)
+                yield from [piece] if children.isdisjoint(piece.children) else others
             yield from more
 
         source = FrameFile(self.reader.path, topics=topics)

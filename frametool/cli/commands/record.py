@@ -82,7 +82,7 @@ def record_command(inputs: Inputs) -> int:
     new = Path(place).resolve()
     for each in filter(os.path.exists, (path, *map(tree_file, more))):
         read = Path(each).resolve()
-        if new in (read, *read.parents) or read in new.parents:  # a file, its folder, or what is in that: data would go
+        if read.is_relative_to(new) or new.is_relative_to(read):  # a file, its folder, or what is in that
             changes = f"would change {printable(each)}, which is read; give another name"
             raise FileProblem(f"{printable(place)}: {changes}")
     tally, edges = Diagnostics(), load_tree(inputs, more[0], more[1:]) if more else None
