@@ -142,8 +142,9 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
 
             if not EARTH_KEYS.isdisjoint(mapping):
                 return placed_by(mapping, read_pose(without_place(mapping), reading, also), reading)
-        if unknown := [key for key in mapping if key not in POSE_KEYS and key not in also]:
-            raise _unknown_keys(unknown, mapping, also)
+        for key in mapping:
+            if key not in POSE_KEYS and key not in also:
+                raise _unknown_keys(mapping, also)
     position: Vector | None = None
     rotation: Quaternion | None = None
     outer_degrees = reading.degrees
@@ -237,8 +238,9 @@ def unknown_key(unknown: Sequence[str], hint: str) -> Misfit:
     return Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (unknown[0],), key=True)
 
 
-def _unknown_keys(unknown: Sequence[str], mapping: dict[str, Any], also: Collection[str]) -> Misfit:
+def _unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> Misfit:
     """Return the error for the unknown keys of an entry."""
+    unknown = [key for key in mapping if key not in POSE_KEYS and key not in also]
     if "children" in also and type(mapping[unknown[0]]) is dict:
         below = f"children: {{{unknown[0]}: ..}}"
         return Misfit(f"frames below one with a pose are under {below}", (unknown[0],), key=True)
@@ -395,7 +397,7 @@ def _shape_of(key: str, value: Any) -> Spelled:
     if row.shape == NAMED or (type(value) is dict and value.keys() == {*row.names}):
         columns = row.names
     texts = read_texts(value, columns, partial=bool(row.angles))  # missing angles of a mapping count as 0
-    return notation, texts, places_in(value) if is_list else [(name,) for name in columns]
+    return notation, texts, places_in(value) if is_list else [*zip(columns)]
 
 
 def _without_order(key: str, notation: Notation, value: Any) -> Misfit:

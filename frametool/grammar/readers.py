@@ -241,10 +241,12 @@ def read_texts(value: Any, names: Sequence[str], *, partial: bool = False) -> li
         raise Misfit(f"expected [{', '.join(names)}], found {kind(value)}")
     if (*value,) == names:  # the common case: all names in their order
         return [*value.values()]
-    if unknown := [key for key in value if key not in names]:
-        raise Misfit(f"unknown key {shown(unknown[0])}; expected {', '.join(names)}", (unknown[0],), key=True)
-    if (missing := [name for name in names if name not in value]) and not partial:
-        raise Misfit(f"missing {', '.join(missing)}; expected {', '.join(names)}")
+    for key in value:
+        if key not in names:
+            raise Misfit(f"unknown key {shown(key)}; expected {', '.join(names)}", (key,), key=True)
+    if len(value) < len(names) and not partial:
+        missing = ", ".join(name for name in names if name not in value)
+        raise Misfit(f"missing {missing}; expected {', '.join(names)}")
     return [value.get(name, "0") for name in names]
 
 
