@@ -219,6 +219,12 @@ def test_rows_get_places_where_their_target_is_the_earth(run: Callable[..., Any]
     assert "rows.csv:4: --to lla wants poses in ecef: this one is in 'map' (row skipped)" in found.err
 
 
+def test_rows_of_a_target_without_places_are_refused_before_their_header(run: Callable[..., Any]) -> None:
+    found = run("lookup", "t.yaml", "map", "--source-column", "src", "--to", "lla", files={"t.yaml": SITE}, stdin="src\ngps\n")
+    assert (found.status, found.out) == (1, "")
+    assert "--to lla wants poses in ecef: this one is in 'map'" in found.err
+
+
 # --- one frame by two names ---
 
 EARTH, OTHER = "frames: {earth: {map: {xyz: [4e6, 1e6, 4e6]}}}", "frames: {ecef: {site: {xyz: [4e6, 1e6, 5e6]}}}"

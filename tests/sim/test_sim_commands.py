@@ -49,6 +49,12 @@ def test_the_default_run_is_the_tutorial(run: Run) -> None:
     assert "final distance to turtle1 0.0001 m; within 0.5 m after 4.064 s" in outcome.err
 
 
+def test_numbers_have_the_decimals_that_are_asked_for(run: Run) -> None:
+    outcome = run("sim", "follow", "--duration", "0.1", "--precision", "2", "-f", "csv")
+    assert outcome.status == 0
+    assert outcome.out.splitlines()[1].startswith("0.00,turtle2,1.93,4.64,3.87,")
+
+
 def test_an_up_key_from_standard_input_moves_the_leader(run: Run) -> None:
     outcome = run("sim", "follow", "--leader", "-", "--emit", "poses", "-f", "csv", "--duration", "2", stdin="up\n")
     rows = [line.split(",") for line in outcome.out.splitlines() if ",turtle1," in line]
