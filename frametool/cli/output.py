@@ -93,7 +93,7 @@ class Output:
         """
         self._inputs = inputs
         self.path: str | None = inputs.output
-        self.force: bool = self.path is not None and inputs.force
+        self.force = bool(inputs.force)
         named: str | None = inputs.format_name
         if self.path is not None and named is None:
             from frametool.formats.detect import refuse_suffix

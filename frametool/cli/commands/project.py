@@ -99,9 +99,8 @@ def project_command(inputs: Inputs) -> int:
     task.camera = task.rectified()
     no_size = "note: the camera has no size, in_image is empty; --size W,H gives it one"
     inputs.note(no_size if task.camera.size is None else None)
-    take = None if overlay is None else overlay.take
-    name, ranged = task.camera_name, bool(inputs.ranged)
-    seen = PixelsOfPoints(task.camera, inputs.first_pixel, name=name, ranged=ranged, take=take)
+    take, ranged = None if overlay is None else overlay.take, bool(inputs.ranged)
+    seen = PixelsOfPoints(task.camera, inputs.first_pixel, name=task.camera_name, ranged=ranged, take=take)
     status = task.finish(task.adds(seen), () if task.is_stream else [*apply.sources_of(inputs, task.rest)], seen)
     if overlay is not None:
         with writing(overlay.path, force=inputs.force) as write:
