@@ -74,20 +74,15 @@ class ColumnRows(PlannedRows):
         ours = dict(zip(self.layout.places, usual, strict=False))
         found = []
         for at, column in enumerate(self.layout.columns, 1):
-            place = column.place if isinstance(column, (Kept, Named)) else None
-            kind = self.file.kinds[column.place] if isinstance(column, Kept) else None
-            new = column.piece if isinstance(column, New) else None
-            if isinstance(column, New) and isinstance(new, Out):
-                kind = self._kind_of(column.name)
-            if isinstance(column, New) and (names or not isinstance(new, Out)):
-                name = column.name
-            elif names and place is not None:
-                name = names[place]
-            elif isinstance(new, Out) and new.first < len(usual):
-                name = usual[new.first]
+            kind, place, name = None, column.place if isinstance(column, Kept) else None, ""
+            if isinstance(column, New):
+                name, number = column.name, column.piece.first if isinstance(column.piece, Out) else None
+                kind = None if number is None else self._kind_of(name)
+                name = usual[number] if number is not None and number < len(usual) and not names else name
             else:
-                name = ours.get(-1 if place is None else place, f"column_{at}")
-            found.append(OutColumn(name * bool(names or named), kind, place if isinstance(column, Kept) else None))
+                name = names[column.place] if names else ours.get(column.place, f"column_{at}")
+                kind = None if place is None else self.file.kinds[place]
+            found.append(OutColumn(name * bool(names or named), kind, place))
         return found
 
     def _kind_of(self, name: str) -> Kind:

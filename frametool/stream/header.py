@@ -385,8 +385,8 @@ def find_six(header: Header, kind: str) -> Columns | None:
     return None
 
 
-def row_shape(pose: PoseColumns, request: Request) -> Shape:
-    """Return what the numbers of a pose's columns mean."""
+def row_shape(pose: PoseColumns, request: Request, kind: str) -> Shape:
+    """Return what the numbers of a pose's columns mean; kind: what they are taken for, "" as they look."""
     position, rotation = pose
     if position and position.kind:
         if not request.operation.moves:
@@ -394,11 +394,11 @@ def row_shape(pose: PoseColumns, request: Request) -> Shape:
         return Shape(position.kind, None)
     unit = position.unit if position and not (rotation and rotation.whole) else None
     if rotation is None or rotation.notation is None:
-        moved = request.operation.takes_points and request.rows.kind != POSE
-        return Shape((request.rows.kind or POINT) if moved else POSE, unit)
-    if request.rows.kind not in ("", POSE) and request.operation.moves:
+        moved = request.operation.takes_points and kind != POSE
+        return Shape((kind or POINT) if moved else POSE, unit)
+    if kind not in ("", POSE) and request.operation.moves:
         raise Misused(
-            f"rows have a rotation, {rotation.shown}, and cannot be taken for a {request.rows.kind}; "
+            f"rows have a rotation, {rotation.shown}, and cannot be taken for a {kind}; "
             "name the three with --columns"
         )
     notation = rotation.notation

@@ -622,7 +622,7 @@ def _with_flat(
     if rotation is None:
         return record
     names = rotation.names
-    shape = row_shape(flat, request.with_rows(degrees=reading.degrees, kind=POSE))
+    shape = row_shape(flat, request.with_rows(degrees=reading.degrees), POSE)
     paths, values = ((), ()) if shape.whole else (record.numbers, record.values)
     numbers = [_number(value, name, shape.in_degrees(at)) for at, name in enumerate(names, len(values))]
     if shape.notation is not None:

@@ -263,9 +263,8 @@ class PlannedRows:
         lacks_name, self.unasked = extra == "" or is_cut, None
         of_formula = timed and not timed.name and operation.formula and not operation.shown
         if not usual and (lacks_name or of_formula):
-            known = f"; columns: {listing(table.names)}" if table.names else ""
-            message = f"no column looks like stamps; name it with --time-column{known}"
-            raise Misused(message, source=table.source, line=1)
+            what = f"no column looks like stamps; name it with --time-column; columns: {listing(table.called)}"
+            raise Misused(what, source=table.source, line=1)
         if lacks_name:
             request = request.with_rows(extra_column=usual)
         if timed is not None and not timed.name:
@@ -363,9 +362,9 @@ class PlannedRows:
         own = numbers.shape[1]
         if plan.shapes and plan.shapes[-1].kind in (NORMAL, RATE):  # vectors that turn along come last
             own -= 3 * (len(plan.targets) - 1)
-        new = {each.name: each.piece for each in layout.columns if isinstance(each, New)}
-        numbered = {name: piece.first for name, piece in new.items() if isinstance(piece, Out)}
-        extras |= {name: numbers[:, at] for name, at in numbered.items() if at >= own}
+        for each in layout.columns:
+            if isinstance(each, New) and isinstance(each.piece, Out) and each.piece.first >= own:
+                extras[each.name] = numbers[:, each.piece.first]
         stamps = block.stamps[0][rows] if layout.times else None
         rename, earth = self.rename, self.earth
         unnamed = (earth, None) if rename is None else rename(earth, None)  # known of places, and of an expression

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
-from itertools import chain, pairwise
+from itertools import pairwise
 from typing import TYPE_CHECKING, TypeAlias
 
 from frametool.errors import FormatError, Misused, NamedTuple, ValueInvalid, alternatives, shown
@@ -81,11 +81,12 @@ def plan_table(table: Table, request: Request) -> tuple[Plan, Layout]:
     passes = not (request.operation.moves or request.results.all_numbers or is_point)
     if request.rows.poses == 1 and not on_earth and passes and request.keeps_position:
         poses = [_without_position(poses[0], request, table)]
-    if wrong := next((each.wrong for pose in poses for each in pose if each and each.wrong), ""):
-        raise FormatError(wrong, source=table.source, line=1)
-    asked = tuple(_place(name, table) for name in request.operation.columns)
-    kinded = zip(poses, request.rows.kinds or (request.rows.kind,) * len(poses), strict=True)
-    shapes = tuple(row_shape(pose, request.with_rows(kind=kind)) for pose, kind in kinded)
+    shapes, places = tuple[Shape, ...](), tuple[int, ...]()
+    for pose, kind in zip(poses, request.rows.kinds or (request.rows.kind,) * len(poses), strict=True):
+        for columns in filter(None, pose):
+            if columns.wrong:
+                raise FormatError(columns.wrong, source=table.source, line=1)
+        shapes, places = (*shapes, row_shape(pose, request, kind)), places + pose.places
     if formula is not None:  # the numbers that it asks for come last
         shapes = ((shapes[0] if shapes else Shape("", None))._replace(extras=formula.columns),)
     if on_earth or request.results.place is not None:
@@ -98,11 +99,11 @@ def plan_table(table: Table, request: Request) -> tuple[Plan, Layout]:
 
         extra, shapes = covariance_columns(table, request, shapes)
     request = request.for_kind(shapes[0].kind) if shapes else request
-    places = *chain.from_iterable(pose.places for pose in poses), *extra
+    places += extra
     if len({*places}) < len(places):
         twice = sorted({table.name(place) for place in places if places.count(place) > 1})
         raise Misused(f"--columns: {', '.join(twice)} appears twice")
-    places += asked
+    places += tuple(_place(name, table) for name in request.operation.columns)
     for pose, kind in _turning_along(table, poses, request):
         poses, shapes, places = [*poses, pose], (*shapes, Shape(kind)), places + pose.places
     has_one = not shapes or request.operation.of == PAIR  # what becomes of a row is one thing
@@ -151,14 +152,14 @@ def _find(table: Table, request: Request) -> list[PoseColumns]:
         from frametool.stream.earth_columns import chosen_pose
 
         return [chosen_pose(spec, table.names, width, request) for spec in specs]
-    ours = [None if at == apart or name == asked.extra_column else name for at, name in enumerate(table.names)]
-    names = ["" if name is None or may_be_uncertain(name) else name for name in ours]
+    hidden = {name for name in table.names if name == asked.extra_column or may_be_uncertain(name)}
+    names = ["" if at == apart or name in hidden else name for at, name in enumerate(table.names)]
     six = header.find_six(header.Header(names), asked.kind if asked.kind in SIX else "")
     if asked.kind in SIX and six is None:
         wanted = " ".join(six_names(asked.kind))
         found = f"no columns of a {asked.kind} ({wanted}) among: {listed(names)}; name them with --columns"
         raise FormatError(found, source=table.source, line=1)
-    others = ["" if six and place in six.places else name for place, name in enumerate(names)]
+    others = ["" if place in six.places else name for place, name in enumerate(names)] if six else names
     if six is not None and (asked.kind in SIX or not has_pose_column(others)):
         return [PoseColumns(six, None)]
     if not (request.operation.moves or request.operation.changes_nothing):
