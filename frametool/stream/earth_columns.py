@@ -373,14 +373,12 @@ def is_on_earth(value: dict[str, Any]) -> bool:
 def placed_record(
     value: dict[str, Any], empty: Record, positions: Sequence[str], inner: Inner, reading: Reading, request: Request
 ) -> Record | None:
-    """Read a record that is placed on the Earth; None for one that is expressed as x, y, z.
+    """Read a record that is placed on the Earth, whole or by half; None for one that is expressed as x, y, z.
 
     empty: the record without what it says; inner: reads the pose that comes with a place, and names its keys
     The numbers of latitude, longitude and height stay members of the record; no other has a place of its own.
     Raises Misfit for half a place, for a pose whose axes nobody says, and for what is no place.
     """
-    if not is_on_earth(value):
-        return None
     own = [key for key in value if key in EARTH_KEYS]
     in_ecef = value.get("frame", value.get("parent")) in EARTH_FRAMES
     if AT not in value and ((positions and not in_ecef) or {"x", "y", "z"} <= value.keys()):

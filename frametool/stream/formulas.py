@@ -276,7 +276,7 @@ def names_in(begin: bytes, fmt: str, source: str, wanted: str, *, header: bool =
         table, _ = open_table(begin, fmt, header=header, source=source)
         return table.called
     from frametool.ros import messages
-    from frametool.stream.splitter import Splitter
+    from frametool.stream.record_stream import Splitter
 
     part = next(iter(Splitter(fmt).parts(begin)[0]), None)
     text = "" if part is None else begin[part.start : part.end].decode("utf-8", "replace")

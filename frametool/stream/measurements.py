@@ -27,7 +27,8 @@ from frametool.grammar.covariance import AXES, is_sigma
 from frametool.grammar.pose import COVARIANCE_KEYS, Pose, inverted, read_angle_unit
 from frametool.grammar.readers import NAME_KEYS, STAMP_KEYS, Misfit, Path, Reading, kind, tell, within
 from frametool.stream.faults import BadRows
-from frametool.stream.record import INNER, KNOWN, Record, find_records, pose_of, value_at
+from frametool.stream.record import Record, find_records, pose_of
+from frametool.stream.record_search import INNER, KNOWN, value_at
 from frametool.stream.record_values import stamp_of
 from frametool.stream.request import COMBINED, Operation, Request, RowOptions
 from frametool.stream.row_layout import POSE, Shape

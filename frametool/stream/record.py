@@ -1,4 +1,4 @@
-"""Records: the points, vectors, poses, twists and wrenches of a document, and where their numbers and names are.
+"""One record: a point, vector, pose, twist or wrench, what its numbers mean, and where they and its names are.
 
     {"id": 7, "frame": "lidar", "point": [1, 2, 3]}
     {"header": {"frame_id": "map"}, "pose": {"position": {"x": ..}, "orientation": {"x": ..}}}    as in ROS messages
@@ -9,35 +9,31 @@ Arguments, files, streams and messages are read by this one definition; keys tha
 
 from __future__ import annotations
 
-import re
+from contextlib import suppress
 from functools import partial
-from itertools import chain, islice, product
+from itertools import product
 from math import nan
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import MOST_COMPARED, NamedTuple, ValueInvalid, alternatives, did_you_mean, first_of, shown
+from frametool.errors import NamedTuple, did_you_mean, shown
 from frametool.geometry import floats
-from frametool.geometry.representations import notation
 from frametool.grammar import readers
 from frametool.grammar.pose import (
     COVARIANCE_KEYS,
-    LISTED_WORDS,
-    POSE_KEYS,
     POSITION_KEYS,
     ROTATION_KEYS,
     SCALE,
+    XYZ,
     Pose,
     as_meant,
     inverted,
-    is_position,
-    is_rotation,
     read_angle_unit,
     read_pose,
     read_rotation,
-    unknown_key,
 )
 from frametool.grammar.readers import EARTH_FRAMES, NAME_KEYS, PARENT_KEYS, STAMP_KEYS, Misfit, Reading, kind, within
+from frametool.stream.record_search import POINT_KEYS, Members, bare_numbers, covariance_keys, find_holders, value_at
 from frametool.stream.row_layout import ACCEL, PARTS, POINT, POSE, TURN, VECTOR, Shape, checked_rotation, doubt
 from frametool.text.numbers import parse_number, read_number_or_angle
 
@@ -46,26 +42,11 @@ if TYPE_CHECKING:
 
     from frametool.grammar.readers import Path
     from frametool.stream.header import PoseColumns
+    from frametool.stream.record_search import Holder
     from frametool.stream.request import Request
 
-    Holder = tuple[Path, str, str]  # of the numbers of a record; of a message its field, and the kind of that
-
-POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # with metres a unit
-INNER = ("transforms", "static_transforms", "poses", "pose", "transform", "twist", "wrench", "accel", "msg", "message",
-         "detections")  # fmt: skip
-LISTS = ("markers", "polygon", "points")  # of messages that hold nothing else
-COVARIANCES = ("covariance", "position_covariance", "orientation_covariance")
-# a mapping with no other keys may be the identity
-NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS)).difference(LISTED_WORDS)
-KNOWN = frozenset((*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS))
-XYZ = ("x", "y", "z")
-MOST_KEYS = 8  # named in a message
-QUATERNION = (*XYZ, "w")
-USED = KNOWN.difference(NAME_KEYS).union(ROTATION_KEYS, (readers.AXES_KEY, "sigma"), COVARIANCES, *PARTS.values())
-NUMBER_BEGINS = frozenset("+-.0123456789n")  # n: of nan
 KEYS_REMEDY = "name the keys _deg"
 EARTH_PARENTS, EARTH_NAMES = ("parent", "frame"), ("child_frame_id", "name", "frame_id")
-STALE = ("gimbal_lock", "distance", "angle", "angle_deg")  # they describe the pose that was
 
 
 class Name(NamedTuple):
@@ -121,209 +102,16 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path) 
 
     Raises Misfit, with the path, for a document without records and for a record that cannot be read.
     """
-    formula = request.operation.formula
     root: Any = document  # all paths begin there; what holds the document is no mapping of it
     for step in reversed(path):
         root = MappingProxyType({step: root})
-    search = _search_under if request.rows.columns else _search
-    found = list(search(document, path, request, reading)) if request.rows.poses else []
-    is_bare = request.rows.poses and not request.operation.takes_points
-    if not found and is_bare and type(document) is dict and NOTHING_BUT.issuperset(document):
-        reading.here = path
-        reading.note("neither position nor rotation: taken as the identity", rule="identity")
-        found = [(path, "", "")]
-    if not found and formula is not None and not formula.reads_row:
-        found = [((*path, *each), "", "") for each in _mappings(document)]
-    if not found:
-        within(path, _refuse, document)
-    if request.operation.of == "pair":
-        raise Misfit("a record holds one pose; name A or B, or compare it with the one before by --consecutive", path)
-    for each in found:
-        yield _record(root, *each, request, reading)
+    for each in find_holders(document, path, request, reading):
+        yield read_record(root, each, request, reading)
 
 
-def _search_under(document: Any, path: Path, request: Request, reading: Reading) -> Iterator[Holder]:
-    """Search what is under the key `detections.pose`, which --columns names; a list stands for its items."""
-    found = [(document, path)]
-    for key in request.rows.columns[0].split("."):
-        items = [(value_at(each, at), (*above, *at)) for each, above in found for at in _mappings(each)]
-        found = [(each[key], (*above, key)) for each, above in items if key in each]
-        if not found:
-            keys = dict.fromkeys(each for item, _ in items for each in item)
-            raise Misfit(f"no key {shown(key)} for --columns{alternatives(key, keys, 'keys')}", path)
-    for each in found:
-        yield from _search(*each, request, reading)
-
-
-def _mappings(document: Any) -> list[Path]:
-    """Return the paths of the mappings that a document is, or is a list of."""
-    if type(document) is list:
-        return [(index,) for index, item in enumerate(document) if type(item) is dict]
-    return [()] if type(document) is dict else []
-
-
-def _refuse(document: Any) -> None:
-    """Stop at a document in which no record was found."""
-    if type(document) is not dict:
-        if type(document) is list and document:
-            raise _bare_numbers(document)
-        raise Misfit(f"expected a pose like {{xyz: [x, y, z], rpy_deg: [..]}}, found {kind(document)}")
-    if "header" not in document:  # fields of another message are no misspelt keys
-        _refuse_typos(document, {*POINT_KEYS, *ROTATION_KEYS}, cutoff=0.6)
-    wanted = "a point like {point: [x, y, z]} or a pose like {xyz: [..], rpy_deg: [..]}"
-    raise Misfit(f"expected {wanted}, found the keys {first_of(list(document), MOST_KEYS, quote=shown)}")
-
-
-def _bare_numbers(value: list[Any]) -> Misfit:
-    """Build the error for a list that may be anything."""
-    spellings = {4: "{xyzw: [..]} or {wxyz: [..]}, or give --from"}
-    write = spellings.get(len(value), "{rpy_deg: [..]}, {xyzw: [..]}, ..")
-    return Misfit(f"a bare list of {len(value)} number{'s' * (len(value) != 1)} does not say what it is; write {write}")
-
-
-def _search(value: Any, path: Path, request: Request, reading: Reading) -> Iterator[Holder]:
-    """Yield what holds numbers; where frames change, a mapping that does not move whole is refused.
-
-    A warning names the velocities that stay where a point or pose moves.
-    """
-    if type(value) is list:
-        is_matrix = len(value) in (3, 4) and all(type(row) is list for row in value)
-        if is_matrix or (value and not any(type(item) in (dict, list) for item in value)):
-            yield path, "", ""
-            return
-        for index, item in enumerate(value):
-            yield from _search(item, (*path, index), request, reading)
-    elif type(value) is dict:
-        operation = request.operation
-        holds: dict[str, str] = {}  # which fields of a known message hold what, and which stay, by the fields it has
-        stays: tuple[str, ...] = ()
-        if "header" in value or "angular_velocity" in value:
-            from frametool.ros.messages import HELD
-
-            there = {key for key, each in value.items() if type(each) in (dict, list)}
-            known = [row for row in HELD.values() if there.issuperset(row[0])]
-            holds, stays = max(known, key=lambda row: len(there.intersection(row[1])), default=({}, ()))
-        if operation.moves and any(holds.values()):
-            found = [(path, field, kind) for field, kind in holds.items()]
-        elif _holds_numbers(value):
-            _refuse_several(value, ["the record's own keys"], path)
-            found = [(path, "", "")]
-        else:
-            found = _search_inside(value, path, request, reading, stays)
-        if not operation.keeps_frames and (operation.formula is None or operation.formula.reads_row):
-            _refuse_half(value, found, path, stays if operation.moves else ())
-        if found and operation.takes_points and (rates := [*filter(partial(re.fullmatch, readers.RATE_KEYS), value)]):
-            rates = [key for key in rates if key not in holds]
-            if rates and operation.turns:
-                what = f"{first_of(rates, 3, quote=shown)} would keep to the old axes; a table turns vx, vy, vz along"
-                raise Misfit(f"{what}; leave them out, or convert to CSV first", (*path, rates[0]), key=True)
-            if rates:
-                stay, reading.here = "stay as they are" if rates[1:] else "stays as it is", path
-                reading.note(f"{first_of(rates, 9)} {stay}: points and poses move", rates[0], rule="stays")
-        yield from found
-
-
-def _search_inside(
-    value: dict[str, Any], path: Path, request: Request, reading: Reading, stays: Sequence[str]
-) -> list[Holder]:
-    """Return what the known keys of a message hold."""
-    inner = [key for key in INNER if type(value.get(key)) in (dict, list)]
-    if request.operation.moves:
-        inner += [key for key in LISTS if _is_geometry(key, value.get(key), doubtful=False)]
-    held = {key: [*_search(value[key], (*path, key), request, reading)] for key in inner if key not in stays}
-    if keys := [key for key, each in held.items() if each]:
-        _refuse_several(value, keys, path)
-    return [*chain.from_iterable(held.values())]
-
-
-def _refuse_half(value: dict[str, Any], found: Sequence[Holder], path: Path, stays: Sequence[str]) -> None:
-    """Stop where another field of what moves is expressed in the same frame, or may be, and would stay as it is."""
-    header = value.get("header")
-    is_message = type(header) is dict and "frame_id" in header
-    if is_message and not found:
-        fields = first_of([key for key in value if key != "header"] or ["header"], MOST_KEYS, quote=shown)
-        raise Misfit(f"a message that cannot be moved whole: its fields are {fields}; see help records", path)
-    used = {"header", *stays}.union(*(
-        (*holder[len(path) :][:1], field, *covariance_keys(field)) for holder, field, _ in found
-    ))  # fmt: skip
-    if any(holder == path and not field for holder, field, _ in found):
-        used |= USED
-    rest = [key for key, each in value.items() if key not in used and _is_geometry(key, each, doubtful=is_message)]
-    if found and rest:
-        message = f"{first_of(rest, 2, quote=shown)} may be given in a frame that changes, and would stay"
-        raise Misfit(f"{message}; leave out what does not move, see help records", (*path, rest[0]), key=True)
-
-
-def _is_geometry(key: str, value: Any, *, doubtful: bool) -> bool:
-    """Return True if a value may depend on a frame: it has x, y, z; if doubtful also x and y, or a list of numbers.
-
-    The names in a list are those of joints, whose positions are no point.
-    """
-    if type(value) is dict:
-        axes = {*XYZ[: 3 - doubtful]}
-        return value.keys() >= axes or any(_is_geometry(at, each, doubtful=doubtful) for at, each in value.items())
-    if type(value) is not list:
-        return False
-    some = value[:MOST_KEYS]
-    numbers = sum(type(each) is str and each[:1] in NUMBER_BEGINS for each in some)
-    is_it = (numbers > 1 and (doubtful or key.endswith("covariance"))) or (doubtful and key == "name")
-    return is_it or any(_is_geometry(key, each, doubtful=doubtful) for each in some)
-
-
-def _holds_numbers(value: dict[str, Any]) -> bool:
-    """Return True if a mapping itself is a record rather than a message around one."""
-    if _is_holder(value) or set(XYZ) <= set(value) or _parts_of(value) is not None:
-        return True
-    if any(type(value.get(key)) in (dict, list) for key in INNER):
-        return False
-    if any(map(readers.may_be_on_earth, value)):
-        from frametool.stream.earth_columns import is_on_earth
-
-        if is_on_earth(value):
-            return True
-    try:
-        return _flat_pose(value, []) is not None
-    except Misfit:
-        return True  # half a rotation, or two: reading it says so
-
-
-def _is_holder(value: dict[str, Any]) -> bool:
-    return bool(_rotations(value)) or any(_holds_position(key, each) for key, each in value.items())
-
-
-def _rotations(value: dict[str, Any]) -> list[str]:
-    """Return the keys of a mapping that hold a rotation; the R of a CameraInfo rectifies pictures."""
-    return [
-        key for key, each in value.items()
-        if is_rotation(key, each) and not (key == "R" and not {"K", "P"}.isdisjoint(value))
-    ]  # fmt: skip
-
-
-def _parts_of(value: dict[str, Any]) -> str | None:
-    """Name the kind whose two vectors a mapping has, as a Twist or a Wrench has."""
-    held = {key for key, each in value.items() if type(each) in (dict, list)}
-    return next((name for name, parts in PARTS.items() if held.issuperset(parts)), None)
-
-
-def _refuse_several(value: dict[str, Any], found: list[str], path: Path) -> None:
-    """Stop where a mapping holds more than one pose: which is meant nobody can tell."""
-    ours = {*POINT_KEYS, *ROTATION_KEYS, *found, "sigma", "twist"}
-    more = [key for key, each in value.items() if type(each) is dict and key not in ours and _is_holder(each)]
-    if len(found) + len(more) > 1:
-        raise Misfit(f"expected one point or pose in a record, found several: {', '.join([*found, *more])}", path)
-
-
-def _holds_position(key: str, value: Any) -> bool:
-    return key in POINT_KEYS and is_position(key, value) and not (key == "point" and type(value) is str)
-
-
-def covariance_keys(field: str) -> Sequence[str]:
-    """Return the keys under which the covariance of a field of a message may be, or that of a record."""
-    return (f"{field}_covariance",) if field else COVARIANCES
-
-
-def _record(root: Any, path: Path, field: str, kind: str, request: Request, reading: Reading) -> Record:
-    """Read the record at a path; of a message its field, which holds something of this kind."""
+def read_record(root: Any, holder: Holder, request: Request, reading: Reading) -> Record:
+    """Read what holds numbers."""
+    path, field, kind, members = holder
     value, formula = value_at(root, path), request.operation.formula
     reading.here = path
     try:
@@ -332,24 +120,24 @@ def _record(root: Any, path: Path, field: str, kind: str, request: Request, read
         if kind:
             record = _of_message(value, path, reading, request, field=field, kind=kind)
         elif request.rows.poses:
-            record = _mapping(value, path, reading, request)
+            record = _mapping(members or Members(value), path, reading, request)
     except Misfit as misfit:
         raise misfit.below(*path) from None
     if not request.rows.poses:
         record = _only_asked(value, path, request)
     if formula is not None and record.shape.kind in PARTS:
         raise Misfit(f"an expression takes poses, points and vectors; this is a {record.shape.kind}", path)
-    if formula is not None and not (formula.reads_row or record.values or _is_holder(value)):
+    if formula is not None and not (formula.reads_row or record.values or Members(value).say_pose):
         record = record._replace(shape=Shape("", None))
     # what says a covariance: the record, or the mapping around it where a message has it so
     around = (path, path[:-1]) if path[-1:] == (record.shape.kind,) else (path,)
     keys = {*covariance_keys(field), *COVARIANCE_KEYS}
     for each in () if record.keys.placed else around:
-        holder = value_at(root, each)
-        if type(holder) is dict and (not keys.isdisjoint(holder) or any(map(readers.may_be_uncertain, holder))):
+        outer = value_at(root, each)
+        if type(outer) is dict and (not keys.isdisjoint(outer) or any(map(readers.may_be_uncertain, outer))):
             from frametool.stream.extra_numbers import with_covariances
 
-            record = with_covariances(record, holder, each, covariance_keys(field), request, reading)
+            record = with_covariances(record, outer, each, covariance_keys(field), request, reading)
             break
     record = _with_asked(record, root, request)
     return _with_names(record, root, request) if request.rows.poses else record
@@ -424,36 +212,36 @@ def _bare_list(value: list[Any], path: Path, reading: Reading, request: Request)
     if type(value[0]) is list:
         return _with_rotation(value, "matrix", Record(path, Shape(POSE, None)), (), reading, request)
     if len(value) != 3 or not request.operation.moves:
-        raise _bare_numbers(value)
+        raise bare_numbers(value)
     return Record(path, Shape(_kind("", (), request)), *_three(value, path, 1.0))
 
 
-def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Request) -> Record:
+def _mapping(members: Members, path: Path, reading: Reading, request: Request) -> Record:
     """Read what a mapping says: its position, then its rotation; or the two vectors of a twist or a wrench."""
-    if (name := _parts_of(value)) is not None and not _is_holder(value):
-        return _two_vectors(value, ACCEL if path[-1:] == (ACCEL,) else name, path, request)
-    positions = [key for key in value if _holds_position(key, value[key])]
-    if any(map(readers.may_be_on_earth, value)):
+    value, positions, rotations = members.value, members.positions, members.rotations
+    if members.parts:
+        return _two_vectors(value, ACCEL if path[-1:] == (ACCEL,) else members.parts, path, request)
+    if members.on_earth:
         from frametool.stream.earth_columns import placed_record
 
         inner = partial(_pose_at_place, path=path, reading=reading, request=request)
         empty = Record(path, Shape("", None), parent=Name(EARTH_FRAMES[0]))
         if (found := placed_record(value, empty, positions, inner, reading, request)) is not None:
             return found
-    rotations = _rotations(value)
-    flat = _flat_pose(value, rotations)
+    flat = members.flat
     if flat and flat.position and flat.position.kind:
         if not request.operation.moves:
             raise Misfit(f"a {flat.position.kind} cannot be taken for a pose; apply moves it")
         return _with_flat(Record(path, Shape(flat.position.kind, None)), value, flat, reading, request)
     turned, there = rotations or (flat and flat.rotation), positions or (flat and flat.position)
     # the grammar of poses allows that several say the same thing twice
-    if len(positions) > 1 and not (turned and POSITION_KEYS.keys() >= {*positions}):
-        raise Misfit(f"expected one position, found {' and '.join(positions)}", (positions[1],), key=True)
+    several = () if turned and POSITION_KEYS.keys() >= {*positions} else (*positions[1:2],)
     if positions and flat and flat.position and not flat.position.absent:
-        shown_both = f"{positions[0]} and {flat.position.shown}"
-        raise Misfit(f"expected one position, found {shown_both}", (flat.position.names[0],), key=True)
-    _refuse_typos(value, {*([] if turned else ROTATION_KEYS), *([] if there else POSITION_KEYS)})
+        several = flat.position.names
+    if several:
+        both = f"{positions[0]} and {' '.join(several)}"
+        raise Misfit(f"expected one position, found {both}", several[:1], key=True)
+    members.refuse_typos({*([] if turned else ROTATION_KEYS), *([] if there else POSITION_KEYS)})
     key = positions[0] if positions else ""
     operation, rows, sigma = request.operation, request.rows, value.get("sigma")
     # what says how sure its rotation is, is a pose, if only by that
@@ -506,33 +294,29 @@ def _pose_at_place(rest: dict[str, Any], path: Path, reading: Reading, request: 
 
         covariance = read_covariance(rest, reading)
     bare = {key: each for key, each in rest.items() if key not in COVARIANCE_KEYS}
-    rotations = _rotations(bare)
-    positions = [key for key in bare if _holds_position(key, bare[key])]
-    if not (rotations or positions or _flat_pose(bare, rotations)):
+    own = Members(bare)
+    if not (own.say_pose or own.flat):
         return Pose(covariance=covariance), []
-    record = _mapping(bare, path, reading, request.with_rows(kind=POSE))
-    keys = [*rotations, *positions, *record.keys.members, *record.keys.flat, *(["angles"] if "angles" in bare else ())]
-    return pose_of(record, request)._replace(covariance=covariance), keys
+    record = _mapping(own, path, reading, request.with_rows(kind=POSE))
+    used = [*own.rotations, *own.positions, *record.keys.members, *record.keys.flat, *{"angles"}.intersection(bare)]
+    return pose_of(record, request)._replace(covariance=covariance), used
 
 
 def pose_of(record: Record, request: Request) -> Pose:
     """Return a record as a named pose; position or rotation is None where it has none."""
-    shape, values = record.shape, record.values
-    position = shape.position(values) if shape.whole or shape.unit is not None else None
-    check = partial(checked_rotation, shape, normalize=request.rows.normalize)
+    shape, values, names = record.shape, record.values, (record.name.text, record.parent.text)
+    check, is_placed = partial(checked_rotation, shape, normalize=request.rows.normalize), shape.whole or shape.unit
     if request.operation.reads_scale(shape):
         from frametool.stream.extra_numbers import of_multiple
 
         whole = of_multiple(shape, values[: shape.own_size], lambda own: check(own)[0], floats)
-        pose = Pose.of(whole[: 7 + (whole[7] != 1.0)], record.name.text, record.parent.text)
-        return pose if position is not None else pose._replace(position=None)
-    rotation = None
-    if shape.notation is not None:
-        x, y, z, w = shape.turned(values, check(values)[0])
-        rotation = x, y, z, w
+        pose = Pose.of(whole[: 7 + (whole[7] != 1.0)], *names)
+        return pose if is_placed else pose._replace(position=None)
+    position: Any = shape.position(values) if is_placed else None
+    rotation: Any = None if shape.notation is None else shape.turned(values, check(values)[0])
     covariance = values[shape.own_size :][:36] if 36 in shape.covariance else None
     scale = values[-1] if 1 in shape.covariance else 1.0
-    pose = Pose(position, rotation, record.name.text, record.parent.text, None, covariance, scale)
+    pose = Pose(position, rotation, *names, None, covariance, scale)
     return inverted(pose) if shape.inverse else pose
 
 
@@ -545,67 +329,7 @@ def _two_vectors(value: dict[str, Any], name: str, path: Path, request: Request)
     return Record(path, Shape(name, None), paths, numbers)
 
 
-def _refuse_typos(value: dict[str, Any], wanted: set[str], cutoff: float = 0.75) -> None:
-    """Stop at a key that is nearly one of those that would say a rotation or a position."""
-    if not wanted or KNOWN.issuperset(value):
-        return
-    wanted -= LISTED_WORDS
-    # a number under a letter or two, as px and ry, is no misspelt list of them
-    others = (key for key in value if key not in KNOWN and (key[2:] or type(value[key]) is not str))
-    near = []
-    for key in islice(others, MOST_COMPARED):
-        word = OTHER_WORDS.get(key.lower(), "") if type(value[key]) in (list, dict) else ""
-        hint = f"; did you mean {shown(word)}?" if word in wanted else did_you_mean(key, wanted, cutoff=cutoff)
-        near += [(key, hint)] if hint else []
-    if near:
-        raise unknown_key([key for key, _ in near], near[0][1])
-
-
-# what others call a rotation or a position; as a list or mapping it is no further field of a record
-OTHER_WORDS = dict.fromkeys(("q", "quats", "quaternions", "orient", "so3"), "quaternion") | {
-    "loc": "xyz", "location": "xyz", "xzy": "xyz",
-    "rpi": "rpy", "ypr": "rpy", "eul": "rpy", "euler_angles": "rpy", "angle_axis": "axis_angle",
-    "ypr_deg": "rpy_deg", "ypr_rad": "rpy_rad", "euler_xyz": "euler", "euler_zyx": "euler",
-}  # fmt: skip
-
-
-def _flat_pose(value: dict[str, Any], rotations: list[str]) -> PoseColumns | None:
-    """Find a position and a rotation among the keys by the names that columns have: x y z, qx qy qz qw, yaw_deg, ..
-
-    None where there is neither.  Raises Misfit for half a rotation, for two of them, and for a unit that is not known.
-    """
-    scalars = [key for key, each in value.items() if type(each) not in (dict, list)]
-    others = NOTHING_BUT.difference(STALE) if "axis_x" in value else NOTHING_BUT
-    names = [key for key in scalars if key not in others]  # that may be numbers of ours
-    is_flat = not (rotations or any(key in POINT_KEYS for key in value))
-    if not (names or (is_flat and len(scalars) >= 6)):
-        return None
-    from frametool.stream.header import Columns, Header, PoseColumns, find_six, has_pose_column, plain_pose
-
-    six = find_six(Header(scalars), "") if is_flat and len(scalars) >= 6 else None
-    if six is not None and not has_pose_column(name for name in scalars if name not in six.names):
-        return PoseColumns(six, None)
-    if not rotations and set(names) == set(QUATERNION) and len(names) == len(value):
-        alone = Columns((0, 1, 2, 3), QUATERNION, notation=notation("quaternion"), said=(None,) * 4)
-        return PoseColumns(None, alone)
-    try:
-        found = plain_pose(tuple(names), affixed=is_flat)
-    except ValueInvalid as error:
-        raise Misfit(str(error), key=True) from None
-    if wrong := next((each.wrong for each in found if each is not None and each.wrong), ""):
-        raise Misfit(wrong.replace("column ", "key ", 1), key=True)
-    if found.rotation and rotations:
-        shown = " and ".join([found.rotation.shown, *rotations])
-        raise Misfit(f"expected one rotation, found {shown}", (found.rotation.names[0],), key=True)
-    if found.position and not found.rotation and not rotations and "w" in value:
-        message = "x, y, z beside w may be a quaternion or a point; write {quaternion: {..}} or {point: [..], w: ..}"
-        raise Misfit(message, ("w",), key=True)
-    return found if found.position or found.rotation else None
-
-
-def _with_flat(
-    record: Record, value: dict[str, Any], flat: PoseColumns, reading: Reading, request: Request
-) -> Record:
+def _with_flat(record: Record, value: dict[str, Any], flat: PoseColumns, reading: Reading, request: Request) -> Record:
     """Add the numbers that are members of the record itself: those of a position, unless it has one, and a rotation."""
     from frametool.stream.header import Columns, row_shape
 
@@ -616,7 +340,7 @@ def _with_flat(
         record = record._replace(
             shape=record.shape._replace(unit=position.unit, absent=position.absent),
             numbers=tuple((*record.path, name) for name in position.names),
-            values=tuple(_number(value, name, None, metres=position.unit == 1.0) for name in position.names),
+            values=tuple(_number(value, name, metres=position.unit == 1.0) for name in position.names),
             keys=RecordKeys(members=position.names),
         )
     if rotation is None:
@@ -624,15 +348,11 @@ def _with_flat(
     names = rotation.names
     shape = row_shape(flat, request.with_rows(degrees=reading.degrees), POSE)
     paths, values = ((), ()) if shape.whole else (record.numbers, record.values)
-    numbers = [_number(value, name, shape.in_degrees(at)) for at, name in enumerate(names, len(values))]
+    numbers = [_number(value, name, degrees=shape.in_degrees(at)) for at, name in enumerate(names, len(values))]
     if shape.notation is not None:
         numbers = as_meant(shape.notation, numbers, [value[name] for name in names], reading)
     every = (*values, *numbers)
-    try:
-        _, doubts = checked_rotation(shape, every, normalize=reading.normalize)
-    except ValueInvalid as error:
-        raise readers.NotARotation(str(error), (names[0],)) from None
-    for rule, message in doubts:
+    for rule, message in within((names[0],), checked_rotation, shape, every, normalize=reading.normalize)[1]:
         reading.note(message, names[0], rule=rule)
     angles = shape.rotation(every)
     largest = max(shape.bare_angles, key=lambda at: abs(angles[at]), default=None)
@@ -644,9 +364,7 @@ def _with_flat(
     return record._replace(shape=shape, numbers=paths, values=every, keys=keys)
 
 
-def _number(
-    value: dict[str, Any], key: str, degrees: bool | None, *, metres: bool = False  # noqa: FBT001 - None: no angle
-) -> float:
+def _number(value: dict[str, Any], key: str, *, degrees: bool | None = None, metres: bool = False) -> float:
     """Read a member that is a number, an angle, or a length."""
     if type(value[key]) is not str:
         raise Misfit(f"expected a number, found {kind(value[key])}", (key,))
@@ -684,9 +402,7 @@ def _three(
     return tuple((*below, axis) if axis in value else None for axis in XYZ), numbers
 
 
-def _with_rotation(
-    value: Any, key: str, record: Record, below: Path, reading: Reading, request: Request
-) -> Record:
+def _with_rotation(value: Any, key: str, record: Record, below: Path, reading: Reading, request: Request) -> Record:
     """Add the rotation's numbers; whether that of a multiple s R is one is seen where s is known."""
     row = ROTATION_KEYS.get(key)
     is_multiple = request.operation.multiples and row is not None and row.representation.whole is not None
@@ -763,13 +479,6 @@ def _with_stamp(record: Record, header: dict[str, Any], path: Path) -> Record:
     return record._replace(stamps=stamps, stamp_ns=record.stamp_ns if record.stamps else stamp_ns)
 
 
-def value_at(value: Any, path: Path) -> Any:
-    """Follow a path of keys and indices down."""
-    for step in path:
-        value = value[step]
-    return value
-
-
 def key_path(documents: Any, holder: Path, names: Sequence[str] = STAMP_KEYS, wanted: str = "a time like 12.5") -> Path:
     """Find a scalar of a point or pose, by default its stamp: its own key, else that of a mapping around it.
 
@@ -781,16 +490,12 @@ def key_path(documents: Any, holder: Path, names: Sequence[str] = STAMP_KEYS, wa
     for step in holder:
         around.append(around[-1][step])
     for name, depth in product(names, range(len(holder), 0, -1)):
-        if (position := messages.position_of(name, around[depth])) is not None:
-            return (*holder[:depth], *position)
-        steps = name.split(".")
-        for keys in ((name,), steps, [int(each) if each.isdecimal() else each for each in steps]):
-            if (found := _below(around[depth], keys)) is None:
-                continue
-            if type(found[0]) not in (dict, list):
-                return (*holder[:depth], *keys)
-            if names is not STAMP_KEYS:
-                raise Misfit(f"expected {wanted}, found {kind(found[0])}", (*holder[:depth], *keys))
+        found = messages.position_of(name, around[depth]) or _below(around[depth], name)
+        value = found and value_at(around[depth], found)
+        if found and type(value) not in (dict, list):
+            return (*holder[:depth], *found)
+        if found and names is not STAMP_KEYS:
+            raise Misfit(f"expected {wanted}, found {kind(value)}", (*holder[:depth], *found))
     if names is STAMP_KEYS:
         usual = ", ".join(names)
         raise Misfit(f"no stamp: neither a header nor {usual}; name its key with --time-column", holder)
@@ -798,11 +503,13 @@ def key_path(documents: Any, holder: Path, names: Sequence[str] = STAMP_KEYS, wa
     raise Misfit(f"no key {shown(names[0])}{did_you_mean(names[0], known)}", holder)
 
 
-def _below(value: Any, keys: Sequence[str | int]) -> tuple[Any] | None:
-    """Follow keys and indices down; None where one is not there."""
-    for key in keys:
-        is_index = type(value) is list and type(key) is int and key < len(value)
-        if not (is_index or (type(value) is dict and key in value)):
-            return None
-        value = value[key]
-    return (value,)
+def _below(value: Any, name: str) -> Path | None:
+    """Return the path of a key, or of several with dots and indices between them; None where it is not there."""
+    for steps in ([name], name.split(".")):
+        path, inner = list[str | int](), value
+        with suppress(LookupError, TypeError):
+            for step in steps:
+                path.append(int(step) if type(inner) is list and step.isdecimal() else step)
+                inner = inner[path[-1]]
+            return (*path,)
+    return None

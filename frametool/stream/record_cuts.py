@@ -14,27 +14,30 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from frametool.documents.document import JSON_NUMBER
+from frametool import sizes
+from frametool.documents.document import JSON_NUMBER, Node
 from frametool.errors import FrametoolError
 from frametool.grammar.pose import DESCRIPTIVE, LISTED_WORDS, POSE_KEYS, ROTATION_KEYS
 from frametool.grammar.readers import AXES_KEY, NAME_KEYS, PARENT_KEYS, Path, may_be_uncertain
 from frametool.stream.evaluate import Plan
 from frametool.stream.faults import NULL, SKIP, Fault
-from frametool.stream.record import KEYS_REMEDY, POINT_KEYS
+from frametool.stream.record import KEYS_REMEDY
+from frametool.stream.record_search import POINT_KEYS
+from frametool.stream.record_values import MOST_ENTRIES
 from frametool.stream.row_layout import POSE, Const, In, Renamed
 from frametool.stream.rows import Block, chosen, numbered, spans_of, stamps_in
 from frametool.stream.splice import OURS, column_in, quoted_name, stretches_of
-from frametool.stream.splitter import DOCUMENTS, LINES, Part, Splitter
 from frametool.text.spans import MARGIN, Bytes, Ints, Spans, without_quotes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from frametool.documents.document import Node
+    from frametool.stream.record_stream import Part, Splitter
     from frametool.stream.record_values import Entry, RecordText
     from frametool.stream.request import Request
 
-    Names: TypeAlias = tuple[str | None, str | None]
+    Names: TypeAlias = tuple[str | None, str | None]  # parent and name
+    Renaming: TypeAlias = tuple[Names, Names]  # of a record, and of its result
     Places: TypeAlias = Sequence[tuple[int, int]]
     Hit: TypeAlias = tuple["Template", Places]
 
@@ -78,150 +81,149 @@ class Template:
     """The text of records, and what holds for all that are written alike.
 
     stretches: where each part of the text is
-    numbers: the stretches that hold our numbers, in order; regular: whether all of them are written plainly
+    numbers: the stretches that hold our numbers, in order; none if one of them is not written plainly
     stamps: the stretches of each entry's stamp
-    frames: the stretches of the names of each entry's frames, parent and name; None where they are the same in all
-    pieces: what the result is made of; renamed: whose name it is that stood somewhere: of which entry, whether its
-        parent or its name, and the scalar that it was
+    named: the stretches of frames whose names may differ; frames: for each entry which of these are its parent and its
+        name, None for one that is the same in all
+    pieces: what the result is made of; roles: whose names stand in it: of which entry, whether its parent or its
+        name, and the scalar that it was
     notes: what is worth telling about all of them
     leaves: of what is written anew, the scalars that differ: the stretch of each, and where it was learned
     """
 
     def __init__(self, known: RecordText) -> None:
         """Cut the text where numbers, stamps, names and edits are."""
-        self.text = text = known.text
-        self.entries = tuple(known.entries)
-        self.json, self.line = known.json, known.line
+        self.text, self.json, self.line = known.text, known.json, known.line
+        self.root, self.entries, self._request = known.root, tuple(known.entries), known.request
         every = known.notes_at(0, known.source.first_column)
         self.notes = [each for each in every if each.about in OF_ALL]
-        self._root, self._request = known.root, known.request
-        self._named: dict[tuple[int, Names], Names | None] = {}
         number = re.compile(JSON_NUMBER if self.json else YAML_NUMBER)
-        self._patterns: dict[tuple[int, int], str] = {}  # of what may be there
-        numbers: list[tuple[int, int]] = []
         paths = [(record, path) for record, *_ in self.entries for path in record.numbers]
-        for record, path in paths:
-            if path is not None:
-                numbers.append(_text_of(known.root.at(path)))
-                self._patterns[numbers[-1]] = NOT_UNKNOWN * (path in record.begins) + number.pattern
-        self.regular = len(numbers) == len(paths) and all(number.fullmatch(text, *span) for span in numbers)
-        self._patterns = self._patterns if self.regular else {}
-        stamps = [[known.root.at(path) for path in entry.stamp] for entry in self.entries]
-        cuts = {*numbers, *((node.start, node.end) for node in chain(*stamps))}
-        frames = [_frames_of(known.root, entry, known.request, json=self.json) for entry in self.entries]
-        self._patterns |= {_text_of(node): FRAME[self.json, node.quote] for node in chain(*frames) if node is not None}
-        leaves: dict[tuple[int, int], Node] = {}
-        if known.request.results.canonical and self.regular:
-            own = [known.root.at(path) for _, path in paths if path is not None]
-            leaves = {_text_of(node): node for node in (*own, *chain(*frames)) if node is not None}
-            taken = cuts | self._patterns.keys()
-            for leaf, pattern in self._free_leaves():  # a stamp is read as it is written, others without their quotes
-                size = 0 if (leaf.start, leaf.end) in taken else len(leaf.quote)
-                span = leaf.start + size, leaf.end - size
-                if span[0] < span[1]:
-                    leaves[span], self._patterns[span] = leaf, pattern[size : len(pattern) - size]
-        self.stretches, pieces = stretches_of(len(text), sorted(cuts | self._patterns.keys()), known.edits)
+        own = [self.root.at(path) for _, path in paths if path is not None]
+        self.regular = len(own) == len(paths) and all(
+            number.fullmatch(self.text, *_text_of(node)) for node in own
+        )  # fmt: skip
+        own = own if self.regular else []
+        self._patterns = {  # of what may be there
+            _text_of(node): NOT_UNKNOWN * (path in record.begins) + number.pattern
+            for node, (record, path) in zip(own, paths, strict=False)
+        }
+        stamps = [[self.root.at(path) for path in entry.stamp] for entry in self.entries]
+        frames = [self._frames_of(entry) for entry in self.entries]
+        named = {_text_of(node): node for node in chain(*frames) if node is not None}
+        self._patterns |= {span: FRAME[self.json, node.quote] for span, node in named.items()}
+        cuts = {*self._patterns, *((node.start, node.end) for node in chain(*stamps))}
+        anew, leaves = known.request.results.canonical, dict[tuple[int, int], Node]()
+        if anew and self.regular:
+            leaves = {_text_of(node): node for node in own} | named
+        for leaf, pattern in () if known.is_long or (anew and not self.regular) else self._free_leaves():
+            # of what is written anew a stamp is read as it is written, others without their quotes
+            size = len(leaf.quote) if anew and (leaf.start, leaf.end) not in cuts else 0
+            span = leaf.start + size, leaf.end - size
+            if span[0] < span[1]:
+                leaves[span] = leaf
+                self._patterns.setdefault(span, pattern[size : len(pattern) - size])
+        self.stretches, pieces = stretches_of(len(self.text), sorted(cuts.union(leaves if anew else ())), known.edits)
         at = dict(zip(self.stretches, count(), strict=False))
-        self.numbers = tuple(at[span] for span in numbers)
+        self.numbers = tuple(at[_text_of(node)] for node in own)
         self.stamps = tuple(tuple(at[node.start, node.end] for node in each) for each in stamps)
-        self.frames = [[None if node is None else at[_text_of(node)] for node in nodes] for nodes in frames]
-        self.leaves = sorted(((at[span], node) for span, node in leaves.items()), key=itemgetter(0))
-        self.renamed: dict[int, tuple[int, int, Node]] = {}
-        for entry, nodes in enumerate(frames):
-            for role, node in enumerate(nodes):
-                if node is not None:
-                    self.renamed.setdefault(node.start, (entry, role, node))
+        self.named = [at[span] for span in named]
+        order = {node.start: place for place, node in enumerate(named.values())}
+        self.frames = [[None if node is None else order[node.start] for node in each] for each in frames]
+        self.leaves = sorted(((at[span], node) for span, node in leaves.items()), key=itemgetter(0)) if anew else []
+        roles = {
+            node.start: (entry, role, node)
+            for entry, each in reversed([*enumerate(frames)]) for role, node in enumerate(each) if node is not None
+        }  # fmt: skip
+        self.roles = [roles[each.at] for each in pieces if isinstance(each, Renamed) and each.at in roles]
+        places = count(len(self.stretches) + 2)  # behind the stretches and what is around a record
         self.pieces = [
-            Const(each.text) if isinstance(each, Renamed) and each.at not in self.renamed else each for each in pieces
+            each if not isinstance(each, Renamed) else In(next(places)) if each.at in roles else Const(each.text)
+            for each in pieces
         ]
-
-    @cached_property
-    def pattern(self) -> re.Pattern[bytes]:
-        """Match a record that is alike."""
-        return re.compile(self._expression)
+        self._results: dict[tuple[str, ...], list[Renaming] | None] = {}
+        self._own = self._renamed(tuple(self.text[slice(*span)] for span in named))
 
     @cached_property
     def block_pattern(self) -> re.Pattern[bytes]:
-        """Match such a record from where one may begin; its last group is what parts it from the next."""
+        """Match a record that is alike from where one may begin; its last group is what parts it from the next."""
+        begin, end = rb"(?:\A|(?<=\n---\n)|(?<=\n---\r\n))", rb"(---[ \t]*\r?\n)"
         if self.json:
-            return re.compile(rb"(?m:^)" + self._expression + rb"([ \t]*,?[ \t]*\r?\n)")
-        return re.compile(rb"(?:\A|(?<=\n---\n)|(?<=\n---\r\n))" + self._expression + rb"(---[ \t]*\r?\n)")
+            begin, end = rb"(?m:^)", rb"([ \t]*,?[ \t]*\r?\n)"
+        return re.compile(begin + self.pattern.pattern + end)
 
     @cached_property
-    def _expression(self) -> bytes:
-        """Return the regular expression, one group a stretch, that all records match that are alike."""
-        free = iter(() if self._request.results.canonical else self._free_leaves())
-        leaf = next(free, None)
-        groups = []
+    def pattern(self) -> re.Pattern[bytes]:
+        """Match a record that is alike, one group a stretch."""
+        groups, left = [], sorted(self._patterns, reverse=True)
         for start, end in self.stretches:
-            if (start, end) in self._patterns:
-                groups.append(f"({self._patterns[start, end]})")
-                continue
             parts, at = [], start
-            while leaf is not None and leaf[0].end <= end:
-                node, pattern = leaf
-                if node.start >= at:
-                    parts += [re.escape(self.text[at : node.start]), pattern]
-                    at = node.end
-                leaf = next(free, None)
+            while left and left[-1][1] <= end:
+                own = left.pop()
+                if own[0] >= at:
+                    parts += [re.escape(self.text[at : own[0]]), self._patterns[own]]
+                    at = own[1]
             groups.append("".join(["(", *parts, re.escape(self.text[at:end]), ")"]))
-        return "".join(groups).encode()
+        return re.compile("".join(groups).encode())
 
-    def named(self, at: int, names: Names) -> Names | None:
-        """Return the frames of the result of an entry that names these; None where the text around them is another."""
-        if (at, names) not in self._named:
-            if len(self._named) > MOST_NAMES:
-                self._named.clear()
-            record = self.entries[at].record
-            found, own = self._renamed(at, names), self._renamed(at, (record.parent.text, record.name.text))
-            self._named[at, names] = found[0] if found and own and found[1:] == own[1:] else None
-        return self._named[at, names]
+    def renamed(self, names: tuple[str, ...]) -> list[Renaming] | None:
+        """Return the frames of each entry, and of its result, where those that may differ are called so.
 
-    def _renamed(self, at: int, names: Names) -> tuple[Names, Any, Any, bool] | None:
-        """Return the frames of such a result, and all else that they decide about its text."""
-        entry, request, timed = self.entries[at], self._request, self._request.timed
-        asked = request.for_kind(entry.record.shape.kind)
-        if any(path[-1] == "frame" and request.counts(names[0] or "") for path in entry.record.parent.paths):
-            return None
-        try:
-            new = names if asked.rename is None else asked.rename(*names)
-            if entry.edge is not None and request.pose_from_frame is not None:
-                request.pose_from_frame(names[0])
-            is_timed = timed is not None and not timed.name and timed.moves(names[0])
-        except FrametoolError:
-            return None
-        parent, name = (
-            name if index is None else (name == old, name == other, not name)
-            for name, old, other, index in zip(new, names, names[::-1], self.frames[at], strict=True)
-        )
-        return new, parent, name, is_timed
+        None where the text around them is another then.
+        """
+        if names not in self._results:
+            if len(self._results) > MOST_NAMES:
+                self._results.clear()
+            found, own = self._renamed(names), self._own
+            self._results[names] = found[0] if found and own and found[1] == own[1] else None
+        return self._results[names]
 
-    def fits_in(self, text: bytes, places: Places) -> bool:
-        """Return True if the frames that a record names fit; places: where its stretches are."""
-        for at, (entry, found) in enumerate(zip(self.entries, self.frames, strict=True)):
-            known = entry.record.parent.text, entry.record.name.text
-            parent, name = (
-                old if index is None else text[slice(*places[index])].decode()
-                for old, index in zip(known, found, strict=True)
-            )
-            if self.named(at, (parent, name)) is None:
-                return False
-        return True
+    def _renamed(self, names: tuple[str, ...]) -> tuple[list[Renaming], list[Any]] | None:
+        """Return the frames of such entries and of their results, and all else that they decide; None if wrong."""
+        found, others, request, timed = list[Any](), list[Any](), self._request, self._request.timed
+        for (record, _, edge, *_), own in zip(self.entries, self.frames, strict=True):
+            pairs = zip((record.parent.text, record.name.text), own, strict=True)
+            parent, name = (old if at is None else names[at] for old, at in pairs)
+            if any(path[-1] == "frame" and request.counts(parent or "") for path in record.parent.paths):
+                return None
+            try:
+                rename = request.for_kind(record.shape.kind).rename
+                new = (parent, name) if rename is None else rename(parent, name)
+                if edge is not None and request.pose_from_frame is not None:
+                    request.pose_from_frame(parent)
+                others.append(timed is not None and not timed.name and timed.moves(parent))
+            except FrametoolError:
+                return None
+            found.append(((parent, name), new))
+            others += [
+                text if at is None else (text == old, not text)
+                for text, old, at in zip(new, (parent, name), own, strict=True)
+            ]
+        return found, others
 
-    def stretch_of(self, path: Path) -> int:
-        """Return the stretch of a scalar that decides nothing."""
-        node = self._root.at(path)
-        return next(at for at, each in self.leaves if each.start == node.start)
+    def _frames_of(self, entry: Entry) -> list[Node | None]:
+        """Return where the frames of a record are named, parent and name, if all that is alike may name others.
+
+        None where no other name may be: a name is written as plainly there as all that are alike are, and is no label.
+        """
+        record, request, found = entry.record, self._request, list[Node | None]()
+        is_placed = record.keys.placed or record.shape.place or request.results.place or request.rows.given_place
+        for name in (record.parent, record.name):
+            is_one = request.rows.poses and not is_placed and name.text and len(name.paths) == 1
+            node = self.root.at(name.paths[0]) if is_one and name.paths[0] not in entry.stamp else None
+            is_plain = node and len(node.value) == node.end - node.start - 2 * bool(node.quote)
+            pattern = FRAME.get((self.json, node.quote)) if node and is_plain else None
+            found.append(node if node and pattern and re.fullmatch(pattern, node.value, re.ASCII) else None)
+        return found
 
     def _free_leaves(self) -> Iterator[tuple[Node, str]]:
         """Yield the scalars that decide nothing, in order, each with the expression of what it may be."""
         around: set[Path] = set()
         fixed: set[Path | None] = set()
         for record, *_ in self.entries:
-            depths = range(len(record.path) + 1)
-            around.update(record.path[:depth] for depth in depths)
-            around.update((*record.path[:depth], "header") for depth in depths)
-            around.update([(*record.path, "scale")] * (record.shape.kind == POSE))
+            for depth in range(len(record.path) + 1):
+                around |= {record.path[:depth], (*record.path[:depth], "header")}
+            around |= {(*record.path, "scale")} if record.shape.kind == POSE else set()
             fixed.update(record.numbers, record.begins)
         has_poses = any(record.shape.kind == POSE for record, *_ in self.entries)
         words = _WORDS if has_poses else _WORDS - {"scale"}  # of points that is data
@@ -230,7 +232,7 @@ class Template:
         operation = self._request.operation
         passes = operation.keeps_frames and operation.formula is None
         stamps = {path: STAMP[at % 2] for record, *_ in self.entries for at, path in enumerate(record.stamps)}
-        for path, leaf in _leaves(self._root, ()):
+        for path, leaf in _leaves(self.root, ()):
             depth = next((depth for depth in range(len(path), 0, -1) if type(path[depth - 1]) is str), 0)
             key, is_own = str(path[depth - 1]) if depth else "", depth == len(path)
             # with our numbers the scalar of a key may be one of them or change what they mean, whatever its unit
@@ -265,24 +267,6 @@ def _leaves(node: Node, path: Path) -> Iterator[tuple[Path, Node]]:
         yield path, node
 
 
-def _frames_of(root: Node, entry: Entry, request: Request, *, json: bool) -> list[Node | None]:
-    """Return where the frames of a record are named, parent and name, if all that is alike may name others.
-
-    None where no other name may be: a name is written as plainly there as all that are alike are, and is no label.
-    """
-    record = entry.record
-    is_placed = record.keys.placed or record.shape.place or request.results.place or request.rows.given_place
-    varies = request.rows.poses and not is_placed
-    found: list[Node | None] = []
-    for name in (record.parent, record.name):
-        is_one = varies and name.text and len(name.paths) == 1 and name.paths[0] not in entry.stamp
-        node = root.at(name.paths[0]) if is_one else None
-        is_plain = node and type(node.value) is str and len(node.value) == node.end - node.start - 2 * bool(node.quote)
-        pattern = FRAME.get((json, node.quote)) if node and is_plain else None
-        found.append(node if node and pattern and re.fullmatch(pattern, node.value, re.ASCII) else None)
-    return found
-
-
 def _text_of(node: Node) -> tuple[int, int]:
     """Return where the text of a scalar is, without its quotes."""
     return node.start + bool(node.quote), node.end - bool(node.quote)
@@ -298,10 +282,28 @@ class Cut(NamedTuple):
     starts: Ints
     ends: Ints
 
-    def part(self, row: int) -> Part:
-        """Return where a record is."""
-        ends = self.ends[row].tolist()
-        return Part(int(self.starts[row, -1]), int(self.starts[row, 0]), int(self.starts[row, -2]), ends[-2])
+    def place(self, row: int) -> tuple[int, int, int, int]:
+        """Return where a record is, as a `Part` says it."""
+        starts = self.starts[row].tolist()
+        return starts[-1], starts[0], starts[-2], int(self.ends[row, -2])
+
+    def frames(self, text: bytes) -> tuple[list[Any], Ints]:
+        """Return the frames of its records and of their results, each set of them once, and which of these each has.
+
+        None for a set whose result is written otherwise; else the frames of each entry.
+        """
+        columns, data = list[list[str]](), np.frombuffer(text, np.uint8)
+        for named in self.template.named:
+            starts, ends = self.starts[:, named], self.ends[:, named]
+            width = ends[0] - starts[0]
+            is_alike = (ends - starts == width).all()
+            is_alike = is_alike and (data[at := starts[:, None] + np.arange(width)] == data[at[0]]).all()
+            spans = zip(*(each[: 1 if is_alike else None].tolist() for each in (starts, ends)), strict=True)
+            columns.append([text[start:end].decode() for start, end in spans])
+        size = max(map(len, columns), default=1)
+        rows = zip(*(each if len(each) == size else each * size for each in columns), strict=True) if columns else [()]
+        known, codes = numbered([*rows])
+        return [*map(self.template.renamed, known)], np.resize(codes, len(self.starts))
 
 
 class RecordCutter:
@@ -314,12 +316,13 @@ class RecordCutter:
         """Start without templates."""
         self.splitter, self.read = splitter, read
         self.templates: list[Template] = []
+        self.left = sizes.LEARNED  # where no records are alike, learning is lost time
 
     def cut(self, text: bytes) -> tuple[list[Cut], list[tuple[int, int]]]:
         """Return the records of a block that templates find, and what is left between them."""
         cuts: list[Cut] = []
         rest = [(0, len(text))]
-        if self.splitter.layout not in (LINES, DOCUMENTS) or not is_text(text):
+        if not is_text(text):
             return cuts, rest
         for template in self.templates[-MOST_TRIED:][::-1]:
             rest = _cut_by(template, text, rest, cuts)
@@ -331,18 +334,13 @@ class RecordCutter:
                 break
             if self.match(head, part) is None:
                 known = self.read(head, part)
-                if isinstance(known, Fault) or known.is_long or not known.entries:
+                if isinstance(known, Fault) or known.is_long or self.learned(known, head, part) is None:
                     break
-                self.learned(known, head, part)
             rest = _cut_by(self.templates[-1], text, rest, cuts)
         found = []
         for cut in cuts:  # without records whose frames are called so that their results are written otherwise
-            fits = np.ones(len(cut.starts), np.bool_)
-            for at in range(len(cut.template.entries)):
-                names = names_of(cut, at, text)
-                wrong = {each for each in {*names} if cut.template.named(at, each) is None}
-                if wrong:
-                    fits &= np.resize(np.array([each not in wrong for each in names]), len(fits))
+            frames, codes = cut.frames(text)
+            fits = np.array([each is not None for each in frames])[codes]
             rest += zip(cut.starts[~fits, 0].tolist(), cut.ends[~fits, -2].tolist(), strict=True)
             found.append(cut if fits.all() else Cut(cut.template, cut.starts[fits], cut.ends[fits]))
         return [cut for cut in found if len(cut.starts)], sorted(rest)
@@ -353,22 +351,30 @@ class RecordCutter:
             return None
         for template in reversed(self.templates):
             found = template.pattern.fullmatch(text, part.start, part.end)
-            if found is not None and template.fits_in(text, found.regs[1:]):
-                return template, found.regs[1:]
+            if found is not None:
+                places = found.regs[1:]
+                if template.renamed(tuple(text[slice(*places[at])].decode() for at in template.named)) is not None:
+                    return template, places
         return None
 
     def learned(self, known: RecordText, text: bytes, part: Part) -> Hit | None:
-        """Learn from a record; a template is kept in mind unless it is long, not too many."""
-        if not known.entries:
+        """Learn from a record that may have its like, or where records depend on each other, from any.
+
+        A template is kept in mind unless it is long, not too many.
+        """
+        canonical, in_order = known.request.results.canonical, known.request.in_order
+        is_alike = self.left and not known.is_long and not (canonical and len(known.entries) > MOST_ENTRIES)
+        if not known.entries or not (is_alike or in_order):
             return None
+        self.left -= bool(is_alike)
         template = Template(known)
         if not known.is_long:  # no expression is made of such
             self.templates = [*self.templates[-MOST_TEMPLATES + 1 :], template]
             if hit := self.match(text, part):
                 return hit
         # long, or with lines between its own that tools print: blanks of that size are in the template's text
-        sizes = [len(template.text[start:end].encode()) for start, end in template.stretches]
-        return template, list(pairwise(accumulate(sizes, initial=part.start)))
+        lengths = [len(template.text[start:end].encode()) for start, end in template.stretches]
+        return template, list(pairwise(accumulate(lengths, initial=part.start)))
 
 
 def _cut_by(template: Template, text: bytes, rest: list[tuple[int, int]], cuts: list[Cut]) -> list[tuple[int, int]]:
@@ -446,10 +452,12 @@ def block_of(cut: Cut, data: Bytes, text: bytes, request: Request) -> Block:
         found, late = stamps_in([without_quotes(parts[index]) for index in each], column)
         stamps.append(found)
         bad = {**late, **bad}
-    named = [names_of(cut, at, text) for at in range(len(template.entries))]
-    frames = [[parent for parent, _ in each] for each in named]
-    renamed = (piece for piece in template.pieces if isinstance(piece, Renamed))
-    parts += [_as_renamed(template, piece, named, rows) for piece in renamed]
+    named, codes = cut.frames(text)
+    which = codes.tolist() if len(named) > 1 else [0]
+    frames = [[named[code][at][0][0] for code in which] for at in range(len(template.entries))]
+    for at, role, node in template.roles:  # as results have them
+        texts = [quoted_name(node, each[at][1][role] or "", json=template.json).encode() for each in named]
+        parts.append(chosen(spans_of(texts), codes))
     # those that are not written as plain numbers are the template's own
     numbers: Any = np.tile([value for record, *_ in template.entries for value in record.values], (rows, 1))
     if template.regular:
@@ -459,43 +467,9 @@ def block_of(cut: Cut, data: Bytes, text: bytes, request: Request) -> Block:
     return Block(numbers, parts, places, line_of, stamps=stamps, bad=bad, place_of=place_of, frames=frames)
 
 
-def names_of(cut: Cut, at: int, text: bytes) -> list[Names]:
-    """Return the frames that an entry of each record names, parent and name; one pair where all name the same."""
-    record = cut.template.entries[at].record
-    columns: list[list[str | None]] = []
-    for index, known in zip(cut.template.frames[at], (record.parent.text, record.name.text), strict=True):
-        if index is None:
-            columns.append([known])
-            continue
-        starts, ends = cut.starts[:, index], cut.ends[:, index]
-        width = ends[0] - starts[0]
-        if (ends - starts == width).all():
-            letters = np.frombuffer(text, np.uint8)[starts[:, None] + np.arange(width)]
-            if (letters == letters[0]).all():
-                columns.append([text[starts[0] : ends[0]].decode()])
-                continue
-        texts = [text[start:end] for start, end in zip(starts.tolist(), ends.tolist(), strict=True)]
-        decoded = {each: each.decode() for each in {*texts}}
-        columns.append([decoded[each] for each in texts])
-    size = max(map(len, columns))
-    parents, names = (each if len(each) == size else each * size for each in columns)
-    return [*zip(parents, names, strict=True)]
-
-
-def _as_renamed(template: Template, piece: Renamed, frames: Sequence[Sequence[Names]], rows: int) -> Spans:
-    """Return the names of frames as results have them."""
-    at, role, node = template.renamed[piece.at]
-    known, codes = numbered(frames[at])
-    named = [(template.named(at, each) or (None, None))[role] or "" for each in known]
-    texts = [quoted_name(node, name, json=template.json).encode() for name in named]
-    return chosen(spans_of(texts), np.resize(codes, rows))
-
-
 def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
     """Return what is done to the records of one template."""
     after, entries = len(template.stretches), template.entries
-    renamed = count(after + 2)
-    pieces = [In(next(renamed)) if isinstance(each, Renamed) else each for each in template.pieces]
     on_error = SKIP if request.on_error == NULL else request.on_error  # rows without one are written elsewhere
     stamp = next((entry.stamp for entry in entries if entry.stamp), ())
     key = str(stamp[0][-1]) if stamp else ""
@@ -508,7 +482,7 @@ def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
         tuple(entry.target for entry in entries),
         request._replace(on_error=on_error, timed=timed, offset_ns=0).with_rows(extra_column=extra),
         tuple(".".join(map(str, (path or ())[1:])) for entry in entries for path in entry.record.numbers),
-        (In(after + 1), *pieces, In(after)),
+        (In(after + 1), *template.pieces, In(after)),
         b"null",
         edge_of=request.pose_from_frame if any(entry.edge is not None for entry in entries) else None,
         yaml=yaml,

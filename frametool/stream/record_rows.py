@@ -18,13 +18,12 @@ from frametool.geometry import floats
 from frametool.geometry.representations import notation
 from frametool.grammar.readers import in_nanoseconds
 from frametool.grammar.result import Result, Style
-from frametool.stream.record_cuts import Cut, Template, names_of, plan_of
-from frametool.stream.record_values import MOST_ENTRIES, SPELLED, Answer, stamp_key, unit_of, values_of_unit
+from frametool.stream.record_cuts import Cut, Template, plan_of
+from frametool.stream.record_values import MOST_ENTRIES, SPELLED, Answer, stamp_key, values_of_unit
 from frametool.stream.request import target_of
 from frametool.stream.row_layout import POINT, POSE, ROTATION, VECTOR, Shape
-from frametool.stream.rows import RowPoses, read_stamps
+from frametool.stream.rows import RowPoses, chosen, read_stamps
 from frametool.stream.writers import LEAF, MORE_NUMBERS, NAME, NUMBERS, PARENT, STAMP_NS, AlikeRows, Marked, leaf_mark
-from frametool.text.spans import MARGIN, Bytes, Spans
 
 if TYPE_CHECKING:
     from frametool.stream.evaluate import Plan, Run
@@ -64,35 +63,31 @@ class RecordRows:
         self._plans[template] = plan._replace(targets=tuple(targets) or plan.targets), found
         return self._plans[template][0]
 
-    def take(self, cut: Cut, run: Run, data: Bytes, text: bytes) -> tuple[list[AlikeRows], set[int]]:
+    def take(self, cut: Cut, run: Run, text: bytes) -> tuple[list[AlikeRows], set[int]]:
         """Return the rows of a run in batches, and which of them are unclear."""
-        template, marked = cut.template, self._plans[cut.template][1]
+        template, marked, parts = cut.template, self._plans[cut.template][1], run.block.parts
         left = {*run.rows[run.locked[run.rows] != 0].tolist()} if marked else {*run.rows.tolist()}
         if self.style.format == "yaml":  # in which a null has lines of its own
-            for at, node in template.leaves:
-                if not node.quote:
-                    left |= {*np.flatnonzero(data[cut.starts[:, at] + MARGIN] == ord("n")).tolist()}
+            for cells in (parts[at] for at, node in template.leaves if not node.quote):
+                left |= {*np.flatnonzero(cells.data[cells.starts] == ord("n")).tolist()}
         stamps = []
-        for entry, each in zip(template.entries, marked, strict=False):  # in their headers, or with them
-            paths = entry.record.stamps[:2] if entry.record.stamp_ns is not None else ()
-            read = [template.leaves[each.stamp[0]][0]] if each.stamp else map(template.stretch_of, paths)
-            spans = tuple(Spans(data, cut.starts[:, at] + MARGIN, cut.ends[:, at] + MARGIN) for at in read)
-            times, late = read_stamps(spans, in_ns=each.stamp[1] if each.stamp else 0) if spans else (None, ())
+        for each in marked:
+            times, late = read_stamps([parts[at] for at in each.stamp], in_ns=each.in_ns) if each.stamp else (None, ())
             stamps.append(times)
             left |= {*late}
         rows = run.rows[np.array([row not in left for row in run.rows.tolist()], np.bool_)]
-        own = Cut(template, cut.starts[rows], cut.ends[rows])
+        frames, codes = cut.frames(text)
+        which = codes[rows].tolist() if len(frames) > 1 else [0]
         first, batches = 0, list[AlikeRows]()
         for at, (each, times) in enumerate(zip(marked, stamps, strict=True) if len(rows) else ()):
-            becomes = [named for pair in names_of(own, at, text) if (named := template.named(at, pair))]
-            parents, names = ([pair[role] for pair in becomes] for role in (0, 1))
+            parents, names = ([frames[code][at][1][role] for code in which] for role in (0, 1))
             numbers = run.results[rows, first : first + each.size]
             leaves = {
-                leaf_mark(number): Spans(data, own.starts[:, place] + MARGIN, own.ends[:, place] + MARGIN)
+                leaf_mark(number): chosen(parts[place], rows)
                 for number, (place, _) in enumerate(template.leaves) if leaf_mark(number) in (each.quotes or ())
             }  # fmt: skip
             block = RowPoses(numbers, None if times is None else times[rows], rows, parents, names, leaves)
-            batches.append(AlikeRows(each, own.starts[:, 0] + at, numbers, block))
+            batches.append(AlikeRows(each, cut.starts[rows, 0] + at, numbers, block))
             first += each.size
         return batches, left.intersection(run.rows.tolist())
 
@@ -127,16 +122,18 @@ class RecordRows:
         )  # fmt: skip
         try:
             root = Node(0, len(text), parse_nodes(text))
-            unit = unit_of(record)
             own_style = style if is_spelled else style.changed(format="csv")
-            (value,) = values_of_unit(root.at(unit), unit, [Answer(shown, parts)], self.request, own_style)
+            (value,) = values_of_unit(root, [Answer(shown, parts)], self.request, own_style)
         except (FrametoolError, ValueError):
             return None
         written = target.written(parts, floats)
         numbers = {repr(number + 0.0): column for column, number in enumerate(written)}
         there = str([*value.pose, value.extras] if isinstance(value, Result) else value)
         quotes = {mark: node.quote for at, (_, node) in enumerate(template.leaves) if (mark := leaf_mark(at)) in there}
-        found = Marked(value, numbers, len(written), None, quotes, template.json)
+        found = Marked(value, numbers, len(written), quotes=quotes, is_json=template.json)
+        if record.stamp_ns is not None:  # in its header
+            begins = [template.root.at(path).start for path in record.stamps[:2]]
+            found = found._replace(stamp=tuple(at for at, node in template.leaves if node.start in begins))
         # a scalar that is a stamp is read, unless it stays as it is written
         extras = value.extras if isinstance(value, Result) else value
         rest = {key: each for key, each in extras.items() if each != STAMP_NS}
@@ -146,7 +143,7 @@ class RecordRows:
             if key != "stamp_ns":
                 del extras[key]
             extras["stamp_ns"] = STAMP_NS
-            found = found._replace(stamp=(int(leaf[1]), in_nanoseconds(key)))
+            found = found._replace(stamp=(template.leaves[int(leaf[1])][0],), in_ns=in_nanoseconds(key))
         if is_spelled:
             cells = value.mapping(style) if isinstance(value, Result) else value
             try:

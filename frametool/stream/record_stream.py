@@ -1,34 +1,36 @@
 """JSON and YAML records as streams: each keeps its spelling and all its other keys, or is written in another format.
 
 Few records of a whole stream are computed one by one, without numpy; of more those written alike are moved as arrays.
+
+Behind a broken JSON line the next one is read; an array, or a value over several lines, ends what can be read where it
+goes wrong.  What is no record is a part of its own with the problem it has, so that nothing passes unseen.
 """
 
 from __future__ import annotations
 
 import re
 from contextlib import suppress
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from io import BufferedReader
 from itertools import chain, count
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from frametool import sizes
-from frametool.documents.document import Node, parse_nodes
-from frametool.errors import FormatError, FrametoolError, ValueInvalid
+from frametool.documents.document import parse_nodes
+from frametool.errors import FormatError, FrametoolError, NamedTuple, ValueInvalid
 from frametool.frames.stamps import read_header_stamp, read_stamp, stamp_text
 from frametool.grammar.pose import Pose
 from frametool.grammar.readers import STAMP_KEYS, in_nanoseconds
 from frametool.grammar.result import NoResult, Style
 from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote
 from frametool.stream.record_results import BlockResults, text_in_order
-from frametool.stream.record_values import MOST_ENTRIES, ROUNDED, Outside, RecordText, plain, values_of_text
+from frametool.stream.record_values import ROUNDED, Outside, RecordText, plain, values_of_text
 from frametool.stream.splice import attempt, column_in, fault_at, nulled, rendered
-from frametool.stream.splitter import ARRAY, NO_END, Part, Splitter
-from frametool.text.lines import Pieces, read_blocks, readiness, with_edits
+from frametool.text.lines import Pieces, read_blocks, readiness, whole_lines, with_edits
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 
     from frametool.geometry.types import Components
     from frametool.stream.evaluate import Run, State
@@ -41,6 +43,21 @@ if TYPE_CHECKING:
 _LEADING_COMMA = re.compile(rb"\A((?:\xef\xbb\xbf)?\s*\[?\s*),\s*")
 LONG_MS = 20  # how long the second block of a stream may take whose first is short
 MOST_EXACT = 100  # bad records of one template in a block whose place is looked for
+NO_END = "the array does not end: its ] is missing"
+DOCUMENTS, LINES, VALUES, ARRAY = "documents", "lines", "values", "array"
+MARK = b"\xef\xbb\xbf"
+MUCH = 1 << 20  # bytes of one unfinished value from which it is looked at only when twice as much has come
+TOO_DEEP = "nested too deeply"
+
+_SEPARATOR = re.compile(rb"^(?:---|\ttotal count: ?\d+---)[ \t]*\r?\n", re.MULTILINE)  # the last: ros2's note of a loss
+_NO_DOCUMENT = re.compile(rb"(?:\xef\xbb\xbf)?(?:[ \t]*(?:#[^\n]*)?\r?(?:\n|\Z))*+(?:(?:\.\.\.|---)\s*)?")
+_LINE = re.compile(rb"[^\n]*\n|[^\n]+\Z")
+_SEVERAL = re.compile(rb"[}\]]\s*+(?:,\s*+)?+[{\[]|\}\s*+(?:,\s*+)?+[^\s,}\]]")
+_AFTER = re.compile(rb"[ \t]*,?[ \t]*\r?\n?")
+_GAP = re.compile(rb"\s*+(,?+)\s*+")
+_OPENING = re.compile(rb"(?:\xef\xbb\xbf)?\s*\[")
+_WORD_AT_END = re.compile(r"[\w.+-]*\s*\Z")  # such as the 1e of 1e-05
+_BEHIND_ITEM = re.compile(rb"\s*+[^\s\[]")
 
 
 def run_records(
@@ -93,36 +110,33 @@ def at_other_times(stream: ByteStream, fmt: str, offset_ns: int) -> BufferedRead
 
 
 def with_offset(text: str, offset_ns: int) -> tuple[str, int]:
-    """Return documents with so much added to all stamps in them, and how many these are."""
-    edits: list[tuple[int, int, str]] = []
-    for root in parse_nodes(text):
-        _shift(root, offset_ns, edits)
-    return with_edits(text, edits), len(edits)
+    """Return documents with so much added to all stamps in them, and how many these are.
 
-
-def _shift(node: Node, offset_ns: int, edits: list[tuple[int, int, str]]) -> None:
-    """Add to `edits` those of the stamps below a node: one of a mapping by its key, or the seconds it is made of."""
-    if type(node.value) is list:
-        for each in node.value:
-            _shift(each, offset_ns, edits)
-    if type(node.value) is not dict:
-        return
-    own = next((key for key in STAMP_KEYS if key in node.value and type(node.value[key][1].value) is str), "")
-    for key, (_, value) in node.value.items():
-        if key != own:
-            _shift(value, offset_ns, edits)
-            continue
-        with suppress(ValueInvalid):
-            in_ns = in_nanoseconds(key)
-            new = stamp_text(value.value, read_stamp(value.value, in_ns=in_ns) + offset_ns, in_ns=in_ns)
-            edits.append((value.start + bool(value.quote), value.end - bool(value.quote), new))
-    for seconds, below in (("sec", "nanosec"), ("secs", "nsecs")):
-        pair = [node.value[key][1] for key in (seconds, below) if key in node.value]
-        if len(pair) == 2:
+    One of a mapping is under its key, or the seconds and nanoseconds that it is made of.
+    """
+    edits, pending = list[tuple[int, int, str]](), parse_nodes(text)
+    for node in pending:  # which grows by what is in it
+        if type(node.value) is list:
+            pending += node.value
+        members = {key: value for key, (_, value) in node.value.items()} if type(node.value) is dict else {}
+        pending += members.values()
+        texts = {key: value for key, value in members.items() if type(value.value) is str}
+        own = [key for key in STAMP_KEYS if key in texts][:1]
+        for keys in (own, ("sec", "nanosec"), ("secs", "nsecs")):
+            found = [texts[key] for key in keys if key in texts]
             with suppress(ValueInvalid):
-                stamp_ns = read_header_stamp(*(each.value for each in pair)) + offset_ns
-                parts = divmod(stamp_ns, 1_000_000_000)
-                edits += [(each.start, each.end, str(part)) for each, part in zip(pair, parts, strict=True)]
+                if len(found) == 2:
+                    stamp_ns = read_header_stamp(*(each.value for each in found))
+                    parts = [*map(str, divmod(stamp_ns + offset_ns, 1_000_000_000))]
+                elif found and keys is own:
+                    in_ns = in_nanoseconds(keys[0])
+                    stamp_ns = read_stamp(found[0].value, in_ns=in_ns)
+                    parts = [stamp_text(found[0].value, stamp_ns + offset_ns, in_ns=in_ns)]
+                else:
+                    continue
+                insides = ((each.start + bool(each.quote), each.end - bool(each.quote)) for each in found)
+                edits += [(*inside, part) for inside, part in zip(insides, parts, strict=True)]
+    return with_edits(text, edits), len(edits)
 
 
 def _as_array(outcomes: Iterable[Outcome], on_error: str) -> Iterator[Outcome]:
@@ -148,18 +162,17 @@ def _as_array(outcomes: Iterable[Outcome], on_error: str) -> Iterator[Outcome]:
 class Found:
     """What one block holds: what becomes of records alone and faults, by place, rows of many, warnings, counts.
 
-    singles: where there are many, the records that follow a template
+    cutter, singles: where there are many, what finds those that are alike, and those that follow a template
     kept: how many records have a result, or null in the place of one
     """
 
-    def __init__(self) -> None:
-        """Create an empty one."""
-        self.singles: list[tuple[Part, Hit]] | None = None
-        self.items: list[tuple[int, Any]] = []
-        self.faults: list[tuple[int, Fault]] = []
+    def __init__(self, text: bytes, cutter: RecordCutter | None) -> None:
+        """Begin with the text of the block."""
+        self.text, self.cutter = text, cutter
+        self.items, self.faults, self.notes = list[tuple[int, Any]](), list[tuple[int, Fault]](), list[RowNote]()
+        self.singles: list[tuple[Part, Hit]] = []
         self.runs: list[Run] = []
         self.alike: list[AlikeRows] = []
-        self.notes: list[RowNote] = []
         self.rows = self.kept = self.mended = 0
 
 
@@ -178,7 +191,6 @@ class RecordBlocks:
         shows_all = operation.shown is not None or (request.results.place is not None and not operation.looks_back)
         learns = (sizes.LEARNED or request.in_order) and not (style is not None and shows_all)
         self._is_singly = not learns  # records are only taken one by one
-        self._left = sizes.LEARNED  # where no records are alike, learning is lost time
         self.ended = True  # whether the last block ended with a line
 
     @cached_property
@@ -196,43 +208,42 @@ class RecordBlocks:
 
     def outcome(self, text: bytes, *, are_few: bool) -> Outcome:
         """Return the outcome of a block; a few records are taken one by one."""
-        found, are_few = Found(), are_few or self._is_singly
-        closed = self._take(text, 0, len(text), found) if are_few else self._run(text, found)
+        found = Found(text, None if are_few or self._is_singly else self._bulk[0])
+        closed = self._take(0, len(text), found) if found.cutter is None else self._run(found)
         self.ended = text.endswith(b"\n")
         found.faults.sort()
         stops = self.request.on_error == STOP and found.faults
         end = found.faults[0][0] if stops else len(text) + 1
-        is_open = None if self.splitter.layout != ARRAY else not closed
-        outcome = Outcome(
-            b"", [*map(itemgetter(1), found.faults)], found.rows, text.count(b"\n"), found.mended,
-            sorted(found.notes, key=RowNote.place), len(text), found.kept, is_open,
-        )  # fmt: skip
         items = sorted((each for each in found.items if each[0] < end), key=itemgetter(0))
+        written, results = b"", None
         if self.style is None:
-            groups = [group for run in found.runs for group in run.groups(end)]
-            return outcome._replace(text=text_in_order(items, groups))
-        alike = [each.take((each.places < end).nonzero()[0]) for each in found.alike] if stops else found.alike
-        return outcome._replace(results=BlockResults([each for each in alike if len(each.places)], items, text))
+            written = text_in_order(items, [group for run in found.runs for group in run.groups(end)])
+        else:
+            alike = [each.take((each.places < end).nonzero()[0]) for each in found.alike] if stops else found.alike
+            results = BlockResults([each for each in alike if len(each.places)], items, text)
+        is_open = None if self.splitter.layout != ARRAY else not closed
+        return Outcome(
+            written, [*map(itemgetter(1), found.faults)], found.rows, text.count(b"\n"), found.mended,
+            sorted(found.notes, key=RowNote.place), len(text), found.kept, is_open, results,
+        )  # fmt: skip
 
-    def _take(self, text: bytes, start: int, end: int, found: Found) -> bool:
+    def _take(self, start: int, end: int, found: Found) -> bool:
         """Take records one by one; what is between them passes.  Return whether an array ends there."""
+        text, cutter, keeps_text, at = found.text, found.cutter, self.style is None, start
         parts, closed = self.splitter.parts(text[start:end])
-        at, singles, keeps_text = start, found.singles, self.style is None
         for part, line in _with_lines(text, (each.behind(start) for each in parts) if start else parts):
             if part.begin > at and keeps_text:
                 found.items.append((at, text[at : part.begin]))
             at = part.after
-            made = (singles is not None and self._bulk[0].match(text, part)) or self._read(text, part, line)
-            if singles is not None and isinstance(made, RecordText):
-                are_few = keeps_text or len(made.entries) <= MOST_ENTRIES
-                is_alike = self._left and are_few and not made.is_long
-                self._left -= bool(is_alike)
-                if is_alike or self.request.in_order:
-                    made = self._bulk[0].learned(made, text, part) or made
-            if isinstance(made, (RecordText, Fault)):
-                self._alone(text, part, made, line, found)
-            elif singles is not None:
-                singles.append((part, made))
+            hit = None if cutter is None else cutter.match(text, part)
+            if hit is None:
+                made = self._read(text, part, line)
+                if cutter is not None and isinstance(made, RecordText):
+                    hit = cutter.learned(made, text, part)
+                if hit is None:
+                    self._alone(part, made, line, found)
+            if hit is not None:
+                found.singles.append((part, hit))
             if found.faults and self.request.on_error == STOP:
                 return closed
         if at < end and keeps_text:
@@ -240,25 +251,21 @@ class RecordBlocks:
         return closed
 
     def _alone(
-        self, text: bytes, part: Part, made: RecordText | Fault, line: int, found: Found,
-        parts: Sequence[Components] | None = None,
-    ) -> None:  # fmt: skip
+        self, part: Part, made: RecordText | Fault, line: int, found: Found, parts: Sequence[Components] | None = None
+    ) -> None:
         """Take what a record becomes, or why it becomes nothing; parts: the numbers of its results, if known."""
-        record, style, items = text[part.start : part.end], self.style, list[tuple[int, Any]]()
+        style, place, record = self.style, part.begin, found.text[part.start : part.end]
         if isinstance(made, RecordText):
             try:
                 answers = made.answers(parts)
                 if style is None:
-                    items = [_put(text, part, rendered(made, answers) or record)]
+                    items: list[tuple[int, Any]] = [(place, part.around(found.text, rendered(made, answers) or record))]
                 else:
                     items = [*zip(count(part.start), values_of_text(made, answers, style), strict=False)]
-                notes = made.notes_at(line, column_in(text, part.start), answers)
-            except FormatError as error:
-                made = fault_at(made.source, error)
+                found.notes += made.notes_at(line, column_in(found.text, part.start), answers)
             except FrametoolError as error:
-                made = Fault(line + made.line, getattr(error, "column_name", ""), error)
+                made = fault_at(made.source, error, line + made.line)
             else:
-                found.notes += notes
                 found.mended += [note.rule for note in made.notes].count(ROUNDED) if made.notes else 0
                 found.rows, found.kept = found.rows + 1, found.kept + 1
                 found.items += items
@@ -266,18 +273,18 @@ class RecordBlocks:
         if isinstance(made.reason, Outside):
             return
         found.rows += 1
-        found.faults.append((part.begin, made))
+        found.faults.append((place, made))
         if self.request.on_error == NULL and not made.final:
             found.kept += 1
             is_json = self.fmt == "json"
             if style is None:  # itself, with null in the place of numbers, or null
                 body = record.rstrip(b"\r\n")
                 row = (nulled(body, json=is_json) or "null").encode() + record[len(body) :]
-                found.items.append(_put(text, part, row))
+                found.items.append((place, part.around(found.text, row)))
             else:
                 found.items.append((part.start, _no_result(record, style, json=is_json)))
 
-    def _run(self, text: bytes, found: Found) -> bool:
+    def _run(self, found: Found) -> bool:
         """Run the records of all templates, the others alone.  Return whether an array ends there.
 
         One that is bad is taken alone too, which says where it is wrong.
@@ -286,11 +293,10 @@ class RecordBlocks:
         from frametool.stream.record_cuts import block_of, by_template, in_order, plan_of
         from frametool.text.spans import framed
 
-        cutter, state, rows = self._bulk
-        found.singles, closed = [], False
-        cuts, rest = cutter.cut(text)
+        text, (cutter, state, rows), closed = found.text, self._bulk, False
+        cuts, rest = cutter.cut(text) if self.splitter.layout in (LINES, DOCUMENTS) else ([], [(0, len(text))])
         for start, end in rest:
-            closed = self._take(text, start, end, found)
+            closed = self._take(start, end, found)
         cuts = by_template(cuts, found.singles)
         cuts = in_order(cuts) if self.request.in_order else cuts
         data = framed(text if cuts else b"")
@@ -299,19 +305,19 @@ class RecordBlocks:
             plan = rows.plan(template) if rows else plan_of(template, self.request, yaml=self.fmt == "yaml")
             run = Run(plan, block_of(cut, data, text, plan.request), state)
             if rows is not None:
-                alike, left = rows.take(cut, run, data, text)
+                alike, left = rows.take(cut, run, text)
                 found.alike += alike
             alone = sorted({*run.reasons, *left})
             found.rows += len(cut.starts) - len(alone)
             found.kept += len(run.rows) - len(left)
             found.mended += len({*run.mended} - left)
             found.runs.append(run)
-            for at, (part, line) in enumerate(_with_lines(text, map(cut.part, alone))):
+            for at, (part, line) in enumerate(_with_lines(text, (Part(*cut.place(row)) for row in alone))):
                 reason = run.reasons.get(row := alone[at])
                 made = self._read(text, part, line) if reason is None or at < MOST_EXACT else None
                 if made is None or (reason is not None and not isinstance(made, Fault)):
                     made = Fault(run.block.line_of(row), *(reason or ("", "")))
-                self._alone(text, part, made, line, found, run.parts_of(row) if self.request.in_order else None)
+                self._alone(part, made, line, found, run.parts_of(row) if self.request.in_order else None)
             found.notes += run.notes
             if len(cut.starts):
                 found.notes += [each._replace(line=run.block.line_of(0)) for each in template.notes]
@@ -340,6 +346,188 @@ def _with_lines(text: bytes, parts: Iterable[Part]) -> Iterator[tuple[Part, int]
         yield part, line
 
 
-def _put(text: bytes, part: Part, row: bytes) -> tuple[int, bytes]:
-    """Return a record with what goes with it, and its place."""
-    return part.begin, text[part.begin : part.start] + row + text[part.end : part.after]
+# --- where the records of a text are: knows the syntax around them and none of their meaning ---
+
+
+class Part(NamedTuple):
+    """A record in a text, and what goes with it.
+
+    begin: where the comma or blanks before it begin, if they vanish with it
+    start, end: the record itself, or from where it goes wrong
+    after: where what follows it ends, if that vanishes with it
+    problem: why it is no record; "" where reading it decides
+    final: nothing behind it can be read
+    """
+
+    begin: int
+    start: int
+    end: int
+    after: int
+    problem: str = ""
+    final: bool = False
+
+    def around(self, text: bytes, record: bytes) -> bytes:
+        """Return what a record becomes with what goes with it."""
+        return text[self.begin : self.start] + record + text[self.end : self.after]
+
+    def behind(self, start: int) -> Part:
+        """Return where a record is in a text that has so much before the one it was found in."""
+        return self._replace(
+            begin=self.begin + start, start=self.start + start, end=self.end + start, after=self.after + start
+        )
+
+
+class Splitter:
+    """Cut a stream into records; `layout` is "" until the first line of JSON has been seen."""
+
+    def __init__(self, fmt: str) -> None:
+        """Take `json` or `yaml`."""
+        self.layout = DOCUMENTS if fmt == "yaml" else ""
+        self._looked = 0
+
+    def whole(self, text: bytes) -> int:
+        """Return how many bytes of what has come are whole records; called with more until some are."""
+        if self.layout == DOCUMENTS:  # what has been looked at is not looked at again
+            ends = [found.end() for found in _SEPARATOR.finditer(text, text.rfind(b"\n", 0, self._looked) + 1)]
+            self._looked = 0 if ends else len(text)
+            return ends[-1] if ends else 0
+        self.layout = self.layout or _layout_of(text, final=False)
+        if self.layout in ("", LINES):
+            return whole_lines(text) if self.layout else 0
+        if MUCH < len(text) < 2 * self._looked:
+            return 0
+        ended = 0
+        for part in self._values(text, final=False)[0]:  # a text is cut so that either piece means what it meant
+            if part.final or self.layout != ARRAY:
+                is_end = part.final or part.after < len(text) or text.endswith(b"\n")
+            else:
+                is_end = bool(_BEHIND_ITEM.match(text, part.end))
+            ended = part.after if is_end else ended
+        self._looked = 0 if ended else len(text)
+        return ended
+
+    def parts(self, text: bytes) -> tuple[list[Part], bool]:
+        """Return the records of a block of whole records, or of a stream's rest, and whether an array ends in it."""
+        if self.layout == DOCUMENTS:
+            return list(_documents(text)), False
+        self.layout = self.layout or _layout_of(text, final=True)
+        if self.layout == LINES:
+            return [part for line in _LINE.finditer(text) for part in _of_line(text, *line.span())], False
+        return self._values(text, final=True)
+
+    def _values(self, text: bytes, *, final: bool) -> tuple[list[Part], bool]:
+        """Scan JSON values one after the other, in an array with commas between them."""
+        opening = _OPENING.match(text) if self.layout == ARRAY else None
+        start = opening.end() if opening else 3 if text.startswith(MARK) else 0
+        return _scanned(text, start, array=self.layout == ARRAY, final=final, first=bool(opening))
+
+
+def _of_line(text: bytes, start: int, end: int) -> list[Part]:
+    """Return the record of a line, or several."""
+    line = text[start:end]
+    body = line.strip(b" \t\r\n,").removeprefix(MARK)
+    if not body:
+        return []
+    begin = start + line.find(body)
+    found, _ = _scanned(body, 0, array=False, final=True) if _SEVERAL.search(body) else ([], False)
+    if len(found) > 1:  # the end of the line goes with none of several
+        return [each.behind(begin)._replace(final=False) for each in found]
+    stop = begin + len(body)
+    after = _AFTER.match(text, stop).end()  # type: ignore[union-attr]
+    return [Part(begin, begin, stop, after, found[0].problem if found else "")]
+
+
+def _layout_of(text: bytes, *, final: bool) -> str:
+    """Return how JSON is laid out by its first lines; "" where they have not come yet."""
+    body = text.removeprefix(MARK).lstrip()
+    if body.startswith(b"["):
+        following = body[1:].lstrip(b" \t\r")[:1]
+        if following in (b"{", b"]", b"\n", b""):
+            return ARRAY if following or final else ""
+    first, end, rest = body.partition(b"\n")
+    if not body or not (end or final):
+        return ""
+    _, problem = _value(first.decode("latin-1").rstrip(" \t\r,"), 0)
+    if body.startswith(b"[") and b"{" in (body if problem is None else first):
+        return ARRAY  # its first item is no record: lists of numbers hold no objects
+    if problem is not None:
+        return LINES
+    # the first line ends within a value, which goes on in the rest or is broken
+    second, end, _ = rest.partition(b"\n")
+    if not (end or final):
+        return ""
+    if not second.startswith(b"{"):
+        return VALUES if rest.strip() else LINES
+    second = second.rstrip(b" \t\r")
+    if _value(second.decode("latin-1"), 0) == (len(second), ""):
+        return LINES
+    _, problem = _value(body.decode("latin-1"), 0)
+    return VALUES if problem == "" else "" if problem is None and not final else LINES
+
+
+def _value(text: str, at: int) -> tuple[int, str | None]:
+    """Return the end of the JSON value at a place and ""; or where it goes wrong and why: None if it is cut off."""
+    try:
+        return _decoder()(text, at)[1], ""
+    except RecursionError:
+        return at, TOO_DEEP
+    except ValueError as error:
+        place: int = getattr(error, "pos", at)
+        message: str = getattr(error, "msg", str(error))
+        is_cut = _WORD_AT_END.match(text, place) or message.startswith("Unterminated string")
+        return place, None if is_cut else f"not JSON: {message[:1].lower()}{message[1:]}"
+
+
+@cache
+def _decoder() -> Callable[[str, int], tuple[object, int]]:
+    """Return the decoder; numbers stay text, so that none is too long."""
+    from json import JSONDecoder
+
+    return JSONDecoder(parse_int=str, parse_float=str, parse_constant=str).raw_decode
+
+
+def _scanned(data: bytes, at: int, *, array: bool, final: bool, first: bool = True) -> tuple[list[Part], bool]:
+    """Scan values from a place on; one that may go on behind the text ends the scan, or is a part if it is final."""
+    found: list[Part] = []
+    text = data.decode("latin-1")  # keeps every offset; the syntax of JSON is ASCII
+    needs_comma = array and not first
+    while True:
+        gap = _GAP.match(data, at)
+        start, comma = (gap.end(), gap[1]) if gap else (at, b"")
+        opening = data[start : start + 1]
+        if comma and array and final and opening in (b"", b"]"):
+            found.append(Part(at, start - (not opening), start, start, "no record follows this comma"))
+        if not opening or (array and opening == b"]" and not final):
+            return found, False
+        if array and opening == b"]":
+            if rest := data[start + 1 :].strip():
+                begin = data.find(rest, start + 1)
+                behind = "text behind the end of the array"
+                found.append(Part(start + 1, begin, begin + len(rest), len(data), behind, final=True))
+            return found, True
+        if array and opening == b",":
+            found.append(Part(at, start, start, start, "no record stands between two commas"))
+            at, needs_comma = start, False
+            continue
+        end, wrong = _value(text, start)
+        if wrong is None and not final:
+            return found, False
+        if wrong != "":
+            problem, begin, place = wrong or "not JSON: it is cut off", at if array else start, end if wrong else start
+            return [*found, Part(begin, place, len(data), len(data), problem, final=True)], False
+        problem = "a comma is missing before this record" if needs_comma and not comma else ""
+        after = end if array else _AFTER.match(data, end).end()  # type: ignore[union-attr]
+        found.append(Part(at if array else start, start, end, after, problem))
+        at, needs_comma = end, array
+
+
+def _documents(text: bytes) -> Iterator[Part]:
+    """Yield the documents of a YAML text that hold more than comments, each with the separator behind it."""
+    start = 0
+    for mark in (*_SEPARATOR.finditer(text), None):
+        after = len(text) if mark is None else mark.end()
+        end = mark.start() if mark and mark[0].startswith(b"-") else after
+        start += len(MARK) * text.startswith(MARK, start)
+        if not _NO_DOCUMENT.fullmatch(text, start, end):
+            yield Part(start, start, end, after)
+        start = after

@@ -30,11 +30,12 @@ from frametool.errors import Finding, FormatError, FrametoolError, Misused, Name
 from frametool.formats.table import holds
 from frametool.geometry import floats
 from frametool.grammar.pose import SCALE, Pose
-from frametool.grammar.readers import Misfit, NotARotation, Path, Reading, in_nanoseconds, stamp_column, tell
+from frametool.grammar.readers import Misfit, NotARotation, Path, Reading, in_nanoseconds, stamp_column, tell, within
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream import row_layout
 from frametool.stream.faults import ZONES, RowNote
-from frametool.stream.record import STALE, Record, find_records, key_path, pose_of, value_at
+from frametool.stream.record import Record, find_records, key_path, pose_of
+from frametool.stream.record_search import STALE, value_at
 from frametool.stream.request import NO_STAMPS, Request, RowOptions
 from frametool.stream.row_layout import FLAT, LEAVES_PLANE, PARTS, POSE, ROTATION, VECTOR, checked_rotation
 
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components, Rigid
     from frametool.stream.request import Operation
     from frametool.stream.row_layout import Shape
-    from frametool.stream.splice import Edit
 
     Value = Result | dict[str, Any]
 
@@ -172,38 +172,32 @@ class RecordText:
 
     values: of its documents, by their number in the text; entries: its records
     notes: warnings about them
-    edits: what changes in the text
+    edits: each `Edit` of the text
     """
 
     def __init__(self, source: Source, request: Request, *, json: bool) -> None:
-        """Read the records; raises FormatError with the place."""
+        """Read the records, and what each is asked; raises FormatError with the place of one that cannot be read."""
         self.source, self.text, self.request, self.json = source, source.text, request, json
-        self.notes: list[Finding] = []
-        self.edits: list[Edit] = []
-        documents = json_documents(source) if json else parse_documents(source.text, source.name)
-        self.values = {document.index: document.value for document in documents}
-        self.entries = [entry for each in documents for entry in self._read(each)]
-
-    def _read(self, document: Document) -> list[Entry]:
-        """Read the records of a document, and what each is asked; add warnings about them to the notes.
-
-        Raises FormatError with the place of a record that cannot be read.
-        """
-        source, request, rows = self.source, self.request, self.request.rows
-        reading = Reading(source, degrees=rows.degrees, normalize=rows.normalize, earth=request.earth)
-        try:
-            records = list(find_records(document.value, request, reading, (document.index,)))
-            for note in reading.notes:
-                # of a rotation the place of the first of its numbers, as blocks of rows have it
-                its = (each for each in records if note.rule == ROUNDED and each.path == note.path)
-                found = next((each for each in its if each.shape.notation), None)
-                path = found and found.numbers[found.shape.rotation_at[0]]
-                self.notes.append(note._replace(path=path) if path else note)
-            return [_entry(document, record, request) for record in records]
-        except Misfit as misfit:
-            error = misfit.placed(source)
-            error.column_name = ".".join(map(str, misfit.path[1:]))  # type: ignore[attr-defined]
-            raise error from misfit
+        self.notes, self.edits = list[Finding](), list[Any]()
+        self.values, self.entries = dict[int, Any](), list[Entry]()
+        rows = request.rows
+        for document in json_documents(source) if json else parse_documents(source.text, source.name):
+            self.values[document.index] = document.value
+            reading = Reading(source, degrees=rows.degrees, normalize=rows.normalize, earth=request.earth)
+            try:
+                records = list(find_records(document.value, request, reading, (document.index,)))
+                for note in reading.notes:
+                    # of a rotation the place of the first of its numbers, as blocks of rows have it
+                    its = (each for each in records if note.rule == ROUNDED and each.path == note.path)
+                    found = next((each for each in its if each.shape.notation), None)
+                    path = found and found.numbers[found.shape.rotation_at[0]]
+                    self.notes.append(note._replace(path=path) if path else note)
+                for record in records:
+                    self.entries.append(_entry(document, record, request))
+            except Misfit as misfit:
+                error = misfit.placed(source)
+                error.column_name = ".".join(map(str, misfit.path[1:]))  # type: ignore[attr-defined]
+                raise error from misfit
 
     @property
     def records(self) -> list[Record]:
@@ -302,8 +296,7 @@ def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
     known = read_text(source, request)
     for record in known.records:
         poses.append(pose_of(record, request)._replace(stamp_ns=stamp_of(known.values, record, source)))
-        unit = unit_of(record)
-        extra.update(_header_stamp(record), _rest(known.root.at(unit), unit, record))
+        extra.update(_header_stamp(record), _rest(known.root, record))
     if not poses:
         raise FormatError("nothing in it; a pose is {xyz: [x, y, z], rpy_deg: [roll, pitch, yaw]}", source=source.name)
     return poses, extra
@@ -312,11 +305,12 @@ def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
 def stamp_of(documents: dict[int, Any], record: Record, source: Source) -> int | None:
     """Return the stamp of a record, of its header or its own; raises FormatError with its place."""
     own = value_at(documents, record.path)
-    key = stamp_key(own) if record.stamp_ns is None and type(own) is dict else ""
+    if record.stamp_ns is not None or type(own) is not dict:
+        return record.stamp_ns
     try:
-        return _read_stamp(key, own[key]) if key else record.stamp_ns
-    except ValueInvalid as error:
-        raise Misfit(str(error), (*record.path, key)).placed(source) from None
+        return with_stamp_ns({**own}, "").get("stamp_ns")
+    except Misfit as misfit:
+        raise misfit.below(*record.path).placed(source) from None
 
 
 def read_text(source: Source, request: Request) -> RecordText:
@@ -354,34 +348,35 @@ def values_of_text(known: RecordText, answers: Sequence[Answer], style: Style) -
     """Yield the results of a text as values; raises FormatError for an alias, and where nothing is in it."""
     units: dict[Path, list[Answer]] = {}
     for each in answers:
-        units.setdefault(unit_of(each.entry.record), []).append(each)
-    for unit, ours in units.items():
+        units.setdefault(_unit_of(each.entry.record), []).append(each)
+    for ours in units.values():
         try:
-            yield from values_of_unit(known.root.at(unit), unit, ours, known.request, style)
+            yield from values_of_unit(known.root, ours, known.request, style)
         except Aliased as error:
             raise error.in_text(known.text) from None
     if not known.values:
         raise FormatError("nothing in it", source=known.source.name)
 
 
-def unit_of(record: Record) -> Path:
+def _unit_of(record: Record) -> Path:
     """Return the path of the thing that a record's result is: the document, or an item of the list it is."""
     return record.path[: 1 + (len(record.path) > 1 and type(record.path[1]) is int)]
 
 
-def values_of_unit(node: Node, unit: Path, answers: list[Answer], request: Request, style: Style) -> Iterator[Value]:
+def values_of_unit(root: Node, answers: list[Answer], request: Request, style: Style) -> Iterator[Value]:
     """Yield what one document or item becomes: a pose, or a mapping, for each record in it."""
-    if request.operation.moves and len({each.entry.record.path for each in answers}) < len(answers):
-        yield _of_several(node, unit, answers, request)
+    is_one = not answers[1:] or not request.operation.moves
+    if not is_one and len({each.entry.record.path for each in answers}) < len(answers):
+        yield _of_several(root, answers, request)
         return
     for each in answers:
-        yield _result(node, unit, each, request, style.format)
+        yield _result(root, each, request, style.format)
 
 
-def _of_several(node: Node, unit: Path, answers: list[Answer], request: Request) -> dict[str, Any]:
+def _of_several(root: Node, answers: list[Answer], request: Request) -> dict[str, Any]:
     """Return several things at one place, as in an Imu: a mapping without levels, a key for each of their numbers."""
     last = answers[-1].entry  # of the first, an orientation, nothing may be known: then it stays
-    found = {"frame": last.parent} | _header_stamp(last.record) | _rest(node, unit, last.record)
+    found = {"frame": last.parent} | _header_stamp(last.record) | _rest(root, last.record)
     for each in answers:
         record, numbers = each.entry.record, written(each)[: each.entry.target.own_size]
         field = record.keys.position or record.keys.rotation
@@ -397,7 +392,7 @@ def _header_stamp(record: Record) -> dict[str, int]:
     return {} if record.stamp_ns is None else {"stamp_ns": record.stamp_ns}
 
 
-def _result(node: Node, unit: Path, made: Answer, request: Request, fmt: str) -> Value:
+def _result(root: Node, made: Answer, request: Request, fmt: str) -> Value:
     """Return what a record becomes, with its frames and what else it says: a pose, or a mapping without levels."""
     (entry, parts, _), operation, extras = made, request.operation, _extras(made, request)
     record, target, kind = entry.record, entry.target, operation.result_kind(entry.record.shape.kind)
@@ -407,10 +402,11 @@ def _result(node: Node, unit: Path, made: Answer, request: Request, fmt: str) ->
             members = operation.shown.values(request.results.prefix, cells)
             extras = operation.shown.cells([*extras], cells) if fmt == "csv" else members
         if operation.only_adds:
+            node = root.at(_unit_of(record))
             return with_stamp_ns(plain(node), fmt) | extras if type(node.value) is dict else extras
         if kind != POSE or request.rows.poses:
             record = record._replace(stamp_ns=None)
-    said = _header_stamp(record) | extras | with_stamp_ns(_rest(node, unit, record), fmt)
+    said = _header_stamp(record) | extras | with_stamp_ns(_rest(root, record), fmt)
     seen_from = "frame" if kind or record.shape.kind != POSE else "parent"
     named = {key: name for key, name in (("name", entry.name), (seen_from, entry.parent)) if name is not None}
     if kind in (POSE, ROTATION):
@@ -430,20 +426,14 @@ def _result(node: Node, unit: Path, made: Answer, request: Request, fmt: str) ->
 
         named.pop(seen_from, None)  # which the place says itself
         place = point_entry(entry.parent, parts[:3], target.place, getattr(parts, "read", None))
-    if holds(fmt, "recording") and operation.keeps_frames:
-        place |= _place_as_read(node.at(record.path[len(unit) :]), record)
+    if holds(fmt, "recording") and operation.keeps_frames:  # which takes lat, lon and alt as they are
+        from frametool.grammar.place import LLA_KEYS, read_at
+
+        keys = [key for key in (*record.keys.members, *record.keys.placed) if key in LLA_KEYS]
+        lla = {key: str(plain(root.at((*record.path, key)))) for key in keys}
+        at, numbers = read_at(lla, Reading(Source("", ""))) if lla else (None, ())
+        place |= {} if at is None else {row_layout.AS_READ: [*at.lla(numbers)]}
     return named | place | said
-
-
-def _place_as_read(holder: Node, record: Record) -> dict[str, list[float]]:
-    """Return lat, lon and alt where a record says them; nothing elsewhere."""
-    from frametool.grammar.place import LLA_KEYS, read_at
-
-    keys = [key for key in (*record.keys.members, *record.keys.placed) if key in LLA_KEYS]
-    if not keys:
-        return {}
-    place, numbers = read_at({key: str(plain(holder.at((key,)))) for key in keys}, Reading(Source("", "")))
-    return {row_layout.AS_READ: [*place.lla(numbers)]}
 
 
 def with_stamp_ns(extras: dict[str, Any], fmt: str) -> dict[str, Any]:
@@ -455,7 +445,14 @@ def with_stamp_ns(extras: dict[str, Any], fmt: str) -> dict[str, Any]:
     is_spelled = fmt in SPELLED and (fmt != "csv" or type(extras[key]) is not dict) if key else False
     if not key or (key != "stamp_ns" and is_spelled):
         return extras
-    return extras | {"stamp_ns": _read_stamp(key, extras.pop(key))}
+    value = extras.pop(key)
+    if type(value) is dict:
+        from frametool.ros.messages import read_stamp
+
+        return extras | {"stamp_ns": within((key,), read_stamp, value)}
+    from frametool.frames.stamps import read_stamp as read
+
+    return extras | {"stamp_ns": within((key,), read, str(value), in_ns=in_nanoseconds(key))}
 
 
 def at_time(value: Value, timed: dict[str, Any]) -> Value:
@@ -475,32 +472,18 @@ def stamp_key(members: dict[str, Any]) -> str:
     return "stamp_ns" if "stamp_ns" in keys else "" if at is None else keys[at]
 
 
-def _read_stamp(key: str, value: Any) -> int:
-    """Read a stamp as its key says, or as whole seconds and nanoseconds; raises ValueInvalid."""
-    if type(value) is dict:
-        from frametool.ros import messages
-
-        return messages.read_stamp(value)
-    from frametool.frames import stamps
-
-    return stamps.read_stamp(str(value), in_ns=in_nanoseconds(key))
-
-
-def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
-    """Return what a record and the mappings around it say besides the pose, its frames and its stamp.
-
-    node: the thing that the record's result is; unit: the path of that
-    """
+def _rest(root: Node, record: Record) -> dict[str, Any]:
+    """Return what a record and the mappings around it say besides the pose, its frames and its stamp."""
     keys, used = record.keys, {*NOT_PLAIN, *PARTS.get(record.shape.kind, ())}  # what is no longer true of the result
     used |= {keys.position, keys.rotation, *keys.others, *keys.flat, *keys.members, *keys.placed}
-    names = {path for each in (record.name, record.parent) for path in each.paths}
+    names = {*record.name.paths, *record.parent.paths}
     rest: dict[str, Any] = {}
-    for depth in range(len(unit), len(record.path) + 1):
+    for depth in range(len(_unit_of(record)), len(record.path) + 1):
         path = record.path[:depth]
-        holder = node.at(path[len(unit) :])
+        holder = root.at(path)
         if type(holder.value) is not dict:
             continue
-        on_the_way = {*record.path[depth : depth + 1], "header", *record.keys.covariances}
+        on_the_way = {*record.path[depth : depth + 1], "header", *keys.covariances}
         for key, (_, value) in holder.value.items():
             is_used = key in on_the_way or (*path, key) in names or (path == record.path and key in used)
             if not is_used and key not in rest:

@@ -30,7 +30,8 @@ from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows
 from frametool.stream.gathering import gathered
 from frametool.stream.header import listed
-from frametool.stream.record import find_records, pose_of, value_at
+from frametool.stream.record import find_records, pose_of
+from frametool.stream.record_search import value_at
 from frametool.stream.record_values import read_text
 from frametool.stream.request import Operation, Request, RowOptions
 from frametool.stream.row_layout import IDENTITY, POSE

@@ -7,6 +7,8 @@ stands between them, and how one is written.
 from __future__ import annotations
 
 from collections import defaultdict
+from itertools import chain
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from frametool.documents.document import Aliased, Node, parse_documents, parse_nodes
@@ -19,7 +21,8 @@ from frametool.grammar.readers import AXES_KEY, EARTH_FRAMES, PLACE_KEYS
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream import row_layout
 from frametool.stream.faults import Fault
-from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ, outermost
+from frametool.stream.record import outermost
+from frametool.stream.record_search import POINT_KEYS, QUATERNION, STALE, XYZ
 from frametool.stream.record_values import Answer, Entry, Outside, RecordText, json_documents, written
 from frametool.stream.row_layout import POSE, SIX, Const, IfLocked, In, Out, Piece, Renamed, Word, number_text
 from frametool.text.lines import with_edits
@@ -27,8 +30,8 @@ from frametool.text.lines import with_edits
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from frametool.stream.record_stream import Part
     from frametool.stream.request import Request
-    from frametool.stream.splitter import Part
 
 Pieces: TypeAlias = tuple[Piece, ...]
 
@@ -91,8 +94,12 @@ class Splicer:
         else:
             if self.members:
                 self._names()
-            if self.kind != shape.kind or not stays or not (self.members or self._same_rotation()):
-                self._anew()
+            if self.kind != shape.kind or not stays or not (self.members or self._same_rotation()):  # all anew
+                keys, size = self.record.keys, self.target.own_size
+                position = [self._place("xyz" if self.kind == POSE else self.kind)] if unit is not None else []
+                self.behind[self.tail] += [*position, *self._rotation(), *self._extras(size)]
+                self.dropped |= {keys.position, keys.rotation, *keys.others, *keys.members, *keys.flat}
+                self.dropped |= {*STALE, "inverse", "angles"}
             elif self.members:
                 self._in_place()
             else:
@@ -176,14 +183,6 @@ class Splicer:
         else:
             self.dropped.update(keys.others)
         self.behind[at or self.tail] += made + self._extras(target.own_size)
-
-    def _anew(self) -> None:
-        """Write all members of a result in place of a bare list, or of what said what a record was."""
-        target, keys = self.target, self.record.keys
-        position = [self._place("xyz" if self.kind == POSE else self.kind)] if target.unit is not None else []
-        self.behind[self.tail] += [*position, *self._rotation(), *self._extras(target.own_size)]
-        self.dropped |= {keys.position, keys.rotation, *keys.others, *keys.members, *keys.flat}
-        self.dropped |= {*STALE, "inverse", "angles"}
 
     def _place(self, key: str) -> Pieces:
         """Write the position as a member, or as those of a place, with the axes of its rotation."""
@@ -302,7 +301,7 @@ def quoted_name(node: Node, name: str, *, json: bool) -> str:
 
 def rendered(known: RecordText, answers: Sequence[Answer]) -> bytes:
     """Return the text with results in the place of numbers, some of them as words; b"" where nothing is in it."""
-    numbers = [number for each in answers for number in written(each)]
+    numbers = [*chain.from_iterable(map(written, answers))]
     precision, exponent = known.request.results.precision, "e" if known.json else ".0e"
     fmt = "" if precision is None else f"z.{precision}f"
     locked = any(each.entry.target.locked(each.parts) for each in answers)
@@ -327,7 +326,7 @@ def stretches_of(
     stretches: list[tuple[int, int]] = []
     pieces: list[Piece] = []
     slots, at = list(reversed(cuts)), 0
-    for edit in (*sorted(edits, key=lambda each: (each.start, each.end)), Edit(length, length, ())):
+    for edit in (*sorted(edits, key=itemgetter(0, 1)), Edit(length, length, ())):
         start = max(edit.start, at)
         for end, stays, added in ((start, True, edit.pieces), (max(edit.end, start), False, ())):
             while at < end:
@@ -377,17 +376,17 @@ def attempt(text: bytes, part: Part, line: int = 0, *, fmt: str, request: Reques
             edits += Splicer(found.root, entry, request, json=found.json, first=first).run()
             first += entry.target.size
         found.edits = list(dict.fromkeys(edits))  # a name that several records share changes once
-    except Aliased as error:
-        return fault_at(source, error.in_text(source.text))
-    except FormatError as error:
-        return fault_at(source, error)
     except FrametoolError as error:
-        return Fault(line, getattr(error, "column_name", ""), error)
+        return fault_at(source, error, line)
     return found
 
 
-def fault_at(source: Source, error: FormatError) -> Fault:
-    """Return an error in a record as a fault with its place."""
-    line, column = source.place(max(error.line, 1), error.column)
-    named = getattr(error, "column_name", "") or (str(column) if error.column else "")
-    return Fault(line - 1, named, error.message, kind=error.kind)
+def fault_at(source: Source, error: FrametoolError, line: int) -> Fault:
+    """Return an error in a record as a fault with its place; line: of one that does not say its own."""
+    column = getattr(error, "column_name", "")
+    if not isinstance(error, FormatError):
+        return Fault(line, column, error)
+    if isinstance(error, Aliased):
+        error = error.in_text(source.text)
+    at_line, at = source.place(max(error.line, 1), error.column)
+    return Fault(at_line - 1, column or (str(at) if error.column else ""), error.message, kind=error.kind)

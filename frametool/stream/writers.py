@@ -390,14 +390,15 @@ class Marked(NamedTuple):
     """The result of one of many rows that are alike, with marks in the place of what differs.
 
     value: the result; numbers: which column of results stands for a number of it, by its text; size: the columns
-    stamp: which scalar of a record is its stamp, if it has no header, and whether it counts nanoseconds
+    stamp: of records, the stretches of their stamp; in_ns: the nanoseconds per unit of a single one
     quotes: of records, those around the scalars, by their marks; is_json: in JSON a scalar without quotes is no text
     """
 
     value: Value
     numbers: Mapping[str, int]
     size: int
-    stamp: tuple[int, int] | None = None
+    stamp: tuple[int, ...] = ()
+    in_ns: int = 0
     quotes: Mapping[str, str] | None = None
     is_json: bool = False
 
