@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     Renaming: TypeAlias = tuple[Names, Names]  # of a record, and of its result
     Places: TypeAlias = Sequence[tuple[int, int]]
     Hit: TypeAlias = tuple["Template", Places]
+    Called: TypeAlias = tuple[list[Any], Ints]
 
 MOST_TEMPLATES = 256  # kept in mind
 MOST_TRIED = 8  # of them tried on whole blocks
@@ -141,8 +142,8 @@ class Template:
             each if not isinstance(each, Renamed) else In(next(places)) if each.at in roles else Const(each.text)
             for each in pieces
         ]
-        self._results: dict[tuple[str, ...], list[Renaming] | None] = {}
-        self._own = self._renamed(tuple(self.text[slice(*span)] for span in named))
+        self._results: dict[tuple[bytes, ...], list[Renaming] | None] = {}
+        self._own = self._renamed(tuple(self.text[slice(*span)].encode() for span in named))
 
     @cached_property
     def block_pattern(self) -> re.Pattern[bytes]:
@@ -166,7 +167,7 @@ class Template:
             groups.append("".join(["(", *parts, re.escape(self.text[at:end]), ")"]))
         return re.compile("".join(groups).encode())
 
-    def renamed(self, names: tuple[str, ...]) -> list[Renaming] | None:
+    def renamed(self, names: tuple[bytes, ...]) -> list[Renaming] | None:
         """Return the frames of each entry, and of its result, where those that may differ are called so.
 
         None where the text around them is another then.
@@ -178,12 +179,12 @@ class Template:
             self._results[names] = found[0] if found and own and found[1] == own[1] else None
         return self._results[names]
 
-    def _renamed(self, names: tuple[str, ...]) -> tuple[list[Renaming], list[Any]] | None:
+    def _renamed(self, names: tuple[bytes, ...]) -> tuple[list[Renaming], list[Any]] | None:
         """Return the frames of such entries and of their results, and all else that they decide; None if wrong."""
         found, others, request, timed = list[Any](), list[Any](), self._request, self._request.timed
         for (record, _, edge, *_), own in zip(self.entries, self.frames, strict=True):
             pairs = zip((record.parent.text, record.name.text), own, strict=True)
-            parent, name = (old if at is None else names[at] for old, at in pairs)
+            parent, name = (old if at is None else names[at].decode() for old, at in pairs)
             if any(path[-1] == "frame" and request.counts(parent or "") for path in record.parent.paths):
                 return None
             try:
@@ -287,19 +288,19 @@ class Cut(NamedTuple):
         starts = self.starts[row].tolist()
         return starts[-1], starts[0], starts[-2], int(self.ends[row, -2])
 
-    def frames(self, text: bytes) -> tuple[list[Any], Ints]:
+    def frames(self, text: bytes) -> Called:
         """Return the frames of its records and of their results, each set of them once, and which of these each has.
 
         None for a set whose result is written otherwise; else the frames of each entry.
         """
-        columns, data = list[list[str]](), np.frombuffer(text, np.uint8)
+        columns, data = list[list[bytes]](), np.frombuffer(text, np.uint8)
         for named in self.template.named:
             starts, ends = self.starts[:, named], self.ends[:, named]
             width = ends[0] - starts[0]
             is_alike = (ends - starts == width).all()
             is_alike = is_alike and (data[at := starts[:, None] + np.arange(width)] == data[at[0]]).all()
             spans = zip(*(each[: 1 if is_alike else None].tolist() for each in (starts, ends)), strict=True)
-            columns.append([text[start:end].decode() for start, end in spans])
+            columns.append([text[start:end] for start, end in spans])
         size = max(map(len, columns), default=1)
         rows = zip(*(each if len(each) == size else each * size for each in columns), strict=True) if columns else [()]
         known, codes = numbered([*rows])
@@ -353,7 +354,7 @@ class RecordCutter:
             found = template.pattern.fullmatch(text, part.start, part.end)
             if found is not None:
                 places = found.regs[1:]
-                if template.renamed(tuple(text[slice(*places[at])].decode() for at in template.named)) is not None:
+                if template.renamed(tuple(text[slice(*places[at])] for at in template.named)) is not None:
                     return template, places
         return None
 
@@ -431,8 +432,8 @@ def in_order(cuts: Sequence[Cut]) -> list[Cut]:
     return [Cut(cut.template, cut.starts[part], cut.ends[part]) for cut, part in parts]
 
 
-def block_of(cut: Cut, data: Bytes, text: bytes, request: Request) -> Block:
-    """Describe the records of one template as rows; request: that of their plan."""
+def block_of(cut: Cut, called: Called, data: Bytes, text: bytes, request: Request) -> Block:
+    """Describe the records of one template as rows; called: their frames, request: that of their plan."""
     template, rows = cut.template, len(cut.starts)
     starts, ends = cut.starts + MARGIN, cut.ends + MARGIN
     parts = [Spans(data, starts[:, index], ends[:, index]) for index in range(starts.shape[1])]
@@ -452,7 +453,7 @@ def block_of(cut: Cut, data: Bytes, text: bytes, request: Request) -> Block:
         found, late = stamps_in([without_quotes(parts[index]) for index in each], column)
         stamps.append(found)
         bad = {**late, **bad}
-    named, codes = cut.frames(text)
+    named, codes = called
     which = codes.tolist() if len(named) > 1 else [0]
     frames = [[named[code][at][0][0] for code in which] for at in range(len(template.entries))]
     for at, role, node in template.roles:  # as results have them

@@ -27,6 +27,7 @@ from frametool.stream.writers import LEAF, MORE_NUMBERS, NAME, NUMBERS, PARENT, 
 
 if TYPE_CHECKING:
     from frametool.stream.evaluate import Plan, Run
+    from frametool.stream.record_cuts import Called
     from frametool.stream.request import Request
 
 QUATERNION = notation("quaternion")
@@ -63,8 +64,8 @@ class RecordRows:
         self._plans[template] = plan._replace(targets=tuple(targets) or plan.targets), found
         return self._plans[template][0]
 
-    def take(self, cut: Cut, run: Run, text: bytes) -> tuple[list[AlikeRows], set[int]]:
-        """Return the rows of a run in batches, and which of them are unclear."""
+    def take(self, cut: Cut, run: Run, called: Called) -> tuple[list[AlikeRows], set[int]]:
+        """Return the rows of a run in batches, and which of them are unclear; called: the frames of all."""
         template, marked, parts = cut.template, self._plans[cut.template][1], run.block.parts
         left = {*run.rows[run.locked[run.rows] != 0].tolist()} if marked else {*run.rows.tolist()}
         if self.style.format == "yaml":  # in which a null has lines of its own
@@ -76,7 +77,7 @@ class RecordRows:
             stamps.append(times)
             left |= {*late}
         rows = run.rows[np.array([row not in left for row in run.rows.tolist()], np.bool_)]
-        frames, codes = cut.frames(text)
+        frames, codes = called
         which = codes[rows].tolist() if len(frames) > 1 else [0]
         first, batches = 0, list[AlikeRows]()
         for at, (each, times) in enumerate(zip(marked, stamps, strict=True) if len(rows) else ()):

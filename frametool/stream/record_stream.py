@@ -303,9 +303,10 @@ class RecordBlocks:
         for cut in cuts:
             template, left = cut.template, set[int]()
             plan = rows.plan(template) if rows else plan_of(template, self.request, yaml=self.fmt == "yaml")
-            run = Run(plan, block_of(cut, data, text, plan.request), state)
+            called = cut.frames(text)
+            run = Run(plan, block_of(cut, called, data, text, plan.request), state)
             if rows is not None:
-                alike, left = rows.take(cut, run, text)
+                alike, left = rows.take(cut, run, called)
                 found.alike += alike
             alone = sorted({*run.reasons, *left})
             found.rows += len(cut.starts) - len(alone)

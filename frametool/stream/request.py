@@ -489,6 +489,8 @@ class Request(NamedTuple):
             written = tuple((each, each.in_degrees(self.rows.degrees)) for each in notations)
             target = target._replace(notations=written, whole=whole)
         else:
+            if shape.inverse:  # which is written anew, with all its numbers in one unit
+                shape = shape._replace(absent=(), radians_at=())
             ahead = 3 * (placed and shape.unit is None and not shape.whole)  # a position comes in front
             absent = tuple(at + ahead for at in shape.absent)
             target = target._replace(notations=shape.notations, whole=shape.whole, absent=absent)

@@ -135,3 +135,10 @@ def test_several_positions_under_affixes_are_an_error_that_names_them(run: Calla
 def test_what_names_its_position_keeps_other_numbers_as_they_are(run: Callable[..., Any]) -> None:
     done = run("apply", "--transform", "{xyz: [1, 0, 0]}", stdin='{"point": [1, 2, 3], "box_x": 1, "box_y": 2, "box_z": 3}\n')
     assert done.out == '{"point": [2.0, 2.0, 3.0], "box_x": 1, "box_y": 2, "box_z": 3}\n'
+
+
+@pytest.mark.parametrize("count", [1, 200])
+def test_the_inverse_of_a_pose_in_the_plane_is_written_anew(count: int) -> None:
+    found = flow(b'{"x":1,"y":2,"yaw_deg":90,"inverse":true}\n' * count, INVERT, "json")
+    wanted = {"xyz": [1.0, 2.0, 0.0], "rpy_deg": {"roll": 0.0, "pitch": 0.0, "yaw": 90.0}}
+    assert [json.loads(line) for line in found.text.splitlines()] == [wanted] * count
