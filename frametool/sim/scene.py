@@ -287,7 +287,7 @@ def _pieces(lines: Iterable[str]) -> Iterator[tuple[Piece, bool]]:
 
     The first line with data distinguishes CSV from documents and words.  A quoted cell may contain a line end.  A
     document comes when the line that ends it has arrived, one of a single line at once.  Lines that the shell or the
-    tools wrote between the messages are blanked; one kind of them ends a document.
+    tools wrote between the messages are blanked.
     """
     is_table: bool | None = None
     held: list[str] = []
