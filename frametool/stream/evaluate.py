@@ -65,9 +65,10 @@ class Plan(NamedTuple):
 
 @dataclass(slots=True)
 class State:
-    """What one block leaves for the next: the row before, and how often each angle has turned around."""
+    """What one block leaves for the next: the row before, its frame, and how often each angle has turned around."""
 
     previous: Floats | None = None
+    frame: str | None = None
     stamp_ns: int | None = None
     angles: dict[int, float] = field(default_factory=dict)
     turns: dict[int, float] = field(default_factory=dict)
@@ -280,8 +281,15 @@ class Run:
         if not len(good):
             return [pose, pose]
         full = np.stack([np.broadcast_to(np.asarray(part, np.float64), self.count) for part in pose])
+        frames, codes = numbered([each and (None if each.isdecimal() else each) for each in self.block.frames[0]])
+        codes = np.resize(codes, self.count)
         if state.previous is None:
-            state.previous = full[:, good[0]]
+            state.previous, state.frame = full[:, good[0]], [*frames][codes[good[0]]]
+        reason = f"given in another frame than {state.frame!r}, as the rows before are"
+        for row in good[codes[good] != frames.get(state.frame, -1)].tolist():
+            self._blame(row, self.plan.frame_column, reason)
+        if not len(good := self._good()):
+            return [pose, pose]
         before = state.previous
         if len(before) == EXACT < len(full):  # exact, or of the scale 1
             before = np.append(before, np.full(len(full) - EXACT, float(len(full) == SCALED)))

@@ -276,7 +276,6 @@ class PlannedRows:
         self.shape = self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
         self.earth = EARTH_FRAMES[0] if self.shape.place is not None else None
         self.rename = request.for_kind(self.shape.kind).renaming
-        self.before: str | None = None
         self.state = State()
         self.mended, self.off = 0, 0.0
 
@@ -316,10 +315,6 @@ class PlannedRows:
             for place, name, result in zip(self.layout.named, pair, results[at], strict=True):
                 if place is not None and name and not result:  # a cell named a frame, and the result does not
                     lost.setdefault(int((of_row == at).argmax()), name)
-        for row, parent in enumerate(parents.each() if self.request.operation.looks_back else ()):
-            self.before = parent if self.before is None else self.before
-            if parent != self.before:
-                bad[row] = called, f"given in another frame than {self.before!r}, as the rows before are"
         known = [None if not text or text in counters else text for text in parents.texts]
         frames = [self.earth] if self.earth else [known[code] for code in parents.codes.tolist()]
         return frames, BlockNames(pairs, results, of_row, dict(sorted(lost.items())[:1])), bad

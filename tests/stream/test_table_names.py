@@ -88,6 +88,17 @@ def test_consecutive_rows_are_given_in_one_frame_and_seen_from_the_row_before(si
     assert result.told[0].startswith("in:3:parent: given in another frame than 'a'")
 
 
+@pytest.mark.parametrize("form", ["csv", "json", "yaml"])
+@pytest.mark.parametrize("way", ["--consecutive", "--first"])
+@pytest.mark.parametrize("count", [1, 400])
+def test_rows_of_another_frame_are_compared_in_no_form(run: Run, form: str, way: str, count: int) -> None:
+    table = f"parent,name,{POSE}\n" + f"a,c,{ONE}\n" * count + f"x,c,{ONE}\n" + f"a,c,{ONE}\n"
+    text = run("convert", "-f", form, stdin=table).out
+    done = run("relative", way, "--on-error", "skip", "-f", "csv", stdin=text)
+    assert (done.status, len(rows(done.out))) == (3, count + 1)
+    assert "given in another frame than 'a', as the rows before are (row skipped)" in done.err
+
+
 @pytest.mark.parametrize("column", ["frame", "frame_id", "parent", "header.frame_id"])
 def test_a_row_in_another_frame_than_source_is_bad_and_names_both(run: Run, column: str) -> None:
     table = f"{column},x,y,z\nlidar,1,0,0\nodom,1,0,0\n"
