@@ -170,7 +170,9 @@ def read_stamp(text: str, *, in_ns: int) -> int:
         bare += SUFFIXES[each]
     stamp_ns = parse_stamp(bare)
     if abs(stamp_ns) >= 1 << 63:
-        remedy = "; are these some? then write ns behind them, or call them stamp_ns"
+        is_whole = bare.rstrip("s").isdecimal()
+        remedy = "; are these some? then write "
+        remedy += "ns behind them, or call them stamp_ns" if is_whole else "whole numbers, without point or exponent"
         raise ValueInvalid(f"{shown(text.strip())} is beyond 64 bits of nanoseconds{remedy}")
     return stamp_ns
 

@@ -481,6 +481,7 @@ WANTED = "frames that stand still have parent and name, one that moves stamp or 
     ("name,x,y,z,yaw\nlidar,1,2,3,0\n", f"no column parent nor stamp among name, x, y, z, yaw; {WANTED}"),
     ("stamp,x,y,z\n1,2,3,0\n", "no rotation among the columns stamp, x, y, z"),
     ("timestamp,x,y,z,qx,qy,qz,qw\n99999999999,1,2,3,0,0,0,1\n", "is beyond 64 bits of nanoseconds; are these some? then write ns behind them, or call them stamp_ns"),
+    ("timestamp,x,y,z,qx,qy,qz,qw\n1.7e+18,1,2,3,0,0,0,1\n", "is beyond 64 bits of nanoseconds; are these some? then write whole numbers, without point or exponent"),
 ])  # fmt: skip
 def test_a_table_that_is_no_trajectory_says_what_is_missing(text: str, said: str, run: Run) -> None:
     done = run("tree", "a.csv", files={"a.csv": text})
