@@ -155,8 +155,17 @@ class Template:
 
     @cached_property
     def pattern(self) -> re.Pattern[bytes]:
-        """Match a record that is alike, one group a stretch."""
-        groups, left = [], sorted(self._patterns, reverse=True)
+        """Match a record that is alike."""
+        return re.compile(self._groups[0])
+
+    @property
+    def sizes(self) -> list[int]:
+        """Return the bytes of each stretch; -1 where they differ, which is a group of the pattern."""
+        return self._groups[1]
+
+    @cached_property
+    def _groups(self) -> tuple[bytes, list[int]]:
+        groups, sizes, left = [], [], sorted(self._patterns, reverse=True)
         for start, end in self.stretches:
             parts, at = [], start
             while left and left[-1][1] <= end:
@@ -164,8 +173,17 @@ class Template:
                 if own[0] >= at:
                     parts += [re.escape(self.text[at : own[0]]), self._patterns[own]]
                     at = own[1]
-            groups.append("".join(["(", *parts, re.escape(self.text[at:end]), ")"]))
-        return re.compile("".join(groups).encode())
+            text = "".join([*parts, re.escape(self.text[at:end])])
+            groups.append(f"({text})" if parts else text)
+            sizes.append(-1 if parts else len(self.text[start:end].encode()))
+        return "".join(groups).encode(), sizes
+
+    def places(self, found: re.Match[bytes]) -> Places:
+        """Return where the stretches of a record are that matches."""
+        groups, ends = iter(found.regs[1:]), [found.start()]
+        for size in self.sizes:
+            ends.append(next(groups)[1] if size < 0 else ends[-1] + size)
+        return [*pairwise(ends)]
 
     def renamed(self, names: tuple[bytes, ...]) -> list[Renaming] | None:
         """Return the frames of each entry, and of its result, where those that may differ are called so.
@@ -353,7 +371,7 @@ class RecordCutter:
         for template in reversed(self.templates):
             found = template.pattern.fullmatch(text, part.start, part.end)
             if found is not None:
-                places = found.regs[1:]
+                places = template.places(found)
                 if template.renamed(tuple(text[slice(*places[at])] for at in template.named)) is not None:
                     return template, places
         return None
@@ -381,18 +399,21 @@ class RecordCutter:
 def _cut_by(template: Template, text: bytes, rest: list[tuple[int, int]], cuts: list[Cut]) -> list[tuple[int, int]]:
     """Cut what is left of a block by one expression, and add the records to `cuts`; return what is then left."""
     left = []
-    width = len(template.stretches) + 2  # with what follows a record, and what parts it from the one before
+    sizes = np.array([-1, *template.sizes, -1])  # with what parts a record from the one before, and what follows it
+    varying = np.flatnonzero(sizes < 0)
     for start, end in rest:
         pieces = template.block_pattern.split(text[start:end])
-        count = len(pieces) // width
-        ends = np.cumsum(np.fromiter(map(len, pieces), np.int64, len(pieces))) + start
-        starts = np.concatenate([[start], ends[:-1]])
-        between = np.arange(0, len(pieces), width)
-        left += [(int(starts[at]), int(ends[at])) for at in between[starts[between] < ends[between]]]
-        if count:
-            begins, stops = (each[: count * width].reshape(count, width)[:, 1:] for each in (starts, ends))
-            first = begins[:, :1]  # nothing is before a record
-            cuts.append(Cut(template, *(np.concatenate([each, first], axis=1) for each in (begins, stops))))
+        lengths = np.tile(sizes, (len(pieces) // len(varying), 1))
+        found = np.fromiter(map(len, pieces[:-1]), np.int64, len(pieces) - 1)
+        lengths[:, varying] = found.reshape(len(lengths), -1)
+        ends = np.cumsum(lengths).reshape(lengths.shape) + start
+        starts, behind = ends - lengths, int(ends[-1, -1]) if len(ends) else start
+        between = lengths[:, 0] > 0
+        left += zip(starts[between, 0].tolist(), ends[between, 0].tolist(), strict=True)
+        left += [(behind, end)] * (behind < end)
+        if len(lengths):
+            first = starts[:, 1:2]  # nothing is before a record
+            cuts.append(Cut(template, *(np.concatenate([each[:, 1:], first], axis=1) for each in (starts, ends))))
     return left
 
 
