@@ -25,7 +25,7 @@ from frametool.stream.record import KEYS_REMEDY
 from frametool.stream.record_search import POINT_KEYS
 from frametool.stream.record_values import MOST_ENTRIES
 from frametool.stream.row_layout import POSE, Const, In, Renamed
-from frametool.stream.rows import Block, chosen, numbered, spans_of, stamps_in
+from frametool.stream.rows import Block, chosen, numbered, one_text, spans_of, stamps_in
 from frametool.stream.splice import OURS, column_in, quoted_name, stretches_of
 from frametool.text.spans import MARGIN, Bytes, Ints, Spans, without_quotes
 
@@ -314,11 +314,8 @@ class Cut(NamedTuple):
         columns, data = list[list[bytes]](), np.frombuffer(text, np.uint8)
         for named in self.template.named:
             starts, ends = self.starts[:, named], self.ends[:, named]
-            width = ends[0] - starts[0]
-            is_alike = (ends - starts == width).all()
-            is_alike = is_alike and (data[at := starts[:, None] + np.arange(width)] == data[at[0]]).all()
-            spans = zip(*(each[: 1 if is_alike else None].tolist() for each in (starts, ends)), strict=True)
-            columns.append([text[start:end] for start, end in spans])
+            only, spans = one_text(Spans(data, starts, ends)), zip(starts.tolist(), ends.tolist(), strict=True)
+            columns.append([only] if only is not None else [text[start:end] for start, end in spans])
         size = max(map(len, columns), default=1)
         rows = zip(*(each if len(each) == size else each * size for each in columns), strict=True) if columns else [()]
         known, codes = numbered([*rows])
@@ -398,7 +395,7 @@ class RecordCutter:
 
 def _cut_by(template: Template, text: bytes, rest: list[tuple[int, int]], cuts: list[Cut]) -> list[tuple[int, int]]:
     """Cut what is left of a block by one expression, and add the records to `cuts`; return what is then left."""
-    left = []
+    left = list[tuple[int, int]]()
     sizes = np.array([-1, *template.sizes, -1])  # with what parts a record from the one before, and what follows it
     varying = np.flatnonzero(sizes < 0)
     for start, end in rest:

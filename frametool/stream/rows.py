@@ -120,14 +120,20 @@ def read_each(values: NDArray[Any], places: Iterable[int], read: Callable[[int],
 
 def coded(cells: Spans) -> Coded:
     """Read cells (n,), not none, as texts; where all are the same, as frames often are, that is one text."""
-    column, rows = without_quotes(cells), len(cells.starts)
-    first = column.text(0)
-    is_alike = len(first) <= MARGIN and not (column.ends - column.starts != len(first)).any()
-    if is_alike and all((column.data[column.starts + at] == byte).all() for at, byte in enumerate(first)):
-        return Coded([_text(first)], np.zeros(rows, np.int64))
+    column = without_quotes(cells)
+    if (only := one_text(column)) is not None:
+        return Coded([_text(only)], np.zeros(len(cells.starts), np.int64))
     data = column.data.tobytes()
     spans = zip(column.starts.tolist(), column.ends.tolist(), strict=True)
     return coded_texts([data[start:end] for start, end in spans], _text)
+
+
+def one_text(column: Spans) -> bytes | None:
+    """Return the text that all cells (n,), not none, have; None where they differ, or are long."""
+    first = column.text(0)
+    if len(first) > MARGIN or (column.ends - column.starts != len(first)).any():
+        return None
+    return first if all((column.data[column.starts + at] == byte).all() for at, byte in enumerate(first)) else None
 
 
 def coded_texts(cells: Sequence[Any], text: Callable[[Any], str] = str) -> Coded:

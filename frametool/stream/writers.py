@@ -40,6 +40,7 @@ from frametool.stream.rows import (
     constant,
     kept,
     objects,
+    one_text,
     plain_cells,
     spans_of,
     text_of,
@@ -451,6 +452,9 @@ class AlikeRows(NamedTuple):
                     made: Piece = Out(columns[mark], columns[mark] + 1)
                 elif mark in (PARENT, NAME, str(STAMP_NS)) or LEAF.fullmatch(mark):
                     scalar, around = self._scalar(mark, syntax)
+                    if (only := one_text(scalar)) is not None:  # what is the same in all rows costs nothing
+                        waiting += f"{around}{only.decode()}{around}"
+                        continue
                     made, spans = In(len(spans)), [*spans, scalar]
                 else:
                     waiting += piece
