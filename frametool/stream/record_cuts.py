@@ -402,7 +402,7 @@ def _cut_by(template: Template, text: bytes, rest: list[tuple[int, int]], cuts: 
         pieces = template.block_pattern.split(text[start:end])
         lengths = np.tile(sizes, (len(pieces) // len(varying), 1))
         found = np.fromiter(map(len, pieces[:-1]), np.int64, len(pieces) - 1)
-        lengths[:, varying] = found.reshape(len(lengths), -1)
+        lengths[:, varying] = found.reshape(-1, len(varying))
         ends = np.cumsum(lengths).reshape(lengths.shape) + start
         starts, behind = ends - lengths, int(ends[-1, -1]) if len(ends) else start
         between = lengths[:, 0] > 0
