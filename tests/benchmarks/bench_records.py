@@ -6,6 +6,7 @@ each beside the same from CSV.  Least processor seconds of several runs, records
 
 from __future__ import annotations
 
+import json
 import os
 import resource
 import subprocess
@@ -49,6 +50,17 @@ def main(count: int) -> None:
             seconds, memory = timed(folder, source, into)
             theirs, _ = timed(folder, "walk.csv", into.replace("csv", "tum"))
             print(f"{source.rpartition('.')[2]:<5} -> {into.rpartition('.')[2]:<5} {seconds:8.2f} {count / seconds:9.0f} {memory:5.0f}  {seconds / theirs:.2f}")
+        few, covariance = count // 10, [0.01 * (at % 7 == 0) for at in range(36)]
+        with Path(folder, "odometry.jsonl").open("w", encoding="utf-8") as lines:
+            for at, row in enumerate(rows[:few]):
+                pose = {"position": dict(zip("xyz", row, strict=False)), "orientation": dict(zip("xyzw", row[3:], strict=True))}
+                twist = dict.fromkeys(("linear", "angular"), dict.fromkeys("xyz", 0.5))
+                header = {"stamp": {"sec": at // 100, "nanosec": at % 100 * 10_000_000}, "frame_id": "odom"}
+                parts = {"pose": {"pose": pose, "covariance": covariance}, "twist": {"twist": twist, "covariance": covariance}}
+                lines.write(json.dumps({"header": header, "child_frame_id": "base_link", **parts}) + "\n")
+        for source, into, size in (("odometry.jsonl", "new.csv", few), ("walk.csv", "new.json", count)):
+            seconds, _ = timed(folder, source, into)
+            print(f"{source} -> {into}: {seconds:.2f} s, {size / seconds:.0f} a second")
         of_table, _ = timed(folder, "walk.jsonl", "new.csv")
         print("the same as documents of YAML, and what depends on the rows before, as rows of CSV; times JSON lines to CSV")
         for command, into in (((), "new.yaml"), (("relative", "--consecutive"), "new.csv"), (("relative", "--consecutive", "--velocity"), "new.csv")):
