@@ -23,7 +23,7 @@ from frametool.errors import FormatError, heard_by, warn
 from frametool.formats import table
 from frametool.formats.table import BAG, FORMATS, holds, is_trajectory, readers
 from frametool.grammar.result import Style
-from frametool.stream.faults import MOST, NULL, ON_ERROR, STOP, BadRow, BadRows, Outcome, run
+from frametool.stream.faults import MOST, NULL, ON_ERROR, STOP, BadRow, BadRows, Outcome, run, written_by
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence
@@ -332,7 +332,6 @@ class Task:
 
     def _records(self, stream: Any, fmt: str, request: Request, chosen: str) -> tuple[Generator[Outcome], str]:
         """Write the results of records in place, or in a format that was chosen."""
-        from frametool.stream.record_results import written_by
         from frametool.stream.record_stream import run_records
 
         if chosen in ("", fmt):

@@ -38,8 +38,7 @@ from frametool.grammar.edges import Answers, Diagnostics, EdgeColumns, Options, 
 from frametool.grammar.readers import EARTH_FRAMES
 from frametool.grammar.result import Style
 from frametool.stream.evaluate import Plan, Run, State
-from frametool.stream.faults import NULL, STOP, BadRow, Fault, Outcome
-from frametool.stream.record_results import written_by
+from frametool.stream.faults import NULL, STOP, BadRow, Fault, Outcome, written_by
 from frametool.stream.request import NO_STAMPS, SOME, Request, RowOptions
 from frametool.stream.row_layout import POINT, POSE, Shape
 from frametool.stream.rows import NO_ROWS, NO_STAMP, Block, RowPoses, kept, spans_of

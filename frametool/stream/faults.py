@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 from frametool.errors import FormatError, FrametoolError, NamedTuple, UnknownFrame, shown, warn
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 
-    from frametool.stream.record_results import BlockResults
+    from frametool.stream.record_results import BlockResults, ResultWriter
     from frametool.stream.rows import RowPoses
 
 STOP, SKIP, NULL = "stop", "skip", "null"
@@ -185,6 +185,27 @@ class Outcome(NamedTuple):
     kept: int = 0
     is_open: bool | None = None
     results: RowPoses | BlockResults | None = None
+
+
+def written_by(writer: ResultWriter, outcomes: Iterator[Outcome], on_error: str) -> Generator[Outcome]:
+    """Let a writer write the results of blocks; what it holds back comes before the error that ends a stream."""
+    begun = False
+    while True:
+        try:
+            outcome = next(outcomes, None)
+        except FrametoolError:
+            if begun:
+                yield from map(Outcome, writer.end())
+            raise
+        if outcome is None:
+            yield from map(Outcome, writer.end())
+            return
+        begun = begun or outcome.kept > 0
+        text = b"" if outcome.results is None else writer.of_block(outcome.results)
+        if begun and any(on_error == STOP or fault.final for fault in outcome.faults):
+            yield from map(Outcome, (text, *writer.end()))
+            text = b""
+        yield outcome._replace(text=text)
 
 
 def run(

@@ -8,13 +8,12 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Protocol
 
 from frametool import sizes
-from frametool.errors import FrametoolError, NamedTuple
+from frametool.errors import NamedTuple
 from frametool.formats.rows.csv import cells_of, row
 from frametool.grammar.result import Style, write_poses
-from frametool.stream.faults import STOP, Outcome
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.stream.record_values import Value
     from frametool.stream.rows import RowPoses
@@ -78,27 +77,6 @@ class ResultWriter(Protocol):
     def end(self) -> Iterable[bytes]:
         """Yield what comes behind the last block."""
         return ()
-
-
-def written_by(writer: ResultWriter, outcomes: Iterator[Outcome], on_error: str) -> Generator[Outcome]:
-    """Let a writer write the results of blocks; what it holds back comes before the error that ends a stream."""
-    begun = False
-    while True:
-        try:
-            outcome = next(outcomes, None)
-        except FrametoolError:
-            if begun:
-                yield from map(Outcome, writer.end())
-            raise
-        if outcome is None:
-            yield from map(Outcome, writer.end())
-            return
-        begun = begun or outcome.kept > 0
-        text = b"" if outcome.results is None else writer.of_block(outcome.results)
-        if begun and any(on_error == STOP or fault.final for fault in outcome.faults):
-            yield from map(Outcome, (text, *writer.end()))
-            text = b""
-        yield outcome._replace(text=text)
 
 
 class Documents(ResultWriter):
