@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cached_property
 from itertools import chain, islice
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Protocol
@@ -14,6 +15,7 @@ from frametool.grammar.result import Style, write_poses
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
+    from tempfile import SpooledTemporaryFile
 
     from frametool.stream.record_values import Value
     from frametool.stream.rows import RowPoses
@@ -123,28 +125,33 @@ class CsvTable(ResultWriter):
 
     def __init__(self, style: Style) -> None:
         """Begin without columns."""
-        from tempfile import SpooledTemporaryFile
-
         self.style = style
         self.columns: dict[str, None] = {}
-        self.waiting = SpooledTemporaryFile(sizes.TABLE)  # noqa: SIM115 - closed with the table
         self.sizes: list[tuple[int, int]] = []  # of each block the columns that it has, and its bytes
 
     def end(self) -> Iterator[bytes]:
         """Yield the table of all blocks."""
-        with self.waiting:
-            if not self.columns:
-                return
-            yield row(self.columns, self.style).encode()
+        if not self.columns:
+            return
+        yield row(self.columns, self.style).encode()
+        with self.waiting:  # there are rows where there are columns
             self.waiting.seek(0)
             for count, size in self.sizes:
                 text = self.waiting.read(size)
                 missing = len(self.columns) - max(count, 1)  # a row without cells is a line all the same
                 yield LINE.sub(rb"\1" + b"," * missing + b"\n", text) if missing else text
 
+    @cached_property
+    def waiting(self) -> SpooledTemporaryFile[bytes]:
+        """Return where rows wait; closed with the table."""
+        from tempfile import SpooledTemporaryFile
+
+        return SpooledTemporaryFile(sizes.TABLE)
+
     def of_block(self, block: BlockResults) -> bytes:
         """Add the rows of a block; nothing is written yet."""
         text = csv_rows(block, self.columns, self.style)
-        self.waiting.write(text)
+        if text:
+            self.waiting.write(text)
         self.sizes.append((len(self.columns), len(text)))
         return b""
