@@ -312,7 +312,7 @@ def read_time(text: str) -> Any:
     try:
         return read_limit(text)
     except ValueInvalid as error:
-        raise ValueInvalid(f"{error}, or latest") from None
+        raise ValueInvalid(f"{error}" + ", or latest" * ("is not a time" in str(error))) from None
 
 
 def _offset(text: str) -> Any:

@@ -234,3 +234,9 @@ def test_a_table_has_all_samples_as_a_trajectory_has(run: Run, more: tuple[str, 
     assert [line.split()[0] for line in run(*command, "-f", "tum", files=files).out.splitlines()] == [
         f"{at}.000000000" for at in stamps
     ]
+
+
+def test_latest_is_named_beside_what_is_no_time_alone(run: Run) -> None:
+    command = ("lookup", "drive.yaml", "map", "base", "--at")
+    assert "nanoseconds (12500000000ns), or latest;" in run(*command, "soon", files={"drive.yaml": DRIVE}).err
+    assert ", or latest" not in run(*command, "1e30").err
