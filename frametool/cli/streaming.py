@@ -23,7 +23,7 @@ from frametool.errors import FormatError, heard_by, warn
 from frametool.formats import table
 from frametool.formats.table import BAG, FORMATS, holds, is_trajectory, readers
 from frametool.grammar.result import Style
-from frametool.stream.faults import MOST, NULL, ON_ERROR, STOP, BadRow, BadRows, Outcome, run, written_by
+from frametool.stream.faults import MOST, NULL, ON_ERROR, SKIP, STOP, BadRow, BadRows, Outcome, run, written_by
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence
@@ -380,7 +380,8 @@ class Task:
         if not holds(output.chosen or fmt, "arrays", "recording"):
             inputs.ask("precision")
         place = output.style.changed(format=output.chosen or fmt).place
-        return request._replace(on_error=inputs.on_error).with_results(place=place)
+        on_error = SKIP if inputs.on_error == NULL and not alone else inputs.on_error  # no row is written, or counts
+        return request._replace(on_error=on_error).with_results(place=place)
 
     def request(self, *, notations: tuple[Any, ...] = (), **asked: Any) -> Request:
         """Return what is done with rows and records, which are read as the options say.

@@ -281,7 +281,8 @@ class Run:
         if not len(good):
             return [pose, pose]
         full = np.stack([np.broadcast_to(np.asarray(part, np.float64), self.count) for part in pose])
-        frames, codes = numbered([each and (None if each.isdecimal() else each) for each in self.block.frames[0]])
+        counts = self.request.counts if not self.plan.frame_column else lambda _: False  # a table has no counters left
+        frames, codes = numbered([None if each and counts(each) else each for each in self.block.frames[0]])
         codes = np.resize(codes, self.count)
         if state.previous is None:
             state.previous, state.frame = full[:, good[0]], [*frames][codes[good[0]]]

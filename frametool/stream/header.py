@@ -148,12 +148,12 @@ class Header:
         units: those that each may have; columns of one unit belong together, and those of several only where each word
         has one column.
         """
-        alike = [at for at, each in enumerate(units) if each is not NUMBER]
         for key, found in self.found.items():
             if found.keys().isdisjoint(base) or (found.keys() >= {*base}) == partly:
                 continue
             words = [found.get(word, {}) for word in base]
-            shared = [unit for unit in (words[alike[0]] if alike else ()) if all(unit in words[at] for at in alike)]
+            alike = [spots for spots, each in zip(words, units, strict=True) if spots and each is not NUMBER]
+            shared = [unit for unit in (alike[0] if alike else ()) if all(unit in spots for spots in alike)]
             for unit in shared or ("",):
                 yield self.columns([spots.get(unit) or next(iter(spots.values()), None) for spots in words], units, key)
 
@@ -376,9 +376,9 @@ def _half_rotation(header: Header, expected: Notation | None) -> str:
 
 
 def find_six(header: Header, kind: str) -> Columns | None:
-    """Find the columns of a twist or a wrench, by the words of its parts, or by usual letters."""
+    """Find the columns of a twist or a wrench, by the words of its parts; by usual letters only where asked."""
     for each in [kind] if kind else LETTERS:
-        for base in (six_names(each), *LETTERS.get(each, ())):
+        for base in (six_names(each), *LETTERS.get(kind, ())):
             for match in header.match(base, (NUMBER,) * 6):
                 if not match.suffix and OUR_UNITS.isdisjoint(match.units):
                     return match._replace(kind=each, wrong="")

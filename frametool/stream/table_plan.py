@@ -359,13 +359,14 @@ def _new_columns(
     """
     rotation, alone, prefix = pose.rotation, not request.results.prefix or several, request.results.prefix
     before, behind = (rotation.prefix, rotation.suffix) if rotation and alone else (prefix, "")
-    turned = [before + name + behind for name in target.names]
+    moved, gone = target.position_columns, target.absent
+    turned = [before + name + behind for at, name in enumerate(target.names, len(moved)) if at not in gone]
     if rotation and alone and same and rotation.whole == target.whole:
         turned = [prefix + name for name in rotation.names]
-    moved = target.position_columns
+    moved = [name for at, name in enumerate(moved) if at not in gone]
     if pose.position and (target.kind in SIX or (moved and alone and target.place == shape.place)):
         moved = list(pose.position.names)
-        if target.place is None and not (target.kind in SIX or target.absent):
+        if target.place is None and not (target.kind in SIX or gone):
             moved += [f"{pose.position.prefix}z{pose.position.suffix}"] * (len(moved) < len(XYZ))
     words = (request.operation.shown or target.place or PLAIN).words
     names = [*(prefix + name for name in moved), *turned, *(prefix + name for name in target.extras)]

@@ -146,8 +146,10 @@ def test_rotations_without_a_mean_are_refused(run: Run) -> None:
     assert "so far apart that none is their mean" in outcome.err
 
 
-def test_bad_rows_are_skipped_and_counted(run: Run) -> None:
-    outcome = run("mean", "-f", "json", "--on-error", "skip", stdin="x,y,z\n1,2,3\nfoo,2,3\n3,2,3\n")
+@pytest.mark.parametrize("text", ["x,y,z\n1,2,3\nfoo,2,3\n3,2,3\n", '[1,2,3]\n["foo",2,3]\n[3,2,3]\n'])
+@pytest.mark.parametrize("policy", ["skip", "null"])
+def test_bad_rows_are_skipped_and_counted(run: Run, text: str, policy: str) -> None:
+    outcome = run("mean", "-f", "json", "--on-error", policy, stdin=text.replace("[", '{"xyz": [').replace("]", "]}"))
     assert outcome.status == 3
     assert json.loads(outcome.out)["xyz"] == [2.0, 2.0, 3.0]
 

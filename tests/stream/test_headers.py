@@ -76,6 +76,21 @@ def test_a_result_that_leaves_the_plane_is_a_bad_row_that_says_what_to_do() -> N
     assert flow(b"x,y,z,yaw\n1,2,0,0\n", asked(right=((0, 0, 0, 0.6, 0, 0, 0.8),))).status == 1
 
 
+def test_a_pose_in_the_plane_stays_one_under_a_prefix() -> None:
+    assert flow(b"x,y,yaw,id\n1,2,0,a\n", STEP.with_results(prefix="n_")).text == (
+        b"n_x,n_y,n_yaw,id\n-1.0,1.0,1.5707963267948966,a\n"
+    )
+
+
+def test_a_turn_in_two_units_is_no_one_turn() -> None:
+    assert "found yaw_rad; yaw_deg; choose with --columns" in flow(b"x,y,yaw_rad,yaw_deg\n1,2,0,0\n", INVERT).told[0]
+
+
+def test_letters_of_a_wrench_are_no_wrench_unless_it_is_asked_for() -> None:
+    pose = b"tx,ty,tz,qx,qy,qz,qw,fx,fy,fz\n1,2,3,0,0,0,1,4,5,6\n"
+    assert flow(pose, SHIFT).text == pose.replace(b"\n1,2,3,0,0,0,1", b"\n2.0,2.0,3.0,0.0,0.0,0.0,1.0")
+
+
 def test_converting_a_pose_in_the_plane_adds_its_height() -> None:
     assert flow(b"x,y,yaw,id\n1.50,2,0,a\n", convert("quaternion")).text == (
         b"x,y,z,qx,qy,qz,qw,id\n1.50,2,0.0,0.0,0.0,0.0,1.0,a\n"

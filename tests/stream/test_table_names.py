@@ -99,6 +99,12 @@ def test_rows_of_another_frame_are_compared_in_no_form(run: Run, form: str, way:
     assert "given in another frame than 'a', as the rows before are (row skipped)" in done.err
 
 
+def test_frames_that_are_called_by_numbers_are_no_counters(run: Run) -> None:
+    text = "{},x,y,z\n1,0,0,0\n2,0,0,0\n"
+    assert "given in another frame than '1'" in run("relative", "--first", stdin=text.format("parent")).err
+    assert run("relative", "--first", stdin=text.format("frame")).status == 0  # which counts pictures
+
+
 @pytest.mark.parametrize("column", ["frame", "frame_id", "parent", "header.frame_id"])
 def test_a_row_in_another_frame_than_source_is_bad_and_names_both(run: Run, column: str) -> None:
     table = f"{column},x,y,z\nlidar,1,0,0\nodom,1,0,0\n"
