@@ -279,7 +279,8 @@ class RecordBlocks:
             is_json = self.fmt == "json"
             if style is None:  # itself, with null in the place of numbers, or null
                 body = record.rstrip(b"\r\n")
-                row = (nulled(body, json=is_json) or "null").encode() + record[len(body) :]
+                text, has_numbers = nulled(body, json=is_json)
+                row = (text if has_numbers else "null").encode() + record[len(body) :]
                 found.items.append((place, part.around(found.text, row)))
             else:
                 found.items.append((part.start, _no_result(record, style, json=is_json)))
@@ -328,14 +329,11 @@ class RecordBlocks:
 def _no_result(record: bytes, style: Style, *, json: bool) -> NoResult:
     """Return what a bad record says besides its numbers; in a table those are empty cells under names of their own."""
     is_table = style.format == "csv"
-    try:
-        root = parse_nodes(nulled(record, json=json) or record.decode())[0]
-        kept = {
-            key: plain(node) for key, (_, node) in (root.value.items() if type(root.value) is dict else ())
-            if not is_table or any(plain(leaf) is not None for leaf in node.leaves())
-        }  # fmt: skip
-    except (FormatError, UnicodeDecodeError, IndexError, TypeError):  # broken: no parser has taken it before
-        kept = {}
+    root = next(iter(parse_nodes(nulled(record, json=json)[0])), None)
+    kept = {
+        key: plain(node) for key, (_, node) in (root.value.items() if root and type(root.value) is dict else ())
+        if not is_table or any(plain(leaf) is not None for leaf in node.leaves())
+    }  # fmt: skip
     return NoResult(Pose(), kept)
 
 

@@ -50,16 +50,18 @@ class Edit(NamedTuple):
     pieces: Pieces
 
 
-def numbers_in(node: Node) -> Iterator[Node]:
-    """Yield all values that are numbers of ours, wherever in a record they are."""
+def nulls_in(node: Node) -> Iterator[tuple[int, int, str]]:
+    """Yield where the numbers of ours are, wherever in a record, each with the null that takes their place."""
     if type(node.value) is list:
         for item in node.value:
-            yield from numbers_in(item)
-    for key, (_, value) in node.value.items() if type(node.value) is dict else ():
-        if (key in OURS and (key not in LISTED_WORDS or type(value.value) in (list, dict))) or key in PLACE_KEYS:
-            yield value
+            yield from nulls_in(item)
+    for key, (named, value) in node.value.items() if type(node.value) is dict else ():
+        if not ((key in OURS and (key not in LISTED_WORDS or type(value.value) in (list, dict))) or key in PLACE_KEYS):
+            yield from nulls_in(value)
+        elif type(value.value) in (list, dict) and not value.flow:  # on lines of its own
+            yield named.end, value.end, ": null"
         else:
-            yield from numbers_in(value)
+            yield value.start, value.end, "null"
 
 
 class Splicer:
@@ -340,15 +342,15 @@ def stretches_of(
     return stretches, pieces
 
 
-def nulled(record: bytes, *, json: bool) -> str | None:
-    """Return a record with null in the place of our numbers; None if it has none that can be found."""
+def nulled(record: bytes, *, json: bool) -> tuple[str, bool]:
+    """Return a record with null in the place of our numbers, and whether it has any; "" for a broken one."""
     try:
         text = record.decode()
         json_documents(Source("", text)) if json else parse_documents(text, "")
-        edits = [(node.start, node.end, "null") for root in parse_nodes(text) for node in numbers_in(root)]
+        edits = [edit for root in parse_nodes(text) for edit in nulls_in(root)]
     except (FormatError, UnicodeDecodeError):
-        return None
-    return with_edits(text, edits) if edits else None
+        return "", False
+    return with_edits(text, edits), bool(edits)
 
 
 def column_in(text: bytes, place: int) -> int:

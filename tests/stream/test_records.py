@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import pytest
 from flow import INVERT, MOVE, Asked, Flow, asked, convert, flow
@@ -168,3 +169,9 @@ def test_each_key_of_several_notations_says_the_unit_of_its_own_angles(copies: i
     for spec in specs.split(","):
         alone = json.loads(flow(text, convert(spec), "json").text.splitlines()[-1])
         assert together | alone == together
+
+
+def test_a_list_on_lines_of_its_own_becomes_null_behind_its_key(run: Any) -> None:
+    text = "id: 0\nxyz:\n- east\n- 1\n- 2\nrpy: [0, 0, 1]\n"
+    done = run("convert", "--on-error", "null", "--to", "rpy_deg", stdin=f"{text}---\nid: 2\nxyz: [1, 2, 3]\n")
+    assert done.out.startswith("id: 0\nxyz: null\nrpy: null\n---\nid: 2\n")
