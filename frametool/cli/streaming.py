@@ -326,7 +326,7 @@ class Task:
 
         request = request.with_results(by_default=True, notations=())
         if fmt in RECORDS:
-            return posed(run_records(stream, fmt, request, source=self.name, style=AS_VALUES), self.name)
+            return posed(run_records(stream, fmt, request, source=self.name, style=AS_VALUES), self.name, timed=False)
         converter = FormatConverter(fmt, request, self.name, AS_VALUES, answers(self.inputs))
         return converter.steps(stream, header=not self.inputs.no_header)
 

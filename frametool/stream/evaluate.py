@@ -287,6 +287,7 @@ class Run:
         if state.previous is None:
             state.previous, state.frame = full[:, good[0]], [*frames][codes[good[0]]]
         reason = f"given in another frame than {state.frame!r}, as the rows before are"
+        reason = reason if state.frame else "given in a frame, as the rows before are not"
         for row in good[codes[good] != frames.get(state.frame, -1)].tolist():
             self._blame(row, self.plan.frame_column, reason)
         if not len(good := self._good()):

@@ -34,11 +34,13 @@ if TYPE_CHECKING:
     from frametool.text.spans import Floats
 
 POSITION = 3  # numbers
-NO_POSE = "expected poses, or points"
 
 
-def posed(outcomes: Iterable[Outcome], source: str) -> Iterator[Step]:
-    """Yield the results of records as poses with their lines, block by block; raises FormatError for what is none."""
+def posed(outcomes: Iterable[Outcome], source: str, *, timed: bool = True) -> Iterator[Step]:
+    """Yield the results of records as poses with their lines, block by block; raises FormatError for what is none.
+
+    timed: stamps count, of all or of none; else they are a column like others
+    """
     for outcome in outcomes:
         results: BlockResults = outcome.results or BlockResults((), [])  # type: ignore[assignment]
         found = results.posed()
@@ -47,6 +49,11 @@ def posed(outcomes: Iterable[Outcome], source: str) -> Iterator[Step]:
             values = [value for _, value in pairs if isinstance(value, Result)]
             if len(values) < len(pairs):
                 raise FormatError("expected poses, or points", source=source)
+            if not timed:
+                values = [
+                    each._replace(extras={"stamp" if key == "stamp_ns" else key: of for key, of in each.extras.items()})
+                    for each in values
+                ]
             found = block_of(values)._replace(lines=np.array([place for place, _ in pairs], np.int64))
             for row, (position, rotation, *_) in enumerate(each.pose for each in values):
                 found.numbers[row, : POSITION * (position is None)] = np.nan
@@ -136,7 +143,7 @@ class MeanRows(Gathered):
         poses = read_poses(source, request._replace(operation=COMBINED))
         self.named += [f"{name}, pose {at}" for at in range(1, len(poses) + 1)] if len(poses) > 1 else [name]
         results = BlockResults((), [*enumerate(map(Result, poses))])
-        for _ in self.of(map(self._looked_at, posed([Outcome(b"", results=results)], name))):
+        for _ in self.of(map(self._looked_at, posed([Outcome(b"", results=results)], name, timed=False))):
             self.stamped |= any(pose.stamp_ns is not None for pose in poses)
             self.uncertain |= any(pose.covariance is not None for pose in poses)
         return poses
@@ -241,4 +248,4 @@ def means_of(rows: MeanRows, values: list[float] | None, *, robust: bool) -> Ite
             extras |= uncertain((covariance if turned else covariance[:3, :3]).ravel().tolist())
         position, rotation = pose.position if placed else None, pose.rotation if turned else None
         body = bodies.pop() if len(bodies) == 1 else None
-        yield Result(Pose(position, rotation, body, next(iter(frames), None)), extras), left_out
+        yield Result(Pose(position, rotation, body, max(frames, default=None)), extras), left_out

@@ -305,7 +305,8 @@ def test_relative_of_two_trajectories_says_what_it_takes_and_what_compares_them(
 
 
 @pytest.mark.parametrize("stdin", [
-    "stamp,x,y,z\n1,2,3,4\n", '{"stamp": 1, "xyz": [1, 2, 3]}\n', "1 1 2 3 0 0 0 1\n2 1 2 3 0 0 0 1\n",
+    "stamp,x,y,z\n1,2,3,4\n", '{"stamp": 1, "xyz": [1, 2, 3]}\n', '{"stamp": 1, "xyz": [1, 2, 3]}\n{"xyz": [1, 2, 3]}\n',
+    "1 1 2 3 0 0 0 1\n2 1 2 3 0 0 0 1\n",
     '{"header": {"stamp": {"sec": 1, "nanosec": 2}, "frame_id": "a"}, "point": {"x": 1, "y": 2, "z": 3}}\n',
 ])  # fmt: skip
 def test_stamps_that_a_mean_does_not_have_are_told_once(run: Run, stdin: str) -> None:
@@ -362,6 +363,7 @@ def test_a_mean_is_in_the_frame_that_all_poses_are_in(run: Run, form: str) -> No
         return run("mean", *(poses * (not text)), *["--by", "name"] * by, "-f", "json", stdin=text)
 
     assert mean("w", "w").out.startswith('{"parent": "w", "xyz": [1.0, 2.0, 0.5]')
+    assert mean("earth", "ecef").out.startswith('{"parent": "ecef",')
     apart = mean("w", "v")
     assert (apart.status, "the poses are in v, w; use one frame for all" in apart.err) == (1, True)
     if form != "arguments":

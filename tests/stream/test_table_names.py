@@ -103,6 +103,8 @@ def test_frames_that_are_called_by_numbers_are_no_counters(run: Run) -> None:
     text = "{},x,y,z\n1,0,0,0\n2,0,0,0\n"
     assert "given in another frame than '1'" in run("relative", "--first", stdin=text.format("parent")).err
     assert run("relative", "--first", stdin=text.format("frame")).status == 0  # which counts pictures
+    mixed = '{"xyz": [1, 2, 3]}\n{"parent": "w", "xyz": [1, 2, 3]}\n'
+    assert "given in a frame, as the rows before are not" in run("relative", "--first", stdin=mixed).err
 
 
 @pytest.mark.parametrize("column", ["frame", "frame_id", "parent", "header.frame_id"])
