@@ -213,7 +213,7 @@ class TreeBuilder:
         edge, components = place.edge, place.edge.components
         parent, child = edge.parent and self.one_name(edge.parent), self.one_name(edge.child)
         if edge.camera is not None and edge.camera.mapping() != self.cameras.setdefault(child, edge.camera).mapping():
-            warn(f"{place.file.name}: {errors.bare(child)}: other numbers come later; the first ones hold")
+            warn(f"{place.file.name}: camera {errors.bare(child)} comes again with other numbers; the first ones hold")
         if parent == child and edge.parent != edge.child:
             if any(components[:6]):
                 what = "'earth' and 'ecef' are one frame, this edge puts one elsewhere in the other; rename one"

@@ -259,7 +259,7 @@ def write_blocks(results: Iterable[Result], target: str, source: str, style: Sty
         heading = ""
 
 
-PATIENCE = 2.0  # seconds before anything is shown
+PATIENCE, BETWEEN = 2.0, 0.1  # seconds before anything is shown, and from then on
 
 
 @contextmanager
@@ -271,14 +271,15 @@ def progress_bar(
     total: bytes, if known; counted: the unit of the count
     """
     is_hidden, begin = quiet or sys.stderr is None or not sys.stderr.isatty(), time.monotonic()
-    rows = size = 0
+    rows, size, due = 0, 0, PATIENCE
     bar: Any = None
 
     def advance(more_rows: int, more_size: int) -> None:
-        nonlocal rows, size, bar
+        nonlocal rows, size, due, bar
         rows, size, seconds = rows + more_rows, size + more_size, time.monotonic() - begin
-        if is_hidden or seconds < PATIENCE:
+        if is_hidden or seconds < due:
             return
+        due = seconds + BETWEEN
         with suppress(OSError):
             if bar is None:
                 from rich.progress import Progress, TextColumn

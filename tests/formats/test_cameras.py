@@ -118,6 +118,15 @@ def test_a_moving_camera_and_one_without_a_parent(tmp_path: Path) -> None:
     assert tree.tree_at(5 * 10**8).camera("cam").axes == "flu"
 
 
+def test_of_two_entries_of_one_camera_the_first_holds_in_files_that_are_merged_too(run: Run) -> None:
+    cam = "{name: cam, parent: base, xyz: [0, 0, 1], camera: {model: pinhole, size: [640, 480], K: [%s, 500, 320, 240]}}"
+    files = {"a.yaml": cam % 500, "b.yaml": cam % 501, "same.yaml": cam % 500}
+    done = run("tree", "a.yaml", "--with", "b.yaml", files=files)
+    assert "K: [500.0, 500.0, 320.0, 240.0]" in done.out
+    assert done.err == "frametool: warning: b.yaml: camera cam comes again with other numbers; the first ones hold\n"
+    assert run("tree", "a.yaml", "--with", "same.yaml", files=files).err == ""
+
+
 def test_a_frame_may_be_called_camera(tmp_path: Path) -> None:
     put(tmp_path, {"robot.yaml": "frames: {base: {camera: {xyz: [0, 0, 1]}}}"})
     assert frametool.load(tmp_path / "robot.yaml").lookup("base", "camera").xyz.tolist() == [0.0, 0.0, 1.0]
