@@ -354,7 +354,7 @@ class RecordCutter:
                     break
             rest = _cut_by(self.templates[-1], text, rest, cuts)
         found = []
-        for cut in cuts:  # without records whose frames are called so that their results are written otherwise
+        for cut in by_template(cuts, ()):  # without records whose frames make their results be written otherwise
             frames, codes = cut.frames(text)
             fits = np.array([each is not None for each in frames])[codes]
             rest += zip(cut.starts[~fits, 0].tolist(), cut.ends[~fits, -2].tolist(), strict=True)
