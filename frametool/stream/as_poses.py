@@ -120,9 +120,14 @@ class FormatConverter:
             steps = self._rows(stream, header=header)
         else:
             steps = self._columns(stream) if "arrays" in FORMATS[self.fmt].reads else self._listed(stream)
+        operation, prefix = self.request.operation, self.request.results.prefix
         for poses, outcome in steps:
-            kind, prefix = self.request.operation.result_kind(self.shape.kind), self.request.results.prefix
-            more = tuple(prefix + name for name in self.request.operation.extras(self.shape))
+            kind, names = operation.result_kind(self.shape.kind), operation.extras(self.shape)
+            every = operation.extras(self.rows.shape) if self.shape.kind == POINT and len(poses.numbers) else names
+            if len(names) < len(every):  # of the covariance of a pose without a rotation, that of its position
+                columns = [*range(3), *(3 + every.index(name) for name in names)]
+                poses = poses._replace(numbers=poses.numbers[:, columns])  # noqa: PLW2901
+            more = tuple(prefix + name for name in names)
             yield poses._replace(kind=kind, placed=self.placed, more=more), outcome
 
     def _begin(self, rows: PlannedRows, line: int = 0) -> None:

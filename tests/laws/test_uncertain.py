@@ -295,3 +295,11 @@ def test_normals_turn_along_with_points_that_get_a_covariance(run: Run, normals:
     )
     assert unsure == exact | {name: unsure[name] for name in NAMES if name in unsure}
     assert sum(name in unsure for name in NAMES) == 9
+
+
+@pytest.mark.parametrize("sigmas", ["sigma_xyz", "sigma_x,sigma_y,sigma_z"])
+def test_points_that_are_inverted_have_the_covariance_of_their_position_in_every_form(run: Run, sigmas: str) -> None:
+    text = f"x,y,z,{sigmas}\n1,2,3,{','.join(['0.5'] * len(sigmas.split(',')))}\n"
+    found = json.loads(run("invert", "-f", "json", stdin=text).out)
+    assert found == {"point": [-1.0, -2.0, -3.0], "covariance": [0.25, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0, 0.0, 0.25]}
+    assert run("invert", "-f", "npy", stdin=text).status == 0

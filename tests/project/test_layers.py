@@ -109,8 +109,7 @@ MOST_LINES = {  # code lines of a room, and behind it what is aimed at; a featur
     "stream": 8_157,  # 6 200
     "formats": 6_165,  # 6 900; cameras 300, solids 92
     "cli": 4_973,  # 5 200; `run` of programs 97
-    "ros": 838,  # with recordings 1 900
-    "recordings": 1_005,
+    "ros": 1_843,  # with recordings; 1 900
     "fit": 1_892,  # 2 200
     "view": 1_788,  # 1 800; the report of compare 294
     "explain": 865,  # 1 000
@@ -123,6 +122,7 @@ MOST_OF_PAGES = 1_900
 def test_the_package_stays_as_small_as_it_can_be_read() -> None:
     """`python tests/count_code.py` says in which room the lines are."""
     files, lines = rooms()
+    lines["ros"] += lines.pop("recordings")
     assert {room: count for room, count in lines.items() if count > MOST_LINES.get(room, count)} == {}
     assert lines.total() <= MOST_IN_ALL
     assert files.total() <= MOST_FILES
