@@ -302,4 +302,4 @@ def test_points_that_are_inverted_have_the_covariance_of_their_position_in_every
     text = f"x,y,z,{sigmas}\n1,2,3,{','.join(['0.5'] * len(sigmas.split(',')))}\n"
     found = json.loads(run("invert", "-f", "json", stdin=text).out)
     assert found == {"point": [-1.0, -2.0, -3.0], "covariance": [0.25, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0, 0.0, 0.25]}
-    assert run("invert", "-f", "npy", stdin=text).status == 0
+    assert run("invert", "-o", "new.npy", stdin=text).status == 0
