@@ -46,7 +46,7 @@ from frametool.stream.table import PlannedRows, TableRows
 from frametool.stream.writers import LEARNED, Blocks
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator
+    from collections.abc import Generator, Iterator, Sequence
 
     from frametool.geometry.types import Components
     from frametool.text.lines import ByteStream
@@ -120,15 +120,17 @@ class FormatConverter:
             steps = self._rows(stream, header=header)
         else:
             steps = self._columns(stream) if "arrays" in FORMATS[self.fmt].reads else self._listed(stream)
-        operation, prefix = self.request.operation, self.request.results.prefix
         for poses, outcome in steps:
-            kind, names = operation.result_kind(self.shape.kind), operation.extras(self.shape)
-            every = operation.extras(self.rows.shape) if self.shape.kind == POINT and len(poses.numbers) else names
-            if len(names) < len(every):  # of the covariance of a pose without a rotation, that of its position
-                columns = [*range(3), *(3 + every.index(name) for name in names)]
-                poses = poses._replace(numbers=poses.numbers[:, columns])  # noqa: PLW2901
-            more = tuple(prefix + name for name in names)
-            yield poses._replace(kind=kind, placed=self.placed, more=more), outcome
+            names, prefix = self.request.operation.extras(self.shape), self.request.results.prefix
+            own = self._of_position(poses, names) if self.shape.kind == POINT and len(poses.numbers) else poses
+            kind, more = self.request.operation.result_kind(self.shape.kind), tuple(prefix + name for name in names)
+            yield own._replace(kind=kind, placed=self.placed, more=more), outcome
+
+    def _of_position(self, poses: RowPoses, names: Sequence[str]) -> RowPoses:
+        """Return points with their own covariance, of rows that were read as poses without a rotation."""
+        every = self.request.operation.extras(self.rows.shape)
+        columns = [*range(3), *(3 + every.index(name) for name in names)]
+        return poses._replace(numbers=poses.numbers[:, columns]) if len(names) < len(every) else poses
 
     def _begin(self, rows: PlannedRows, line: int = 0) -> None:
         """Decide what rows become: without a rotation points, where nobody asked for one; raises FormatError."""
