@@ -49,15 +49,12 @@ def posed(outcomes: Iterable[Outcome], source: str, *, timed: bool = True) -> It
             values = [value for _, value in pairs if isinstance(value, Result)]
             if len(values) < len(pairs):
                 raise FormatError("expected poses, or points", source=source)
-            if not timed:
-                values = [
-                    each._replace(extras={"stamp" if key == "stamp_ns" else key: of for key, of in each.extras.items()})
-                    for each in values
-                ]
+            own = {} if timed else {"stamp_ns": "stamp"}
+            said = ({own.get(key, key): of for key, of in each.extras.items()} for each in values)
+            values = [each._replace(extras=extras) for each, extras in zip(values, said, strict=True)]
             found = block_of(values)._replace(lines=np.array([place for place, _ in pairs], np.int64))
-            for row, (position, rotation, *_) in enumerate(each.pose for each in values):
-                found.numbers[row, : POSITION * (position is None)] = np.nan
-                found.numbers[row, 7 if rotation else POSITION :] = np.nan
+            lacks = [[not each.pose.position] * 3 + [not each.pose.rotation] * 4 for each in values]
+            found.numbers[np.array(lacks, np.bool_).reshape(-1, 7)] = np.nan
         ends = np.flatnonzero(np.frombuffer(results.text, np.uint8) == ord("\n"))
         yield found._replace(lines=np.searchsorted(ends, found.lines)), outcome
 
@@ -156,8 +153,9 @@ class MeanRows(Gathered):
         with_each = (*rows.extras, *rows.more)
         self.uncertain |= any(re.fullmatch("sigma|c11|.*covariance", key) or is_sigma(key) for key in with_each)
         self.stamped |= rows.stamps_ns is not None or stamp_column(with_each) is not None
+        rows = rows._replace(stamps_ns=None)
         if self.key is None or self.named:
-            return step
+            return rows, outcome
         values, reasons = self._values(rows, self.key)
         good = np.delete(np.arange(len(values)), [*reasons])
         self.extra.append(values[good])
@@ -203,15 +201,12 @@ def means_of(rows: MeanRows, values: list[float] | None, *, robust: bool) -> Ite
     from frametool.fit.calibration import solve_mean
     from frametool.fit.least_squares import length, off_text
 
-    numbers, by = rows.numbers, rows.by
-    if not len(numbers):
+    if not rows.blocks:
         raise ValueInvalid("no poses to take the mean of")
+    by, (numbers, _, lines, parents, names, *_) = rows.by, rows.rows("")
     placed, turned = (not np.isnan(part).all() for part in (numbers[:, 0], numbers[:, POSITION]))
     poses = Transform.of(*np.where(np.isnan(numbers), NOWHERE, numbers).T.copy())
     extra = np.concatenate(rows.extra) if rows.extra else None
-    lines = np.concatenate([each.lines for each in rows.blocks])
-    parents = [*chain.from_iterable(each.for_each(each.parents) for each in rows.blocks)]
-    names = [*chain.from_iterable(each.for_each(each.names) for each in rows.blocks)]
     counted = {each for each in {*parents} if each is None or each.isdecimal()}  # which are no frames
     rows_of: dict[str, Any] = {}
     if by is not None:

@@ -46,11 +46,6 @@ class BlockResults(NamedTuple):
         """Yield all results as values, in the order of their records."""
         yield from map(itemgetter(1), self.placed())
 
-    def together(self) -> Iterator[list[Value]]:
-        """Yield them many together."""
-        rest = self.in_order()
-        return iter(lambda: list(islice(rest, TOGETHER)), [])
-
 
 def blocks_of(values: Iterable[Value]) -> Iterator[BlockResults]:
     """Yield single results as blocks."""

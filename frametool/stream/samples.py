@@ -246,8 +246,7 @@ def read_points(argument: str, *, fmt: str, answers: Answers, policy: Callable[[
             if np.isnan(rows.numbers[0, 0]):
                 raise FormatError("no positions in it: rotations alone are no points", source=file.name)
             row = " row " if "arrays" in reads else ":"
-            lines = rows.lines if row == ":" else np.arange(1, len(rows.numbers) + 1)
-            places = [f"{file.name}{row}{line}" for line in lines.tolist()]
+            places = [f"{file.name}{row}{line}" for line in rows.lines.tolist()]
     finally:
         file.close()
     extras = {key: plain_cells(cells) for key, cells in rows.extras.items()}

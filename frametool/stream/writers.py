@@ -317,7 +317,8 @@ class Blocks(ResultWriter):
         """Return the text of a block of poses, or of results, many together."""
         posed = block if isinstance(block, RowPoses) else block.posed()
         if posed is None:
-            return b"".join(self._write(self._block(values)) for values in block.together())  # type: ignore[union-attr]
+            values = [*block.in_order()]  # type: ignore[union-attr]
+            return self._write(self._block(values)) if values else b""
         if self.writer is not None and posed.placed > self.writer.placed:
             posed = posed._replace(numbers=posed.numbers[:, 3:], placed=False)
         return self._write(posed)

@@ -288,8 +288,7 @@ def progress_bar(
                 bar = Progress(*columns, console=coloured_console(stderr=True), transient=True)
                 bar.start()
                 bar.add_task("", total=total)
-            text = f"{rows:,} {counted}  {rows / seconds:,.0f} {counted}/s"
-            bar.update(bar.task_ids[0], completed=size, description=text)
+            bar.update(bar.task_ids[0], completed=size, description=f"{rows:,} {counted}  {rows / seconds:,.0f}/s")
 
     try:
         yield advance
