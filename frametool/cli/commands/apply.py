@@ -327,7 +327,7 @@ class TreeWay(Way):
         self._called: dict[str, str] = {}  # so that a leading / is reported once
         if self.at is None:
             self.timed = Timed(
-                (self.is_stream and inputs.time_column) or "", self.at_times, self.from_frame,
+                (self.is_stream and inputs.peek("time_column")) or "", self.at_times, self.from_frame,
                 width=UNCERTAIN if self.uncertain else EXACT,
                 moves=lambda own: tree.latest(self.target, self.start(own)) is not None,
             )  # fmt: skip
