@@ -223,7 +223,7 @@ class Output:
             return CsvTable(self.style) if self.style.format == "csv" else Documents(self.style)
         if not self._in_blocks:
             return AllTogether(self)
-        from frametool.stream.writers import Blocks
+        from frametool.stream.as_poses import Blocks
 
         return Blocks(self.style)
 

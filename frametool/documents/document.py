@@ -21,7 +21,7 @@ from frametool.text.numbers import odd_characters
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Sequence
 
-    from frametool.documents.source import Event, Path
+    from frametool.documents.source import Event, InputFile, Path
 
 _BYTE_ORDER_MARK = "\ufeff"
 JSON_NUMBER = r"-?(?:0|[1-9][0-9]*+)(?:\.[0-9]++)?+(?:[eE][-+]?[0-9]++)?+"
@@ -132,6 +132,11 @@ def format_error(
     bare = source._replace(text=source.text.removeprefix(_BYTE_ORDER_MARK))
     (offset,) = _offsets(bare.text, [path], key=key)
     return error_at(bare, offset, message, error)
+
+
+def file_error(file: InputFile, what: str, line: int, path: Path, kind: type[FormatError] = FormatError) -> FormatError:
+    """Return the error for a path from the top of a file's document, or where there is none for a line."""
+    return format_error(file.source, path, what, error=kind) if path else file.error(what, line, kind=kind)
 
 
 def explain_scalar(text: str) -> str:

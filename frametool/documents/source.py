@@ -328,13 +328,9 @@ class InputFile:
         return Source(self.name, self.text)
 
     def error(
-        self, message: str, line: int = 0, column: int = 0, *, path: Path = (), kind: type[FormatError] = FormatError
+        self, message: str, line: int = 0, column: int = 0, *, kind: type[FormatError] = FormatError
     ) -> FormatError:
-        """Return the error for a path from the top of a document, a line, a place in the text, or the whole file."""
-        if path:
-            from frametool.documents.document import format_error
-
-            return format_error(self.source, path, message, error=kind)
+        """Return the error for a line, a place in the text, or the whole file."""
         snippet = pointer(self.text.split("\n")[line - 1].rstrip("\r"), column) if column else ""
         return kind(message, source=self.name, line=line, column=column, snippet=snippet)
 

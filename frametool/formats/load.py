@@ -17,7 +17,7 @@ from os import PathLike
 from typing import Any, BinaryIO
 
 from frametool import errors
-from frametool.documents.document import locate_many
+from frametool.documents.document import file_error, locate_many
 from frametool.documents.source import InputFile, Source, paused_collector
 from frametool.errors import BadTopology, FileProblem, FormatError, NamedTuple, ValueInvalid, alternatives, shown, warn
 from frametool.formats.detect import Beginning, detect, of_folder
@@ -363,7 +363,7 @@ class EdgePlace(NamedTuple):
 
     def error(self, message: str, kind: type[FormatError]) -> FormatError:
         """Return the error for this place."""
-        return self.file.error(message, self.edge.line, path=self.edge.path, kind=kind)
+        return file_error(self.file, message, self.edge.line, self.edge.path, kind)
 
     def seen_from(self, other: EdgePlace) -> str:
         """Format this place relative to another one: `line 7`, or `other.yaml:7` in another file."""

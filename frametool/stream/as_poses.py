@@ -30,25 +30,27 @@ import numpy as np
 
 from frametool.documents.source import InputFile, not_text
 from frametool.errors import FormatError, Misused, ValueInvalid, warn
-from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, describe
+from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, describe, rows_of
 from frametool.formats.table import FORMATS, Rows, holds, is_trajectory
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Answers, Diagnostics, EdgeColumns, Options, Topics, stop
 from frametool.grammar.readers import EARTH_FRAMES
-from frametool.grammar.result import Style
+from frametool.grammar.result import Result, Style
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, BadRow, Fault, Outcome, written_by
+from frametool.stream.record_results import BlockResults, ResultWriter, blocks_of
 from frametool.stream.request import NO_STAMPS, SOME, Request, RowOptions
 from frametool.stream.row_layout import POINT, POSE, Shape
-from frametool.stream.rows import NO_ROWS, NO_STAMP, Block, RowPoses, kept, spans_of
+from frametool.stream.rows import NO_ROWS, NO_STAMP, Block, RowPoses, block_of, block_of_points, kept, spans_of
 from frametool.stream.table import PlannedRows, TableRows
-from frametool.stream.writers import LEARNED, Blocks
+from frametool.stream.writers import LEARNED, PoseWriter, RowsWriter, SingleWriter, TextWriter
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator, Sequence
+    from collections.abc import Generator, Iterable, Iterator, Sequence
 
     from frametool.geometry.types import Components
+    from frametool.stream.record_values import Value
     from frametool.text.lines import ByteStream
     from frametool.text.spans import Ints
 
@@ -57,6 +59,81 @@ if TYPE_CHECKING:
 QUATERNION = notation("quaternion")
 NO_ROTATION = "no rotation among the columns {}: poses are wanted"
 AS_VALUES = Style("json")  # of results that are not written
+
+
+def writer_for(style: Style, first: RowPoses) -> PoseWriter:
+    """Return what writes blocks in the format of a style: text, columns of numbers, or messages of a recording."""
+    if holds(style.format, "arrays"):
+        from frametool.stream.array_writer import ArrayWriter
+
+        return ArrayWriter(style, first)
+    if holds(style.format, "recording"):
+        from frametool.stream.recording_writer import RecordingWriter
+
+        return RecordingWriter(style, first)
+    text = TextWriter if rows_of(style.format) else SingleWriter
+    return (RowsWriter if style.format in LEARNED else text)(style, first)
+
+
+class Blocks(ResultWriter):
+    """Write blocks of things of one kind, those of the first block, in the format of a style."""
+
+    def __init__(self, style: Style) -> None:
+        """Begin without any."""
+        self.style = style
+        self.writer: PoseWriter | None = None
+
+    def of_block(self, block: RowPoses | BlockResults) -> bytes:
+        """Return the text of a block of poses, or of results, many together."""
+        posed = block if isinstance(block, RowPoses) else block.posed()
+        if posed is None:
+            values = [*block.in_order()]  # type: ignore[union-attr]
+            return self._write(self._block(values)) if values else b""
+        if self.writer is not None and posed.placed > self.writer.placed:
+            posed = posed._replace(numbers=posed.numbers[:, 3:], placed=False)
+        return self._write(posed)
+
+    def end(self) -> Iterator[bytes]:
+        """Yield what comes behind the last."""
+        if self.writer is None:
+            self._write(block_of([]))
+        yield from self.writer.end()  # type: ignore[union-attr]
+
+    def _write(self, block: RowPoses) -> bytes:
+        if self.writer is None:
+            self.writer = writer_for(self.style, block)
+        elif block.kind != self.writer.kind:
+            kinds = f"{self.writer.kind} and {block.kind}"
+            raise ValueInvalid(f"{self.style.format} holds things of one kind, found {kinds}")
+        return self.writer.of_block(block)
+
+    def _block(self, values: list[Value]) -> RowPoses:
+        """Return results as a block; what has no rotation is a point, but for the poses of a trajectory."""
+        fmt = self.style.format
+        found = values if is_trajectory(fmt) else [*map(_as_point, values)]
+        points = [each for each in found if not isinstance(each, Result)]
+        if is_trajectory(fmt) and (points or any(each.pose.rotation is None for each in found)):  # type: ignore[union-attr]
+            raise ValueInvalid("a trajectory holds poses; a point has no rotation")
+        if points:
+            if len(points) < len(found):
+                raise ValueInvalid(f"{fmt} holds things of one kind, found poses among others")
+            return block_of_points(points)
+        are_turns = holds(fmt, "arrays") and all(each.pose.position is None for each in found)  # type: ignore[union-attr]
+        return block_of(found, placed=not are_turns if self.writer is None else self.writer.placed)  # type: ignore[arg-type]
+
+
+def text_of(values: Iterable[Value], style: Style) -> str:
+    """Return single results as text of a format whose rows are poses."""
+    writer = Blocks(style)
+    return b"".join((*map(writer.of_block, blocks_of(values)), *writer.end())).decode()
+
+
+def _as_point(value: Value) -> Value:
+    """Take a result without a rotation for a point."""
+    if not isinstance(value, Result) or value.pose.rotation is not None or value.pose.position is None:
+        return value
+    named = {"name": value.pose.name, "frame": value.pose.parent, "point": list(value.pose.position)}
+    return {key: each for key, each in named.items() if each is not None} | value.extras
 
 
 class FormatConverter:

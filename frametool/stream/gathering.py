@@ -53,8 +53,8 @@ def posed(outcomes: Iterable[Outcome], source: str, *, timed: bool = True) -> It
             said = ({own.get(key, key): of for key, of in each.extras.items()} for each in values)
             values = [each._replace(extras=extras) for each, extras in zip(values, said, strict=True)]
             found = block_of(values)._replace(lines=np.array([place for place, _ in pairs], np.int64))
-            lacks = [[not each.pose.position] * 3 + [not each.pose.rotation] * 4 for each in values]
-            found.numbers[np.array(lacks, np.bool_).reshape(-1, 7)] = np.nan
+            for row, (position, rotation, *_) in enumerate(each.pose for each in values):
+                found.numbers[row, [not position] * 3 + [not rotation] * 4] = np.nan
         ends = np.flatnonzero(np.frombuffer(results.text, np.uint8) == ord("\n"))
         yield found._replace(lines=np.searchsorted(ends, found.lines)), outcome
 

@@ -34,7 +34,7 @@ from importlib import import_module
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.document import parse_documents
+from frametool.documents.document import file_error, parse_documents
 from frametool.documents.source import InputFile, lines
 from frametool.errors import FormatError, NamedTuple, ValueInvalid, listing, shown
 from frametool.formats.table import FORMATS, Rows
@@ -250,7 +250,7 @@ def blocks(file: InputFile, options: Options, *, named: bool = True) -> Iterator
         columns = np.array([row.numbers for row in some], np.float64).T
         found = read_rotations(notation(spec.rotation), list(columns[3:]), normalize=options.normalize)
         for at, reason in sorted(found.reasons.items()):
-            options.report(file.error(reason, some[at].line, path=some[at].path))
+            options.report(file_error(file, reason, some[at].line, some[at].path))
         if spec.rotation == "matrix":
             options.tally.projected = max(options.tally.projected, found.off)
         else:
@@ -261,7 +261,7 @@ def blocks(file: InputFile, options: Options, *, named: bool = True) -> Iterator
         for row in some if stamps is None else ():
             if row.number >= NUMBERED:
                 what = f"{row.number} is too large to count seconds; give --stamps FILE"
-                raise file.error(what, row.line, path=row.path)
+                raise file_error(file, what, row.line, row.path)
         before, count = count, count + len(some)
         times = stamps.between(before, count) if stamps else [row.number * BILLION for row in some]
         good = [at for at in range(len(some)) if at not in found.reasons]
