@@ -122,7 +122,7 @@ class Blocks(ResultWriter):
         return block_of(found, placed=not are_turns if self.writer is None else self.writer.placed)  # type: ignore[arg-type]
 
 
-def text_of(values: Iterable[Value], style: Style) -> str:
+def poses_text(values: Iterable[Value], style: Style) -> str:
     """Return single results as text of a format whose rows are poses."""
     writer = Blocks(style)
     return b"".join((*map(writer.of_block, blocks_of(values)), *writer.end())).decode()

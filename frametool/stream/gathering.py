@@ -49,7 +49,7 @@ def posed(outcomes: Iterable[Outcome], source: str, *, timed: bool = True) -> It
             values = [value for _, value in pairs if isinstance(value, Result)]
             if len(values) < len(pairs):
                 raise FormatError("expected poses, or points", source=source)
-            own = {} if timed else {"stamp_ns": "stamp"}
+            own = {} if timed else {"stamp_ns": "stamp"}  # no stamp of the block then
             said = ({own.get(key, key): of for key, of in each.extras.items()} for each in values)
             values = [each._replace(extras=extras) for each, extras in zip(values, said, strict=True)]
             found = block_of(values)._replace(lines=np.array([place for place, _ in pairs], np.int64))

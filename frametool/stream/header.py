@@ -270,10 +270,9 @@ def _rotation(columns: Columns, row: Representation, expected: Notation | None) 
     return columns._replace(notation=notation)
 
 
-def find_poses(names: Sequence[str], expected: Notation | None, count: int, source: str) -> list[PoseColumns]:
+def find_poses(header: Header, expected: Notation | None, count: int, source: str) -> list[PoseColumns]:
     """Find so many points or poses; raises FormatError that lists the candidates, or the columns there are."""
-    header = Header(names)
-    positions, rotations = find_positions(header), find_rotations(header, expected)
+    names, positions, rotations = header.names, find_positions(header), find_rotations(header, expected)
     if len(positions) > 1:
         positions = [each for each in positions if each.names not in NORMALS]
     reason = "" if rotations or count > 1 or len(positions) > 1 else _half_rotation(header, expected)

@@ -154,7 +154,7 @@ def _find(table: Table, request: Request) -> list[PoseColumns]:
         return [chosen_pose(spec, table.names, width, request) for spec in specs]
     hidden = {name for name in table.names if name == asked.extra_column or may_be_uncertain(name)}
     names = ["" if at == apart or name in hidden else name for at, name in enumerate(table.names)]
-    six = header.find_six(header.Header(names), asked.kind if asked.kind in SIX else "")
+    six = header.find_six(known := header.Header(names), asked.kind if asked.kind in SIX else "")
     if asked.kind in SIX and six is None:
         wanted = " ".join(six_names(asked.kind))
         found = f"no columns of a {asked.kind} ({wanted}) among: {listed(names)}; name them with --columns"
@@ -169,7 +169,8 @@ def _find(table: Table, request: Request) -> list[PoseColumns]:
 
         if (pose := find_pose(others, request, table.source)) is not None:
             return [pose]
-    return header.find_poses(others, asked.given, asked.poses, table.source)
+    rest = known if others is names else header.Header(others)
+    return header.find_poses(rest, asked.given, asked.poses, table.source)
 
 
 def _by_width(table: Table, request: Request) -> str:

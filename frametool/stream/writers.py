@@ -473,7 +473,7 @@ class AlikeRows(NamedTuple):
             yield Result(own, extras)
 
     def poses(self) -> RowPoses | None:
-        """Return the rows as a block of poses; None where they are points, on the Earth, or scaled."""
+        """Return the rows as poses, with places for lines; None where they are points, on the Earth, or scaled."""
         value = self.marked.value
         if not isinstance(value, Result) or None in (value.pose.position, value.pose.rotation):
             return None

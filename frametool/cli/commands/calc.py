@@ -156,9 +156,9 @@ def _for_programs(term: Term, style: Style) -> str:
     """Write one value as a document or line of a machine format."""
     fmt, result, kind = style.format, plain_result(term, style), term.type.kind
     if kind == POSE and is_trajectory(fmt):
-        from frametool.stream.as_poses import text_of
+        from frametool.stream.as_poses import poses_text
 
-        return text_of([result], style)
+        return poses_text([result], style)
     held = {"arrays": "columns of numbers", "recording": "messages"}
     if what := next((held[each] for each in FORMATS[fmt].writes if each in held), ""):
         raise ValueInvalid(f"{fmt} holds {what}: calc writes rows of -i in it, not single values")
