@@ -135,13 +135,13 @@ def _angular(t: N, d: Sequence[float], _xp: Functions[N]) -> Two[N]:
 
 
 def _inverse(grown: Callable[..., Any], y: N, d: Sequence[float], top: float, tolerance: float, xp: Functions[N]) -> N:
-    """Invert a growing function on 0 to the top: Newton's method, safeguarded by a shrinking bracket."""
+    """Invert a growing function on 0 to the top: Newton's steps of at most half the bracket, else bisection."""
     low, high, t = 0.0 * y, 0.0 * y + top, xp.minimum(y, top)
     for _ in range(60):
         value, slope = grown(t, d, xp)
         low, high = xp.where(value < y, t, low), xp.where(value < y, high, t)
         new = t - (value - y) / xp.where(slope > TINY, slope, TINY)
-        new = xp.where((new >= low) & (new <= high), new, 0.5 * (low + high))
+        new = xp.where(abs(new - t) <= 0.5 * (high - low), new, 0.5 * (low + high))
         going = abs(new - t) > tolerance * (1.0 + t)
         if not xp.some(going):
             break

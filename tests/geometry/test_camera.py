@@ -163,6 +163,14 @@ EXTREME = (
 )
 
 
+def test_rays_of_a_fisheye_lens_that_bends_inward_are_those_of_its_points() -> None:
+    """Newton's steps that jump from one end of the bracket to the other come to no rest; they are bisected."""
+    camera = Camera("equidistant", [850.0, 800.0, 320.0, 240.0], [0.08, -0.002, 0.01, -0.001])
+    angles = np.linspace(0.0, 0.999 * camera.end_angle, 1500)
+    points = np.stack([np.sin(angles), 0.0 * angles, np.cos(angles)], axis=-1)
+    np.testing.assert_allclose(camera.unproject(camera.project(points)[0]), points, rtol=0.0, atol=1e-9)
+
+
 @pytest.mark.parametrize("camera", [*CAMERAS.values(), *EXTREME], ids=lambda camera: camera.model)
 def test_no_number_stops_a_kernel_and_floats_and_arrays_agree(camera: Camera) -> None:
     given, places = [*itertools.product(ODD, repeat=3)], [*itertools.product((*ODD, 320.0, -5e3), repeat=2)]
