@@ -1,10 +1,10 @@
-"""One record: a point, vector, pose, twist or wrench, what its numbers mean, and where they and its names are.
+"""Read one record: a point, vector, pose, twist or wrench; the meaning of its numbers, their paths and its frames.
 
     {"id": 7, "frame": "lidar", "point": [1, 2, 3]}
     {"header": {"frame_id": "map"}, "pose": {"position": {"x": ..}, "orientation": {"x": ..}}}    as in ROS messages
     {"x": 1, "y": 2, "z": 3, "qx": 0, "qy": 0, "qz": 0, "qw": 1}                                  as columns of tables
 
-Arguments, files, streams and messages are read by this one definition; keys that are not named here pass.
+Arguments, files, streams and messages are read by this definition; other keys are preserved.
 """
 
 from __future__ import annotations
@@ -50,20 +50,20 @@ EARTH_PARENTS, EARTH_NAMES = ("parent", "frame"), ("child_frame_id", "name", "fr
 
 
 class Name(NamedTuple):
-    """A frame's name and the paths at which a record says it; the name is None where it is missing or empty."""
+    """A frame's name, None if missing or empty, and the paths at which the record has it."""
 
     text: str | None = None
     paths: tuple[Path, ...] = ()
 
 
 class RecordKeys(NamedTuple):
-    """The keys under which a record says what it is.
+    """The keys of a record's position, rotation and covariance.
 
-    position: "" where each of its numbers is a member of the record, whose keys are `members`
-    others: further keys that say the same rotation or position
-    flat: keys that hold one number of the rotation each; `rotation` is then the first of them
-    covariances: the keys of those whose numbers come last, or of a scale
-    placed: those of a position on the Earth and the rotation there, where the record's numbers are not theirs
+    position: "" if each of its numbers has a key of its own, then these are `members`
+    others: further keys with the same rotation or position in another notation
+    flat: the keys of a rotation with one number each; `rotation` is then the first of them
+    covariances: the keys of the covariances, or of a scale, whose numbers are the last
+    placed: the keys of a geodetic position, if the record's numbers are converted from it
     """
 
     position: str = ""
@@ -76,13 +76,13 @@ class RecordKeys(NamedTuple):
 
 
 class Record(NamedTuple):
-    """One point, vector, pose, twist or wrench: what its numbers mean, where they are, which frames it names.
+    """One point, vector, pose, twist or wrench: its numbers, their meaning and paths, and its frames.
 
-    path: of the mapping or list that holds the numbers
-    numbers: the path of each; None for a number that is not written and counts as 0
+    path: of the mapping or list with the numbers
+    numbers: the path of each number; None for one that is not written and counts as 0
     values: the numbers, in the order of `shape`
-    begins: where each covariance of messages begins; those that begin with -1 are unknown, and none of these numbers
-    stamps: the paths of seconds and nanoseconds in its header, then in those around it; stamp_ns: the time of the first
+    begins: the path of the first entry of each covariance of a message; one that begins with -1 is unknown
+    stamps: the paths of seconds and nanoseconds in its header, then in those around it; stamp_ns: the first stamp
     """
 
     path: Path
@@ -98,11 +98,11 @@ class Record(NamedTuple):
 
 
 def find_records(document: Any, request: Request, reading: Reading, path: Path) -> Iterator[Record]:
-    """Yield the records of a document in order; `path` leads to it and begins all paths.
+    """Yield the records of a document in order; all paths begin with `path`, that of the document.
 
     Raises Misfit, with the path, for a document without records and for a record that cannot be read.
     """
-    root: Any = document  # all paths begin there; what holds the document is no mapping of it
+    root: Any = document  # all paths begin here; a proxy is no dict, so that no key is searched in it
     for step in reversed(path):
         root = MappingProxyType({step: root})
     for each in find_holders(document, path, request, reading):
@@ -110,7 +110,7 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path) 
 
 
 def read_record(root: Any, holder: Holder, request: Request, reading: Reading) -> Record:
-    """Read what holds numbers."""
+    """Read the record in a mapping or list."""
     path, field, kind, members = holder
     value, formula = value_at(root, path), request.operation.formula
     reading.here = path
@@ -129,7 +129,7 @@ def read_record(root: Any, holder: Holder, request: Request, reading: Reading) -
         raise Misfit(f"an expression takes poses, points and vectors; this is a {record.shape.kind}", path)
     if formula is not None and not (formula.reads_row or record.values or Members(value).say_pose):
         record = record._replace(shape=Shape("", None))
-    # what says a covariance: the record, or the mapping around it where a message has it so
+    # the covariance is in the record, or in the mapping around it as in messages
     around = (path, path[:-1]) if path[-1:] == (record.shape.kind,) else (path,)
     keys = {*covariance_keys(field), *COVARIANCE_KEYS}
     for each in () if record.keys.placed else around:
@@ -144,9 +144,9 @@ def read_record(root: Any, holder: Holder, request: Request, reading: Reading) -
 
 
 def _only_asked(value: dict[str, Any], path: Path, request: Request) -> Record:
-    """Return a record of which only what is asked for counts; what a result adds must not be there.
+    """Return a record without numbers, to which the operation adds a result; it must not have such keys yet.
 
-    A JointState gives way to the pose, and the frame in its header becomes that of the pose.
+    A JointState is replaced by the pose, and the frame of its header becomes that of the pose.
     """
     from frametool.ros import messages
 
@@ -164,12 +164,12 @@ def _only_asked(value: dict[str, Any], path: Path, request: Request) -> Record:
 
 
 def outermost(path: Path) -> Path:
-    """Return the path of the outermost value that holds a record alone: an item of a list, or the whole document."""
+    """Return the path of the outermost value with a single record: an item of a list, or the document."""
     return path[: max((at for at, step in enumerate(path, 1) if type(step) is int), default=0)]
 
 
 def _with_asked(record: Record, root: Any, request: Request) -> Record:
-    """Add the numbers under the keys that an expression asks for; stop where a key that it adds is there already."""
+    """Add the numbers of the keys that a formula needs; raise Misfit if a key that it adds exists."""
     operation, value, said = request.operation, value_at(root, record.path), request.operation.shown
     for name in operation.columns:
         found, number = None, nan
@@ -187,10 +187,7 @@ def _with_asked(record: Record, root: Any, request: Request) -> Record:
 
 
 def _of_message(value: Any, path: Path, reading: Reading, request: Request, *, field: str, kind: str) -> Record:
-    """Read a field of a message.
-
-    An orientation with a covariance that begins with -1 is unknown: nothing of it is read, and it stays.
-    """
+    """Read a field of a message; an orientation whose covariance begins with -1 is unknown and unchanged."""
     if request.rows.kind not in ("", kind):
         raise Misfit(f"{field} cannot be taken for a {request.rows.kind}")
     if kind == VECTOR:
@@ -217,7 +214,7 @@ def _bare_list(value: list[Any], path: Path, reading: Reading, request: Request)
 
 
 def _mapping(members: Members, path: Path, reading: Reading, request: Request) -> Record:
-    """Read what a mapping says: its position, then its rotation; or the two vectors of a twist or a wrench."""
+    """Read the position and the rotation of a mapping, or the two vectors of a twist or wrench."""
     value, positions, rotations = members.value, members.positions, members.rotations
     if members.parts:
         return _two_vectors(value, ACCEL if path[-1:] == (ACCEL,) else members.parts, path, request)
@@ -234,7 +231,7 @@ def _mapping(members: Members, path: Path, reading: Reading, request: Request) -
             raise Misfit(f"a {flat.position.kind} cannot be taken for a pose; apply moves it")
         return _with_flat(Record(path, Shape(flat.position.kind, None)), value, flat, reading, request)
     turned, there = rotations or (flat and flat.rotation), positions or (flat and flat.position)
-    # the grammar of poses allows that several say the same thing twice
+    # a pose may have the same position or rotation twice
     several = () if turned and POSITION_KEYS.keys() >= {*positions} else (*positions[1:2],)
     if positions and flat and flat.position and not flat.position.absent:
         several = flat.position.names
@@ -244,10 +241,10 @@ def _mapping(members: Members, path: Path, reading: Reading, request: Request) -
     members.refuse_typos({*([] if turned else ROTATION_KEYS), *([] if there else POSITION_KEYS)})
     key = positions[0] if positions else ""
     operation, rows, sigma = request.operation, request.rows, value.get("sigma")
-    # what says how sure its rotation is, is a pose, if only by that
+    # with a sigma of the rotation it is a pose
     is_sure = type(sigma) is dict and any(each[:3] in ("rpy", "rol", "pit", "yaw") for each in sigma)
     turns = turned or (not operation.moves and is_sure)
-    # a PointStamped or Vector3Stamped stays one where it is written anew and nobody asked for a rotation
+    # a PointStamped or Vector3Stamped remains one in another format, unless a rotation was asked for
     is_kept = operation.changes_nothing and operation.formula is None
     stays = not turns and "header" in value and key in (POINT, VECTOR) and is_kept and not (rows.kind or rows.given)
     stays = stays and {each.spec for each in request.results.notations} <= {"quaternion"}
@@ -261,7 +258,7 @@ def _mapping(members: Members, path: Path, reading: Reading, request: Request) -
         record = _with_rotation(value[rotations[0]], rotations[0], record, (rotations[0],), reading, request)
     if len(rotations) > 1 or len(positions) > 1:
         keys = (*rotations, *(positions if len(positions) > 1 else ()))
-        read_pose({key: value[key] for key in value if key in keys}, reading)  # they have to say the same
+        read_pose({key: value[key] for key in value if key in keys}, reading)  # they must be equal
     if (flag := value.get("inverse", "false")) not in ("true", "false"):
         raise Misfit(f"inverse must be true or false, found {kind(flag)}", ("inverse",))
     shape = record.shape._replace(inverse=flag == "true")
@@ -272,7 +269,7 @@ def _mapping(members: Members, path: Path, reading: Reading, request: Request) -
 
 
 def _given_on_earth(record: Record, request: Request) -> Record:
-    """Return a record whose x, y, z are in ecef or the axes of an origin, as --from says."""
+    """Return a record whose x, y, z are in ecef, or in the axes of an origin, as set by --from."""
     from frametool.geometry.place import Earth, Place
 
     place = Place.of_xyz(request.rows.given_place, request.earth or Earth())
@@ -287,7 +284,7 @@ def _given_on_earth(record: Record, request: Request) -> Record:
 
 
 def _pose_at_place(rest: dict[str, Any], path: Path, reading: Reading, request: Request) -> tuple[Pose, list[str]]:
-    """Read the pose that comes with a place on the Earth, and return the keys that say it but its covariance."""
+    """Read the pose next to a geodetic position, and return its keys except those of its covariance."""
     covariance = None
     if not COVARIANCE_KEYS.isdisjoint(rest):
         from frametool.grammar.covariance import read_covariance
@@ -303,7 +300,7 @@ def _pose_at_place(rest: dict[str, Any], path: Path, reading: Reading, request: 
 
 
 def pose_of(record: Record, request: Request) -> Pose:
-    """Return a record as a named pose; position or rotation is None where it has none."""
+    """Return a record as a pose with its frames; position or rotation is None if it has none."""
     shape, values, names = record.shape, record.values, (record.name.text, record.parent.text)
     check, is_placed = partial(checked_rotation, shape, normalize=request.rows.normalize), shape.whole or shape.unit
     if request.operation.reads_scale(shape):
@@ -330,7 +327,7 @@ def _two_vectors(value: dict[str, Any], name: str, path: Path, request: Request)
 
 
 def _with_flat(record: Record, value: dict[str, Any], flat: PoseColumns, reading: Reading, request: Request) -> Record:
-    """Add the numbers that are members of the record itself: those of a position, unless it has one, and a rotation."""
+    """Add position, unless it has one, and rotation from keys with one number each."""
     from frametool.stream.header import Columns, row_shape
 
     position, rotation = flat
@@ -372,7 +369,7 @@ def _number(value: dict[str, Any], key: str, *, degrees: bool | None = None, met
 
 
 def _kind(key: str, rotations: object, request: Request) -> str:
-    """Decide what a mapping is: with a rotation a pose, else a point or a vector, or what --as says."""
+    """Return the kind of a mapping: a pose if it has a rotation, else a point or vector, or the kind set by --as."""
     if request.rows.kind in PARTS:
         raise Misfit(f"a {request.rows.kind} has {' and '.join(PARTS[request.rows.kind])}, two vectors {{x:, y:, z:}}")
     if rotations or request.rows.kind == POSE or not request.operation.takes_points:
@@ -383,7 +380,7 @@ def _kind(key: str, rotations: object, request: Request) -> str:
 
 
 def _with_position(record: Record, value: Any, metre: float, *, partial: bool) -> Record:
-    """Add the position: a list, or a map in which, if it may be partial, what is missing is 0."""
+    """Add the position: a list, or a mapping in which missing numbers are 0 if it may be partial."""
     key, parts = record.keys.position, round(1.0 / metre, 6)
     paths, numbers = within((key,), _three, value, (*record.path, key), parts, partial=partial)
     return record._replace(shape=record.shape._replace(unit=parts), numbers=paths, values=numbers)
@@ -392,9 +389,9 @@ def _with_position(record: Record, value: Any, metre: float, *, partial: bool) -
 def _three(
     value: Any, below: Path, parts: float = 0.0, *, partial: bool = False
 ) -> tuple[tuple[Path | None, ...], tuple[float, ...]]:
-    """Read a list, or x, y and z, with the paths of the numbers; if it may be partial, what is missing is 0.
+    """Read a list, or x, y and z, with the paths of the numbers; if it may be partial, missing ones are 0.
 
-    parts: how many of a length's make a metre, 0 for what is no length
+    parts: units per metre of a length, 0 for other numbers
     """
     numbers = readers.read_numbers(value, XYZ, partial=partial, metres=parts == 1.0)
     if type(value) is list:
@@ -403,7 +400,7 @@ def _three(
 
 
 def _with_rotation(value: Any, key: str, record: Record, below: Path, reading: Reading, request: Request) -> Record:
-    """Add the rotation's numbers; whether that of a multiple s R is one is seen where s is known."""
+    """Add the numbers of the rotation; of a scaled matrix s R it is checked when s is known."""
     row = ROTATION_KEYS.get(key)
     is_multiple = request.operation.multiples and row is not None and row.representation.whole is not None
     quiet = Reading(reading.source, degrees=reading.degrees) if is_multiple else reading
@@ -416,14 +413,14 @@ def _with_rotation(value: Any, key: str, record: Record, below: Path, reading: R
     if places and degrees == (reading.degrees if notation.degrees is None else notation.degrees):
         above, has_all = (*record.path, *below), type(value) is not dict
         paths = tuple((*above, *each) if has_all or each[0] in value else None for each in places[: len(values)])
-    # else the numbers say another unit than their key: the member is written anew
+    # else the numbers have another unit than their key, and are not replaced in place
     shape = record.shape._replace(kind=POSE, notations=((notation, degrees),), whole=whole)
     keys, every = record.keys._replace(rotation=key), (*record.values, *values)
     return record._replace(shape=shape, numbers=record.numbers + paths, values=every, keys=keys)
 
 
 def _with_names(record: Record, root: Any, request: Request) -> Record:
-    """Add the frames that the record and the message around it name, and the stamp of its header."""
+    """Add the frames of the record and of the message around it, and the stamp of its header."""
     parent, name, path = Name(), Name(), record.path
     on_earth = record.parent.text in EARTH_FRAMES
     for depth in range(len(path), -1, -1):
@@ -433,7 +430,7 @@ def _with_names(record: Record, root: Any, request: Request) -> Record:
         if record.shape.kind == POSE and SCALE in value and (around == path or type(value[SCALE]) is str):
             from frametool.stream.extra_numbers import with_scale
 
-            record = with_scale(record, value[SCALE], around, request)  # around it, of a Marker: its shape's
+            record = with_scale(record, value[SCALE], around, request)  # not the scale of a Marker, which is a size
         parent_keys, name_keys = (EARTH_PARENTS, EARTH_NAMES) if on_earth else (PARENT_KEYS, NAME_KEYS)
         parent = _named(value, parent_keys, around, parent, request)
         if record.shape.kind == POSE or around == path:
@@ -441,7 +438,7 @@ def _with_names(record: Record, root: Any, request: Request) -> Record:
         header = value.get("header")
         if type(header) is dict:
             inside = (*around, "header")
-            if on_earth:  # the frame of a fix is that of its antenna
+            if on_earth:  # the frame of a NavSatFix is its antenna
                 name = name if name.text else Name(header.get("frame_id") or None)
             else:
                 parent = _named(header, ("frame_id",), inside, parent, request)
@@ -452,7 +449,7 @@ def _with_names(record: Record, root: Any, request: Request) -> Record:
 
 
 def _named(value: dict[str, Any], keys: Sequence[str], path: Path, found: Name, request: Request) -> Name:
-    """Add the keys of a mapping that name a frame; raise Misfit where two of them name different ones."""
+    """Add the name under some keys of a mapping; raise Misfit if two of them differ."""
     for key in keys:
         text = value.get(key)
         if key not in value or type(text) in (dict, list) or (key == "frame" and text and request.counts(text)):
@@ -461,14 +458,14 @@ def _named(value: dict[str, Any], keys: Sequence[str], path: Path, found: Name, 
             hint = f"leave {key} out or quote the name"
             raise Misfit(f"{key} must be a frame's name, found nothing; {hint}", (*path, key))
         if text and found.text and text != found.text:
-            where = ".".join(map(str, found.paths[0][1:][-2:]))  # without the count of the document
+            where = ".".join(map(str, found.paths[0][1:][-2:]))  # without the number of the document
             raise Misfit(f"{key} says {shown(text)} and {where} says {shown(found.text)}; keep one", (*path, key))
         found = Name(found.text or text or None, (*found.paths, (*path, key)))
     return found
 
 
 def _with_stamp(record: Record, header: dict[str, Any], path: Path) -> Record:
-    """Add the stamp of a header, and where its seconds and nanoseconds are; one further in said it better."""
+    """Add the stamp of a header and the paths of its seconds and nanoseconds; that of an inner header comes first."""
     if "stamp" not in header:
         return record
     from frametool.ros.messages import read_stamp
@@ -480,9 +477,9 @@ def _with_stamp(record: Record, header: dict[str, Any], path: Path) -> Record:
 
 
 def key_path(documents: Any, holder: Path, names: Sequence[str] = STAMP_KEYS, wanted: str = "a time like 12.5") -> Path:
-    """Find a scalar of a point or pose, by default its stamp: its own key, else that of a mapping around it.
+    """Find a scalar of a point or pose, by default its stamp, in the record or in the mappings around it.
 
-    The name of a joint leads to its position in a JointState.  Raises Misfit.
+    The name of a joint finds its position in a JointState.  Raises Misfit.
     """
     from frametool.ros import messages
 
@@ -504,7 +501,7 @@ def key_path(documents: Any, holder: Path, names: Sequence[str] = STAMP_KEYS, wa
 
 
 def _below(value: Any, name: str) -> Path | None:
-    """Return the path of a key, or of several with dots and indices between them; None where it is not there."""
+    """Return the path of a key, or of keys and indices joined by dots; None if absent."""
     for steps in ([name], name.split(".")):
         path, inner = list[str | int](), value
         with suppress(LookupError, TypeError):

@@ -1,7 +1,7 @@
-"""Records that are written alike: what is learned from one of them, and holds for all; where in a text the others are.
+"""Find records with the same layout in a text: a template is learned from one record and matches the others.
 
-Records are alike if they differ only in our numbers and in scalars that cannot matter; then one regular expression
-cuts them all into the same stretches, and nothing has to be parsed again.
+Records have the same layout if they differ only in the numbers of their poses and in scalars that do not influence how
+the record is read.  One regular expression then splits all of them into the same stretches, without parsing.
 """
 
 from __future__ import annotations
@@ -42,15 +42,15 @@ if TYPE_CHECKING:
     Hit: TypeAlias = tuple["Template", Places]
     Called: TypeAlias = tuple[list[Any], Ints]
 
-MOST_TEMPLATES = 256  # kept in mind
+MOST_TEMPLATES = 256  # remembered
 MOST_TRIED = 8  # of them tried on whole blocks
-MOST_LOOKED = 1 << 16  # bytes in which the first record of what is left is looked for
+MOST_LOOKED = 1 << 16  # bytes in which the first remaining record is searched for
 WORTH_CUTTING = 1 << 12  # bytes
-MOST_NAMES = 1 << 16  # of frames, kept in mind
-# what a number looks like: JSON's is exact, YAML's is judged when it is read
+MOST_NAMES = 1 << 16  # of frames, remembered
+# a number: exact for JSON; for YAML what it matches is checked when it is read
 YAML_NUMBER = r"[-+.]?[0-9][-+.0-9eE]*+"
 JSON_TEXT = r'"[^"\\\x00-\x1f]*(?:\\(?:["\\/bfnrt]|u[0-9a-fA-F]{4})[^"\\\x00-\x1f]*)*"'
-# what may stand for a scalar that passes, by its quotes: never anything that could be read as more than one scalar
+# what may replace an unused scalar, by its quotes: never text that could be more than one scalar
 YAML_PLAIN = r"(?:-(?! )|[A-Za-z0-9_./+])(?:[\w./+-]| (?=[\w./+(-])|:(?=[\w/]))*"
 FREE = {
     (True, '"'): JSON_TEXT,
@@ -66,34 +66,33 @@ FRAME = {
     (False, ""): rf"(?!(?:null|Null|NULL)\b){YAML_PLAIN}",
 }
 STAMP = r"(?:0|[1-9]\d{0,8}|[1-3]\d{9})(?![.\deE])", r"(?:0|[1-9]\d{0,8})(?![.\deE])"  # seconds, nanoseconds
-NOT_UNKNOWN = r"(?!-1(?:\.0*)?(?:[eE][-+]?0+)?(?![.\deE]))"  # as a covariance begins of which nothing is known
-# scalars under these keys decide what a record is, wherever in it they are ..
+NOT_UNKNOWN = r"(?!-1(?:\.0*)?(?:[eE][-+]?0+)?(?![.\deE]))"  # an unknown covariance begins with -1
+# scalars under these keys decide what a record is, at any depth ..
 DECISIVE = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *PARENT_KEYS, *NAME_KEYS))
-# .. and these in the mappings that hold the record, unless a number alone is under them
+# .. and these in the mappings around the record, unless their value is a single number
 _WORDS = frozenset(
     word.partition("_deg")[0].partition("_rad")[0] for word in {*OURS, *POSE_KEYS, "theta"} - LISTED_WORDS
 )  # fmt: skip
-COVARIANCE = "covariance"  # an entry of one that passes as it is decides nothing
+COVARIANCE = "covariance"  # the entries of one that is unchanged decide nothing
 RESULT_KEYS = DESCRIPTIVE - {"frame"}  # a number under these belongs to a result; null may be another record
-OF_ALL = ("unnamed", "identity", "no-alt", "band-s", "stays", "left-out")  # rules of notes that hold for all alike
+OF_ALL = ("unnamed", "identity", "no-alt", "band-s", "stays", "left-out")  # rules of warnings for all
 
 
 class Template:
-    """The text of records, and what holds for all that are written alike.
+    """The layout of records, learned from one of them.
 
-    stretches: where each part of the text is
-    numbers: the stretches that hold our numbers, in order; none if one of them is not written plainly
+    stretches: start and end of each part of the text
+    numbers: the stretches of the numbers of the poses, in order; none if one of them is not a plain number
     stamps: the stretches of each entry's stamp
-    named: the stretches of frames whose names may differ; frames: for each entry which of these are its parent and its
-        name, None for one that is the same in all
-    pieces: what the result is made of; roles: whose names stand in it: of which entry, whether its parent or its
-        name, and the scalar that it was
-    notes: what is worth telling about all of them
-    leaves: of what is written anew, the scalars that differ: the stretch of each, and where it was learned
+    named: the stretches of frames whose names may differ; frames: for each entry the indices among these of its parent
+        and its name, None for one that is the same in all records
+    pieces: the pieces of the result; roles: for each name among them its entry, parent (0) or name (1), and its node
+    notes: the warnings that hold for all records
+    leaves: with a style, the scalars that differ: the stretch and the node of each
     """
 
     def __init__(self, known: RecordText) -> None:
-        """Cut the text where numbers, stamps, names and edits are."""
+        """Split the text at numbers, stamps, names and edits."""
         self.text, self.json, self.line = known.text, known.json, known.line
         self.root, self.entries, self._request = known.root, tuple(known.entries), known.request
         every = known.notes_at(0, known.source.first_column)
@@ -118,7 +117,7 @@ class Template:
         if anew and self.regular:
             leaves = {_text_of(node): node for node in own} | named
         for leaf, pattern in () if known.is_long or (anew and not self.regular) else self._free_leaves():
-            # of what is written anew a stamp is read as it is written, others without their quotes
+            # with a style, a stamp is taken with its quotes, others without
             size = len(leaf.quote) if anew and (leaf.start, leaf.end) not in cuts else 0
             span = leaf.start + size, leaf.end - size
             if span[0] < span[1]:
@@ -137,7 +136,7 @@ class Template:
             for entry, each in reversed([*enumerate(frames)]) for role, node in enumerate(each) if node is not None
         }  # fmt: skip
         self.roles = [roles[each.at] for each in pieces if isinstance(each, Renamed) and each.at in roles]
-        places = count(len(self.stretches) + 2)  # behind the stretches and what is around a record
+        places = count(len(self.stretches) + 2)  # behind the stretches and the text around a record
         self.pieces = [
             each if not isinstance(each, Renamed) else In(next(places)) if each.at in roles else Const(each.text)
             for each in pieces
@@ -147,7 +146,7 @@ class Template:
 
     @cached_property
     def block_pattern(self) -> re.Pattern[bytes]:
-        """Match a record that is alike from where one may begin; its last group is what parts it from the next."""
+        """Match a record with this layout where one may begin; its last group is the separator behind it."""
         begin, end = rb"(?:\A|(?<=\n---\n)|(?<=\n---\r\n))", rb"(---[ \t]*\r?\n)"
         if self.json:
             begin, end = rb"(?m:^)", rb"([ \t]*,?[ \t]*\r?\n)"
@@ -155,12 +154,12 @@ class Template:
 
     @cached_property
     def pattern(self) -> re.Pattern[bytes]:
-        """Match a record that is alike."""
+        """Match a record with this layout."""
         return re.compile(self._groups[0])
 
     @property
     def sizes(self) -> list[int]:
-        """Return the bytes of each stretch; -1 where they differ, which is a group of the pattern."""
+        """Return the bytes of each stretch; -1 for one of varying size, which is a group of the pattern."""
         return self._groups[1]
 
     @cached_property
@@ -179,16 +178,16 @@ class Template:
         return "".join(groups).encode(), sizes
 
     def places(self, found: re.Match[bytes]) -> Places:
-        """Return where the stretches of a record are that matches."""
+        """Return start and end of each stretch of a record that matches."""
         groups, ends = iter(found.regs[1:]), [found.start()]
         for size in self.sizes:
             ends.append(next(groups)[1] if size < 0 else ends[-1] + size)
         return [*pairwise(ends)]
 
     def renamed(self, names: tuple[bytes, ...]) -> list[Renaming] | None:
-        """Return the frames of each entry, and of its result, where those that may differ are called so.
+        """Return the frames of each entry and of its result for some names of the frames that may differ.
 
-        None where the text around them is another then.
+        None if the rest of the result would differ with these names.
         """
         if names not in self._results:
             if len(self._results) > MOST_NAMES:
@@ -198,7 +197,7 @@ class Template:
         return self._results[names]
 
     def _renamed(self, names: tuple[bytes, ...]) -> tuple[list[Renaming], list[Any]] | None:
-        """Return the frames of such entries and of their results, and all else that they decide; None if wrong."""
+        """Return the frames of entries and results, and all else that depends on the names; None for invalid names."""
         found, others, request, timed = list[Any](), list[Any](), self._request, self._request.timed
         for (record, _, edge, *_), own in zip(self.entries, self.frames, strict=True):
             pairs = zip((record.parent.text, record.name.text), own, strict=True)
@@ -221,9 +220,9 @@ class Template:
         return found, others
 
     def _frames_of(self, entry: Entry) -> list[Node | None]:
-        """Return where the frames of a record are named, parent and name, if all that is alike may name others.
+        """Return the nodes of a record's parent and name, None for one that must be the same in all records.
 
-        None where no other name may be: a name is written as plainly there as all that are alike are, and is no label.
+        A name may differ if it is plain text at one place, and is not one that counts rows.
         """
         record, request, found = entry.record, self._request, list[Node | None]()
         is_placed = record.keys.placed or record.shape.place or request.results.place or request.rows.given_place
@@ -236,7 +235,7 @@ class Template:
         return found
 
     def _free_leaves(self) -> Iterator[tuple[Node, str]]:
-        """Yield the scalars that decide nothing, in order, each with the expression of what it may be."""
+        """Yield the scalars that do not influence how a record is read, in order, each with its pattern."""
         around: set[Path] = set()
         fixed: set[Path | None] = set()
         for record, *_ in self.entries:
@@ -254,7 +253,7 @@ class Template:
         for path, leaf in _leaves(self.root, ()):
             depth = next((depth for depth in range(len(path), 0, -1) if type(path[depth - 1]) is str), 0)
             key, is_own = str(path[depth - 1]) if depth else "", depth == len(path)
-            # with our numbers the scalar of a key may be one of them or change what they mean, whatever its unit
+            # next to the numbers of a pose a scalar may be one of them, or change their meaning, whatever its unit
             stem = re.split(r"[^a-z0-9_]|_(?:deg|rad|mm)", key.casefold(), maxsplit=1)[0]
             is_free = key in RESULT_KEYS if is_own else key == COVARIANCE and passes
             pattern = FREE.get((self.json, leaf.quote), FREE[self.json, ""])
@@ -263,7 +262,7 @@ class Template:
             elif path in stamps:
                 pattern = f"{leaf.quote}{stamps[path]}{leaf.quote}"
             elif "sigma" in path or may_be_uncertain(key) or any(path[: len(each)] == each for each in placed):
-                continue  # they say a covariance or a place, and are no numbers of ours
+                continue  # part of a covariance or a geodetic position that is read by itself
             elif is_free and path not in fixed and re.fullmatch(number, leaf.value):
                 pattern = f"{leaf.quote}{number}{leaf.quote}"
             elif is_own and key in LISTED_WORDS:
@@ -275,7 +274,7 @@ class Template:
 
 
 def _leaves(node: Node, path: Path) -> Iterator[tuple[Path, Node]]:
-    """Yield the scalars that are values, in the order of the text, with their paths."""
+    """Yield the scalar values below a node with their paths, in the order of the text."""
     if type(node.value) is dict:
         for key, (_, value) in node.value.items():
             yield from _leaves(value, (*path, key))
@@ -287,14 +286,14 @@ def _leaves(node: Node, path: Path) -> Iterator[tuple[Path, Node]]:
 
 
 def _text_of(node: Node) -> tuple[int, int]:
-    """Return where the text of a scalar is, without its quotes."""
+    """Return start and end of a scalar without its quotes."""
     return node.start + bool(node.quote), node.end - bool(node.quote)
 
 
 class Cut(NamedTuple):
-    """Records of one template found in a block: where each stretch of each begins and ends.
+    """The records of one template in a block: starts and ends (n, stretches + 2) of their stretches.
 
-    The last two columns are what follows a record and what is before it.
+    The last two columns are the separators behind and before a record.
     """
 
     template: Template
@@ -302,14 +301,14 @@ class Cut(NamedTuple):
     ends: Ints
 
     def place(self, row: int) -> tuple[int, int, int, int]:
-        """Return where a record is, as a `Part` says it."""
+        """Return begin, start, end, after of a record, as in `Part`."""
         starts = self.starts[row].tolist()
         return starts[-1], starts[0], starts[-2], int(self.ends[row, -2])
 
     def frames(self, text: bytes) -> Called:
-        """Return the frames of its records and of their results, each set of them once, and which of these each has.
+        """Return the distinct frames of the records and their results, and the index of each record's.
 
-        None for a set whose result is written otherwise; else the frames of each entry.
+        None instead of frames with which the result would be written differently.
         """
         columns, data = list[list[bytes]](), np.frombuffer(text, np.uint8)
         for named in self.template.named:
@@ -323,26 +322,26 @@ class Cut(NamedTuple):
 
 
 class RecordCutter:
-    """Finds the records of blocks that are written alike; keeps the templates it has met.
+    """Find the records of blocks by templates, and learn these.
 
-    read: reads a record, or says what is wrong with it
+    read: reads a record; returns a Fault for one that is invalid
     """
 
     def __init__(self, splitter: Splitter, read: Callable[[bytes, Part], RecordText | Fault]) -> None:
         """Start without templates."""
         self.splitter, self.read = splitter, read
         self.templates: list[Template] = []
-        self.left = sizes.LEARNED  # where no records are alike, learning is lost time
+        self.left = sizes.LEARNED  # records to learn from: where all differ, learning is lost time
 
     def cut(self, text: bytes) -> tuple[list[Cut], list[tuple[int, int]]]:
-        """Return the records of a block that templates find, and what is left between them."""
+        """Return the records of a block that match templates, and the rest of the block."""
         cuts: list[Cut] = []
         rest = [(0, len(text))]
         if not is_text(text):
             return cuts, rest
         for template in self.templates[-MOST_TRIED:][::-1]:
             rest = _cut_by(template, text, rest, cuts)
-        for _ in range(MOST_TRIED):  # by one that is learned from the first record of what is left, if need be
+        for _ in range(MOST_TRIED):  # learn one from the first remaining record
             start, end = rest[0] if len(rest) == 1 else (0, 0)
             head = text[start : min(end, start + MOST_LOOKED)]
             part = next(iter(self.splitter.parts(head)[0]), None) if end - start >= WORTH_CUTTING else None
@@ -354,7 +353,7 @@ class RecordCutter:
                     break
             rest = _cut_by(self.templates[-1], text, rest, cuts)
         found = []
-        for cut in by_template(cuts, ()):  # without records whose frames make their results be written otherwise
+        for cut in by_template(cuts, ()):  # less the records whose frames need another template
             frames, codes = cut.frames(text)
             fits = np.array([each is not None for each in frames])[codes]
             rest += zip(cut.starts[~fits, 0].tolist(), cut.ends[~fits, -2].tolist(), strict=True)
@@ -362,7 +361,7 @@ class RecordCutter:
         return [cut for cut in found if len(cut.starts)], sorted(rest)
 
     def match(self, text: bytes, part: Part) -> Hit | None:
-        """Find the template that a record follows, and where its stretches are."""
+        """Return the template that matches a record, and where its stretches are."""
         if part.problem or not is_text(text[part.start : part.end]):
             return None
         for template in reversed(self.templates):
@@ -374,9 +373,9 @@ class RecordCutter:
         return None
 
     def learned(self, known: RecordText, text: bytes, part: Part) -> Hit | None:
-        """Learn from a record that may have its like, or where records depend on each other, from any.
+        """Learn a template from a record; from any if records depend on each other, else from those worth it.
 
-        A template is kept in mind unless it is long, not too many.
+        The template is remembered unless the record is long.
         """
         canonical, in_order = known.request.results.canonical, known.request.in_order
         is_alike = self.left and not known.is_long and not (canonical and len(known.entries) > MOST_ENTRIES)
@@ -384,19 +383,19 @@ class RecordCutter:
             return None
         self.left -= bool(is_alike)
         template = Template(known)
-        if not known.is_long:  # no expression is made of such
+        if not known.is_long:  # no expression is compiled for such
             self.templates = [*self.templates[-MOST_TEMPLATES + 1 :], template]
             if hit := self.match(text, part):
                 return hit
-        # long, or with lines between its own that tools print: blanks of that size are in the template's text
+        # long, or with lines of tools in it, for which the template has blanks of the same size
         lengths = [len(template.text[start:end].encode()) for start, end in template.stretches]
         return template, list(pairwise(accumulate(lengths, initial=part.start)))
 
 
 def _cut_by(template: Template, text: bytes, rest: list[tuple[int, int]], cuts: list[Cut]) -> list[tuple[int, int]]:
-    """Cut what is left of a block by one expression, and add the records to `cuts`; return what is then left."""
+    """Split the rest of a block by one expression and add the records to `cuts`; return what is left."""
     left = list[tuple[int, int]]()
-    sizes = np.array([-1, *template.sizes, -1])  # with what parts a record from the one before, and what follows it
+    sizes = np.array([-1, *template.sizes, -1])  # with what is before a record and what follows it
     varying = np.flatnonzero(sizes < 0)
     for start, end in rest:
         pieces = template.block_pattern.split(text[start:end])
@@ -415,10 +414,7 @@ def _cut_by(template: Template, text: bytes, rest: list[tuple[int, int]], cuts: 
 
 
 def by_template(cuts: Iterable[Cut], singles: Iterable[tuple[Part, Hit]]) -> list[Cut]:
-    """Return all records of a block, those of each template as they follow each other in the text.
-
-    singles: those that were found alone
-    """
+    """Return all records of a block by template, in the order of the text; singles: those found one by one."""
     found: dict[Template, list[Cut]] = {}
     for cut in cuts:
         found.setdefault(cut.template, []).append(cut)
@@ -438,7 +434,7 @@ def by_template(cuts: Iterable[Cut], singles: Iterable[tuple[Part, Hit]]) -> lis
 
 
 def in_order(cuts: Sequence[Cut]) -> list[Cut]:
-    """Part cuts so that their records follow each other as in the text; a record that holds several is alone."""
+    """Split cuts so that all records are in the order of the text; a record with several entries is one by itself."""
     if not cuts:
         return []
     sorts = np.concatenate([np.full(len(cut.starts), index) for index, cut in enumerate(cuts)])
@@ -451,7 +447,7 @@ def in_order(cuts: Sequence[Cut]) -> list[Cut]:
 
 
 def block_of(cut: Cut, called: Called, data: Bytes, text: bytes, request: Request) -> Block:
-    """Describe the records of one template as rows; called: their frames, request: that of their plan."""
+    """Return the records of one template as rows; called: their frames, request: that of their plan."""
     template, rows = cut.template, len(cut.starts)
     starts, ends = cut.starts + MARGIN, cut.ends + MARGIN
     parts = [Spans(data, starts[:, index], ends[:, index]) for index in range(starts.shape[1])]
@@ -474,10 +470,10 @@ def block_of(cut: Cut, called: Called, data: Bytes, text: bytes, request: Reques
     named, codes = called
     which = codes.tolist() if len(named) > 1 else [0]
     frames = [[named[code][at][0][0] for code in which] for at in range(len(template.entries))]
-    for at, role, node in template.roles:  # as results have them
+    for at, role, node in template.roles:  # the names of results
         texts = [quoted_name(node, each[at][1][role] or "", json=template.json).encode() for each in named]
         parts.append(chosen(spans_of(texts), codes))
-    # those that are not written as plain numbers are the template's own
+    # numbers that are no plain text are the same in all records
     numbers: Any = np.tile([value for record, *_ in template.entries for value in record.values], (rows, 1))
     if template.regular:
         columns = list(template.numbers)
@@ -487,14 +483,14 @@ def block_of(cut: Cut, called: Called, data: Bytes, text: bytes, request: Reques
 
 
 def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
-    """Return what is done to the records of one template."""
+    """Return the plan for the records of one template."""
     after, entries = len(template.stretches), template.entries
-    on_error = SKIP if request.on_error == NULL else request.on_error  # rows without one are written elsewhere
+    on_error = SKIP if request.on_error == NULL else request.on_error  # records without a result are written one by one
     stamp = next((entry.stamp for entry in entries if entry.stamp), ())
     key = str(stamp[0][-1]) if stamp else ""
     timed = request.timed
     if timed is not None and not timed.name and request.operation.formula is not None:
-        timed = timed._replace(name=key if len(stamp) == 1 else "")  # what was found says by its own name what it is
+        timed = timed._replace(name=key if len(stamp) == 1 else "")  # the key that was found has the unit in its name
     extra = None if request.rows.extra_column is None else key
     return Plan(
         tuple(entry.record.shape for entry in entries),
@@ -512,7 +508,7 @@ def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
 
 
 def is_text(block: bytes) -> bool:
-    """Return True if bytes are UTF-8: an expression for bytes would let others pass."""
+    """Return True if bytes are UTF-8, which an expression for bytes does not check."""
     try:
         block.decode()
     except UnicodeDecodeError:

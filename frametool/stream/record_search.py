@@ -1,4 +1,4 @@
-"""Where a document holds records: what holds numbers, and what cannot be moved whole and is refused."""
+"""Find the records in a document, and refuse documents that can only be moved in part."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ if TYPE_CHECKING:
     from frametool.stream.header import PoseColumns
     from frametool.stream.request import Request
 
-POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # with metres a unit
+POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # metres per unit
 INNER = ("transforms", "static_transforms", "poses", "pose", "transform", "twist", "wrench", "accel", "msg", "message",
          "detections")  # fmt: skip
-LISTS = ("markers", "polygon", "points")  # of messages that hold nothing else
+LISTS = ("markers", "polygon", "points")  # of messages with nothing else in them
 COVARIANCES = ("covariance", "position_covariance", "orientation_covariance")
 # a mapping with no other keys may be the identity
 NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS)).difference(LISTED_WORDS)
 KNOWN = frozenset((*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS))
 XYZ = ("x", "y", "z")
 QUATERNION = (*XYZ, "w")
-MOST_KEYS = 8  # named in a message
+MOST_KEYS = 8  # listed in an error
 USED = KNOWN.difference(NAME_KEYS).union(ROTATION_KEYS, (readers.AXES_KEY, "sigma"), COVARIANCES, *PARTS.values())
 NUMBER_BEGINS = frozenset("+-.0123456789n")  # n: of nan
-STALE = ("gimbal_lock", "distance", "angle", "angle_deg")  # they describe the pose that was
-# what others call a rotation or a position; as a list or mapping it is no further field of a record
+STALE = ("gimbal_lock", "distance", "angle", "angle_deg")  # they describe the pose before the operation
+# other names of a rotation or position; a list or mapping under them is not taken for an extra field
 OTHER_WORDS = dict.fromkeys(("q", "quats", "quaternions", "orient", "so3"), "quaternion") | {
     "loc": "xyz", "location": "xyz", "xzy": "xyz",
     "rpi": "rpy", "ypr": "rpy", "eul": "rpy", "euler_angles": "rpy", "angle_axis": "axis_angle",
@@ -52,14 +52,14 @@ OTHER_WORDS = dict.fromkeys(("q", "quats", "quaternions", "orient", "so3"), "qua
 
 
 class Members:
-    """What of a mapping says a position or a rotation: made once, where records are searched for.
+    """The keys of a mapping that are a position or a rotation, classified once for search and reading.
 
-    positions, rotations: the keys of each; say_pose: whether there is one
-    parts: the kind whose two vectors it has instead, as a Twist has, or ""; lists: the keys of lists and mappings
+    positions, rotations: the keys of each; say_pose: whether there are any
+    parts: the kind of two vectors that it has instead, such as a twist, or ""; lists: the keys of lists and mappings
     """
 
     def __init__(self, value: dict[str, Any]) -> None:
-        """Look at the keys."""
+        """Classify the keys."""
         self.value, self.lists = value, set[str]()
         self.positions, self.rotations, self.parts = list[str](), list[str](), ""
         for key, each in value.items():
@@ -77,7 +77,7 @@ class Members:
 
     @cached_property
     def on_earth(self) -> bool:
-        """Return True if they say a position on the Earth, whole or by half."""
+        """Return True if it has a geodetic position, complete or not."""
         if not any(map(readers.may_be_on_earth, self.value)):
             return False
         from frametool.stream.earth_columns import is_on_earth
@@ -86,14 +86,14 @@ class Members:
 
     @cached_property
     def flat(self) -> PoseColumns | None:
-        """Return the position and rotation of keys that are called as columns: x y z, qx qy qz qw, yaw_deg, ..
+        """Return the position and rotation of keys named like columns: x y z, qx qy qz qw, yaw_deg, ..
 
-        None for neither.  Raises Misfit for half a rotation, for two of them, and for a unit that is not known.
+        None for neither.  Raises Misfit for an incomplete rotation, for two, and for an unknown unit.
         """
         value, rotations = self.value, self.rotations
         scalars = [key for key in value if key not in self.lists]
         others = NOTHING_BUT.difference(STALE) if "axis_x" in value else NOTHING_BUT
-        names = [key for key in scalars if key not in others]  # that may be numbers of ours
+        names = [key for key in scalars if key not in others]  # that may be numbers of a pose
         is_flat = not rotations and POINT_KEYS.keys().isdisjoint(value)
         if not (names or (is_flat and len(scalars) >= 6)):
             return None
@@ -120,11 +120,11 @@ class Members:
         return found if found.position or found.rotation else None
 
     def refuse_typos(self, wanted: set[str], cutoff: float = 0.75) -> None:
-        """Stop at a key that is nearly one of those that would say a rotation or a position."""
+        """Raise Misfit for a misspelt key of a rotation or position."""
         if not wanted or KNOWN.issuperset(self.value):
             return
         wanted -= LISTED_WORDS
-        # a number under a letter or two, as px and ry, is no misspelt list of them
+        # a number under one or two letters, as px and ry, is no misspelt list
         near = []
         for key in islice(self.value, MOST_COMPARED):
             if key in KNOWN or not (key[2:] or type(self.value[key]) is not str):
@@ -137,7 +137,7 @@ class Members:
 
 
 class Holder(NamedTuple):
-    """What holds the numbers of a record: a mapping or list; of a message its field, and the kind of that."""
+    """The mapping or list with the numbers of a record; of a message also the field and its kind."""
 
     path: Path
     field: str = ""
@@ -146,9 +146,9 @@ class Holder(NamedTuple):
 
 
 def find_holders(document: Any, path: Path, request: Request, reading: Reading) -> list[Holder]:
-    """Return what holds numbers in a document, or its mappings where rows need not say poses.
+    """Return the holders of the records of a document, or its mappings if records need no poses.
 
-    Raises Misfit, with the path, where there is none.
+    Raises Misfit, with the path, if there are none.
     """
     formula = request.operation.formula
     found: list[Holder] = []
@@ -172,7 +172,7 @@ def find_holders(document: Any, path: Path, request: Request, reading: Reading) 
 
 
 def _under(document: Any, path: Path, spec: str) -> list[tuple[Any, Path]]:
-    """Return what is under the key `detections.pose`, which --columns names; a list stands for its items."""
+    """Return the values under a key such as `detections.pose` of --columns, for each item of a list."""
     found = [(document, path)]
     for key in spec.split("."):
         items = [(value_at(each, at), (*above, *at)) for each, above in found for at in _mappings(each)]
@@ -184,14 +184,14 @@ def _under(document: Any, path: Path, spec: str) -> list[tuple[Any, Path]]:
 
 
 def _mappings(document: Any) -> list[Path]:
-    """Return the paths of the mappings that a document is, or is a list of."""
+    """Return the paths of the mappings of a document: itself, or the items of its list."""
     if type(document) is list:
         return [(index,) for index, item in enumerate(document) if type(item) is dict]
     return [()] if type(document) is dict else []
 
 
 def _refuse(document: Any) -> None:
-    """Stop at a document in which no record was found."""
+    """Raise Misfit for a document in which no record was found."""
     if type(document) is not dict:
         if type(document) is list and document:
             raise bare_numbers(document)
@@ -203,9 +203,9 @@ def _refuse(document: Any) -> None:
 
 
 def _search(value: Any, path: Path, request: Request, reading: Reading) -> list[Holder]:
-    """Return what holds numbers; where frames change, a mapping that does not move whole is refused.
+    """Return the holders below a value; if frames change, refuse a mapping that would move only in part.
 
-    A warning names the velocities that stay where a point or pose moves.
+    A warning names velocities that are not moved with a point or pose.
     """
     if type(value) is list:
         is_matrix = len(value) in (3, 4) and all(type(row) is list for row in value)
@@ -216,7 +216,7 @@ def _search(value: Any, path: Path, request: Request, reading: Reading) -> list[
     if type(value) is not dict:
         return []
     operation, members = request.operation, Members(value)
-    holds: dict[str, str] = {}  # which fields of a known message hold what, and which stay, by the fields it has
+    holds: dict[str, str] = {}  # the fields of a known message and their kinds, and the fields that stay
     stays: tuple[str, ...] = ()
     if "header" in value or "angular_velocity" in value:
         from frametool.ros.messages import HELD
@@ -249,17 +249,17 @@ def _search(value: Any, path: Path, request: Request, reading: Reading) -> list[
 
 
 def _holds_numbers(members: Members) -> bool:
-    """Return True if a mapping itself is a record rather than a message around one."""
+    """Return True if a mapping is a record, not a message around one."""
     if members.say_pose or members.parts or members.value.keys() >= {*XYZ}:
         return True
     try:
         return members.lists.isdisjoint(INNER) and (members.on_earth or members.flat is not None)
     except Misfit:
-        return True  # half a rotation, or two: reading it says so
+        return True  # an incomplete rotation, or two: reading it raises the error
 
 
 def _refuse_several(members: Members, found: list[str], path: Path) -> None:
-    """Stop where a mapping holds more than one pose: which is meant nobody can tell."""
+    """Raise Misfit for a mapping with more than one pose, which is ambiguous."""
     ours = {*POINT_KEYS, *ROTATION_KEYS, *found, "sigma", "twist"}
     value = members.value
     more = [key for key in value if type(value[key]) is dict and key not in ours and Members(value[key]).say_pose]
@@ -268,7 +268,7 @@ def _refuse_several(members: Members, found: list[str], path: Path) -> None:
 
 
 def _refuse_half(value: dict[str, Any], found: Sequence[Holder], path: Path, stays: Sequence[str]) -> None:
-    """Stop where another field of what moves is expressed in the same frame, or may be, and would stay as it is."""
+    """Raise Misfit if another field of a mapping that moves is, or may be, expressed in the same frame."""
     header = value.get("header")
     is_message = type(header) is dict and "frame_id" in header
     if is_message and not found:
@@ -287,7 +287,7 @@ def _refuse_half(value: dict[str, Any], found: Sequence[Holder], path: Path, sta
 def _is_geometry(key: str, value: Any, *, doubtful: bool) -> bool:
     """Return True if a value may depend on a frame: it has x, y, z; if doubtful also x and y, or a list of numbers.
 
-    The names in a list are those of joints, whose positions are no point.
+    If doubtful, so is a list under `name`: the positions may be those of joints.
     """
     if type(value) is dict:
         axes = {*XYZ[: 3 - doubtful]}
@@ -301,19 +301,19 @@ def _is_geometry(key: str, value: Any, *, doubtful: bool) -> bool:
 
 
 def bare_numbers(value: list[Any]) -> Misfit:
-    """Build the error for a list that may be anything."""
+    """Return the error for a list of numbers without a notation."""
     spellings = {4: "{xyzw: [..]} or {wxyz: [..]}, or give --from"}
     write = spellings.get(len(value), "{rpy_deg: [..]}, {xyzw: [..]}, ..")
     return Misfit(f"a bare list of {len(value)} number{'s' * (len(value) != 1)} does not say what it is; write {write}")
 
 
 def covariance_keys(field: str) -> Sequence[str]:
-    """Return the keys under which the covariance of a field of a message may be, or that of a record."""
+    """Return the keys of the covariance of a field of a message, or of a record."""
     return (f"{field}_covariance",) if field else COVARIANCES
 
 
 def value_at(value: Any, path: Path) -> Any:
-    """Follow a path of keys and indices down."""
+    """Return the value at a path of keys and indices."""
     for step in path:
         value = value[step]
     return value

@@ -1,9 +1,10 @@
-"""JSON and YAML records as streams: each keeps its spelling and all its other keys, or is written in another format.
+"""Process streams of JSON and YAML records: results replace the numbers in the text, or are written in another format.
 
-Few records of a whole stream are computed one by one, without numpy; of more those written alike are moved as arrays.
+A short stream is computed record by record, without numpy; in longer ones records with the same layout are computed
+together as arrays.
 
-Behind a broken JSON line the next one is read; an array, or a value over several lines, ends what can be read where it
-goes wrong.  What is no record is a part of its own with the problem it has, so that nothing passes unseen.
+Reading resumes at the line behind a broken JSON line.  It ends at the first broken item of an array, or at the first
+broken value over several lines.  Text that is no record is a `Part` with a problem, so that it is always reported.
 """
 
 from __future__ import annotations
@@ -41,12 +42,12 @@ if TYPE_CHECKING:
     from frametool.text.lines import ByteStream
 
 _LEADING_COMMA = re.compile(rb"\A((?:\xef\xbb\xbf)?\s*\[?\s*),\s*")
-LONG_MS = 20  # how long the second block of a stream may take whose first is short
-MOST_EXACT = 100  # bad records of one template in a block whose place is looked for
+LONG_MS = 20  # time to wait for the second block of a stream whose first is short
+MOST_EXACT = 100  # bad records of one template in a block that are read again for their exact place
 NO_END = "the array does not end: its ] is missing"
 DOCUMENTS, LINES, VALUES, ARRAY = "documents", "lines", "values", "array"
 MARK = b"\xef\xbb\xbf"
-MUCH = 1 << 20  # bytes of one unfinished value from which it is looked at only when twice as much has come
+MUCH = 1 << 20  # bytes of one unfinished value beyond which it is scanned again only at twice the size
 TOO_DEEP = "nested too deeply"
 
 _SEPARATOR = re.compile(rb"^(?:---|\ttotal count: ?\d+---)[ \t]*\r?\n", re.MULTILINE)  # the last: ros2's note of a loss
@@ -63,13 +64,13 @@ _BEHIND_ITEM = re.compile(rb"\s*+[^\s\[]")
 def run_records(
     stream: ByteStream, fmt: str, request: Request, *, source: str, style: Style | None = None
 ) -> Generator[Outcome]:
-    """Yield the outcomes of a stream of records: as text in place, or as results to be written in a style."""
+    """Yield the outcomes of a stream of records: text with results in place, or with a style results to be written."""
     outcomes = _outcomes(stream, RecordBlocks(fmt, request, source, style))
     yield from _as_array(outcomes, request.on_error) if fmt == "json" and style is None else outcomes
 
 
 def _outcomes(stream: ByteStream, work: RecordBlocks) -> Generator[Outcome]:
-    """Yield the outcomes of the blocks of a stream; the lack of the closing bracket of an array is a fault."""
+    """Yield the outcome of each block; an array without its closing bracket is a fault at the end."""
     blocks = read_blocks(stream, whole=work.splitter.whole)
     first = next(blocks, None)
     if first is None:
@@ -79,7 +80,7 @@ def _outcomes(stream: ByteStream, work: RecordBlocks) -> Generator[Outcome]:
     if len(first) < sizes.SMALL and readiness(stream, unknown=True)(LONG_MS):
         try:
             second = next(blocks, None)
-        except FormatError as error:  # comes behind the results of what is whole
+        except FormatError as error:  # raised behind the results of the first block
             failed = error
     are_few = second is None and not work.request.in_order and len(work.splitter.parts(first)[0]) <= sizes.FEW
     is_open: bool | None = True
@@ -94,7 +95,7 @@ def _outcomes(stream: ByteStream, work: RecordBlocks) -> Generator[Outcome]:
 
 
 def at_other_times(stream: ByteStream, fmt: str, offset_ns: int) -> BufferedReader:
-    """Return a stream of records with so much added to all stamps in them; a record that cannot be read stays."""
+    """Return a stream of records with an offset added to all stamps; a record that cannot be read is unchanged."""
 
     def pieces() -> Iterator[bytes]:
         splitter = Splitter(fmt)
@@ -110,9 +111,9 @@ def at_other_times(stream: ByteStream, fmt: str, offset_ns: int) -> BufferedRead
 
 
 def with_offset(text: str, offset_ns: int) -> tuple[str, int]:
-    """Return documents with so much added to all stamps in them, and how many these are.
+    """Return documents with an offset added to all stamps, and the number of stamps.
 
-    One of a mapping is under its key, or the seconds and nanoseconds that it is made of.
+    A stamp is the value of one of STAMP_KEYS, or a pair of seconds and nanoseconds.
     """
     edits, pending = list[tuple[int, int, str]](), parse_nodes(text)
     for node in pending:  # which grows by what is in it
@@ -140,9 +141,9 @@ def with_offset(text: str, offset_ns: int) -> tuple[str, int]:
 
 
 def _as_array(outcomes: Iterable[Outcome], on_error: str) -> Iterator[Outcome]:
-    """Allow no comma before the first record that is left, and close an array that does not end.
+    """Remove the comma before the first remaining record, and close an array that has no end.
 
-    What is before that record is held back: where the first one is an error nothing is written.
+    The text before the first record is held back, so that nothing is written if that record is an error.
     """
     any_kept, held = False, b""
     for outcome in outcomes:
@@ -160,14 +161,15 @@ def _as_array(outcomes: Iterable[Outcome], on_error: str) -> Iterator[Outcome]:
 
 
 class Found:
-    """What one block holds: what becomes of records alone and faults, by place, rows of many, warnings, counts.
+    """The results, faults and warnings of one block while it is processed.
 
-    cutter, singles: where there are many, what finds those that are alike, and those that follow a template
-    kept: how many records have a result, or null in the place of one
+    items: results of single records, by position; runs, alike: those of records with the same layout
+    cutter: finds records with a known layout, None in short streams; singles: records found one by one to have such
+    kept: number of records with a result, or with null instead of one
     """
 
     def __init__(self, text: bytes, cutter: RecordCutter | None) -> None:
-        """Begin with the text of the block."""
+        """Start with the text of the block."""
         self.text, self.cutter = text, cutter
         self.items, self.faults, self.notes = list[tuple[int, Any]](), list[tuple[int, Fault]](), list[RowNote]()
         self.singles: list[tuple[Part, Hit]] = []
@@ -177,10 +179,7 @@ class Found:
 
 
 class RecordBlocks:
-    """Process one block of records after the other.
-
-    Results take the places of numbers and all else stays, or they are values and rows to be written in a style.
-    """
+    """Process blocks of records: results replace the numbers in the text, or are values and rows for a writer."""
 
     def __init__(self, fmt: str, request: Request, source: str, style: Style | None = None) -> None:
         """Start without templates."""
@@ -195,7 +194,7 @@ class RecordBlocks:
 
     @cached_property
     def _bulk(self) -> tuple[RecordCutter, State, RecordRows | None]:
-        """Return what finds records that are alike, what one block leaves for the next, and what makes rows of them."""
+        """Return the cutter, the state carried from block to block, and, with a style, the maker of rows."""
         from frametool.stream.evaluate import State
         from frametool.stream.record_cuts import RecordCutter
 
@@ -207,7 +206,7 @@ class RecordBlocks:
         return RecordCutter(self.splitter, self._read), State(), rows
 
     def outcome(self, text: bytes, *, are_few: bool) -> Outcome:
-        """Return the outcome of a block; a few records are taken one by one."""
+        """Return the outcome of a block; are_few: compute its records one by one."""
         found = Found(text, None if are_few or self._is_singly else self._bulk[0])
         closed = self._take(0, len(text), found) if found.cutter is None else self._run(found)
         self.ended = text.endswith(b"\n")
@@ -228,7 +227,7 @@ class RecordBlocks:
         )  # fmt: skip
 
     def _take(self, start: int, end: int, found: Found) -> bool:
-        """Take records one by one; what is between them passes.  Return whether an array ends there."""
+        """Process records one by one and copy the text between them; return True if an array ends there."""
         text, cutter, keeps_text, at = found.text, found.cutter, self.style is None, start
         parts, closed = self.splitter.parts(text[start:end])
         for part, line in _with_lines(text, (each.behind(start) for each in parts) if start else parts):
@@ -253,7 +252,7 @@ class RecordBlocks:
     def _alone(
         self, part: Part, made: RecordText | Fault, line: int, found: Found, parts: Sequence[Components] | None = None
     ) -> None:
-        """Take what a record becomes, or why it becomes nothing; parts: the numbers of its results, if known."""
+        """Add the result of one record, or its fault; parts: the components of its results, if already computed."""
         style, place, record = self.style, part.begin, found.text[part.start : part.end]
         if isinstance(made, RecordText):
             try:
@@ -286,9 +285,9 @@ class RecordBlocks:
                 found.items.append((part.start, _no_result(record, style, json=is_json)))
 
     def _run(self, found: Found) -> bool:
-        """Run the records of all templates, the others alone.  Return whether an array ends there.
+        """Compute records with a known layout as arrays, the others one by one; return True if an array ends there.
 
-        One that is bad is taken alone too, which says where it is wrong.
+        A bad record is read once more by itself, for an error with its exact place.
         """
         from frametool.stream.evaluate import Run
         from frametool.stream.record_cuts import block_of, by_template, in_order, plan_of
@@ -327,7 +326,7 @@ class RecordBlocks:
 
 
 def _no_result(record: bytes, style: Style, *, json: bool) -> NoResult:
-    """Return what a bad record says besides its numbers; in a table those are empty cells under names of their own."""
+    """Return the other fields of a bad record; in a table the cells of its numbers are empty."""
     is_table = style.format == "csv"
     root = next(iter(parse_nodes(nulled(record, json=json)[0])), None)
     kept = {
@@ -338,23 +337,22 @@ def _no_result(record: bytes, style: Style, *, json: bool) -> NoResult:
 
 
 def _with_lines(text: bytes, parts: Iterable[Part]) -> Iterator[tuple[Part, int]]:
-    """Yield records that follow each other, each with its line, counted from 0."""
+    """Yield records in the order of the text, each with its line, counted from 0."""
     line = counted = 0
     for part in parts:
         line, counted = line + text.count(b"\n", counted, part.start), part.start
         yield part, line
 
 
-# --- where the records of a text are: knows the syntax around them and none of their meaning ---
+# --- where the records of a text are: the syntax around them, without their meaning ---
 
 
 class Part(NamedTuple):
-    """A record in a text, and what goes with it.
+    """The position of a record in a text.
 
-    begin: where the comma or blanks before it begin, if they vanish with it
-    start, end: the record itself, or from where it goes wrong
-    after: where what follows it ends, if that vanishes with it
-    problem: why it is no record; "" where reading it decides
+    begin, after: the record with the comma, blanks or separator that are removed together with it
+    start, end: the record itself, or the text from the place of the error
+    problem: why it is no record; "" if only reading it can find out
     final: nothing behind it can be read
     """
 
@@ -366,18 +364,18 @@ class Part(NamedTuple):
     final: bool = False
 
     def around(self, text: bytes, record: bytes) -> bytes:
-        """Return what a record becomes with what goes with it."""
+        """Return another record with the text around this one."""
         return text[self.begin : self.start] + record + text[self.end : self.after]
 
     def behind(self, start: int) -> Part:
-        """Return where a record is in a text that has so much before the one it was found in."""
+        """Return the position in a text with `start` bytes more at its beginning."""
         return self._replace(
             begin=self.begin + start, start=self.start + start, end=self.end + start, after=self.after + start
         )
 
 
 class Splitter:
-    """Cut a stream into records; `layout` is "" until the first line of JSON has been seen."""
+    """Split a stream into records; `layout` is "" until the first line of JSON has been read."""
 
     def __init__(self, fmt: str) -> None:
         """Take `json` or `yaml`."""
@@ -385,7 +383,7 @@ class Splitter:
         self._looked = 0
 
     def whole(self, text: bytes) -> int:
-        """Return how many bytes of what has come are whole records; called with more until some are."""
+        """Return the number of bytes that are whole records; called again with more text while it is 0."""
         if self.layout == DOCUMENTS:  # what has been looked at is not looked at again
             ends = [found.end() for found in _SEPARATOR.finditer(text, text.rfind(b"\n", 0, self._looked) + 1)]
             self._looked = 0 if ends else len(text)
@@ -396,7 +394,7 @@ class Splitter:
         if MUCH < len(text) < 2 * self._looked:
             return 0
         ended = 0
-        for part in self._values(text, final=False)[0]:  # a text is cut so that either piece means what it meant
+        for part in self._values(text, final=False)[0]:  # both pieces must have the meaning that they have together
             if part.final or self.layout != ARRAY:
                 is_end = part.final or part.after < len(text) or text.endswith(b"\n")
             else:
@@ -406,7 +404,7 @@ class Splitter:
         return ended
 
     def parts(self, text: bytes) -> tuple[list[Part], bool]:
-        """Return the records of a block of whole records, or of a stream's rest, and whether an array ends in it."""
+        """Return the records of a block, or of the rest of a stream, and whether an array ends in it."""
         if self.layout == DOCUMENTS:
             return list(_documents(text)), False
         self.layout = self.layout or _layout_of(text, final=True)
@@ -415,14 +413,14 @@ class Splitter:
         return self._values(text, final=True)
 
     def _values(self, text: bytes, *, final: bool) -> tuple[list[Part], bool]:
-        """Scan JSON values one after the other, in an array with commas between them."""
+        """Scan JSON values in sequence, or in an array with commas between them."""
         opening = _OPENING.match(text) if self.layout == ARRAY else None
         start = opening.end() if opening else 3 if text.startswith(MARK) else 0
         return _scanned(text, start, array=self.layout == ARRAY, final=final, first=bool(opening))
 
 
 def _of_line(text: bytes, start: int, end: int) -> list[Part]:
-    """Return the record of a line, or several."""
+    """Return the records of a line, usually one."""
     line = text[start:end]
     body = line.strip(b" \t\r\n,").removeprefix(MARK)
     if not body:
@@ -437,7 +435,7 @@ def _of_line(text: bytes, start: int, end: int) -> list[Part]:
 
 
 def _layout_of(text: bytes, *, final: bool) -> str:
-    """Return how JSON is laid out by its first lines; "" where they have not come yet."""
+    """Return the layout of JSON by its first lines; "" if they have not arrived yet."""
     body = text.removeprefix(MARK).lstrip()
     if body.startswith(b"["):
         following = body[1:].lstrip(b" \t\r")[:1]
@@ -448,10 +446,10 @@ def _layout_of(text: bytes, *, final: bool) -> str:
         return ""
     _, problem = _value(first.decode("latin-1").rstrip(" \t\r,"), 0)
     if body.startswith(b"[") and b"{" in (body if problem is None else first):
-        return ARRAY  # its first item is no record: lists of numbers hold no objects
+        return ARRAY  # the first item is no record: lists of numbers hold no objects
     if problem is not None:
         return LINES
-    # the first line ends within a value, which goes on in the rest or is broken
+    # the first line ends within a value, which continues or is broken
     second, end, _ = rest.partition(b"\n")
     if not (end or final):
         return ""
@@ -465,7 +463,7 @@ def _layout_of(text: bytes, *, final: bool) -> str:
 
 
 def _value(text: str, at: int) -> tuple[int, str | None]:
-    """Return the end of the JSON value at a place and ""; or where it goes wrong and why: None if it is cut off."""
+    """Return the end of the JSON value at an offset and "", or the place and message of an error, None if cut off."""
     try:
         return _decoder()(text, at)[1], ""
     except RecursionError:
@@ -479,14 +477,14 @@ def _value(text: str, at: int) -> tuple[int, str | None]:
 
 @cache
 def _decoder() -> Callable[[str, int], tuple[object, int]]:
-    """Return the decoder; numbers stay text, so that none is too long."""
+    """Return the decoder; numbers remain text, so that none is too long."""
     from json import JSONDecoder
 
     return JSONDecoder(parse_int=str, parse_float=str, parse_constant=str).raw_decode
 
 
 def _scanned(data: bytes, at: int, *, array: bool, final: bool, first: bool = True) -> tuple[list[Part], bool]:
-    """Scan values from a place on; one that may go on behind the text ends the scan, or is a part if it is final."""
+    """Scan values from an offset on; one that may continue behind the text ends the scan, unless the text is final."""
     found: list[Part] = []
     text = data.decode("latin-1")  # keeps every offset; the syntax of JSON is ASCII
     needs_comma = array and not first

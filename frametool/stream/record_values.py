@@ -1,7 +1,7 @@
-"""The records of a text, read once: an argument, a document or one record of a stream, and what becomes of them.
+"""Read the records of one text (an argument, a document, or one record of a stream) and compute them one by one.
 
-Results are values: for arguments, for files, and for output in another format.  The records, the operation and what is
-said of them are those of streams.
+Results are values for arguments, files and output in another format.  Reading, operation and warnings are the same as
+for streams.
 """
 
 from __future__ import annotations
@@ -48,26 +48,26 @@ if TYPE_CHECKING:
 
     Value = Result | dict[str, Any]
 
-ROUNDED = "rounded"  # rule of the warning about rotations that were normalised
-MOST_LEAVES = 2000  # scalars of a record: an expression that cuts those written alike takes longer for more
-MOST_ENTRIES = 8  # points or poses of a record whose result is written anew: each is looked at for itself
+ROUNDED = "rounded"  # the rule of the warning for normalised rotations
+MOST_LEAVES = 2000  # scalars of a record from which a template is learned: for more its expression is slow
+MOST_ENTRIES = 8  # points or poses of a record for which rows are made together
 SIX_BY_SIX = 36  # entries of the covariance of a pose
-SPELLED = ("yaml", "json", "csv")  # formats in which other keys keep their names
+SPELLED = ("yaml", "json", "csv")  # formats that preserve the names of other keys
 NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
 
 
 class Outside(FrametoolError):
-    """Report a record whose time is not wanted, which is left out without a word."""
+    """A record outside --start and --stop, which is left out without a warning."""
 
     kind = "outside"
 
 
 class Entry(NamedTuple):
-    """One record of a text and what is asked of it.
+    """One record of a text and how its result is made.
 
-    target: how its result is written
-    edge: the pose that moves it; None if absent, or where its own time decides
-    stamp: the paths of that time, or of what else comes with it: one, or seconds and nanoseconds
+    target: the shape of the result
+    edge: the pose that moves it; None for none, or for one that depends on its stamp
+    stamp: the path of the stamp or weight, or the paths of seconds and nanoseconds
     parent, name: the frames of its result
     """
 
@@ -80,7 +80,7 @@ class Entry(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What became of a record: the components of its result; has_gaps: numbers of it may be nan."""
+    """The result of a record: its components; has_gaps: some of them may be nan."""
 
     entry: Entry
     parts: Components
@@ -88,7 +88,7 @@ class Answer(NamedTuple):
 
 
 def _entry(document: Document, record: Record, request: Request) -> Entry:
-    """Find the pose that moves a record, or the stamp at which it is looked up; check the frames it names."""
+    """Find the pose that moves a record, or the stamp for its look-up, and the frames of its result."""
     stamp: tuple[Path, ...] = ()
     edge = None
     timed, operation = request.timed, request.operation
@@ -108,16 +108,16 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
     if request.rename is not None:
         parent, name = request.rename(parent, name)
     names = [each.representation.name for each in request.results.notations]
-    # conventions of Euler angles share a key and are together
+    # conventions of Euler angles share a key and must be neighbours
     together = sorted(request.results.notations, key=lambda each: names.index(each.representation.name))
     target = request.with_results(notations=tuple(together)).target(record.shape)
     return Entry(record, target, edge, stamp, parent, name)
 
 
 def answer(entry: Entry, values: Mapping[int, Any], request: Request) -> Answer:
-    """Return what becomes of a record; values: of the documents in which its own time is.
+    """Compute the result of a record; values: the documents, in which its stamp is read.
 
-    Raises ValueInvalid for what is no rotation, FrametoolError where there is no pose at its time.
+    Raises ValueInvalid for an invalid rotation, FrametoolError without a pose at its stamp.
     """
     operation, shape, timed = request.operation, entry.record.shape, request.timed
     edge, at_ns = entry.edge, None
@@ -143,7 +143,7 @@ def answer(entry: Entry, values: Mapping[int, Any], request: Request) -> Answer:
 
 
 def wide_turn(made: Answer, operation: Operation) -> Finding | None:
-    """Return a warning of a turn that is too uncertain for the first order; of what moves others it comes elsewhere."""
+    """Return the warning for a rotation too uncertain for the first order, unless the operation itself warns."""
     record = made.entry.record
     if operation.uncertain or len(operation.carried(record.shape)) < SIX_BY_SIX:
         return None
@@ -154,29 +154,28 @@ def wide_turn(made: Answer, operation: Operation) -> Finding | None:
 
 
 def written(each: Answer) -> list[float]:
-    """Return the numbers of a result as they are written; raises ValueInvalid for one that leaves the plane."""
+    """Return the numbers of a result as written; raises ValueInvalid for one that leaves the plane or is not finite."""
     target = each.entry.target
     for name, number in target.left_out(each.parts, floats):
         if abs(number) > FLAT:
             raise ValueInvalid(LEAVES_PLANE.format(name, number))
     if target.place is not None:
         target.place.check_result(*each.parts[:3])
-    numbers = [number + 0.0 for number in target.written(each.parts, floats)]  # none is -0.0
+    numbers = [number + 0.0 for number in target.written(each.parts, floats)]  # no -0.0
     if not all(map(isfinite, numbers)) and (not each.has_gaps or any(map(isinf, numbers))):
         raise ValueInvalid("the result is not finite: the numbers are too large")
     return numbers
 
 
 class RecordText:
-    """The records of a text, and what is asked of each.
+    """The records of a text and how their results are made.
 
-    values: of its documents, by their number in the text; entries: its records
-    notes: warnings about them
-    edits: each `Edit` of the text
+    values: its documents by number; entries: its records
+    notes: warnings about the records; edits: the edits that write results in place
     """
 
     def __init__(self, source: Source, request: Request, *, json: bool) -> None:
-        """Read the records, and what each is asked; raises FormatError with the place of one that cannot be read."""
+        """Read the records; raises FormatError with the place of one that cannot be read."""
         self.source, self.text, self.request, self.json = source, source.text, request, json
         self.notes, self.edits = list[Finding](), list[Any]()
         self.values, self.entries = dict[int, Any](), list[Entry]()
@@ -187,7 +186,7 @@ class RecordText:
             try:
                 records = list(find_records(document.value, request, reading, (document.index,)))
                 for note in reading.notes:
-                    # of a rotation the place of the first of its numbers, as blocks of rows have it
+                    # the place of a rotation is that of its first number, as in blocks of rows
                     its = (each for each in records if note.rule == ROUNDED and each.path == note.path)
                     found = next((each for each in its if each.shape.notation), None)
                     path = found and found.numbers[found.shape.rotation_at[0]]
@@ -206,24 +205,24 @@ class RecordText:
 
     @cached_property
     def root(self) -> Node:
-        """Return the nodes of the text, by the number of their document."""
+        """Return the nodes of the text, a list of documents."""
         return Node(0, len(self.text), parse_nodes(self.text))
 
     @cached_property
     def is_long(self) -> bool:
-        """Return True if it has so many scalars that no other one is looked for that is written alike."""
+        """Return True if it has too many scalars to learn a template from."""
         return next(islice(self.root.leaves(), MOST_LEAVES, None), None) is not None
 
     @cached_property
     def line(self) -> int:
-        """Return the line, from 0, of the first of our numbers."""
+        """Return the line, from 0, of the first number of a pose."""
         paths = (path for entry in self.entries for path in entry.record.numbers if path is not None)
         return self.text.count("\n", 0, min((self.root.at(path).start for path in paths), default=0))
 
     def answers(self, parts: Sequence[Components] | None = None) -> list[Answer]:
-        """Return what becomes of the records but for those whose time is not wanted; raises Outside if none is.
+        """Compute the results of the records within --start and --stop; raises Outside if all are outside.
 
-        parts: the components of each result, if known
+        parts: the components of each result, if already computed
         """
         if parts is not None:
             return [Answer(*each) for each in zip(self.entries, parts, strict=True)]
@@ -237,14 +236,14 @@ class RecordText:
 
     @property
     def lost(self) -> str:
-        """Name a frame that a record names and its result cannot."""
+        """Return a frame of a record whose result has no frames, else ""."""
         for record, _, _, _, parent, name in self.entries:
             if parent is None and name is None and (lost := record.parent.text or record.name.text):
                 return lost
         return ""
 
     def notes_at(self, line: int, column: int, answers: Sequence[Answer] = ()) -> list[RowNote]:
-        """Return all warnings about the records, their numbers, and what became of them, each with its place.
+        """Return all warnings about the records and their results, each with its place.
 
         line, column: where the text begins; lines count from 0
         """
@@ -269,7 +268,7 @@ class RecordText:
 
 
 def json_documents(source: Source) -> list[Document]:
-    """Read strict JSON: what only YAML would take is a fault of the record."""
+    """Read strict JSON: what only YAML allows is an error."""
     check_text(source)
     values = strict_json(source)
     return [Document(value, index, source) for index, value in enumerate(values) if value is not None]
@@ -279,16 +278,16 @@ def json_documents(source: Source) -> list[Document]:
 
 
 def read_poses(source: Source, asked: Request) -> list[Pose]:
-    """Return every pose of a text, in order; at least one.
+    """Return all poses of a text, at least one.
 
-    asked: the unit of bare angles, what counts as a rotation, the operation, which may not take all that records say
+    asked: the unit of bare angles, the check of rotations, and the operation, which may not support scales
     Raises FormatError with the place.
     """
     return read_given(source, asked)[0]
 
 
 def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
-    """Return every pose of a text as `read_poses` does, and the keys that come with any of them."""
+    """Return all poses of a text as `read_poses` does, and the other keys of their records."""
     own = RowOptions(kind=POSE, degrees=asked.rows.degrees, normalize=asked.rows.normalize)
     request = Request(asked.operation, own)
     poses: list[Pose] = []
@@ -303,7 +302,7 @@ def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
 
 
 def stamp_of(documents: dict[int, Any], record: Record, source: Source) -> int | None:
-    """Return the stamp of a record, of its header or its own; raises FormatError with its place."""
+    """Return the stamp of a record's header, or its own; raises FormatError with its place."""
     own = value_at(documents, record.path)
     if record.stamp_ns is not None or type(own) is not dict:
         return record.stamp_ns
@@ -314,14 +313,14 @@ def stamp_of(documents: dict[int, Any], record: Record, source: Source) -> int |
 
 
 def read_text(source: Source, request: Request) -> RecordText:
-    """Read the records of a text, and warn of what is invalid in them, with its place."""
+    """Read the records of a text and emit the warnings about them."""
     known = RecordText(source, request, json=False)
     tell(source, known.notes)
     return known
 
 
 def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
-    """Yield the results of every record of a text in a format: poses with what else their records say, or messages.
+    """Yield the results of all records of a text: poses with the other fields of their records, or mappings.
 
     Raises FormatError with the place of a record that cannot be read or has no result.
     """
@@ -336,7 +335,7 @@ def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
         try:
             with suppress(Outside):
                 answers.append(answer(entry, known.values, request))
-        except ValueInvalid as error:  # what was read well has no result
+        except ValueInvalid as error:  # a valid record without a result
             misfit = error if isinstance(error, Misfit) else NotARotation(str(error), entry.record.path)
             raise misfit.placed(known.source) from misfit
     if warning := next(filter(None, (wide_turn(each, request.operation) for each in answers)), None):
@@ -345,7 +344,7 @@ def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
 
 
 def values_of_text(known: RecordText, answers: Sequence[Answer], style: Style) -> Iterator[Value]:
-    """Yield the results of a text as values; raises FormatError for an alias, and where nothing is in it."""
+    """Yield the results of a text as values; raises FormatError for an alias and for an empty text."""
     units: dict[Path, list[Answer]] = {}
     for each in answers:
         units.setdefault(_unit_of(each.entry.record), []).append(each)
@@ -359,12 +358,12 @@ def values_of_text(known: RecordText, answers: Sequence[Answer], style: Style) -
 
 
 def _unit_of(record: Record) -> Path:
-    """Return the path of the thing that a record's result is: the document, or an item of the list it is."""
+    """Return the path of the value that a record's result replaces: the document, or an item of its list."""
     return record.path[: 1 + (len(record.path) > 1 and type(record.path[1]) is int)]
 
 
 def values_of_unit(root: Node, answers: list[Answer], request: Request, style: Style) -> Iterator[Value]:
-    """Yield what one document or item becomes: a pose, or a mapping, for each record in it."""
+    """Yield the results of one document or item: a pose or a mapping for each record in it."""
     is_one = not answers[1:] or not request.operation.moves
     if not is_one and len({each.entry.record.path for each in answers}) < len(answers):
         yield _of_several(root, answers, request)
@@ -374,8 +373,8 @@ def values_of_unit(root: Node, answers: list[Answer], request: Request, style: S
 
 
 def _of_several(root: Node, answers: list[Answer], request: Request) -> dict[str, Any]:
-    """Return several things at one place, as in an Imu: a mapping without levels, a key for each of their numbers."""
-    last = answers[-1].entry  # of the first, an orientation, nothing may be known: then it stays
+    """Return the results of several fields of one message, as of an Imu, as one flat mapping with a key per number."""
+    last = answers[-1].entry  # an unknown orientation is the first, and unchanged
     found = {"frame": last.parent} | _header_stamp(last.record) | _rest(root, last.record)
     for each in answers:
         record, numbers = each.entry.record, written(each)[: each.entry.target.own_size]
@@ -393,7 +392,7 @@ def _header_stamp(record: Record) -> dict[str, int]:
 
 
 def _result(root: Node, made: Answer, request: Request, fmt: str) -> Value:
-    """Return what a record becomes, with its frames and what else it says: a pose, or a mapping without levels."""
+    """Return the result of a record with its frames and other fields: a pose, or a flat mapping."""
     (entry, parts, _), operation, extras = made, request.operation, _extras(made, request)
     record, target, kind = entry.record, entry.target, operation.result_kind(entry.record.shape.kind)
     if operation.formula is not None:
@@ -411,7 +410,7 @@ def _result(root: Node, made: Answer, request: Request, fmt: str) -> Value:
     named = {key: name for key, name in (("name", entry.name), (seen_from, entry.parent)) if name is not None}
     if kind in (POSE, ROTATION):
         placed, turned = target.unit is not None or target.whole, bool(target.notations)
-        # a vector that nothing turns is at no place
+        # a vector that is not rotated has no position
         if record.keys.position == VECTOR and placed and not turned and operation.keeps_frames:
             return named | {VECTOR: [*parts[:3]]} | said
         pose = Pose.of(parts[:7], entry.name, entry.parent)
@@ -424,9 +423,9 @@ def _result(root: Node, made: Answer, request: Request, fmt: str) -> Value:
     if target.place is not None:
         from frametool.grammar.place import point_entry
 
-        named.pop(seen_from, None)  # which the place says itself
+        named.pop(seen_from, None)  # which is in the geodetic position
         place = point_entry(entry.parent, parts[:3], target.place, getattr(parts, "read", None))
-    if holds(fmt, "recording") and operation.keeps_frames:  # which takes lat, lon and alt as they are
+    if holds(fmt, "recording") and operation.keeps_frames:  # which writes lat, lon and alt as they were read
         from frametool.grammar.place import LLA_KEYS, read_at
 
         keys = [key for key in (*record.keys.members, *record.keys.placed) if key in LLA_KEYS]
@@ -437,9 +436,9 @@ def _result(root: Node, made: Answer, request: Request, fmt: str) -> Value:
 
 
 def with_stamp_ns(extras: dict[str, Any], fmt: str) -> dict[str, Any]:
-    """Read the stamp that a record says, in whole seconds and nanoseconds too, unless its format keeps it as it is.
+    """Convert the stamp of a record to `stamp_ns`, unless the format preserves it as it is written.
 
-    Raises ValueInvalid for what is no time.
+    Raises ValueInvalid for an invalid time.
     """
     key = stamp_key(extras)
     is_spelled = fmt in SPELLED and (fmt != "csv" or type(extras[key]) is not dict) if key else False
@@ -456,7 +455,7 @@ def with_stamp_ns(extras: dict[str, Any], fmt: str) -> dict[str, Any]:
 
 
 def at_time(value: Value, timed: dict[str, Any]) -> Value:
-    """Return a result with a stamp, or without any; its own stays as it is written if there is to be one."""
+    """Return a result with a stamp, {} for none; its own is preserved as it is written if there is to be one."""
     if not isinstance(value, Result):
         return value
     key = stamp_key(value.extras)
@@ -473,8 +472,8 @@ def stamp_key(members: dict[str, Any]) -> str:
 
 
 def _rest(root: Node, record: Record) -> dict[str, Any]:
-    """Return what a record and the mappings around it say besides the pose, its frames and its stamp."""
-    keys, used = record.keys, {*NOT_PLAIN, *PARTS.get(record.shape.kind, ())}  # what is no longer true of the result
+    """Return the other fields of a record and of the mappings around it, without pose, frames and header."""
+    keys, used = record.keys, {*NOT_PLAIN, *PARTS.get(record.shape.kind, ())}  # no longer true of the result
     used |= {keys.position, keys.rotation, *keys.others, *keys.flat, *keys.members, *keys.placed}
     names = {*record.name.paths, *record.parent.paths}
     rest: dict[str, Any] = {}
@@ -492,12 +491,12 @@ def _rest(root: Node, record: Record) -> dict[str, Any]:
 
 
 def _extras(made: Answer, request: Request) -> dict[str, Any]:
-    """Return what a result says behind its own numbers, by its keys: a distance, its covariances, a scale."""
+    """Return the extra numbers of a result by key: a distance, covariances, a scale."""
     shape = made.entry.record.shape
     names = [request.results.prefix + name for name in request.operation.extras(shape)]
     sizes = () if shape.rewritten else shape.covariance
     numbers = iter([number + 0.0 for number in made.parts[len(made.parts) - len(names) - sum(sizes) :]])
-    found = dict(zip(names, numbers, strict=False))  # the covariances come behind them
+    found = dict(zip(names, numbers, strict=False))  # the covariances are behind them
     extras: dict[str, Any] = found if request.operation.shown else with_entries(found)
     for key, size in zip(made.entry.record.keys.covariances, sizes, strict=False):
         entries = list(islice(numbers, size))
@@ -506,7 +505,7 @@ def _extras(made: Answer, request: Request) -> dict[str, Any]:
 
 
 def plain(node: Node) -> Any:
-    """Return a node as a plain value; numbers and truth values keep their text."""
+    """Return a node as a plain value; numbers and booleans keep their text."""
     if type(node.value) is dict:
         return {key: plain(value) for key, (_, value) in node.value.items()}
     if type(node.value) is list:
@@ -516,7 +515,7 @@ def plain(node: Node) -> Any:
 
 
 def plain_text(text: str, quote: str) -> Any:
-    """Return the text within the quotes of a scalar as a plain value; numbers and truth values keep theirs."""
+    """Return the text of a scalar without its quotes as a plain value; numbers and booleans keep their text."""
     if quote:
         return plain(parse_nodes(f"{quote}{text}{quote}")[0]) if "\\" in text else text
     if text in ("null", "~", ""):

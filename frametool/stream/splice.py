@@ -1,7 +1,7 @@
-"""Records in the text of a stream: numbers are replaced where they are, members are replaced, added or left out.
+"""Edit records in the text of a stream: replace numbers in place; replace, add or remove members.
 
-Everything else stays as it is, byte for byte.  Knows the syntax of JSON and YAML only as far as members go: what
-stands between them, and how one is written.
+All other text is unchanged, byte for byte.  Of the syntax of JSON and YAML this uses only how members are written and
+separated.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ OURS = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *XYZ, "linear", "angula
 
 
 class Edit(NamedTuple):
-    """A stretch of the text and what replaces it; an empty stretch is an insertion."""
+    """A range of the text and its replacement; an empty range is an insertion."""
 
     start: int
     end: int
@@ -51,23 +51,23 @@ class Edit(NamedTuple):
 
 
 def nulls_in(node: Node) -> Iterator[tuple[int, int, str]]:
-    """Yield where the numbers of ours are, wherever in a record, each with the null that takes their place."""
+    """Yield the ranges of the numbers of poses at any depth of a record, each with the null that replaces it."""
     if type(node.value) is list:
         for item in node.value:
             yield from nulls_in(item)
     for key, (named, value) in node.value.items() if type(node.value) is dict else ():
         if not ((key in OURS and (key not in LISTED_WORDS or type(value.value) in (list, dict))) or key in PLACE_KEYS):
             yield from nulls_in(value)
-        elif type(value.value) in (list, dict) and not value.flow:  # on lines of its own
+        elif type(value.value) in (list, dict) and not value.flow:  # a block of lines
             yield named.end, value.end, ": null"
         else:
             yield value.start, value.end, "null"
 
 
 class Splicer:
-    """What the members of one record become; `first` is the index of its first number among all results of the text.
+    """The edits of one record's members; `first` is the index of its first number among all results of the text.
 
-    ahead, behind: what is written around a member, by its key; dropped: the members that go
+    ahead, behind: members to insert before and behind one, by its key; dropped: keys of members to remove
     """
 
     def __init__(self, root: Node, entry: Entry, request: Request, *, json: bool, first: int) -> None:
@@ -80,7 +80,7 @@ class Splicer:
         self.members: dict[str, tuple[Node, Node]] = self.node.value if type(self.node.value) is dict else {}
         self.flow = json or self.node.flow or not self.members
         self.head, self.tail = next(iter(self.members), ""), next(reversed(self.members), "")
-        self.between = ", " if self.flow else "\n" + " " * self.members[self.head][0].column  # what parts two members
+        self.between = ", " if self.flow else "\n" + " " * self.members[self.head][0].column  # the separator
         self.edits: list[Edit] = []
         self.ahead, self.behind = defaultdict[str, list[Pieces]](list), defaultdict[str, list[Pieces]](list)
         self.dropped: set[str] = set()
@@ -89,14 +89,14 @@ class Splicer:
     def run(self) -> list[Edit]:
         """Return the edits, in no order."""
         shape, unit = self.record.shape, self.target.unit
-        # a bare list stays one if the result has its numbers and no others
+        # a bare list remains one if the result has the same numbers
         stays = bool(self.members) or ((unit is None or shape.unit is not None) and not self.target.extras)
         if self.request.operation.only_adds:
             self.behind[self.tail] += self._extras(0)
         else:
             if self.members:
                 self._names()
-            if self.kind != shape.kind or not stays or not (self.members or self._same_rotation()):  # all anew
+            if self.kind != shape.kind or not stays or not (self.members or self._same_rotation()):  # all new members
                 keys, size = self.record.keys, self.target.own_size
                 position = [self._place("xyz" if self.kind == POSE else self.kind)] if unit is not None else []
                 self.behind[self.tail] += [*position, *self._rotation(), *self._extras(size)]
@@ -109,11 +109,11 @@ class Splicer:
         return [*self.edits, *self._put_together()]
 
     def _put_together(self) -> Iterator[Edit]:
-        """Yield what writes members, or leaves them out, with what parts them from their neighbours."""
+        """Yield the edits that insert and remove members, with their separators."""
         gap, members = Const(self.between.encode()), list(self.members.values())
         if not members and (parts := self.behind[""]):
             yield Edit(self.node.start, self.node.end, (Const(b"{"), *_joined(parts, gap), Const(b"}")))
-        follows = False  # whether a member comes before
+        follows = False  # whether a member is before it
         for at, (key, (key_node, value)) in enumerate(self.members.items()):
             parts = self.behind[key]
             yield from (Edit(key_node.start, key_node.start, (*part, gap)) for part in self.ahead[key])
@@ -128,24 +128,24 @@ class Splicer:
             follows = follows or bool(parts) or key not in self.dropped
 
     def _same_rotation(self) -> bool:
-        """Return True if the rotation is written as it was read, number by number."""
+        """Return True if the rotation is written in the notation it was read in."""
         shape, target = self.record.shape, self.target
         same = [(shape.notation, shape.degrees)] == list(target.notations) if shape.notation else not target.notations
-        is_alone = self.record.keys.flat == QUATERNION and target.unit is not None  # x y z w mean nothing with xyz
+        is_alone = self.record.keys.flat == QUATERNION and target.unit is not None  # no rotation next to xyz
         return same and shape.whole == target.whole and not (shape.inverse or is_alone)
 
     def _numbers(self, slots: Sequence[int], first: int) -> None:
-        """Put numbers of the result where the slots are."""
+        """Replace the numbers in some slots by those of the result from `first` on."""
         for out, slot in enumerate(slots, self.first + first):
             if (node := self.slots[slot]) is not None:
                 inside = node.start + bool(node.quote), node.end - bool(node.quote)
                 self.edits.append(Edit(*inside, (Out(out, out + 1, b""),)))
 
     def _in_place(self) -> None:
-        """Write the numbers of a result where those of the record are, or its members anew."""
+        """Write the numbers of a result in the place of the record's, or as new members."""
         target, shape, keys = self.target, self.record.shape, self.record.keys
         if target.scaled:
-            self.dropped.update(keys.covariances)  # the matrix says the scale
+            self.dropped.update(keys.covariances)  # the matrix has the scale
         elif not shape.rewritten:
             own, extras = shape.own_size, len(target.extras)
             self._numbers(range(own, own + sum(shape.covariance)), target.own_size + extras)
@@ -161,12 +161,12 @@ class Splicer:
         if shape.unit is None:
             if target.unit is not None:
                 self.ahead[keys.rotation or self.head].append(self._place("xyz"))
-        elif target.unit is None:  # a whole matrix takes it in
+        elif target.unit is None:  # becomes part of a 4x4 matrix
             self.dropped.update(members)
         elif None in self.slots[:there] or (there < 3 and not target.absent) or target.place != shape.place:
             self.behind[members[0]].append(self._place(keys.position or kind))
             self.dropped.update(members)
-        elif not self.request.keeps_position or shape.inverse:  # else it keeps its text
+        elif not self.request.keeps_position or shape.inverse:  # else its text is unchanged
             self._numbers(range(there), 0)
         at, made = "", list[Pieces]()
         if shape.kind in row_layout.TURNED:
@@ -180,14 +180,14 @@ class Splicer:
                 if at:
                     self.dropped.update({"angles", at, *keys.flat})
                 elif made and target.unit is None:
-                    at = next(iter(members), "")  # the place of the position, which it takes in
+                    at = next(iter(members), "")  # where the position was, which is part of it
             at = at or keys.position
         else:
             self.dropped.update(keys.others)
         self.behind[at or self.tail] += made + self._extras(target.own_size)
 
     def _place(self, key: str) -> Pieces:
-        """Write the position as a member, or as those of a place, with the axes of its rotation."""
+        """Write the position as members: x, y, z, or a geodetic one with the axes of its rotation."""
         place = self.target.place
         entry: dict[str, Any] = {key: list(SAMPLE[:3])} if place is None else place.entry(place.sample)
         if place is not None and place.name in EARTH_FRAMES:
@@ -197,9 +197,9 @@ class Splicer:
         return self._member(entry, 0)
 
     def _rotation(self) -> list[Pieces]:
-        """Write the rotation in all its notations, and the flag of a lock; nothing without a rotation."""
+        """Write the rotation in all notations, with the flag for gimbal lock; [] without a rotation."""
         notations = self.target.notations
-        degrees = any(degrees for notation, degrees in notations if notation.degrees is None)  # what bare angles are
+        degrees = any(degrees for notation, degrees in notations if notation.degrees is None)  # of bare angles
         style = Style("json", tuple(notation for notation, _ in notations), degrees=degrees)
         entry = Result(Pose(SAMPLE[:3] if self.target.whole else None, SAMPLE)).mapping(style)
         entry.pop("gimbal_lock", None)
@@ -210,7 +210,7 @@ class Splicer:
         return [made] if made else []
 
     def _extras(self, first: int) -> list[Pieces]:
-        """Return what comes with a result as members; one of the record that gives way to such a one is replaced."""
+        """Return the extra numbers of a result as members; existing ones are replaced if the operation does so."""
         said, prefix = self.request.operation.shown, self.request.results.prefix
         if said is None:
             names = [prefix + name for name in self.target.extras]
@@ -231,7 +231,7 @@ class Splicer:
         return members
 
     def _listed(self, places: Sequence[int]) -> Iterator[Piece]:
-        """Yield the numbers of a list, or the one alone; null instead of nan."""
+        """Yield the pieces of a list of numbers, or of a single one; null instead of nan."""
         precision = self.request.results.precision
         fmt, exponent = "" if precision is None else f"z.{precision}f", b"e" if self.json else b".0e"
         opens, closes = ("[", "]") if places[1:] else ("", "")
@@ -241,13 +241,13 @@ class Splicer:
             yield row_layout.Item(self.first + at, around, exponent)
 
     def _names(self) -> None:
-        """Rename the frames as the operation does: where the record says them, or in members of their own."""
+        """Rename frames where the record names them, or in new members."""
         record, place, kind = self.record, self.target.place, self.record.shape.kind
         parent, placed = "parent" if self.kind == POSE else "frame", record.keys.placed
         is_place = place is not None and place.name not in EARTH_FRAMES and parent == "frame"
         is_local = is_place or (place is not None and place.origin is not None)
         said: dict[str, Any] = {}
-        if record.parent.text and not record.parent.paths and not is_local:  # a place, which says its frame
+        if record.parent.text and not record.parent.paths and not is_local:  # of a geodetic position
             said[parent] = self.entry.parent
         if placed and record.name.text and not record.name.paths:
             said["name"] = self.entry.name
@@ -255,12 +255,12 @@ class Splicer:
             said["stamp_ns"] = Verbatim(str(record.stamp_ns))
         names = [(record.name, self.entry.name, "name")]
         names += [(record.parent, self.entry.parent, parent)] if record.parent.paths or not record.parent.text else []
-        # in a row that was no pose they say something else
+        # in a row that was no pose these keys have another meaning
         others = not self.request.rows.poses and {"name", "parent"} & self.members.keys() - {*record.keys.members}
         for old, new, key in () if self.request.rename is None or others else names:
             if new == old.text:
                 continue
-            if not old.paths and kind not in SIX:  # a bare Twist or Wrench has no field for it
+            if not old.paths and kind not in SIX:  # a bare Twist or Wrench has no such field
                 said[key] = new
             for path in old.paths:
                 if new is None and path[:-1] == record.path and path[-1] != "child_frame_id":
@@ -273,7 +273,7 @@ class Splicer:
             self.ahead[self.head].append(self._member(said, 0))
 
     def _member(self, entry: dict[str, Any], first: int) -> Pieces:
-        """Write members in the record's style, each number a piece."""
+        """Write members in the style of the record; each number is a piece."""
         if self.flow:
             text = (dump_json if self.json else flow)(entry, lambda _: MARK)[1:-1]
         else:
@@ -288,12 +288,12 @@ class Splicer:
 
 
 def _joined(parts: Sequence[Pieces], gap: Const) -> Pieces:
-    """Return members with what parts them."""
+    """Return members with separators."""
     return tuple(piece for part in parts for piece in (gap, *part))[1:]
 
 
 def quoted_name(node: Node, name: str, *, json: bool) -> str:
-    """Write a frame's name with the quotes that the one before it had."""
+    """Write a frame's name with the quotes of the name that it replaces."""
     if node.quote == "'":
         return "'" + name.replace("'", "''") + "'"
     if not json and (node.quote != '"' or not node.value):
@@ -302,7 +302,7 @@ def quoted_name(node: Node, name: str, *, json: bool) -> str:
 
 
 def rendered(known: RecordText, answers: Sequence[Answer]) -> bytes:
-    """Return the text with results in the place of numbers, some of them as words; b"" where nothing is in it."""
+    """Return the text with results instead of its numbers; b"" if it has no records."""
     numbers = [*chain.from_iterable(map(written, answers))]
     precision, exponent = known.request.results.precision, "e" if known.json else ".0e"
     fmt = "" if precision is None else f"z.{precision}f"
@@ -324,7 +324,7 @@ def rendered(known: RecordText, answers: Sequence[Answer]) -> bytes:
 def stretches_of(
     length: int, cuts: Sequence[tuple[int, int]], edits: Iterable[Edit]
 ) -> tuple[list[tuple[int, int]], list[Piece]]:
-    """Cut a text into stretches, each number one of its own; return them with the pieces of the result."""
+    """Split a text into stretches, one for each of `cuts`, and return them with the pieces of the result."""
     stretches: list[tuple[int, int]] = []
     pieces: list[Piece] = []
     slots, at = list(reversed(cuts)), 0
@@ -343,7 +343,7 @@ def stretches_of(
 
 
 def nulled(record: bytes, *, json: bool) -> tuple[str, bool]:
-    """Return a record with null in the place of our numbers, and whether it has any; "" for a broken one."""
+    """Return a record with null instead of the numbers of its pose, and whether it has any; "" for a broken one."""
     try:
         text = record.decode()
         json_documents(Source("", text)) if json else parse_documents(text, "")
@@ -354,12 +354,12 @@ def nulled(record: bytes, *, json: bool) -> tuple[str, bool]:
 
 
 def column_in(text: bytes, place: int) -> int:
-    """Return the column, from 1, at which a place is in its line."""
+    """Return the column, from 1, of an offset in its line."""
     return len(text[text.rfind(b"\n", 0, place) + 1 : place].decode("utf-8", "replace")) + 1
 
 
 def attempt(text: bytes, part: Part, line: int = 0, *, fmt: str, request: Request, name: str) -> RecordText | Fault:
-    """Read one record of a stream, or say what is wrong with it; line: where it begins, counted from 0."""
+    """Read one record of a stream and prepare its edits, or return a Fault; line: its first line, from 0."""
     if part.problem:
         return Fault(line, "", part.problem, final=part.final)
     source = Source(name, "", line + 1, column_in(text, part.start))
@@ -377,14 +377,14 @@ def attempt(text: bytes, part: Part, line: int = 0, *, fmt: str, request: Reques
         for entry in () if request.results.canonical else found.entries:
             edits += Splicer(found.root, entry, request, json=found.json, first=first).run()
             first += entry.target.size
-        found.edits = list(dict.fromkeys(edits))  # a name that several records share changes once
+        found.edits = list(dict.fromkeys(edits))  # a name that several records share is edited once
     except FrametoolError as error:
         return fault_at(source, error, line)
     return found
 
 
 def fault_at(source: Source, error: FrametoolError, line: int) -> Fault:
-    """Return an error in a record as a fault with its place; line: of one that does not say its own."""
+    """Return an error in a record as a Fault with its place; line: for an error without one."""
     column = getattr(error, "column_name", "")
     if not isinstance(error, FormatError):
         return Fault(line, column, error)
