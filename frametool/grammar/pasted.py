@@ -100,7 +100,8 @@ def number_rows(text: str, *, any_text: bool = False) -> Rows | None:
     for piece in filter(str.strip, pieces):
         row = piece.strip().removesuffix(",").strip()
         gaps = re.findall(r"\s*,\s*|\s+", row)
-        if 0 < sum("," in gap for gap in gaps) < len(gaps):
+        is_number = re.fullmatch(rf"(?:{NUMBER}|[\s,])+", row) is not None
+        if is_number and 0 < sum("," in gap for gap in gaps) < len(gaps):
             both = f"{shown(row)} is separated by blanks and by commas"
             raise ValueInvalid(f"{both}; are these decimal commas? write points")
         rows.append(re.split(r"\s*,\s*|\s+", row))

@@ -56,7 +56,8 @@ _BEGIN = re.compile(
       | [-+]?\s*+(?:{DECIMAL}\s*+)?(?:\*\s*+)?[ijk]\s*+(?:[-+]|\Z) | {NUMBER}\s*+[-+]
       | \d+[\xd7x]\d+\b | Columns?\ \d | \[,\d | \\(?:left|begin)\b | [⎡⎛│┌] | (?:se3|so3|quaternion)\s*\n )
     | \x1b\[ | Out\[\d | Parameter\ containing: | (?:[A-Za-z_]\w*\s*)?<< | \(x,\s*y,\s*z,\s*w\)\s*=
-    | (?:\w++:\s*+)?t\s*+= | (?:R|rot|rotation|rotation_matrix|t|p|T|trans|translation|tvec)\s*[:=]\s*[\[(\n]
+    | (?:\w++:\s*+)?t\s*+= | (?:R|rot|rotation|rotation_matrix|t|p|T|trans|translation|tvec)\s*[:=][^\S\n]*+
+      (?:[\[(] | \n\s*+(?:[-+]?[.\d\[(]|[A-Za-z_][\w.]*+\())       # no list of YAML, which has - and a blank
     | [xyzw]:\s*{NUMBER}\s*,
     | <(?:origin|joint|node|Matrix|Quaternion|Euler)\b | (?:args|x)\s*=
     | (?:\[\w++\]\ .*+\n\s*+)*+(?:At\ (?:any\ )?time\b|-\ ++(?:Translation|Rotation):|Rotation:\ in\ |\S+\ seen\ from\ )

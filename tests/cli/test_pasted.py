@@ -360,3 +360,15 @@ def test_three_lines_of_unequal_length_are_a_table_with_a_bad_row(command: str, 
     done = run(*command.split(), stdin=ragged)
     assert done.status == 1
     assert "stdin:2: expected 3 cells, found" in done.err
+
+
+@pytest.mark.parametrize("key", ["translation", "rotation", "t"])
+def test_a_stream_of_yaml_is_not_pasted_whatever_its_first_key(run: Run, key: str) -> None:
+    turned = "rotation:\n  x: 0.0\n  y: 0.0\n  z: 1.0\n  w: 0.0\n" if key == "rotation" else "rpy_deg: [0, 0, 180]\n"
+    moved = f"{'translation' if key == 'rotation' else key}:\n- 1.0\n- 2.0\n- 3.0\n"
+    record = (turned + moved if key == "rotation" else moved + turned) + "note: a, b\n---\n"
+    found = run("invert", "--to", "xyzw", "-f", "json", stdin=record * 1000)
+    assert (found.status, found.err) == (0, "")
+    assert [json.loads(line) for line in found.out.splitlines()] == 1000 * [
+        {"xyz": [1.0, 2.0, -3.0], "xyzw": [0.0, 0.0, 1.0, 0.0], "note": "a, b"}
+    ]
