@@ -524,10 +524,11 @@ def chained(along: Array, delta: float) -> tuple[Indices, Indices]:
 
 
 def all_pairs(along: Array, delta: float, tolerance: float) -> tuple[Indices, Indices]:
-    """Return for each i the j whose distance from there is the nearest to delta, within a share of it."""
+    """Return for each i the first j whose distance from there is the nearest to delta, within a share of it."""
     wanted = along + delta
     after = np.searchsorted(along, wanted).clip(1, len(along) - 1)
-    end = np.where(wanted - along[after - 1] <= along[after] - wanted, after - 1, after)
+    nearest = np.where(wanted - along[after - 1] <= along[after] - wanted, after - 1, after)
+    end = np.searchsorted(along, along[nearest])
     start = np.arange(len(along))
     fits = (np.abs(along[end] - wanted) <= tolerance * delta) & (end > start)
     return start[fits], end[fits]

@@ -425,7 +425,7 @@ def _relative(
         else:
             ends = alignment.chained(along, delta.amount)
             if reporting.all_pairs:
-                ends = alignment.all_pairs(along, delta.amount, reporting.tolerance)
+                ends = alignment.all_pairs(along, delta.amount, reporting.tolerance * (delta.unit != "frames"))
             why = "" if len(ends[0]) else "no two poses are so far apart"
         if not why:
             yield delta, alignment.relative_errors(ref, est, *ends)

@@ -77,6 +77,12 @@ def test_evo_does_the_same(run: Run) -> None:
     assert each["rpe"][0]["full"]["rmse"] == pytest.approx(rpe["full"]["rmse"], rel=1e-9)
 
 
+def test_all_pairs_of_frames_are_exactly_so_many_frames_apart(run: Run) -> None:
+    """The tolerance is one of distances and times: nine frames at the end are no ten."""
+    rows = run("compare", *DRONE, "--delta", "20frames", "--all-pairs", "--rows=rpe", "-f", "csv", files=FILES).out
+    assert len(rows.splitlines()) == 1 + 160 - 20
+
+
 def test_clock_and_mount_are_found_and_told(run: Run) -> None:
     told = run("compare", "clock-ref.tum", "clock-est.tum", files=FILES).err
     assert re.search(r"the clock of clock-est.tum seems 0.25\d s behind \(score 0.99\d\); --offset auto", told)

@@ -150,6 +150,11 @@ def test_evo_gives_the_same_numbers() -> None:
             close(statistics(found.m), row["trans_part"], exact)
 
 
+def test_all_pairs_end_at_the_first_of_poses_at_one_place() -> None:
+    starts, ends = all_pairs(np.array([0.0, 0.5, 1.0, 1.0, 1.0, 2.5]), 1.0, 0.1)
+    assert (starts.tolist(), ends.tolist()) == ([0], [2])
+
+
 def test_a_clock_that_is_late_is_found_to_a_millisecond() -> None:
     for name, case in CASES.items():
         ref, est = read(case["ref"]).in_order(), read(case["est"]).in_order()
