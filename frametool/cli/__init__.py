@@ -1,7 +1,7 @@
-"""The command line: the edge where whatever goes wrong becomes a line on stderr and an exit code.
+"""Run the command line; every error becomes one line on stderr and an exit code.
 
-Nothing is read from a file to import this: from the first moment on Ctrl-C ends the process without a traceback, and
-that no module can be opened is one line.
+Importing this module opens no files: Ctrl-C ends the process without a traceback from the start, and a module that
+cannot be opened is an error of one line.
 """
 
 import gc
@@ -10,28 +10,28 @@ import sys
 from io import TextIOWrapper
 
 IN_OUT, INTERRUPTED = 5, 130  # exit codes
-COLLECTED_EVERY = (50_000, 20, 100)  # objects, and rounds of them: a tree is no garbage, and walking it takes longest
+COLLECTED_EVERY = (50_000, 20, 100)  # objects, and collections: scanning a large tree again and again is slow
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line as a program of its own and exit with its status."""
     try:
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads that nothing here uses cost memory
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # unused threads would cost memory
         gc.set_threshold(*COLLECTED_EVERY)
         from frametool.cli.signals import with_signals
 
         status = with_signals(run, sys.argv[1:] if arguments is None else arguments)
     except KeyboardInterrupt:
         status = INTERRUPTED
-    except (ImportError, OSError) as error:  # no module can be opened any more, nor those with better words
+    except (ImportError, OSError) as error:  # no module can be opened, nor those that write messages
         sys.stderr.write(f"frametool: {(getattr(error, 'strerror', None) or str(error)).lower()}\n")
         status = IN_OUT
-    gc.freeze()  # on the way out nothing is looked through for garbage
+    gc.freeze()  # no garbage collection at exit
     sys.exit(status)
 
 
 def run(arguments: list[str]) -> int:
-    """Run one command; whatever goes wrong becomes one line on stderr and an exit code."""
+    """Run one command; every error becomes one line on stderr and an exit code."""
     from frametool.cli.commands import TROUBLE, answer
     from frametool.cli.signals import die_of
     from frametool.cli.sink import TROUBLES, discard, say, say_error, say_warning, wants_json, words_of
@@ -46,7 +46,7 @@ def run(arguments: list[str]) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # the same bytes in every locale and on every system
             stream.reconfigure(encoding="utf-8", errors=stream.errors, newline="\n")
-    sys.setrecursionlimit(max(sys.getrecursionlimit(), 20 * DEEPEST))  # a document may be so deep, a walk some calls
+    sys.setrecursionlimit(max(sys.getrecursionlimit(), 20 * DEEPEST))  # calls for each level of a document
     status = 0
     try:
         with heard_by(say_warning):
@@ -59,9 +59,9 @@ def run(arguments: list[str]) -> int:
                 status = own or error.exit_code
         sys.stdout.flush()
     except BrokenPipeError:
-        status = die_of("SIGPIPE")  # as `cat` does when its reader is gone
+        status = die_of("SIGPIPE")  # as `cat` does if its reader is gone
     except TROUBLES as error:
-        if status != in_out or not isinstance(error, OSError):  # else it was reported, and the buffer fails again
+        if status != in_out or not isinstance(error, OSError):  # else it is reported, and the buffer fails again
             say(words_of(error))
         if isinstance(error, OSError):
             discard(sys.stdout)

@@ -1,7 +1,7 @@
-"""What a command is: its inputs, its arguments and options as data, its help, and how click parses it.
+"""Define commands: their inputs, arguments, options and help, and how click parses them.
 
-An option that was passed, and that nobody has asked for when the first result is written, would be ignored: it is a
-usage error, and nothing is written.
+An option that was passed but not used before the first result is written has no effect: this is a usage error, and
+nothing is written.
 """
 
 from __future__ import annotations
@@ -28,28 +28,28 @@ if TYPE_CHECKING:
     Lists = Callable[[click.HelpFormatter, bool], None]
     Offers = Callable[[click.Context, str], Mapping[str, str] | None]
 
-# an argument that begins like this is a number, whatever short options there are
+# an argument that begins like this is a number, not a short option
 NEGATIVE = r"(?i)-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translation:|Rotation:|Pose \[)|--\s)"
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
-EVERYTHING = "frametool.everything"  # a key in a context's `meta`
+EVERYTHING = "frametool.everything"  # a key of a context's `meta`
 INPUTS = "frametool.inputs"  # another
-# the value of an option of several values in a command without it
+# values of repeatable options in commands that do not have them
 WITHOUT = {"input_formats": (), "topics": (), "joints": (), "joint_files": (), "named_frames": (), "messages": ()}
-# options that any way may ignore: they are about what is said, not about what is done
+# options on messages, which may be without effect
 OF_MESSAGES = ("quiet", "verbose")
 
 
 class Inputs:
-    """The arguments and options of a command, by the names of its parameters; to read one is to ask for it.
+    """The arguments and options of a command, by the names of its parameters; reading one marks it as used.
 
-    idle: the options that were passed and that nobody has asked for yet
-    peek: returns a value that is looked at and not used
-    reads_trees: whether files of frames are opened: --in is then about these too
-    earth: what the options say of places on the Earth, made when first needed
+    idle: the options that were passed and are not used yet
+    peek: returns a value without marking it as used
+    reads_trees: files of frames are opened, so --in applies to these too
+    earth: the options on geodetic positions, set when first needed
     """
 
     def __init__(self, values: dict[str, Any], idle: dict[Any, Option]) -> None:
-        """Keep the values, and the options that were passed."""
+        """Store the values, and the options that were passed."""
         values |= WITHOUT | values
         self._values, self.idle = values, idle
         self.peek: Callable[[str], Any] = values.get
@@ -57,19 +57,19 @@ class Inputs:
         self.earth: Earth | None = None
 
     def __getattr__(self, name: str) -> Any:
-        """Return the value of an argument or option, which counts as asked for; None where the command has none."""
+        """Return the value of an argument or option and mark it as used; None if the command does not have it."""
         if name.startswith("_"):
             raise AttributeError(name)
         self.idle.pop(name, None)
         return self._values.get(name)
 
     def ask(self, *names: str) -> None:
-        """Count options as asked for."""
+        """Mark options as used."""
         for name in names:
             self.idle.pop(name, None)
 
     def leave(self, **values: Any) -> None:
-        """Put what other readers have left in the place of what was passed."""
+        """Replace values by the part of them that is left for other readers."""
         self._values |= values
 
     def but(self, **values: Any) -> Inputs:
@@ -77,50 +77,50 @@ class Inputs:
         return Inputs(self._values | values, self.idle)
 
     def note(self, *texts: str | None) -> None:
-        """Report how the input is taken, unless --quiet; what is empty is no report."""
+        """Report what is assumed of the input, unless --quiet; empty texts are skipped."""
         for text in () if self.quiet else filter(None, texts):
             say(text)
 
     def refuse_idle(self, *names: str) -> None:
-        """Raise a usage error for options that were passed and that nobody has asked for, or for these of them."""
+        """Raise a usage error for options, or some of them, that were passed but not used."""
         if idle := [option.opts[-1] for name, option in self.idle.items() if not names or name in names]:
             raise click.UsageError(f"{', '.join(idle)} {'has' if len(idle) == 1 else 'have'} no effect here")
 
 
 class Option(click.Option):
-    """An option with what it says about others of its command, by the names of their parameters, and its place in help.
+    """An option with its relations to others of the command, by the names of their parameters, and its help heading.
 
-    excludes: those that cannot accompany it
-    requires: without any of these it has no meaning
+    excludes: options that cannot be combined with it
+    requires: one of these must be passed too
     under: the first word of its heading
     """
 
     def __init__(self, names: Any, excludes: Any = (), requires: Any = (), under: str = "Options", **rest: Any) -> None:
-        """Keep these next to what click keeps."""
+        """Store these; the rest is click's."""
         super().__init__(names, **rest)
         self.excludes, self.requires, self.under = excludes, requires, under
 
 
-def refuse(holds: object, message: str) -> None:
-    """Raise a usage error where something holds of what was asked for."""
-    if holds:
+def refuse(is_wrong: object, message: str) -> None:
+    """Raise a usage error if the condition is true."""
+    if is_wrong:
         raise click.UsageError(message)
 
 
 def refuse_two_readers(arguments: Iterable[str]) -> None:
-    """Raise a usage error where two arguments are standard input."""
+    """Raise a usage error if two arguments are standard input."""
     refuse([*arguments].count("-") > 1, "standard input can be read once; only one argument may be -")
 
 
 def say_if_typed(argument: str = "-") -> None:
-    """Note that a terminal is read where an argument is standard input."""
+    """Report that input is read from the terminal, if the argument is standard input and that is one."""
     if argument == "-" and sys.stdin is not None and sys.stdin.isatty():
         say("reading from the terminal; end with Ctrl-D")
 
 
 @contextmanager
 def misuse(where: str = "") -> Iterator[None]:
-    """Turn values that cannot be into usage errors, but for what is no rotation; where: what begins their sentence."""
+    """Turn ValueInvalid into a usage error that begins with `where`; NotARotation is passed on."""
     try:
         yield
     except ValueInvalid as error:
@@ -132,7 +132,7 @@ def misuse(where: str = "") -> Iterator[None]:
 
 
 def asking(inputs: Inputs, kind: type[Record], options: Mapping[str, Sequence[str]]) -> type[Record]:
-    """Return a kind of record whose fields, where they hold something, count options as asked for when looked at."""
+    """Return a subclass of a record type; reading a field that is not empty marks its options as used."""
 
     def look_at(record: Record, name: str) -> Any:
         value = kind.__getattribute__(record, name)
@@ -144,7 +144,7 @@ def asking(inputs: Inputs, kind: type[Record], options: Mapping[str, Sequence[st
 
 
 def show_help(ctx: click.Context, *, everything: bool = False, paged: bool = False) -> None:
-    """Print the help of a command, with `everything` of all its options."""
+    """Print the help of a command; with `everything` all its options are explained."""
     ctx.meta[EVERYTHING] = everything
     show(f"{ctx.get_help()}\n", paged=paged or everything)
 
@@ -156,7 +156,7 @@ def _help(ctx: click.Context, option: click.Parameter, chosen: bool) -> None:  #
 
 
 def option_row(option: click.Option) -> tuple[str, str]:
-    """Return the names of an option with what it takes, and its meaning; long lists of choices are in the latter."""
+    """Return the names of an option with its value, and its meaning; long lists of choices are part of the meaning."""
     names, text = ", ".join((*option.opts, *option.secondary_opts)), option.help or ""
     taken = option.metavar or option.type.name.upper()
     if isinstance(option.type, click.Choice) and not option.metavar:
@@ -170,7 +170,7 @@ def option_row(option: click.Option) -> tuple[str, str]:
     return names if option.is_flag or option.count else f"{names} {taken}", text
 
 
-# made without click's translations: those load `locale`, 2 ms of every start
+# defined here because click's own, which are translated, import `locale`, 2 ms of every start
 HELP_OPTION = click.Option(
     ["-h", "--help"], is_flag=True, is_eager=True, expose_value=False, callback=_help,
     help="this message; --help-all explains every option",
@@ -185,13 +185,13 @@ HEADINGS = (
     "Rows (help streams)", "Result (help errors)", "Formats that do not specify something (help formats)",
     "Turtles (help turtles)",
 )  # fmt: skip
-WIDEST = 24  # of the left column
-LONGEST_CHOICE = 14  # of choices next to their option
-LONGEST_LINE = 62  # of names of common options
+WIDEST = 24  # columns of the option names
+LONGEST_CHOICE = 14  # characters of choices in the left column
+LONGEST_LINE = 62  # characters of the names of common options
 
 
 def grouped(options: Iterable[click.Parameter], own: Sequence[str] = ()) -> dict[str, list[click.Option]]:
-    """Return options under their headings, `own` ones among the first; no heading is empty."""
+    """Return options by heading, those in `own` under the first one; empty headings are omitted."""
     found: dict[str, list[click.Option]] = {title: [] for title in HEADINGS}
     for each in options:
         if isinstance(each, click.Option) and not each.hidden:
@@ -201,7 +201,7 @@ def grouped(options: Iterable[click.Parameter], own: Sequence[str] = ()) -> dict
 
 
 def option_groups(command: click.Command, ctx: click.Context) -> dict[str, list[click.Option]]:
-    """Return the options of a command under their headings, those that it is about first."""
+    """Return the options of a command by heading, its main ones under the first."""
     return grouped(command.get_params(ctx), getattr(command, "own", ()))
 
 
@@ -216,17 +216,17 @@ def write_options(formatter: click.HelpFormatter, groups: Mapping[str, Sequence[
 
 
 def _is_negative(argument: str) -> bool:
-    """Return True if an argument begins as a number; most need no pattern for that, whose compiling takes longest."""
+    """Return True if an argument is a negative number; the pattern is only compiled if it may match, which is slow."""
     is_long = argument[:2] == "--" and argument[2:3].isalpha()
     return argument[:1] == "-" and not is_long and re.match(NEGATIVE, argument) is not None
 
 
 class Text(click.types.StringParamType):
-    """A text argument, without the blank that shields negative numbers; as a file's name it may hold any bytes.
+    """The type of a text argument: removes the space that protects negative numbers; a file name may have any bytes.
 
-    read: returns what a text says; a ValueInvalid that it raises is a wrong value of the option
-    offers: returns what the shell may complete, and what it means; None for names of files, which the shell knows
-    choices: all texts that there are, where they are few
+    read: parses the text; ValueInvalid from it is a usage error of the option
+    offers: returns the shell's completions and their meanings; None for file names, which the shell completes itself
+    choices: all valid texts, if they are few
     """
 
     name = "text"
@@ -235,11 +235,11 @@ class Text(click.types.StringParamType):
         self, read: Callable[[str], Any] = str, offers: Offers = lambda _ctx, _incomplete: {},
         choices: Collection[str] = (),
     ) -> None:  # fmt: skip
-        """Keep these."""
+        """Store these."""
         self.read, self.offers, self.choices = read, offers, choices
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Remove the blank, and read the text."""
+        """Remove the space, and parse the text."""
         if not isinstance(value, str):
             return value
         try:
@@ -248,13 +248,13 @@ class Text(click.types.StringParamType):
             self.fail(str(error), param, ctx)
 
     def offered(self, ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:
-        """Return what it offers, without a word; nothing where a file cannot be read."""
+        """Return the completions, without any messages; none if a file cannot be read."""
         with heard_by(lambda *_: None), suppress(FrametoolError, click.UsageError, OSError):
             return self.offers(ctx, incomplete)
         return {}
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
-        """Offer what begins as the incomplete word does."""
+        """Return the completions that begin with the incomplete word."""
         from click.shell_completion import CompletionItem
 
         offered = self.offered(ctx, incomplete)
@@ -265,13 +265,13 @@ class Text(click.types.StringParamType):
 
 TEXT = Text()
 FILE = Text(offers=lambda _ctx, _incomplete: None)
-# options that may be without =VALUE, and their values: the first is what they mean then
+# options whose =VALUE may be omitted, and their values, the default first
 OPTIONAL = {"--explain": ("text", "markdown"), "--rows": ("ate", "rpe", "kitti")}
-OF_POSES = ("compose", "convert", "interpolate", "invert", "mean", "relative")  # they have no other arguments
+OF_POSES = ("compose", "convert", "interpolate", "invert", "mean", "relative")  # they take only poses
 
 
 def _kind(kind: Any) -> click.ParamType[Any]:
-    """Return the type of words that a value may be, or of what a function reads."""
+    """Return the parameter type of a tuple of choices, or of a function that parses the text."""
     if isinstance(kind, click.ParamType):
         return kind
     if isinstance(kind, tuple):
@@ -280,10 +280,10 @@ def _kind(kind: Any) -> click.ParamType[Any]:
 
 
 def option(spec: str, about: str, kind: Any = None, name: str = "", **more: Any) -> Adds:
-    """Return an option as its help has it: `-o --output FILE`; a flag, where no word follows and no kind is said.
+    """Return an option from its names and value as in its help, `-o --output FILE`; a flag without value and kind.
 
-    kind: the words a value may be, or what reads it; text, or a file, unless it is said
-    name: of the parameter, where it is not that of the option
+    kind: the choices, or a function that parses the value; by default a text or a file
+    name: of the parameter, if it differs from that of the option
     """
     words = spec.split()
     names = [each for each in words if each.startswith("-")]
@@ -298,31 +298,31 @@ def option(spec: str, about: str, kind: Any = None, name: str = "", **more: Any)
     made = cache(partial(Option, names, help=about, metavar=taken or None, show_default=shows, **more))
 
     def add(function: Any) -> Any:
-        vars(function).setdefault("__click_params__", []).append(made())  # one object for all that share it
+        vars(function).setdefault("__click_params__", []).append(made())  # one object for all commands
         return function
 
     return add
 
 
 def argument(name: str, kind: Any = TEXT, metavar: str | None = None, **more: Any) -> Adds:
-    """Return an argument; optional where it has a default, `required=False` or any number of values."""
+    """Return an argument; optional with a default, `required=False` or any number of values."""
     return click.argument(name, type=_kind(kind), metavar=metavar, **more)
 
 
 def together(*options: Adds) -> Adds:
-    """Return what adds several options to a command, in this order in its help."""
+    """Return a decorator that adds several options to a command, in this order in its help."""
     return lambda function: reduce(lambda made, add: add(made), reversed(options), function)
 
 
 class WithHelp(click.Command):
     """A command with one -h and --help, and --help-all.
 
-    own: the options that it is about although they have a heading elsewhere
-    lists: writes a list before the exit codes, for --help-all with all its meanings
+    own: its main options, which other commands have under another heading
+    lists: writes a list before the exit codes, for --help-all with explanations
     """
 
     def __init__(self, *args: Any, own: Sequence[str] = (), lists: Lists | None = None, **kwargs: Any) -> None:
-        """Add the helps, which are the same for all; of options with one name the first counts, as a command's own."""
+        """Add the help options; of several options with one name the first, that of the command itself, is used."""
         super().__init__(*args, **kwargs)
         self.add_help_option = False
         names = {name: each for each in reversed(self.params) for name in each.opts}
@@ -330,7 +330,7 @@ class WithHelp(click.Command):
         self.own, self.lists = own, lists
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the options of this command, and a line for each group that others have too; then the commands."""
+        """Write the options of this command, one line per group of common options, and the subcommands."""
         groups = option_groups(self, ctx)
         formatter.write_paragraph()
         if ctx.meta.get(EVERYTHING):
@@ -338,7 +338,7 @@ class WithHelp(click.Command):
         else:
             write_options(formatter, {"Options": groups.pop("Options")})
             rows = []
-            for title, options in groups.items():  # what a line of 80 columns has no room for is left to --help-all
+            for title, options in groups.items():  # those that do not fit in 80 columns are only in --help-all
                 line = " ".join(each.opts[0] for each in options)
                 cut = f"{line[:LONGEST_LINE].rpartition(' ')[0]} .." if len(line) > LONGEST_LINE else line
                 rows.append((title.partition(" ")[0], cut))
@@ -352,20 +352,20 @@ class WithHelp(click.Command):
 class Command(WithHelp):
     """A command whose arguments may be negative numbers.
 
-    click takes `-1e-3` for options. A blank before each such argument keeps it from doing so without giving up its
-    own check of misspelled options; `Text` takes the blank off again.
+    click takes `-1e-3` for options. A space before each such argument prevents this and preserves click's check of
+    misspelled options; `Text` removes the space.
     """
 
     parser: Any = None
 
     def make_parser(self, ctx: click.Context) -> Any:
-        """Return click's parser, made once: it is asked for the options that are passed, and in a batch again."""
+        """Return click's parser, created once for all calls, also those of a batch."""
         self.parser = self.parser or super().make_parser(ctx)
         self.parser.ctx = ctx
         return self.parser
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Shield negative numbers (-j is an option where joints are), give bare options their values, then parse."""
+        """Protect negative numbers (not -j if it is an option), add default values of options, then parse."""
         if any(map(_is_negative, args)):
             options = {name for each in self.get_params(ctx) for name in each.opts}
             args = [f" {each}" if _is_negative(each) and each not in options else each for each in args]
@@ -395,14 +395,14 @@ class Command(WithHelp):
         return rest
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command on its inputs, each of which must have been asked for when something is written."""
+        """Run the command; all options that were passed must be used before something is written."""
         passed: Inputs = ctx.meta[INPUTS]
         CHECKS.append(passed.refuse_idle)
         try:
             result = ctx.invoke(self.callback or (lambda _: 0), passed)
         except FormatError as error:
             advised = re.search(r"; (?:give|name them with) (--[\w-]+)$", error.message)
-            if advised and not any(advised[1] in each.opts for each in self.params):  # this command has no such option
+            if advised and not any(advised[1] in each.opts for each in self.params):  # not an option of this command
                 error.message = error.message[: advised.start()]
             raise
         finally:
@@ -411,7 +411,7 @@ class Command(WithHelp):
         return result
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """End every help with the exit codes, those of most commands unless its epilog says others."""
+        """End the help with the exit codes: those of the epilog, or the common ones."""
         formatter.write_paragraph()
         if self.lists:
             self.lists(formatter, bool(ctx.meta.get(EVERYTHING)))
@@ -420,7 +420,7 @@ class Command(WithHelp):
 
 
 def _joined(args: list[str], ctx: click.Context, *, always: bool) -> list[str]:
-    """Write the word `inv` before a pose as inv(POSE); before what may be no pose it is a name, unless `always`."""
+    """Rewrite the word `inv` and the pose behind it as inv(POSE); `always`: also if that may not be a pose."""
     joined: list[str] = []
     for each in reversed(args):
         is_pose = bool(joined) and (always or joined[-1].lstrip(" ~").startswith(("{", "[", "inv(", "p[")))
@@ -433,4 +433,4 @@ def _joined(args: list[str], ctx: click.Context, *, always: bool) -> list[str]:
     return joined[::-1]
 
 
-command_named = partial(click.command, cls=Command)  # what makes a function a command
+command_named = partial(click.command, cls=Command)  # decorator of the function of a command

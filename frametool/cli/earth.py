@@ -1,7 +1,4 @@
-"""What the command line says of places on the Earth: the origin, the axes of rotations, the zone; loaded where it does.
-
-Also takes the places out of what --to and --from name.
-"""
+"""Read the options on geodetic positions: origin, axes of rotations, UTM zone, positions in --to."""
 
 from __future__ import annotations
 
@@ -32,7 +29,7 @@ ASKED = {"origin": ("origin",), "axes": ("local_axes",), "zone": ("zone",)}  # f
 
 
 def earth(said: Inputs) -> Earth:
-    """Return what the options say; raises click.UsageError for what is no place and no zone."""
+    """Return origin, axes and zone of the options; raises click.UsageError for invalid ones."""
     if said.earth is None:
         zone, origin = said.peek("zone"), said.peek("origin")
         with misuse("--zone: "):
@@ -43,9 +40,9 @@ def earth(said: Inputs) -> Earth:
 
 
 def _origin(said: Inputs, text: str) -> Origin:
-    """Read --origin: a place, numbers of lat, lon, alt, or the first position."""
+    """Read --origin: a mapping, the numbers lat, lon, alt, or `first`."""
     if text == FIRST:
-        return Origin(tell=partial(_tell, said))
+        return Origin(tell=partial(_report_origin, said))
     from frametool.documents.document import parse_documents
 
     numbers = re.split(r"\s*,\s*|\s+", text.strip())
@@ -66,7 +63,7 @@ def _origin(said: Inputs, text: str) -> Origin:
     return Origin((lat, lon, alt))
 
 
-def _tell(said: Inputs, place: Vector) -> None:
+def _report_origin(said: Inputs, place: Vector) -> None:
     lat, lon, alt = place
     said.note(f"origin: lat {lat!r}, lon {lon!r}, alt {alt!r}, the first position")
     if lat == lon == 0.0:
@@ -74,7 +71,7 @@ def _tell(said: Inputs, place: Vector) -> None:
 
 
 def places_of(said: Inputs, notations: Sequence[Notation]) -> tuple[tuple[Notation, ...], Place | None]:
-    """Part what --to names into rotations, and how positions are written; raises ValueInvalid for --to enu alone."""
+    """Return the rotation representations of --to, and its position format; raises ValueInvalid for --to enu alone."""
     names = [each.representation.name for each in notations if each.representation.is_place]
     rest = tuple(each for each in notations if not each.representation.is_place)
     place = Place.written(names, earth(said)) if names else None
@@ -85,7 +82,7 @@ def places_of(said: Inputs, notations: Sequence[Notation]) -> tuple[tuple[Notati
 
 
 def mapping_of(said: Inputs, texts: Sequence[str], name: str) -> str:
-    """Write bare numbers of a place as the mapping that says the same; raises click.UsageError for another count."""
+    """Return a mapping of the bare numbers of a geodetic position; raises click.UsageError for a wrong count."""
     from frametool.documents.writers import dump_json
 
     row, arithmetic = POSITIONS[name], kernels(name)

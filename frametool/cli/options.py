@@ -1,4 +1,4 @@
-"""What commands share: the types of arguments, the options of inputs, results and times; adding them reads nothing.
+"""Define what commands share: types of arguments, options of inputs, results and times; defining them reads no file.
 
 Times are decimal seconds or nanoseconds, `latest`, ranges and files; they never pass through a float.
 """
@@ -30,13 +30,13 @@ READ = readers("tree", "records", "rows", "arrays", "joints", "drawing")
 
 
 def utf8(text: str) -> str:
-    """Return text that will be part of a result; bytes that are no text are refused."""
+    """Return text that becomes part of a result; raises ValueInvalid for bytes that are not UTF-8."""
     encoded(text)
     return text
 
 
 def read_names(text: str, spec: str = "") -> tuple[str, ...]:
-    """Read names with commas between them; spec: as many as REF,EST has, each once."""
+    """Parse names separated by commas; spec: an example like REF,EST with the required number of different names."""
     names = tuple(name.strip() for name in text.split(",")) if text else ()
     if not all(names):
         raise ValueInvalid(f"{shown(text)} is not names with commas between them")
@@ -45,20 +45,20 @@ def read_names(text: str, spec: str = "") -> tuple[str, ...]:
     return names
 
 
-FULL = -1  # digits: as many as the number has
-OF_EARTH = ("origin", "local_axes", "zone")  # what is said of places on the Earth
+FULL = -1  # --precision full: as many digits as the number has
+OF_EARTH = ("origin", "local_axes", "zone")  # options on geodetic positions
 
 
 def _read_notations(text: str) -> tuple[Notation, ...]:
-    """Look each name up."""
+    """Parse representations separated by commas."""
     chosen = tuple(each for spec in text.split(",") for each in notations(spec.strip()))
     for each in chosen:
-        each.bound_axes()  # euler without its axes is refused before any work
+        each.bound_axes()  # raises for euler without axes, before anything is read
     return chosen
 
 
 def _offer_notations(_ctx: click.Context, incomplete: str) -> Mapping[str, str]:
-    """Offer names behind the last comma, and the axes of one that has its colon."""
+    """Offer names behind the last comma, and the axes behind a colon."""
     done, comma, begun = incomplete.rpartition(",")
     names = [*REPRESENTATIONS, *(f"{name}_deg" for name, row in REPRESENTATIONS.items() if row.angles)]
     spec = begun.partition(":")[0]
@@ -72,9 +72,9 @@ NOTATIONS = Text(_read_notations, _offer_notations)
 
 
 def format_among(choices: Collection[str], are: str) -> Text:
-    """Return the type of the name of a format: any, or one of those that a command reads or writes.
+    """Return the parameter type of a format name, with the formats that a command reads or writes.
 
-    are: what the choices are, in an error: `read`, `known`
+    are: what the choices are, for errors: `read`, `known`
     """
 
     def read(text: str) -> str:
@@ -92,19 +92,19 @@ def format_among(choices: Collection[str], are: str) -> Text:
 
 
 def suffix_of(path: str) -> str:
-    """Return a file's suffix in small letters."""
+    """Return a file's suffix in lower case."""
     return os.path.splitext(path)[1].lower()
 
 
 def read_path(path: str, suffixes: Collection[str]) -> str:
-    """Take the name of a file that ends in one of some suffixes."""
+    """Return the name of a file; raises ValueInvalid unless it ends in one of the suffixes."""
     if suffix_of(path) not in suffixes:
         raise ValueInvalid(f"{shown(path)} does not end in {' or '.join(suffixes)}")
     return path
 
 
 def _offer_axes(_ctx: click.Context, incomplete: str) -> Mapping[str, str]:
-    """Offer the conventions; behind `_from_` those it may come from."""
+    """Offer the axis conventions, and those behind `_from_`."""
     from frametool.geometry.conventions import AXES, MIRRORED, SYSTEMS
 
     begun, joint, _ = incomplete.partition("_from_")
@@ -116,7 +116,7 @@ AXIS = Text(offers=_offer_axes)
 
 
 def _offer_columns(ctx: click.Context, incomplete: str) -> Mapping[str, str]:
-    """Offer those of the file that -i names."""
+    """Offer the columns, or keys, of the file of -i."""
     from frametool.documents.source import HEAD
     from frametool.formats.detect import Beginning, detect
     from frametool.stream.table import open_table
@@ -137,13 +137,13 @@ COLUMN = Text(offers=_offer_columns)
 
 
 def tree_on_the_line(ctx: click.Context) -> str | None:
-    """Return the first file of frames; behind an option click has not come to the arguments."""
+    """Return the first file of frames, also from arguments that click has not parsed yet."""
     named = ctx.params.get("files") or ctx.params.get("arguments") or ctx.args
     return ctx.params.get("tree") or ctx.params.get("recording") or next(iter(named), None)
 
 
 def _offer_joints(ctx: click.Context, incomplete: str) -> Mapping[str, str]:
-    """Offer the joints of the robot on the line with their limits; behind the = the limits."""
+    """Offer the joints of the robot and their limits; behind the = the limits."""
     from frametool.formats.load import load
 
     robots = load(tree_on_the_line(ctx) or "").robots
@@ -171,9 +171,9 @@ _CAMERA_AXES = _of_formats("--camera-axes", _AXES, CAMERA_AXES)
 _STAMPS = _of_formats("--stamps FILE", "timestamps for poses without any, one per line")
 _EDGES = _of_formats("--edges", "read the edges of a g2o graph instead of its vertices")
 _TOPIC = _of_files("--topic NAME", "read only this topic; may be repeated", name="topics", multiple=True)
-# of streams about trajectories: the topic of a bag, the times of their poses, the axes of cameras
+# for streams of poses: the topic of a bag, timestamps, axes of cameras
 pose_reading_options = together(_TOPIC, _CAMERA_AXES, _STAMPS, _EDGES)
-# how files of frames are read; `opened` heeds them
+# how files of frames are read, for `trees.opened`
 reading_options = together(
     in_option,
     _TOPIC,
@@ -193,9 +193,9 @@ reading_options = together(
 
 
 def input_formats(inputs: Inputs, *, streams: bool = False) -> tuple[list[str], str]:
-    """Return the formats that --in names for files of frames, in their order, and the format of the stream.
+    """Return the formats of --in for files of frames, in order, and that of the stream.
 
-    streams: there is a stream; its format is the last one that can be streamed, "" if there is none
+    streams: there is a stream; its format is the last one that can be streamed, "" without such
     """
     formats = list(inputs.input_formats)
     for at in reversed(range(len(formats) * streams)):
@@ -205,7 +205,7 @@ def input_formats(inputs: Inputs, *, streams: bool = False) -> tuple[list[str], 
 
 
 def for_each(formats: Sequence[str], files: int) -> list[str]:
-    """Return the format of each of several files as --in names them, the last for the rest; "" where it names none."""
+    """Return the format of each file by --in; the last one is repeated, "" without any."""
     refuse(len(formats) > files, f"--in appears {len(formats)} times for {files} file{'s' * (files != 1)}")
     return [*formats, *([*formats[-1:]] or [""]) * (files - len(formats))]
 
@@ -222,7 +222,7 @@ MESSAGES = ("pose", "tf", "path", "point", "fix")
 
 
 def parse_messages(text: str) -> tuple[str, ...]:
-    """Read kinds of messages with commas between them; raises ValueInvalid."""
+    """Parse kinds of messages separated by commas; raises ValueInvalid."""
     kinds = tuple(dict.fromkeys(text.split(",")))
     if unknown := [each for each in kinds if each not in MESSAGES]:
         near = did_you_mean(unknown[0], MESSAGES)
@@ -235,14 +235,14 @@ _RECORDING = together(
                 parse_messages, default=()),
     _of_results("--topic-out NAME", "topic of the messages of a recording"),
 )  # fmt: skip
-# of commands that have no --frames for what they read
+# of commands without --frames for their input
 _FRAMES_OUT = "names of the frames of poses in a recording; adds /tf"
 frames_out_option = _of_results("--frames WORLD,BODY", _FRAMES_OUT, partial(read_names, spec="WORLD,BODY"),
                                 name="recorded_frames")  # fmt: skip
 
 
 def result_options(*what: str) -> Adds:
-    """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
+    """Return the options of a command on its result; the kinds of results in `what` decide the formats."""
     formats = writers(*what)
     recording = [_RECORDING] * (not set(formats).isdisjoint(writers("recording")))
     kind = format_among(("text", *formats), "written here")
@@ -251,9 +251,9 @@ def result_options(*what: str) -> Adds:
 
 
 def list_options(*more: str) -> Adds:
-    """Add to a command the options that shape and place a list for people, which is text wherever it goes.
+    """Return the options of a command on its result, a list for people whose default is text.
 
-    more: formats besides text and those of reports
+    more: formats other than text and those of reports
     """
     formats = "text", *writers("report"), *more
     return together(option("-f --format", "of the result  [default: text]", formats, name="format_name"), place_options)
@@ -274,7 +274,7 @@ scale_option = option("--scale", "read a matrix s R as a similarity with scale s
 
 
 def pose_result_options(*what: str) -> Adds:
-    """Add to a command the options that say how poses are read, and those of its result."""
+    """Return the options of a command on reading poses and on its result."""
     return together(rotation_options, pose_options, result_options(*what))
 
 
@@ -284,14 +284,14 @@ LATEST = "latest"
 
 
 def read_limit(text: str) -> int:
-    """Return the nanoseconds of a time in seconds, or in nanoseconds with `ns`."""
-    from frametool.frames.stamps import parse_time  # few calls say a time
+    """Parse a time in seconds, or in nanoseconds with `ns`, to nanoseconds."""
+    from frametool.frames.stamps import parse_time  # few calls have a time
 
     return parse_time(text)
 
 
 def read_span(text: str) -> int:
-    """Read a time that is not negative."""
+    """Parse a duration, not negative, to nanoseconds."""
     found = read_limit(text)
     if found < 0:
         raise ValueInvalid(f"a time here is not less than 0, found {shown(text)}")
@@ -299,14 +299,14 @@ def read_span(text: str) -> int:
 
 
 def read_rate(text: str) -> float:
-    """Read how many a second."""
+    """Parse a rate in Hz."""
     from frametool.frames.lookups import checked_rate
 
     return checked_rate(parse_number(text))
 
 
 def read_time(text: str) -> Any:
-    """Return nanoseconds, or `latest`."""
+    """Parse a time to nanoseconds, or `latest`."""
     if text == LATEST:
         return text
     try:
@@ -316,7 +316,7 @@ def read_time(text: str) -> Any:
 
 
 def _offset(text: str) -> Any:
-    """Return the nanoseconds that are added to other times, or what makes the first of them 0."""
+    """Parse an offset to nanoseconds, or `first`, which shifts the first time to 0."""
     from frametool.frames.stamps import FromFirst
 
     return FromFirst() if text == "first" else read_limit(text)
@@ -327,7 +327,7 @@ def at_ns(chosen: int | str | None) -> int | None:
     return chosen if isinstance(chosen, int) else None
 
 
-# of a tree: more files, and how moving frames are taken
+# of a tree: more files, and the meaning of moving frames
 rules_options = together(
     _of_files("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True),
     _of_times("--moving", "an edge with one timestamp is valid only at that time"),
@@ -342,7 +342,7 @@ limit_options = together(
     _of_times("--stop TIME", "ignore everything after", read_limit),
     offset_option,
 )
-# a command of files of frames; of one tree whose frames may move
+# for commands that read files of frames; for one tree whose frames may move
 file_options = together(reading_options, verbose_option, pose_options)
 moving_options = together(rules_options, offset_option, reading_options, verbose_option)
 
@@ -352,7 +352,7 @@ color_option = _of_results("--color", _COLOR, ("auto", "always", "never"), defau
 
 
 def window_of(passed: Inputs) -> tuple[int, int] | None:
-    """Return the first and the last nanosecond that --start and --stop leave, None without either; nobody asks yet."""
+    """Return the first and last nanosecond of --start and --stop, None without both; does not mark them as used."""
     start, stop = passed.peek("start"), passed.peek("stop")
     refuse(start is not None and stop is not None and start > stop, "--start is after --stop")
     if start is stop is None:
@@ -363,9 +363,9 @@ def window_of(passed: Inputs) -> tuple[int, int] | None:
 
 
 def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int]:
-    """Read START:STOP:STEP (seconds; STOP counts if a step meets it), T,T,.., or the stamps of a file or `-`, in order.
+    """Return the times of START:STOP:STEP (seconds; STOP is included if a step meets it), T,T,.., a file or `-`.
 
-    report: takes the errors of lines that are no time.
+    report: called with the errors of lines that are not a time
     """
     if text.count(":") == 2 or (re.match(r"[-+]?\.?\d", text) and not os.path.exists(text)):
         from frametool.frames.stamps import parse_times
@@ -380,7 +380,7 @@ def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int
 
 # --- misuse --------------------------------------------------------------------------------------------------------
 
-# an option, alone or behind its command, an option with a value, or a subcommand -> what to use instead
+# an option, also behind its command or with a value, or a subcommand -> what to use instead
 REPLACED = {
     "--jobs": "split the input, `split -n l/8 ROWS part. && ls part.* | xargs -P 8 -I{} frametool .. -i {} -o {}.out`",
     "sim sweep": 'a loop in Python over `frametool.simulate(..)` of `FollowController("ros1", gain_linear=2)`',
@@ -396,7 +396,7 @@ REPLACED = {
 
 
 def replacement(arguments: Sequence[str]) -> str | None:
-    """Return the sentence on the first word of a command line that went; None where all are in use."""
+    """Return the message on the first removed option or subcommand of a command line, None without one."""
     for word in arguments:
         option = word.partition("=")[0]
         for name in (option, word, f"{arguments[0]} {option}"):
@@ -406,10 +406,10 @@ def replacement(arguments: Sequence[str]) -> str | None:
 
 
 def usage_sentence(error: click.ClickException, arguments: Sequence[str]) -> str:
-    """Put a usage error on one line that ends in where help is; what it quotes of the arguments is cut."""
+    """Return a usage error as one line with a pointer to the help; long arguments in it are shortened."""
     ctx = getattr(error, "ctx", None)
     message = error.format_message().replace("\n", " ").rstrip(".")
-    if isinstance(error, click.NoSuchOption):  # each version of click has its own words
+    if isinstance(error, click.NoSuchOption):  # click's own wording depends on its version
         name, near = error.option_name, error.possibilities or ()
         message = f"no such option {shown(name)}{did_you_mean(name, near)}"
     message = replacement(arguments) or message

@@ -1,7 +1,4 @@
-"""Results: in which format they are written, and where to.
-
-Pictures on their way out: in which format, by the suffix of a file.
-"""
+"""Choose the format of results by the options and the suffix of the output, and write them."""
 
 from __future__ import annotations
 
@@ -35,7 +32,7 @@ if TYPE_CHECKING:
 
 
 def _place(fmt: str, output: str | None) -> str:
-    """Return where a recording is written; raises UsageError where it cannot be."""
+    """Return the path of a recording to write; raises UsageError if it does not fit the format."""
     if output is None or output == "-":
         raise UsageError(f"{fmt} is no text; give -o {'FOLDER' if fmt in table.FOLDERS else 'FILE'}")
     suffixes = table.FORMATS[fmt].suffixes
@@ -48,15 +45,15 @@ def _place(fmt: str, output: str | None) -> str:
 
 
 def folder_of(place: str) -> str:
-    """Return the folder in which there is room for what is written to a place; "" where that does not exist."""
+    """Return the folder of an output path, "" if it does not exist."""
     folder = os.path.dirname(os.path.abspath(place))
     return folder if os.path.isdir(folder) else ""
 
 
 def copied_as(fmt: str, path: str, output: str | None, named: str | None) -> tuple[str, str]:
-    """Return the format in which a recording is copied, and its place; raise UsageError where none can be.
+    """Return the format and the path of a copy of a recording; raise UsageError if they do not fit.
 
-    named: the format, where the name of the output does not say it
+    named: the format of -f, None if the name of the output decides
     """
     folder = "bag2" if os.path.isdir(path) and output and not os.path.splitext(output)[1] else None
     copy = named or table.by_name(output, table.writers("recording")) or folder
@@ -70,10 +67,10 @@ def copied_as(fmt: str, path: str, output: str | None, named: str | None) -> tup
     return copy, place
 
 
-BATCH = 256  # poses
-QUATERNION = (notation("quaternion"),)  # where no representation is asked for
+BATCH = 256  # poses that are written together
+QUATERNION = (notation("quaternion"),)  # the default representation
 ZEROS = r"(?<![\w.:])(?P<dim>-?0\.0+)(?![\w.])"
-ENDS = (  # of a pose
+ENDS = (  # the frames of a pose
     r"(?m)^(?P<green>\S.*?)(?: at \S+)? seen from (?P<cyan>.*?)(?: at \S+)?(?=  \(maps|$)",
     r"(?m)\(maps points in (?P<green>.+?) to points in (?P<cyan>.+?)\)$",
 )
@@ -82,14 +79,15 @@ OF_TEXT = (".txt", ".out", ".log", ".dat")
 
 
 class Output:
-    """Where results go and how they look: what the options of a command say."""
+    """The destination, format and style of results, from the options of a command."""
 
-    marks: tuple[str, ...] = (ZEROS, *ENDS)  # patterns of what has a style in text on a terminal
+    marks: tuple[str, ...] = (ZEROS, *ENDS)  # patterns with a style in text on a terminal
 
     def __init__(self, inputs: Inputs, *what: str, otherwise: str | None = None) -> None:
-        """Choose the format: as chosen, else by the file's suffix, else text for a terminal and YAML for a pipe.
+        """Choose the format: that of --format, else by the file's suffix, else text for a terminal and YAML for a pipe.
 
-        otherwise: the format instead of these two
+        what: kinds of results, which decide the formats that a suffix may name
+        otherwise: the default format, instead of text and YAML
         """
         self._inputs = inputs
         self.path: str | None = inputs.output
@@ -109,12 +107,12 @@ class Output:
         self._format_is_default = not (self.chosen or otherwise)
         fmt = self.chosen or otherwise or ("text" if self.path is None and sys.stdout.isatty() else "yaml")
         holds_arrays = table.holds(fmt, "arrays")
-        self.is_trajectory = table.is_trajectory(fmt)  # of the poses of one frame over time
+        self.is_trajectory = table.is_trajectory(fmt)  # the poses of one frame over time
         self._in_blocks = self.is_trajectory or holds_arrays or table.holds(fmt, "recording")
-        self.holds_all = self._in_blocks or fmt == "csv"  # rows, of which there may be many
+        self.holds_all = self._in_blocks or fmt == "csv"  # formats for many rows
         if holds_arrays and self.path is None and sys.stdout.isatty():
             raise ValueInvalid(f"{fmt} is no text for a terminal; give -o FILE, or pipe it")
-        usual = () if fmt in ("text", "dot", "mermaid") else QUATERNION  # drawings choose their own
+        usual = () if fmt in ("text", "dot", "mermaid") else QUATERNION  # drawings have defaults of their own
         digits = inputs.peek("precision")
         self.style = Style(
             fmt, notations or usual, degrees=bool(inputs.deg), precision=None if digits == FULL else digits,
@@ -130,7 +128,7 @@ class Output:
             self.style = self.style._replace(recording=recording)
 
     def take_axes(self, known: str, operation: Operation | None = None) -> None:
-        """Keep the axes of the camera that poses are of: as --camera-axes says, else as their format has them."""
+        """Set the axes of the camera whose poses are written: those of --camera-axes, else of the input format."""
         stated = self._inputs.peek("camera_axes") or ""
         axes = (stated or known) if operation is None or operation.keeps_child else ""
         self.style = self.style._replace(axes=axes, in_camera=operation is not None and operation.looks_back)
@@ -139,12 +137,12 @@ class Output:
             self._inputs.ask("camera_axes")
 
     def take_axes_in(self, tree: Frames, source: str) -> None:
-        """Keep the axes of a frame of a tree: where none is known to be a camera, --camera-axes is about this one."""
+        """Set the camera axes of a frame of a tree; if the tree has no cameras, --camera-axes applies to this frame."""
         if source in tree.camera_axes or not tree.camera_axes:
             self.take_axes(tree.camera_axes.get(source, ""))
 
     def values(self, values: Iterable[Value]) -> None:
-        """Write results: poses as poses; points, vectors and messages as the mappings they are."""
+        """Write results: poses as poses; points, vectors and messages, which are mappings, unchanged."""
         if not self._in_blocks:
             self.text(self.text_of([*values]))
             return
@@ -154,13 +152,13 @@ class Output:
         self.pieces(filter(None, chain(map(writer.of_block, blocks_of(values)), writer.end())))
 
     def _refuse_places(self) -> None:
-        """Stop where the format has no place for latitude and longitude."""
+        """Raise ValueInvalid if the format cannot hold latitude and longitude."""
         if self.style.place is not None and self.style.format not in WITH_PLACES:
             names = ", ".join(each.name for each in (self.style.place, *self.style.place.more))
             raise ValueInvalid(f"{self.style.format} has no place for {names}; write csv, json, yaml or text")
 
     def text_of(self, found: list[Value]) -> str:
-        """Return the text of all results; name what they say besides where the format has no place for it."""
+        """Return the text of all results; warn of fields that the format cannot hold."""
         self._refuse_places()
         poses = [each for each in found if isinstance(each, Result)]
         if len(poses) < len(found) and self.style.format != "csv":
@@ -168,7 +166,7 @@ class Output:
                 raise ValueInvalid(f"{self.style.format} holds poses; a point has no rotation")
             mappings = [each.mapping(self.style) if isinstance(each, Result) else each for each in found]
             placed = [each for each in mappings if not {"point", "vector"}.isdisjoint(each) and "header" not in each]
-            # for a person one a line, but what has more than three numbers as a mapping
+            # text has one per line, but mappings for those with more than three numbers
             is_plain = all(any(isinstance(each.get(kind), list) for kind in ("point", "vector")) for each in mappings)
             text_module = "frametool.view.text" if is_plain else table.FORMATS["yaml"].writer
             text, others = self._module(text_module).write_points(mappings, self.style), {*chain.from_iterable(placed)}
@@ -187,7 +185,7 @@ class Output:
         return str(text)
 
     def _shorten(self) -> None:
-        """Show poses on a terminal by quaternion and rpy only, where no representation is asked for."""
+        """Show poses on a terminal as quaternion and rpy only, unless --to chooses a representation."""
         if self.style.screen and not self.style.notations:
             self.style = self.style._replace(notations=(notation("quaternion"), notation("rpy_deg")))
 
@@ -201,9 +199,10 @@ class Output:
             self.pieces(self._batches(results))
 
     def _batches(self, results: Iterator[Result]) -> Iterator[str | bytes]:
-        """Yield the text of some results after the other, short batches first.
+        """Yield the text of results in batches of growing size.
 
-        In every format the text of several results begins with that of the first: what follows it is the batch's.
+        In every format the text of several results begins with that of the first one.  Each batch is written behind
+        the first result, whose text is then cut off.
         """
         write_poses = self._module("frametool.view.text").write_poses
         size = 2
@@ -215,7 +214,7 @@ class Output:
             size = min(2 * size, BATCH)
 
     def writer(self) -> ResultWriter:
-        """Return what writes the results of a stream of records."""
+        """Return the writer of the results of a stream of records."""
         from frametool.stream.record_results import CsvTable, Documents
 
         self._refuse_places()
@@ -228,7 +227,7 @@ class Output:
         return Blocks(self.style)
 
     def tree(self, tree: Frames, color: str = "auto") -> None:
-        """Write a tree; on a terminal in colour, or as `color` says; in a format made of poses with every sample."""
+        """Write a tree: in colour on a terminal or as `color` says; with every sample in a format of poses."""
         if tree.drawn and self._format_is_default:
             self.style = self.style.changed(format="text")
         if tree.drawn and self.style.format != "text":
@@ -280,7 +279,7 @@ class Output:
         return import_module(table.FORMATS[self.style.format].writer if self.style.format in table.FORMATS else default)
 
     def pieces(self, pieces: Iterable[str | bytes]) -> None:
-        """Write text as it comes; into a file, whole or not at all."""
+        """Write pieces of text as they arrive; a file is written atomically."""
         if not table.holds(self.style.format, "arrays", "recording"):
             self._inputs.ask("precision")
         with self.opened() as write:
@@ -290,20 +289,20 @@ class Output:
             self.report_suffix()
 
     def shown(self, text: str) -> str:
-        """Return text as it is written: that for people printable, and on a terminal in colour."""
+        """Return text as it is written: in the text format printable, and on a terminal in colour."""
         if self.style.format == "text":
             text = "\n".join(map(printable, text.split("\n")))
             return in_colour(text, self.marks) if self.style.screen else text
         return text
 
     def opened(self) -> AbstractContextManager[Write]:
-        """Open the place where results go."""
+        """Open the output for writing."""
         return writing(self.path, force=self.force, folder=self.style.format in table.FOLDERS)
 
     def report_suffix(self, fmt: str = "") -> None:
-        """Report the format of a file whose suffix names none, where none was chosen.
+        """Report the format of an output file if its suffix names none and --format is not set.
 
-        fmt: of a stream, which keeps that of its input: a suffix of any text, or its own, goes without a note
+        fmt: of a stream that is written in the format of its input: its own suffixes and those of text are not reported
         """
         if not self._format_is_default or not self.path or self._inputs.peek("quiet"):
             return
@@ -319,17 +318,17 @@ class Output:
 
 
 class AllTogether:
-    """Keep results, for formats that are written of all of them at once."""
+    """Collect results for formats that need all of them at once."""
 
     def __init__(self, output: Output) -> None:
-        """Begin without any."""
+        """Create a collector without results."""
         self.output, self.values = output, list[Any]()
 
     def of_block(self, block: BlockResults) -> bytes:
-        """Keep those of a block of records; nothing is written."""
+        """Collect the results of a block of records and return no text yet."""
         self.values += block.in_order()
         return b""
 
     def end(self) -> Iterator[bytes]:
-        """Yield the text of all."""
+        """Yield the text of all results."""
         yield encoded(self.output.shown(self.output.text_of(self.values)))

@@ -1,6 +1,6 @@
-"""Poses from the command line: inline mappings, bare numbers, files, standard input.
+"""Read poses from the command line: inline mappings, bare numbers, files, standard input.
 
-Distinguish what somebody pasted from what has always been a stream of rows or records: arguments and standard input.
+Pasted output of other tools, in arguments and standard input, is distinguished from streams of rows or records.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
 
 INLINE = "argument"
-# the grammar's own, or a header; compiled when first needed
+# records and tables: a mapping, or a header; compiled when first needed
 _PLAIN = r"""\s*(?![ijk]\s*$|[xyzw]:\s*[-+.\d]+\s*,|Out\[)(?:\{\s*["}\w][^,{]*:|[A-Za-z_"'%#][\w"'-]*\s*(?:[,:\t]|$))"""
 _COMMAS = r"\s*[-+]?[.\d][-+.\deE]*(?:[ \t]*,[ \t]*[-+]?[.\d][-+.\deE]*)+[ \t\r]*(?:\n|\Z)"
-# of a table; the last: GTSAM, Gazebo, tf2_echo
+# pasted text that looks like the header of a table; the last: GTSAM, Gazebo, tf2_echo
 _NO_HEADER = r"\s*[A-Za-z_]\w*:\s*\n|\s*\w+\s*=|\s*(?:R|Model|- Pose[^:]*|Translation):\s*\[|\s*Rotation: in "
 
 
 def is_inline(text: str) -> bool:
-    """Distinguish a mapping or list written on the command line, or the inverse of one, from a file's name."""
+    """Return True for a mapping or list written on the command line, or the inverse of one; False for a file name."""
     while found := _inverted(text):
         text = (found[1] or found[2] or "").strip()
     return text.startswith(("{", "["))
 
 
 def is_pasted(text: str, notation: Notation | None = None) -> bool:
-    """Distinguish a text with a pose in it from a file's name; what exists is a file.
+    """Return True for text with a pose; False for a file name, also for the name of any existing file.
 
-    Raises FormatError for a text that is known and cannot be taken.
+    Raises FormatError for a text of a known format that is invalid.
     """
     if is_inline(text) or text == "-" or os.path.exists(text):
         return is_inline(text)
@@ -54,9 +54,9 @@ def is_pasted(text: str, notation: Notation | None = None) -> bool:
     return rewritten(Source(INLINE, text), notation, normalize=False, points=False) is not None
 
 
-@lru_cache(8)  # an argument is looked at before it is read, and warned of once
+@lru_cache(8)  # `is_pasted` and `pose_source` read an argument, and its warnings are written once
 def rewritten(source: Source, notation: Notation | None, *, normalize: bool, points: bool) -> Source | None:
-    """Return a text that was pasted as one of the grammar; None for one that is."""
+    """Return pasted text as a mapping of the grammar of poses; None for text that already is one."""
     if re.match(_PLAIN, source.text) and "\n" not in source.text.strip():
         return None
     from frametool.ros.pasted_blocks import in_grammar
@@ -66,7 +66,7 @@ def rewritten(source: Source, notation: Notation | None, *, normalize: bool, poi
 
 
 def rejoined(values: Sequence[str]) -> tuple[str, ...]:
-    """Put together what the shell took apart: `[0, 0, 0.7, 0.7]` and `0.7 + 0.7k` without quotes."""
+    """Join arguments that the shell has split: `[0, 0, 0.7, 0.7]` and `0.7 + 0.7k` without quotes."""
     text = " ".join(values)
     is_apart = len(values) > 1 and (
         any(value[-1:] == "," for value in values[:-1])
@@ -79,15 +79,15 @@ def rejoined(values: Sequence[str]) -> tuple[str, ...]:
 def pasted_stream(
     stream: BufferedReader, name: str, request: Request, notation: Notation | None, place: str
 ) -> tuple[Source | None, BufferedReader]:
-    """Return what was pasted into a stream as text of the grammar, and the stream, with all that is in it if not.
+    """Return pasted text in a stream as a source in the grammar of poses, else None; and the unread stream.
 
-    Only a beginning with which no stream of rows or records has a result is read to its end.
-    notation, place: the notation, or the position on the Earth, that --from names
+    The stream is only read to its end if it begins in a way that no valid stream of rows or records does.
+    notation, place: the notation, or the format of geodetic positions, of --from
     """
     head = stream.peek()[:4096].decode("utf-8", "replace").lstrip("\ufeff")
     if re.match(_PLAIN, head) and not re.match(_NO_HEADER, head):
         return None, stream
-    if found := re.match(_COMMAS, head):  # rows of what --from names, without a header; those of a matrix are pasted
+    if found := re.match(_COMMAS, head):  # rows in the notation of --from without a header, not rows of a matrix
         rep = notation and notation.representation
         if place or (rep and rep.whole is None and found[0].count(",") + 1 - len(rep.columns) in (0, 3)):
             return None, stream
@@ -116,9 +116,9 @@ def _inverted(text: str) -> re.Match[str] | None:
 
 
 def without_inverse(argument: str) -> tuple[str, bool]:
-    """Return an argument without `inv(..)` and `~`, and whether its inverse is meant; twice is not at all.
+    """Return an argument without `inv(..)` and `~`, and True if its inverse is meant; two inverses cancel.
 
-    Raises click.UsageError where no pose is left.
+    Raises click.UsageError if no pose is left.
     """
     bare, is_inverse = argument, False
     while (found := _inverted(bare)) and not os.path.exists(bare):
@@ -128,7 +128,7 @@ def without_inverse(argument: str) -> tuple[str, bool]:
 
 
 def _inverses(source: Source, request: Request) -> Source:
-    """Return a text with the inverse of each pose of another one: what `invert -f json` writes of it."""
+    """Return a source with the inverses of the poses of another one, as `invert -f json` writes them."""
     from frametool.documents.writers import dump_json
     from frametool.geometry.representations import notation
     from frametool.grammar.result import Style
@@ -146,7 +146,7 @@ def _inverses(source: Source, request: Request) -> Source:
 
 
 def source_of(argument: str | Source) -> Source:
-    """Take what was read already or an inline argument as it stands, or read a file, or standard input for `-`."""
+    """Return the source of an argument: itself if already read, inline text, a file, or standard input for `-`."""
     if isinstance(argument, Source):
         return argument
     if is_inline(argument):
@@ -163,9 +163,9 @@ def source_of(argument: str | Source) -> Source:
 
 
 def pose_source(argument: str | Source, request: Request) -> Source:
-    """Take an argument as text of the grammar of poses: what was pasted is rewritten, else as `source_of`.
+    """Return the source of an argument as `source_of` does, with pasted text rewritten in the grammar of poses.
 
-    Where the request moves records, three numbers are a point.
+    If the request moves records, three numbers are a point.
     """
     if not isinstance(argument, Source):
         bare, is_inverse = without_inverse(argument)
@@ -177,7 +177,7 @@ def pose_source(argument: str | Source, request: Request) -> Source:
         from frametool.documents.document import parse_documents
         from frametool.stream.record_stream import with_offset
 
-        parse_documents(source.text, source.name)  # raises where it is broken
+        parse_documents(source.text, source.name)  # raises for invalid text
         text, count = with_offset(source.text, request.offset_ns)
         if not count:
             raise FormatError("--time-offset has no effect: no timestamps in it", source=source.name)
@@ -197,7 +197,7 @@ def values_of(arguments: Sequence[str | Source], request: Request, output: Outpu
 def read_with(
     argument: str | Source, request: Request, read: Callable[[Source, Request], Iterable[Any]]
 ) -> Iterator[Any]:
-    """Yield what is read of an argument: inline, `-`, or a file; the error for a file of frames points to lookup."""
+    """Yield what `read` finds in an argument: inline, `-`, or a file; an error for a file of frames hints at lookup."""
     with inline_misuse():
         source = pose_source(argument, request)
         try:
@@ -212,7 +212,7 @@ def read_with(
 
 @contextmanager
 def inline_misuse() -> Iterator[None]:
-    """Count an inline argument that cannot be parsed as misuse (2); what parses but is no rotation is bad data (1)."""
+    """Let the error of an invalid inline argument exit with 2; an invalid rotation is bad data, which exits with 1."""
     try:
         yield
     except FormatError as error:
@@ -222,7 +222,7 @@ def inline_misuse() -> Iterator[None]:
 
 
 class ArgumentPoses(NamedTuple):
-    """What an argument holds: its poses, the keys that accompany any of them, and its warnings."""
+    """The poses of an argument, their extra keys, and its warnings."""
 
     source: Source
     poses: list[Pose]
@@ -230,7 +230,7 @@ class ArgumentPoses(NamedTuple):
     warnings: list[tuple[Any, ...]]
 
     def only_poses(self, *, timed: bool) -> list[Pose]:
-        """Return the poses alone; warn of what was noted and of what is left out, except stamps if `timed`."""
+        """Return the poses; emit the warnings, and one on extra keys that are left out, except stamps if `timed`."""
         for message, rule in self.warnings:
             warn(message, rule=rule)
         left_out = [key for key in sorted(self.others) if not (timed and stamp_column([key]) is not None)]
@@ -239,13 +239,13 @@ class ArgumentPoses(NamedTuple):
         return self.poses
 
     def only_pose(self, *, timed: bool = False) -> Pose:
-        """Return the one pose as `only_poses` does; raises click.UsageError for several."""
+        """Return the single pose as `only_poses` does; raises click.UsageError for several."""
         refuse(len(self.poses) != 1, f"one pose is wanted here, {self.source.name} holds {len(self.poses)}")
         return self.only_poses(timed=timed)[0]
 
 
 def _read_argument(argument: str | Source, request: Request) -> ArgumentPoses:
-    """Read all poses of one of several arguments, and keep the warnings for later."""
+    """Read all poses of one of several arguments, and collect the warnings."""
     from frametool.stream.record_values import read_given
     from frametool.stream.request import COMBINED
 
@@ -259,7 +259,7 @@ def _read_argument(argument: str | Source, request: Request) -> ArgumentPoses:
 
 
 def _several(read: Sequence[ArgumentPoses | None]) -> list[int]:
-    """Return the index of the argument that holds several poses; raise ValueInvalid if another one does too."""
+    """Return the index of the argument with several poses, [] if none has; raise ValueInvalid if two have."""
     found = [at for at, each in enumerate(read) if each and len(each.poses) > 1]
     if len(found) > 1:
         named = " and ".join(f"{each.source.name} ({len(each.poses)})" for each in read if each and each.poses[1:])
@@ -268,9 +268,11 @@ def _several(read: Sequence[ArgumentPoses | None]) -> list[int]:
 
 
 class Operands(NamedTuple):
-    """Which argument holds the records that make the results, one each; and the one pose of each other argument.
+    """The argument with the records, each of which has a result, and the single poses of the other arguments.
 
-    timed: the time of single poses, {} where they have none or several; None where each result has its record's
+    at: the index of that argument
+    before, behind: the poses of the arguments before and behind it
+    timed: the common stamp of single poses, {} without one; None if each result has the stamp of its record
     """
 
     at: int
@@ -281,7 +283,7 @@ class Operands(NamedTuple):
 
 
 def rows_among(arguments: Sequence[str], request: Request, task: Task) -> Operands:
-    """Choose them: standard input, a table, what holds several poses, or the last that says more than a pose."""
+    """Choose the argument with the records: standard input, a table, several poses, or the last one with extra keys."""
     bare = [without_inverse(each)[0] for each in arguments]
     refuse_two_readers(bare)
     refuse(task.path and "-" not in bare, "-i FILE is read where - stands among the poses")
@@ -290,8 +292,8 @@ def rows_among(arguments: Sequence[str], request: Request, task: Task) -> Operan
     refuse(len(streams) > 1, f"only one argument may hold rows, {files} do; frametool compare takes two trajectories")
     stream = streams[0] if streams else None
     read = [None if at == stream else _read_argument(each, request) for at, each in enumerate(arguments)]
-    says_more = [at for at, each in enumerate(read) if each and each.others]
-    at = [0, *says_more, *_several(read)][-1] if stream is None else stream
+    with_extras = [at for at, each in enumerate(read) if each and each.others]
+    at = [0, *with_extras, *_several(read)][-1] if stream is None else stream
     both = zip(bare, read, strict=True)
     uncertain = [text for text, each in both if each and any(pose.covariance is not None for pose in each.poses)]
     if twice := [each for each in dict.fromkeys(uncertain) if uncertain.count(each) > 1]:
@@ -308,7 +310,7 @@ def rows_among(arguments: Sequence[str], request: Request, task: Task) -> Operan
 
 
 def combinations(arguments: Sequence[str], request: Request) -> list[tuple[Pose, ...]]:
-    """Read one pose from each argument; one of them may hold several, which are then taken one after another."""
+    """Return tuples of one pose per argument; one argument may hold several poses, each of which has a tuple."""
     found = [_read_argument(each, request) for each in arguments]
     several = _several(found)
     read = [each.only_poses(timed=True) for each in found]
@@ -317,12 +319,12 @@ def combinations(arguments: Sequence[str], request: Request) -> list[tuple[Pose,
 
 
 def one_pose(argument: str | Source, request: Request) -> Pose:
-    """Read the one pose of an argument; warn of what else it holds."""
+    """Read the single pose of an argument; warn of extra keys."""
     return _read_argument(argument, request).only_pose()
 
 
 def pose_from_numbers(texts: Sequence[str], request: Request) -> Pose:
-    """Read bare numbers; raises click.UsageError for what is no such list, ValueInvalid for what is no rotation."""
+    """Read bare numbers; raises click.UsageError for an invalid list, NotARotation if they are not a rotation."""
     reading = Reading(Source(INLINE, ""), degrees=request.rows.degrees, normalize=request.rows.normalize)
     with misuse():
         found = pose_of_numbers(texts, request.rows.given, reading)

@@ -1,4 +1,4 @@
-"""Signals that end a run: one handler turns them into exceptions, so that every `with` cleans up behind itself."""
+"""Turn signals that end a run into exceptions, so that every `with` block cleans up."""
 
 from __future__ import annotations
 
@@ -10,18 +10,20 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from types import FrameType
 
-# those that the system has: Windows knows no SIGHUP
+# those that the system has: Windows has no SIGHUP
 ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
 class Terminated(BaseException):
-    """Report the signal that asks the process to end; its name is the message."""
+    """Report a signal that ends the process; its name is the message."""
 
 
 class _Signals:
-    """Whether the process is ours, a line is being written, and Ctrl-C came meanwhile.
+    """The handler of signals, and the state that decides what it does.
 
-    cleans_up: there is what to clean up: what ends the run is raised, in the middle of an import too
+    owns_process: the program runs as a process of its own
+    cleans_up: something must be cleaned up, so an exception is raised even during an import
+    writing: a block of lines is being written; interrupted: Ctrl-C came meanwhile
     """
 
     owns_process = False
@@ -30,16 +32,16 @@ class _Signals:
     interrupted = False
 
     def end(self, number: int, frame: FrameType | None) -> None:
-        """Raise what ends the run; the first Ctrl-C waits until the line that is being written is out."""
+        """Raise the exception that ends the run; the first Ctrl-C is deferred while lines are being written."""
         name = signal.Signals(number).name
         while frame and not frame.f_code.co_filename.startswith("<frozen importlib"):
             frame = frame.f_back
         if frame and not self.cleans_up and not self.writing:
-            # what is raised in the middle of an import may be printed there, and lost
+            # an exception raised during an import may be printed there, and lost
             os._exit(130 if number == signal.SIGINT else die_of(name))
         if number != signal.SIGINT:
             for each in ENDING:
-                signal.signal(each, signal.SIG_IGN)  # `timeout` sends it twice: nothing cuts the cleaning short
+                signal.signal(each, signal.SIG_IGN)  # `timeout` sends it twice: do not interrupt the cleanup
             raise Terminated(name)
         if self.interrupted or not self.writing:
             raise KeyboardInterrupt
@@ -50,7 +52,7 @@ STATE = _Signals()
 
 
 def with_signals(run: Callable[[list[str]], int], arguments: list[str]) -> int:
-    """Run the program with its signals taken over; one that is ignored, as SIGHUP under nohup, stays ignored."""
+    """Run the program with handlers for its signals; an ignored one, as SIGHUP under nohup, is left ignored."""
     STATE.owns_process = True
     caught = [each for each in ENDING if signal.getsignal(each) not in (signal.SIG_IGN, None)]
     try:
@@ -65,11 +67,11 @@ def with_signals(run: Callable[[list[str]], int], arguments: list[str]) -> int:
 
 
 def die_of(name: str) -> int:
-    """End as a program that does not catch the signal, so that the caller sees it; within another program return."""
+    """End the process by a signal, which the caller then sees; inside another program return its exit status."""
     number = getattr(signal, name, None)
     if number is None:  # SIGPIPE on Windows
         return 1
     if STATE.owns_process:
         signal.signal(number, signal.SIG_DFL)
         os.kill(os.getpid(), number)
-    return 128 + int(number)  # where the signal is blocked: what a shell would say
+    return 128 + int(number)  # as in a shell; also if the signal is blocked

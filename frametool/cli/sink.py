@@ -1,7 +1,7 @@
-"""Where results go: standard output, whole lines at a time, or a file or a folder that is written atomically.
+"""Write results to standard output, whole lines at a time, or atomically to a file or a folder.
 
 On a terminal, text for people has styles, and a pager where it is longer than the screen.
-Messages about the work go to stderr, by `say` and `tell` alone, which never fail; errors as sentences or as JSON.
+Messages go to stderr, only by `say` and `tell`, which never fail; errors are sentences or JSON.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
     Write = Callable[[str | bytes | memoryview], None]
 
-CHECKS: list[Callable[[], None]] = []  # each raises what it finds wrong with the call before anything is written
-BAG_FILE, BAG_DATA = "metadata.yaml", (".mcap", ".db3")  # what a folder may hold that is replaced
+CHECKS: list[Callable[[], None]] = []  # called before anything is written; each raises an error for a wrong call
+BAG_FILE, BAG_DATA = "metadata.yaml", (".mcap", ".db3")  # a folder with other files is not replaced
 STYLES = {"bold": 1, "dim": 2, "red": 31, "green": 32, "magenta": 35, "cyan": 36}  # legible on dark and light
 HELP_MARKS = (  # of helps, topics, formats and the cookbook
     r"(?m)^ +(?P<green>(?:\$ .*|(?:frametool|printf|sed) .*))",
@@ -35,20 +35,20 @@ HELP_MARKS = (  # of helps, topics, formats and the cookbook
     r"(?m)^  (?P<cyan>[a-z][\w-]*)  +(?=\S)",
     r"(?<![\w-])(?P<cyan>--?[a-zA-Z][\w-]*)",
 )
-LONGEST_BEGIN = 40  # characters of a name that its part begins with: names have 255 bytes
+LONGEST_BEGIN = 40  # characters of the final name in that of the temporary file: names have 255 bytes
 
 
 @contextmanager
 def writing(path: str | None, *, force: bool = False, folder: bool = False) -> Iterator[Write]:
-    """Open a place for results and yield what writes to it; each piece of text is out when the call returns.
+    """Open the output and yield a function that writes to it; each piece of text is flushed when the call returns.
 
-    path: None or `-` is standard output.  A pipe, a device or one of the process's own streams is written to as it
-    is.  Anything else is written to `NAME.PID.part` next to it, which takes its place when the block ends without an
-    error (with mode and owner of the file before; the file itself, if the path is a link), and else is gone; only
+    path: None or `-` is standard output.  A pipe, a device or one of the process's own streams is written to
+    directly.  Anything else is written to `NAME.PID.part` next to it, which replaces the file when the block ends
+    without an error (preserving its mode and owner; the target, if the path is a link) and is removed otherwise; only
     `kill -9` leaves it behind.
-    folder: the place is a new folder, and a piece that has a name begins the file of this name
+    folder: the output is a new folder; a piece that has a name begins the file of this name
     Raises FileProblem if the file exists and `force` is not set, or cannot be written; BrokenPipeError if the reader
-    of a pipe is gone; what a check finds wrong.
+    of a pipe is gone; the errors of CHECKS.
     """
     if path in (None, "-", "/dev/stdout"):
         yield writer_into(sys.stdout.buffer, "standard output")
@@ -65,7 +65,7 @@ def writing(path: str | None, *, force: bool = False, folder: bool = False) -> I
 
 @contextmanager
 def _replacing(path: str, *, force: bool, folder: bool) -> Iterator[Write]:
-    """Yield what writes a part that takes the place of `path` if all goes well."""
+    """Yield a function that writes a temporary file or folder, which replaces `path` if the block succeeds."""
     refuse = partial(refuse_existing, path, force=force, folder=folder)
     refuse()
     STATE.cleans_up = True
@@ -74,7 +74,7 @@ def _replacing(path: str, *, force: bool, folder: bool) -> Iterator[Write]:
     part = os.path.join(parent, f"{name[:LONGEST_BEGIN]}.{os.getpid()}.part")
     try:
         with ExitStack() as opened:
-            mode = 0o600 if os.path.exists(path) else 0o666  # private until it has the mode of the file before
+            mode = 0o600 if os.path.exists(path) else 0o666  # private until it gets the mode of the old file
             yield _folder_writer(part, path, opened) if folder else _file_writer(part, path, opened, mode)
             check()
         refuse()  # again, now that the part is complete
@@ -85,7 +85,7 @@ def _replacing(path: str, *, force: bool, folder: bool) -> Iterator[Write]:
                 os.rename(part, place)
                 _remove(f"{part}.before")
                 return
-            with suppress(FileNotFoundError):  # the file before has a mode and, where the system lets us, an owner
+            with suppress(FileNotFoundError):  # preserve the mode of the old file and, if permitted, its owner
                 known = os.stat(place)
                 with suppress(OSError, AttributeError):  # Windows has no chown
                     os.chown(part, known.st_uid, known.st_gid)
@@ -97,9 +97,9 @@ def _replacing(path: str, *, force: bool, folder: bool) -> Iterator[Write]:
 
 
 def in_colour(text: str, marks: Iterable[str]) -> str:
-    """Return text for a terminal: each named group of some patterns in the style that is its name, unless NO_COLOR.
+    """Return text for a terminal, with each named group of the patterns in the style of its name, unless NO_COLOR.
 
-    Where two overlap, the pattern that comes first counts.
+    If two overlap, the first pattern is used.
     """
     if os.environ.get("NO_COLOR") or os.environ.get("TERM") in ("dumb", "unknown"):
         return text
@@ -118,7 +118,7 @@ def in_colour(text: str, marks: Iterable[str]) -> str:
 
 
 def show(text: str, *, paged: bool) -> None:
-    """Write a help or the like to standard output; on a terminal in styles, and paged where it is longer."""
+    """Write a help text to standard output; on a terminal with styles, and paged if longer than the screen."""
     from shutil import get_terminal_size
 
     is_seen = sys.stdout.isatty() and os.environ.get("TERM") != "dumb"
@@ -131,13 +131,13 @@ def show(text: str, *, paged: bool) -> None:
 
 
 def check() -> None:
-    """Raise what a check finds wrong with the call."""
+    """Run all CHECKS, which raise an error for a wrong call."""
     for each in CHECKS:
         each()
 
 
 def refuse_existing(path: str | None, *, force: bool, folder: bool = False) -> None:
-    """Raise FileProblem for what `writing` would refuse to replace: without --force, a folder of more than a bag."""
+    """Raise FileProblem for a path that `writing` must not replace: without --force, or a folder that is not a bag."""
     if path is None or path == "-" or not os.path.exists(path) or (is_special(path) and not folder):
         return
     if not force:
@@ -150,18 +150,18 @@ def refuse_existing(path: str | None, *, force: bool, folder: bool = False) -> N
 
 
 def is_special(path: str) -> bool:
-    """Return True if a path leads to something that is no plain file: a device, a pipe, a folder, an own stream."""
+    """Return True if a path is not a regular file: a device, a pipe, a folder, or one of the process's streams."""
     return _own_stream(path) is not None or (os.path.exists(path) and not os.path.isfile(path))
 
 
 def _own_stream(path: str) -> int | None:
-    """Return the descriptor that a path such as /dev/stdout denotes."""
+    """Return the descriptor of a path such as /dev/stdout, None for other paths."""
     found = re.fullmatch(r"(?:/dev|/proc/self)/fd/(\d+)", path)
     return int(found[1]) if found else {"/dev/stdout": 1, "/dev/stderr": 2}.get(path)
 
 
 def encoded(text: str) -> bytes:
-    """Return text in UTF-8; raises ValueInvalid for bytes of a name that are no text."""
+    """Return text in UTF-8; raises ValueInvalid for undecodable bytes of a file name."""
     try:
         return text.encode()
     except UnicodeEncodeError as error:
@@ -169,15 +169,15 @@ def encoded(text: str) -> bytes:
 
 
 def writer_into(stream: BinaryIO, name: str) -> Write:
-    """Return what checks the call and writes pieces into an open stream, which messages call by a name."""
+    """Return a function that runs the checks and writes pieces to an open stream; messages use its name."""
 
     def write(piece: str | bytes | memoryview) -> None:
         check()
         view = memoryview(encoded(piece) if isinstance(piece, str) else piece)
-        STATE.writing = True  # Ctrl-C waits until the block of lines is written
+        STATE.writing = True  # Ctrl-C is deferred until the block of lines is written
         try:
             with problems_of(name):
-                while view:  # an unbuffered stream may take a part
+                while view:  # an unbuffered stream may write only a part
                     view = view[stream.write(view) :]
                 stream.flush()
         finally:
@@ -191,7 +191,7 @@ def writer_into(stream: BinaryIO, name: str) -> Write:
 
 @contextmanager
 def problems_of(name: str) -> Iterator[None]:
-    """Name the place in what the system reports of it; a reader that is gone is no problem."""
+    """Turn errors of the system into FileProblem with the name of the file; a closed pipe is not one."""
     try:
         yield
     except BrokenPipeError:
@@ -201,21 +201,21 @@ def problems_of(name: str) -> Iterator[None]:
 
 
 def _file_writer(part: str, path: str, opened: ExitStack, mode: int = 0o666) -> Write:
-    """Open a part that is not there yet."""
+    """Create a temporary file and return a function that writes to it."""
     with problems_of(path):
         file = open(part, "xb", buffering=0, opener=lambda name, flags: os.open(name, flags, mode))  # noqa: SIM115
     return writer_into(opened.enter_context(file), path)
 
 
 def _folder_writer(part: str, path: str, opened: ExitStack) -> Write:
-    """Make a folder; each of its files is begun by a piece that has its name."""
+    """Create a folder and return a function that writes its files; a piece with a name begins the file of this name."""
     write: Write | None = None
 
     def fill(piece: str | bytes | memoryview) -> None:
         nonlocal write
         if name := getattr(piece, "name", ""):
             write = _file_writer(os.path.join(part, name), path, opened)
-        if write is not None and piece:  # nothing comes before the first name
+        if write is not None and piece:  # the first piece has a name
             write(piece)
 
     with problems_of(path):
@@ -224,7 +224,7 @@ def _folder_writer(part: str, path: str, opened: ExitStack) -> Write:
 
 
 def _remove(part: str) -> None:
-    """Remove a file or a folder, if there is one."""
+    """Remove a file or a folder, if it exists."""
     if os.path.isdir(part):
         from shutil import rmtree
 
@@ -233,11 +233,11 @@ def _remove(part: str) -> None:
         os.unlink(part)
 
 
-PLACES: list[dict[str, Any]] = []  # source and line of a batch; the last one begins all messages
+PLACES: list[dict[str, Any]] = []  # source and line of a batch; all messages begin with the last one
 
 
 def tell(text: str) -> None:
-    """Write lines; that stderr is closed or on a full disk does not change what the data is worth."""
+    """Write lines to stderr; if it is closed or its disk is full they are dropped, and the results are still valid."""
     if sys.stderr is None:
         return
     try:
@@ -247,14 +247,14 @@ def tell(text: str) -> None:
 
 
 def say(text: str) -> None:
-    """Write one line about the work, under the program's name; several where a terminal ends."""
+    """Write a message to stderr after the program's name, wrapped on a terminal."""
     where = "{source}:{line}: ".format(**PLACES[-1]) if PLACES else ""
     text = printable(f"frametool: {where}{text}")
     tell(folded(text) if sys.stderr is not None and sys.stderr.isatty() else text)
 
 
 def folded(line: str) -> str:
-    """Break a line between words where the terminal ends; the rest is indented."""
+    """Wrap a line between words at the width of the terminal; the rest is indented."""
     from shutil import get_terminal_size
 
     width = get_terminal_size().columns
@@ -268,8 +268,8 @@ def folded(line: str) -> str:
 def say_warning(message: str, rule: str = "") -> None:
     """Write a warning.
 
-    With --quiet there is no word on names that lost their leading slash: their tree is as it was meant.  What stamps
-    are taken for by their size is said once.
+    --quiet suppresses the warning on names that lost their leading slash: the tree is as intended.  The warning on the
+    unit that is assumed for stamps by their size is written once.
     """
     if rule in ("slash", "by-size"):
         context = click.get_current_context()
@@ -280,10 +280,10 @@ def say_warning(message: str, rule: str = "") -> None:
 
 
 def say_error(error: FrametoolError, *, in_json: bool = False, fate: str = "") -> None:
-    """Write an error: as a sentence with the source line, or as one object of its kind, its message and its fields.
+    """Write an error: as a sentence with the source line, or as a JSON object with its kind, message and fields.
 
-    The place of an object is the line of a batch, if one runs; its own place is then under `input`.
-    fate: what became of the line of a batch in which it is
+    In a batch the location in the object is the line of the batch; that of the error itself is then under `input`.
+    fate: what happens to the line or time with the error, e.g. `line skipped`
     """
     fate = f" ({fate})" if fate else ""
     if in_json:
@@ -304,7 +304,7 @@ def say_error(error: FrametoolError, *, in_json: bool = False, fate: str = "") -
 def say_first(
     texts: Sequence[Any], most: int, more: str, report: Callable[[Any], object], end: Callable[[str], object] = say
 ) -> None:
-    """Report the first of many, and how many more there are; one more than the most is reported too."""
+    """Report the first `most` and the number of the others; a single one more is reported instead of counted."""
     most += len(texts) == most + 1
     for each in texts[:most]:
         report(each)
@@ -313,7 +313,7 @@ def say_first(
 
 
 def discard(stream: TextIO) -> None:
-    """Let what is still buffered vanish, so that it does not raise again when the process ends."""
+    """Redirect a stream to the null device, so that its buffer does not raise again when the process ends."""
     with suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
@@ -322,10 +322,10 @@ TROUBLES = (MemoryError, ImportError, OSError)
 
 
 def words_of(trouble: Exception) -> str:
-    """Return what Python or the system could not do."""
+    """Return the message of an error of Python or the system."""
     if isinstance(trouble, MemoryError):
         return "out of memory"
-    if isinstance(trouble, ImportError):  # numpy's tells of missing memory and files in many lines, the cause last
+    if isinstance(trouble, ImportError):  # numpy's message has many lines, the cause is the last
         return f"a library cannot be loaded: {str(trouble).strip().splitlines()[-1]}"
     return (getattr(trouble, "strerror", None) or str(trouble)).lower()
 

@@ -1,4 +1,4 @@
-"""Streams on the command line: their options and their run; for commands on poses also arguments and `--explain`."""
+"""Run streams on the command line: options, formats, bad rows; for commands on poses also arguments and --explain."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from frametool.stream.gathering import MeanRows
     from frametool.stream.request import Request
 
-TOP = 2  # lines of a table up to its first row: what is bad there may be bad in every row
+TOP = 2  # lines of a table up to its first row: an error there may be in every row
 BAGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
 _MAGICS: list[Any] = [what for name in BAGS for kind, what in FORMATS[name].magic if kind == "magic"]
 RECORDS = readers("records")
@@ -70,10 +70,10 @@ EXPLAIN = explain_option()
 
 
 class Task:
-    """What a command is asked: its stream or arguments and where the results go, as the options describe them.
+    """The task of a command: its stream or arguments, and the output of its results, by the options.
 
-    plan: how the derivation is written, if it is wanted instead of the result
-    window: the first and the last nanosecond that --start and --stop leave
+    plan: the style of the derivation, with --explain
+    window: the first and last nanosecond of --start and --stop
     """
 
     _opened: BufferedReader | None = None
@@ -81,17 +81,17 @@ class Task:
     plan: Style | None = None
 
     def __init__(self, inputs: Inputs, *what: str, output: Output | None = None) -> None:
-        """Look at what the options say; each is asked for where it counts.
+        """Look at the options; they are marked as used where they have an effect.
 
-        what: the results that the command writes, where its output is not made yet
+        what: the kinds of results of the command, unless `output` is passed
         """
         self.inputs, self.normalize = inputs, bool(inputs.normalize)
         self.output = output = output or Output(inputs, *what)
         path = inputs.peek("input_path")
         self.paths: Sequence[str] = path if isinstance(path, tuple) else () if path is None else (path,)
         self.path: str | None = self.paths[0] if self.paths and self.paths[0] != "-" else None
-        self.name: str = self.path or "stdin"  # as messages call the stream
-        # an option may say that the stream is a table
+        self.name: str = self.path or "stdin"  # of the stream, in messages
+        # these options are only for tables
         self._is_table = any(map(inputs.peek, ("columns", "keep", "prefix", "no_header")))
         notations: Any = inputs.peek("from_rep") or (None,)
         refuse(len(notations) > 1, "--from takes one representation")
@@ -106,7 +106,7 @@ class Task:
             self.plan = output.style.changed(precision=significant(inputs.precision), notations=notations)
 
     def opened(self) -> BufferedReader:
-        """Open the input once: of a pipe, what a first reader has taken is gone for a second; raises FileProblem."""
+        """Open the input once, because a pipe cannot be read twice; raises FileProblem."""
         if self._opened is None:
             self.inputs.ask("input_path")
             name = "-" if self.path is None else self.path
@@ -119,7 +119,7 @@ class Task:
         return self._opened
 
     def _shows_format(self, begin: bytes) -> bool:
-        """Return True if what comes later does not change the format that is found."""
+        """Return True if the beginning of the stream is long enough to detect its format."""
         if has_record(begin) or not has_line(begin):
             return has_record(begin)
         with suppress(FormatError):
@@ -127,9 +127,9 @@ class Task:
         return False
 
     def messages(self) -> BufferedReader | None:
-        """Return the points, poses or fixes of the bag that -i names as JSON lines; None for any other file.
+        """Return the points, poses or fixes of the bag of -i as JSON lines; None for other files and bags of clouds.
 
-        Raises FormatError for a bag without any, unless it may hold clouds instead.
+        Raises FormatError for a bag without any of these.
         """
         if self._opened is None and self.path and is_bag(self.path):
             from frametool.grammar.edges import Diagnostics
@@ -141,7 +141,7 @@ class Task:
         return self._opened
 
     def read_clouds_as_rows(self) -> None:
-        """Let the points of a cloud be rows of CSV, which has room for more columns."""
+        """Replace a cloud by its points as rows of CSV, to which columns can be added."""
         from frametool.formats.detect import by_sign
 
         opened = self.opened()
@@ -167,15 +167,15 @@ class Task:
                 yield bytes(made.text)
 
     def has_input(self) -> bool:
-        """Return True if something is piped in."""
+        """Return True if standard input is not a terminal and not empty."""
         if sys.stdin is None or sys.stdin.isatty() or not sys.stdin.readable():
             return False
         return bool(self.opened().peek(1))
 
     def has_table(self, argument: str) -> bool:
-        """Stream a file that an argument names if it is a table; one of records, or none known, is not touched.
+        """Return True and stream the file of an argument if it is a table, a bag, or a pipe, as `<(command)`.
 
-        What can be read once only, as `<(command)`, is streamed whatever it holds.
+        A pipe can be read only once, so it is streamed whatever its format is.
         """
         if argument == "-" or is_pasted(argument, self.notation):
             return False
@@ -185,13 +185,13 @@ class Task:
                 with open(argument, "rb") as file:
                     if self.format_of(file.read(HEAD), name=argument) in RECORDS:
                         return False
-            except (OSError, ValueError):  # it cannot be read, or its format is unknown
+            except (OSError, ValueError):  # not readable, or of an unknown format
                 return False
         self.path = self.name = argument
         return True
 
     def chosen_format(self) -> str:
-        """Return the format that --in names for the stream, "" if it names none."""
+        """Return the format of the stream by --in, "" if it is not set."""
         others, fmt = options.input_formats(self.inputs, streams=True)
         if others and not self.inputs.reads_trees:
             both = f"--in {others[0]} and --in {fmt}: there is one stream"
@@ -200,9 +200,9 @@ class Task:
         return fmt
 
     def run(self, request: Request, rows: MeanRows | None = None) -> int:
-        """Run the stream and return its exit status; the error that ends it says what to do.
+        """Run the stream and return its exit status; a FormatError gets a hint what to do.
 
-        rows: takes the results, which are not written then
+        rows: receives the results instead of the output
         """
         from frametool.formats.detect import with_hint
 
@@ -217,7 +217,7 @@ class Task:
                 raise with_hint(error, head, self.name, chosen=bool(self.chosen_format())) from None
 
     def _run_opened(self, stream: BufferedReader, request: Request, rows: MeanRows | None) -> int:
-        """Run the stream, of whatever format it is."""
+        """Detect the format of the stream and run it."""
         looks_up = not request.rows.poses and request.operation.formula is None
         output, is_table = self.output, looks_up or self._is_table
         fmt = self.within or self.chosen_format()
@@ -239,7 +239,7 @@ class Task:
             if self.inputs.verbose:
                 say(f"{self.name}: read as {fmt} ({FORMATS[fmt].summary})")
             if fmt == "kitti" and self.notation:
-                fmt = "columns"  # --from says what the numbers are, and nothing of pictures
+                fmt = "columns"  # with --from, 12 numbers per row are not poses of KITTI
         if output.chosen is None and (output.path or "").endswith(".bin") and not fmt.endswith("-bin"):
             raise click.UsageError(f"-o {output.path} does not name its format; give -f kitti-bin or nuscenes-bin")
         refuse(looks_up and fmt in RECORDS, f"frames are looked up for the rows of a table, not of {fmt}")
@@ -252,7 +252,7 @@ class Task:
         refuse(request.offset_ns and holds(fmt, "arrays"), of_numbers)
         output.take_axes(FORMATS[fmt].rows.axes, request.operation)
         if is_trajectory(fmt) and not output.notations:
-            request = request.with_results(notations=())  # its rows stay what they are
+            request = request.with_results(notations=())  # rows are written in their own representation
         bad = self.policy(self.name, "row" if holds(fmt, "arrays") else "line")
         if rows is not None:
             outcomes, written, tally = rows.take(self._steps(stream, fmt, request), bad.place), "", None
@@ -266,7 +266,7 @@ class Task:
         with (
             output.opened() if rows is None else nullcontext(lambda _: None) as write,
             progress as advance,
-            self.opened(),  # closed before a file takes its place, which Windows asks for
+            self.opened(),  # Windows cannot replace a file that is open
             closing(outcomes),
         ):
             status = run(outcomes, write, bad, advance)
@@ -277,7 +277,7 @@ class Task:
         return status
 
     def format_of(self, begin: bytes, *, name: str = "", is_table: bool = False) -> str:
-        """Return the format of the stream as --in names it, else by what it begins with, and by its name."""
+        """Return the format of the stream: that of --in, else detected from its first bytes and its name."""
         from frametool.formats.detect import detect
 
         otherwise, chosen = "columns" if is_table else "", self.within or self.chosen_format()
@@ -286,7 +286,7 @@ class Task:
     def _outcomes(self, stream: Any, fmt: str, request: Request) -> tuple[Generator[Outcome], str, Diagnostics | None]:
         """Choose how rows become results: as columns of numbers, as poses in another format, or in place.
 
-        Also: the format in which they are, and what was assumed of that of the input.
+        Also returns the format of the results, and the diagnostics of the input format.
         """
         from frametool.formats.rows.pose_rows import is_turned
         from frametool.stream.row_layout import POSE, Shape
@@ -296,7 +296,7 @@ class Task:
             return self._columns(stream, fmt, request), fmt, None
         listed = holds(fmt, "arrays") or (is_trajectory(fmt) and not FORMATS[fmt].is_table)
         is_kindred = chosen == "csv" and fmt in ("tsv", "semicolon")
-        # a trajectory has no room for more columns, or for other ones
+        # a trajectory cannot hold more columns, or other ones
         asked = output.notations or output.style.place
         no_room = output.is_trajectory and bool(asked or request.operation.extras(Shape(POSE)))
         turns = output.style.axes and not output.notations and is_turned(output.style.changed(format=chosen or fmt))
@@ -318,7 +318,7 @@ class Task:
         return run_table(stream, fmt, request, source=self.name, header=not self.inputs.no_header), fmt, None
 
     def _steps(self, stream: Any, fmt: str, request: Request) -> Iterator[Step]:
-        """Return what becomes of each block as poses that are not written."""
+        """Return the results of each block as poses that are not written."""
         from frametool.cli.trees import answers
         from frametool.stream.as_poses import AS_VALUES, FormatConverter
         from frametool.stream.gathering import posed
@@ -331,7 +331,7 @@ class Task:
         return converter.steps(stream, header=not self.inputs.no_header)
 
     def _records(self, stream: Any, fmt: str, request: Request, chosen: str) -> tuple[Generator[Outcome], str]:
-        """Write the results of records in place, or in a format that was chosen."""
+        """Return the results of records, in place or in the chosen format, and that format."""
         from frametool.stream.record_stream import run_records
 
         if chosen in ("", fmt):
@@ -340,12 +340,12 @@ class Task:
             raise click.UsageError(f"--on-error null: {chosen} cannot hold a row without a result; give skip")
         request = request.with_results(by_default=holds(chosen, "arrays", "recording") and not self.output.notations)
         if table.holds(chosen, "recording"):
-            request = request.with_results(place=None)  # a fix is made of ecef, unless of what was read
+            request = request.with_results(place=None)  # fixes are written from ecef, or unchanged
         outcomes = run_records(stream, fmt, request, source=self.name, style=self.output.style)
         return written_by(self.output.writer(), outcomes, request.on_error), chosen
 
     def _columns(self, stream: Any, fmt: str, request: Request) -> Generator[Outcome]:
-        """Write columns of numbers in the format they came in, or in another that holds such."""
+        """Return the results as columns of numbers, in the input's format or another one of such columns."""
         from frametool.stream.column_stream import OtherColumns, run_columns
 
         output = self.output
@@ -359,15 +359,15 @@ class Task:
         return run_columns(columns, request, style, source=self.name)
 
     def policy(self, name: str, counted: str = "line") -> BadRows:
-        """Return what reports and counts the bad rows of a source."""
+        """Return the policy that reports and counts the bad rows of a source."""
         tell = partial(say_error, in_json=self.inputs.peek("format_name") == "json")
         return BadRows(name, self.inputs.on_error, most=self.inputs.max_errors, tell=tell, counted=counted)
 
     def _completed(self, request: Request, fmt: str, *, alone: bool) -> Request:
-        """Add what the stream's options say to the request; alone: its results are written."""
+        """Add the options of the stream to the request; alone: the results are written, not collected."""
         inputs, output = self.inputs, self.output
         is_table = fmt not in RECORDS
-        adds = bool(request.rows.poses) or request.operation.formula is None  # look-ups add by themselves
+        adds = bool(request.rows.poses) or request.operation.formula is None  # formulas alone append anyway
         if is_table and output.chosen not in RECORDS and adds and alone:
             request = request.with_results(keep=inputs.keep)
         if (is_table or request.operation.only_adds) and alone:
@@ -380,13 +380,13 @@ class Task:
         if not holds(output.chosen or fmt, "arrays", "recording"):
             inputs.ask("precision")
         place = output.style.changed(format=output.chosen or fmt).place
-        on_error = SKIP if inputs.on_error == NULL and not alone else inputs.on_error  # no row is written, or counts
+        on_error = SKIP if inputs.on_error == NULL and not alone else inputs.on_error  # no empty rows to collect
         return request._replace(on_error=on_error).with_results(place=place)
 
     def request(self, *, notations: tuple[Any, ...] = (), **asked: Any) -> Request:
-        """Return what is done with rows and records, which are read as the options say.
+        """Return the request for rows and records by the options.
 
-        asked: fields of a request, and of how its rows are read
+        asked: further fields of Request and RowOptions
         """
         from frametool.stream.request import Request, ResultOptions, RowOptions
 
@@ -398,7 +398,7 @@ class Task:
             said = inputs.peek(name) or ()
             for text in [said] if isinstance(said, str) else said:
                 bare = without_inverse(text)[0].strip()
-                if not (bare.startswith("{") and ":" in bare):  # whose keys say what its numbers are
+                if not (bare.startswith("{") and ":" in bare):  # not a mapping, whose keys name the representation
                     inputs.ask("from_rep")
         if says_earth := bool(style.place or self.place or any(map(inputs.peek, options.OF_EARTH))):
             from frametool.cli.earth import earth
@@ -418,13 +418,13 @@ class Task:
         return made
 
     def only_arguments(self, arguments: Sequence[str | Source | None]) -> None:
-        """Ask for what is said of files, where arguments are all that is read and one of them may be a file."""
+        """Mark --in as used if one of the arguments is a file; raise a usage error if -i is set too."""
         refuse(self.path is not None, "-i FILE and arguments are two inputs; give one")
         if any(isinstance(each, str) and os.path.exists(each) for each in arguments):
             self.inputs.ask("input_formats")
 
     def streamed(self, arguments: Sequence[str], request: Request) -> Request | None:
-        """Return what is asked of the stream, where it, a table or its inverse is the argument; else None."""
+        """Return the request for the stream if the only argument is `-`, a table, or their inverse; else None."""
         bare, is_inverse = without_inverse(arguments[0]) if arguments else ("-", False)
         if len(arguments) > 1 or (bare != "-" and (self.path or not self.has_table(bare))):
             return None
@@ -433,7 +433,7 @@ class Task:
     def answer(self, argument: str | Source, request: Request, timed: dict[str, Any] | None = None) -> int:
         """Write the results of the records of one argument: inline, a file, or the stream of the command.
 
-        timed: the stamp of a single result, {} for none, where it is not that of its record
+        timed: replaces the stamp of a single result; {} removes it
         """
         if isinstance(argument, str) and (streamed := self.streamed([argument], request)):
             return self.run(streamed)
@@ -447,9 +447,9 @@ class Task:
         return 0
 
     def written(self, argument: str | Source | None, *, warned: bool = False) -> WrittenPose:
-        """Read the one pose of an argument as it is written.
+        """Read the single pose of an argument with its original notation, for a derivation.
 
-        warned: its warnings are on stderr already
+        warned: its warnings were already written
         """
         if isinstance(argument, str):
             argument, is_inverse = without_inverse(argument)
@@ -467,7 +467,7 @@ class Task:
         return found[0]
 
     def derive(self, operation: str, *parts: Any, **more: Any) -> int:
-        """Write the derivation of an operation where the result would go."""
+        """Write the derivation of an operation to the output."""
         from frametool.explain import derive
 
         made: Explanation = getattr(derive, operation)(self.plan, *parts, **more)
@@ -476,13 +476,13 @@ class Task:
 
 
 def open_columns(file: InputFile, fmt: str) -> Any:
-    """Return the columns of numbers that a file of a format holds."""
+    """Open a file of a format of columns of numbers."""
     file.format = fmt
     return import_module(FORMATS[fmt].reader).open_columns(file)
 
 
 def is_bag(path: str) -> bool:
-    """Recognize a bag by its first bytes, or as a folder."""
+    """Return True for a bag, by its first bytes, its suffix if empty, or its folder."""
     if not os.path.isfile(path):
         from frametool.formats.detect import of_folder
 
@@ -493,7 +493,7 @@ def is_bag(path: str) -> bool:
 
 
 def significant(precision: int | None) -> int | None:
-    """Return how many significant digits --precision asks for; None for all."""
+    """Return the number of significant digits of --precision for derivations; None for all."""
     from frametool.explain.run import DIGITS
 
     refuse(precision == 0, "--precision counts significant digits with --explain; give 1 or more, or full")
@@ -501,6 +501,6 @@ def significant(precision: int | None) -> int | None:
 
 
 def one_argument(argument: str | Source | None) -> str | Source:
-    """Return an argument that holds a record; standard input is a stream."""
+    """Return an argument with a record; raises click.UsageError for standard input, which is a stream."""
     refuse(argument in (None, "-"), f"standard input is a stream; {ONE_RECORD}")
     return argument or ""

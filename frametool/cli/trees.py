@@ -1,6 +1,6 @@
-"""Trees and frame names from the command line: files, inline texts, standard input, read as the options say.
+"""Read the trees and frame names of the command line: files, inline text, standard input, by the options.
 
-What several lines of a batch read from the same files is read once for as long as these stay as they are.
+In a batch, files that several lines name are read once, and again when they have changed.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from frametool.formats.robots.model import Robot
     from frametool.frames.lookups import Frames
 
-# field of Answers -> the parameters that say it; of the others the formats say whether they count, and what moves
+# field of Answers -> its parameters; whether the others have an effect depends on formats and moving frames
 ASKED_OUTSIDE = ("time_offset", "frames", "camera_axes")
 ANSWERED: dict[str, tuple[str, ...]] = {name: (name,) for name in Answers._fields if name not in ASKED_OUTSIDE}
 ANSWERED["order"] = "order", "from_rep"
@@ -38,10 +38,10 @@ OF_FILES = (*Answers._fields, "named_frames", "from_rep", "input_formats", "topi
 def load_tree(
     inputs: Inputs, argument: str, more: Sequence[str] = (), *, streams: bool = False, drawings: bool = False
 ) -> Frames:
-    """Read the tree of an argument and merge further files into it; say what files of other formats were taken for.
+    """Read the tree of an argument and merge further files into it; report what is assumed of their formats.
 
-    streams: `--in` is about what is streamed wherever that can be
-    drawings: a file without poses is taken too, if it is alone
+    streams: the command also reads a stream; the last --in that can be streamed is the format of the stream
+    drawings: accept a file without poses too, if it is the only one
     """
     from frametool.formats.load import Rules  # not every command that may read trees does
 
@@ -50,7 +50,7 @@ def load_tree(
 
 
 def load_sides(inputs: Inputs, a: Sequence[str], b: Sequence[str]) -> list[tuple[Frames, dict[str, EdgePlace]]]:
-    """Read two trees that will be compared, each of several files, as `load_tree` does; with each frame's place."""
+    """Read two trees to compare, each of several files, as `load_tree` does; with the location of each frame."""
     from frametool.formats.load import Rules
 
     refuse_two_readers((*a, *b))
@@ -66,10 +66,10 @@ def load_sides(inputs: Inputs, a: Sequence[str], b: Sequence[str]) -> list[tuple
 def _load(
     inputs: Inputs, arguments: Sequence[str], rules: Rules, *, placed: bool = False, **how: Any
 ) -> tuple[Frames, dict[str, EdgePlace]]:
-    """Merge files into a tree; in a batch only if they have changed since they were read.  Also: each frame's place.
+    """Merge files into a tree and return it with the location of each frame; a batch caches unchanged files.
 
-    placed: whether the places are wanted
-    how: they are opened
+    placed: collect the locations
+    how: options of `opened`
     """
     from frametool.formats.load import load_sources
 
@@ -98,16 +98,16 @@ def _load(
 
 
 def lookups_in(inputs: Inputs, tree: Frames, *, carried: bool) -> Lookups:
-    """Return the look-ups of a command; report covariances that are not wanted."""
+    """Return the lookups of a command; report covariances that are not used."""
     unused = tree.covariances and not carried
     inputs.note(f"sigmas of {bare(tree.name)} not used (--covariance)" if unused else None)
     return Lookups(tree, carried=carried)
 
 
 def state(inputs: Inputs, files: Sequence[FrameFile]) -> None:
-    """Report on stderr what files that were read were taken for: those of other formats than the own one, with -v all.
+    """Report on stderr what was assumed of files that were read; with -v also their formats.
 
-    Where one of them names a topic, --topic has an effect.
+    --topic has an effect if one of them has topics.
     """
     for file in files:
         if file.topics.counts or file.topics.seen:
@@ -121,12 +121,12 @@ def opened(
     inputs: Inputs, arguments: Sequence[str], *, streams: bool = False, behind: int = 0, of: int | None = None,
     drawings: bool = False,
 ) -> list[FrameFile]:  # fmt: skip
-    """Open trees and recordings: files, `-` for standard input, `.` for FRAMETOOL_TREE, or trees written inline.
+    """Open trees and recordings: files, `-` for standard input, `.` for FRAMETOOL_TREE, or inline trees.
 
-    streams: as `load_tree` has it
-    behind: so many files came before these; their --in and --frames are passed over, unless they are all there are
-    of: so many files there are in all
-    drawings: files without poses are taken too
+    streams: as in `load_tree`
+    behind: the number of files before these, whose --in and --frames are skipped unless there are no more
+    of: the number of all files
+    drawings: accept files without poses too
     """
     from frametool.formats.load import FrameFile, opened_together
 
@@ -159,7 +159,7 @@ def opened(
         for file in found:
             file.close()
         raise click.UsageError(f"--frames appears {len(named)} times, {len(lacking)} of the files need names")
-    if len(named) == 1:  # for poses that have no names at all, rather than for names that others go without saying
+    if len(named) == 1:  # for poses without any names, if there are some, not for files with default names
         lacking = [file for file in lacking if "rows" in FORMATS[file.format].reads] or lacking
     for file, names in zip(found if len(named) == files else lacking, named[behind:] or named, strict=False):
         file.answers = file.answers._replace(frames=names)
@@ -168,7 +168,7 @@ def opened(
 
 
 def answers(inputs: Inputs) -> Answers:
-    """Return what the options say about all files whose format leaves it open; no joint has two values."""
+    """Return the options for what formats do not specify; raises click.UsageError for a joint with two values."""
     joints: dict[str, str] = {}
     for text in inputs.peek("joints"):
         name, _, value = text.partition("=")
@@ -186,14 +186,14 @@ def answers(inputs: Inputs) -> Answers:
 
 
 def tree_file(argument: str) -> str:
-    """Return the file that an argument denotes."""
+    """Return the file of an argument: for `.` that of FRAMETOOL_TREE."""
     named = os.environ.get("FRAMETOOL_TREE") if argument == "." else argument
     refuse(argument == "." and not named, "TREE is . but FRAMETOOL_TREE is not set; name a file")
     return named or ""
 
 
 def _offer_frames(ctx: click.Context, _incomplete: str) -> Mapping[str, str] | None:
-    """Offer the frames of the tree, or files where none is named yet."""
+    """Offer the frames of the tree; None, for files, if no tree is named yet."""
     named = tree_on_the_line(ctx)
     if named is None and "arguments" in ctx.params:
         return None
@@ -204,7 +204,7 @@ FRAME = Text(offers=_offer_frames)
 
 
 def frame_name(name: str, tree: Frames | Robot) -> str:
-    """Return what a tree calls a frame: without the leading `/` of old versions of tf2; the Earth's by either name."""
+    """Return the name of a frame in a tree: without the leading `/` of old tf; ecef and earth are one frame."""
     if name in EARTH_FRAMES and name not in tree.frames:
         return next((other for other in EARTH_FRAMES if other in tree.frames), name)
     return name if name in tree.frames else without_slash(name)

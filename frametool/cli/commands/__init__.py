@@ -1,7 +1,4 @@
-"""One file a command, the table and the group of them, and their calls.
-
-Each command is imported when it is called; help and completion come from the table.
-"""
+"""Hold the table of commands, import each when it is called, and call it; help and completion come from the table."""
 
 from __future__ import annotations
 
@@ -56,10 +53,10 @@ COMMANDS = {
     "help": ("frametool.cli.commands.help", "topics, the cookbook, and any word: pose, axes, extrinsics"),
     "sim": ("frametool.cli.commands.sim", "turtlesim and its followers, without ROS and without a screen"),
 }
-# first command of a group -> its heading
+# first command of a section of the help -> its heading
 GROUPS = {"convert": "Poses", "lookup": "Trees", "apply": "Rows", "compare": "Trajectories", "echo": "Recordings",
           "formats": "Help", "sim": "Turtles"}  # fmt: skip
-TROUBLE = {"diff": 2}  # command -> its one exit code for whatever goes wrong, as that of diff(1)
+TROUBLE = {"diff": 2}  # command -> its exit code for all errors, as diff(1) has one
 
 HELP = """The calculator for rigid-body frames.
 
@@ -76,7 +73,7 @@ COMPLETION = "_FRAMETOOL_COMPLETE"  # the variable by which shells ask for compl
 
 
 class Group(WithHelp, click.Group):
-    """The commands of a table, name -> (module, what it does), each imported when it is called and not before."""
+    """The commands of a table, name -> (module, what it does), each imported when it is called."""
 
     def __init__(self, *args: Any, table: Mapping[str, tuple[str, str]] = COMMANDS, **kwargs: Any) -> None:
         """Keep the table."""
@@ -84,18 +81,18 @@ class Group(WithHelp, click.Group):
         self.table = table
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Answer a call without arguments with help; click's own way to it has changed with its versions."""
+        """Show the help if there are no arguments; how click itself does this depends on its version."""
         if not args and not ctx.resilient_parsing:
             show_help(ctx)
             ctx.exit()
         return super().parse_args(ctx, args)
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
-        """Name the commands, in the table's order."""
+        """Return the names of the commands in the order of the table."""
         return list(self.table)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
-        """Import one command, if it is not here, or say which ones there are."""
+        """Return a command, imported if it is new; raises click.UsageError with the nearest name for an unknown one."""
         if cmd_name in self.commands:
             return self.commands[cmd_name]
         if cmd_name not in self.table:
@@ -106,7 +103,7 @@ class Group(WithHelp, click.Group):
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
-        """List the commands from the table, without importing any."""
+        """Write the commands from the table, without importing any."""
         width, rows = max(map(len, self.table)), list(self.table.items())
         starts = [0, *(at for at, name in enumerate(self.table) if at and name in GROUPS)]
         for begin, end in pairwise([*starts, len(rows)]):
@@ -125,9 +122,9 @@ PACKAGES = ("numpy", "click", "rich", "pyyaml", "rosbags", "pyarrow", "laspy", "
 
 
 def _show_version(ctx: click.Context) -> NoReturn:
-    """Print the version, with -v also those of Python and of the packages there are, for a report of a fault.
+    """Print the version, with -v also those of Python and of the installed packages, for bug reports.
 
-    It is a literal, because asking importlib.metadata for it takes 25 ms.
+    It is a literal, because importlib.metadata takes 25 ms.
     """
     lines = [f"frametool {__version__}"]
     if ctx.params.get("all_versions"):
@@ -153,11 +150,11 @@ group = Group("group", help=HELP, params=[
 def answer(
     words: Sequence[str], parent: click.Context | None = None, prepare: Callable[[click.Context], None] | None = None
 ) -> int:
-    """Call a command and return its exit status; raise FrametoolError for all that a user did wrong.
+    """Call a command and return its exit status; raise FrametoolError for all errors of the user.
 
-    Not by click's own `main`, which writes to stderr at Ctrl-C and turns a closed pipe into status 1.
-    parent: a context of the group, which the lines of a batch share
-    prepare: is shown the command's context before it runs
+    click's own `main` is not used: it writes to stderr at Ctrl-C and turns a closed pipe into status 1.
+    parent: a context of the group, shared by the lines of a batch
+    prepare: called with the command's context before it runs
     """
     result, width = None, 100 if sys.stdout.isatty() else 80
     try:
@@ -182,17 +179,17 @@ SCRIPTS = os.path.join(os.path.dirname(os.path.dirname(__file__)), "completions"
 
 
 def _completed(wanted: str, line: str) -> int:
-    """Print what a shell asks for; return 0.
+    """Print what a shell needs for completion; return 0.
 
-    wanted: `words`, those that may end the line, each between its type and its meaning; or `bash_source` and the like
-    The scripts are our own: those of click differ with its versions, and part words at a colon or a comma.
+    wanted: `words`, the completions of the line, each with its type and meaning; or `bash_source` etc., a script
+    The scripts are our own: those of click depend on its version, and split words at a colon or a comma.
     """
     shells = sorted(os.listdir(SCRIPTS))
     if wanted == "words":
         from click.shell_completion import ShellComplete, split_arg_string
 
-        *words, begun = split_arg_string(f"{line}.")  # the point: behind a blank a word begins
-        option = begun[: begun.find("=") + 1] if begun.startswith("--") else ""  # a word is also what is before its =
+        *words, begun = split_arg_string(f"{line}.")  # the point: behind a space a new word begins
+        option = begun[: begun.find("=") + 1] if begun.startswith("--") else ""  # --NAME= is part of the word
         before = list(map(os.path.expanduser, words[1:]))
         found = ShellComplete(group, {}, "frametool", COMPLETION).get_completions(before, begun[:-1])
         rows = [(each.type, option + each.value, each.help or "") for each in found]

@@ -115,7 +115,7 @@ def relative_command(inputs: Inputs) -> int:
     if inputs.consecutive or inputs.first:
         velocity = inputs.consecutive and inputs.velocity
         refuse(b is not None, "rows are compared with one of themselves; leave A and B out")
-        # a row is seen from another one of the same stream, which is the same thing at another moment
+        # both rows are poses of one frame at different times, so the result has its name twice
         operation = Operation(of=VELOCITIES if velocity else PREVIOUS if inputs.consecutive else START)
         column = (inputs.time_column or "") if velocity or task.window else None
         request = task.request(operation=operation, extra_column=column, rename=lambda _parent, name: (name, name))
@@ -230,7 +230,7 @@ def mean_command(inputs: Inputs) -> int:
     return status
 
 
-OPPOSITE = 1e-8  # radians from half a turn at which no digit of the axis is left
+OPPOSITE = 1e-8  # radians from half a turn within which the axis is undetermined
 
 
 @command_named("between", own=("notations",))

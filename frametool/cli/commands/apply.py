@@ -50,9 +50,9 @@ _WRITTEN = f"formats: {', '.join(writers('arrays'))}"
 
 
 def bag_of_clouds(task: streaming.Task) -> Callable[[Way], int]:
-    """Return what moves the clouds of the bag that -i names and writes each into its file; it returns the exit status.
+    """Return a function that moves the clouds of the bag of -i, writes each to its file and returns the exit status.
 
-    Of --topic, what names no clouds is left to the tree.
+    Topics of --topic that are not clouds are left to the tree.
     """
     from frametool.recordings.messages import cloud_topics, read_clouds
     from frametool.recordings.read import opened_recording
@@ -71,7 +71,7 @@ def bag_of_clouds(task: streaming.Task) -> Callable[[Way], int]:
     inputs.leave(topics=tuple(topic for topic in chosen if topic.strip("/") not in clouds))
 
     def write_one(cloud: PointCloud, pose: Components) -> int:
-        texts = {place: re.sub(r"[/\0]|^\.+", "_", text(cloud)) for place, text in PLACES.items()}  # no other folder
+        texts = {place: re.sub(r"[/\0]|^\.+", "_", text(cloud)) for place, text in PLACES.items()}  # stay in the folder
         name = re.sub(r"\{(\w+)\}", lambda found: texts.get(found[1], found[0]), str(output.path))
         if name in names:
             both = f"messages {names[name]} and {cloud.number} would both become {shown(name)}"
@@ -114,9 +114,9 @@ def bag_of_clouds(task: streaming.Task) -> Callable[[Way], int]:
 
 
 def several_clouds(task: streaming.Task) -> Callable[[Way], int]:
-    """Return what makes one cloud of those of several -i, each expressed in a frame of its own, or all in SOURCE.
+    """Return a function that merges the clouds of several -i, each in a frame of its own or all in SOURCE, into one.
 
-    Takes --frames and the --in of clouds, which the tree may not have too.
+    --frames and the --in of clouds are then not available to the tree.
     """
     from frametool.formats.detect import detect
     from frametool.stream.column_stream import OtherColumns
@@ -125,10 +125,10 @@ def several_clouds(task: streaming.Task) -> Callable[[Way], int]:
     others = [path for path in paths if path == "-" or streaming.is_bag(path)]
     refuse(others, f"-i {''.join(others[:1])}: several -i are files of one cloud each")
     refuse(not holds(output.chosen, "arrays"), f"several clouds become one: -o all.ply, or -f; {_WRITTEN}")
-    given, count = inputs.input_formats, len(paths)
-    named = [fmt for fmt in given if "arrays" in FORMATS[fmt].reads]
+    passed, count = inputs.input_formats, len(paths)
+    named = [fmt for fmt in passed if "arrays" in FORMATS[fmt].reads]
     formats, frames = options.for_each(named, count), [*chain.from_iterable(inputs.named_frames)]
-    inputs.leave(input_formats=[fmt for fmt in given if fmt not in named], named_frames=())
+    inputs.leave(input_formats=[fmt for fmt in passed if fmt not in named], named_frames=())
 
     def move_all(way: Way) -> int:
         is_open, on_error = way.has_source == bool(frames) or len(frames) not in (0, count), inputs.on_error
@@ -157,7 +157,7 @@ def several_clouds(task: streaming.Task) -> Callable[[Way], int]:
 
 
 CHOICES = ("point", "vector", "pose", "twist", "wrench")
-# of rows that are moved by a tree
+# options on rows that are moved by a tree
 frame_column_option = option("--frame-column NAME", "column with the frame of each row, without SOURCE", options.COLUMN)
 moving_row_options = together(
     option("--time-column NAME", "column or key with the time of each row", options.COLUMN, excludes=("at",),
@@ -198,7 +198,7 @@ def apply_command(inputs: Inputs) -> int:
     if len(task.paths) > 1:
         move_clouds = several_clouds(task)
     elif task.path and streaming.is_bag(task.path) and (holds(output.chosen, "arrays") or task.messages() is None):
-        move_clouds = bag_of_clouds(task)  # whose messages are no records
+        move_clouds = bag_of_clouds(task)  # their messages are not records
     way = Way(task) if inputs.pose is not None else TreeWay(task, numbers=bool(task.place))
     rest, is_stream = way.rest, way.is_stream
     if move_clouds is not None:
@@ -224,7 +224,7 @@ def apply_command(inputs: Inputs) -> int:
         if task.place:
             inputs.ask("from_rep")
         output.values(values_of(list(sources_of(inputs, rest, kind, task.place)), request, output))
-    if isinstance(way, TreeWay):  # what was taken for granted
+    if isinstance(way, TreeWay):  # report what was assumed
         inputs.note(way.lookups.granted())
     else:
         warn_if_wide([way.pose.covariance or ()] * way.uncertain)
@@ -250,16 +250,16 @@ def _derived(task: streaming.Task, plan: Style, way: Way, record: str | Source, 
 
 
 class Way:
-    """Where records go and what takes them there: one pose; where it names its frames, records must be in that one.
+    """Transforms records by one pose; if the pose names its frames, records must be expressed in its source.
 
-    target: the frame they are then expressed in, if it has a name
-    source: the frame that they come from, if it has a name; by a tree None where each names its own
-    uncertain: whether the covariance of what moves records counts, which then comes behind the seven components
-    has_source: whether all come from one frame
-    counters: whether no frame has a number for its name
-    rest: the arguments that are records; is_stream: whether a stream takes their place
-    into: in which frame records are then expressed, for messages
-    timed: what moves each at its own time, unless all move at one
+    target: the frame of the results, if it has a name
+    source: the frame of the records, if it has a name; with a tree None if each record names its own
+    uncertain: use the covariance of the transform, which follows its seven components
+    has_source: all records are expressed in one frame
+    counters: no frame has a number for its name, so that a number in a frame column is a counter
+    rest: the arguments that are records; is_stream: a stream replaces them
+    into: the frame of the results, for messages
+    timed: transforms records at their own times; None if all use one time
     """
 
     timed: Timed | None = None
@@ -280,14 +280,14 @@ class Way:
         self.pose = pose if self.uncertain else pose._replace(covariance=None)
 
     def from_frame(self, own: str | None, own_ns: int | None = None) -> Components:  # noqa: ARG002 - of a tree
-        """Return what moves records from a frame, at a time or the latest."""
+        """Return the transform of records from a frame, at a time or the latest."""
         _settled(own, self.source)
         return self.pose.placed
 
     def request(self, formula: Formula | None = None, **asked: Any) -> Request:
-        """Return how records move: from one frame or each from its own.
+        """Return the request to transform records from one frame, or each from its own.
 
-        asked: more of the request
+        asked: further fields of the request
         """
         inputs = self.task.inputs
         frame_column, time_column = (inputs.frame_column, inputs.time_column) if self.is_stream else (None, None)
@@ -302,12 +302,12 @@ class Way:
 
 
 class TreeWay(Way):
-    """Move by the look-ups of a tree."""
+    """Transforms records by lookups in a tree."""
 
     def __init__(self, task: streaming.Task, *, numbers: bool) -> None:
-        """Take tree, target and, if one is named, source from the arguments.
+        """Read tree, target and, if present, source from the arguments.
 
-        numbers: what looks like one is no frame's name
+        numbers: an argument that looks like a number is not a frame's name
         """
         inputs = task.inputs
         self.task, self.at, self.uncertain = task, inputs.at, bool(inputs.covariance)
@@ -324,7 +324,7 @@ class TreeWay(Way):
         if not {self.target, self.source or self.target} <= set(tree.frames):
             tree.lookup(self.target, self.source or self.target)  # raises, and names the nearest frames
         self.counters = not any(map(str.isdecimal, tree.frames))
-        self._called: dict[str, str] = {}  # so that a leading / is reported once
+        self._resolved: dict[str, str] = {}  # name in records -> in the tree, so that a leading / is reported once
         if self.at is None:
             self.timed = Timed(
                 (self.is_stream and inputs.peek("time_column")) or "", self.at_times, self.from_frame,
@@ -333,24 +333,24 @@ class TreeWay(Way):
             )  # fmt: skip
 
     def start(self, own: str | None) -> str:
-        """Return the frame that records come from: SOURCE, or the one that they name."""
-        if own and own not in self._called:
-            self._called[own] = frame_name(own, self.tree)
-        if (settled := _settled(own and self._called[own], self.source)) is None:
+        """Return the frame in which records are expressed: SOURCE, or the one that they name."""
+        if own and own not in self._resolved:
+            self._resolved[own] = frame_name(own, self.tree)
+        if (settled := _settled(own and self._resolved[own], self.source)) is None:
             raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
         return settled
 
     def from_frame(self, own: str | None, own_ns: int | None = None) -> Components:
-        """Return what moves records from a frame, at the one time of all, at theirs, or the latest."""
+        """Return the transform of records from a frame, at the time of all, at their own, or the latest."""
         return self.lookups.one(self.target, self.start(own), own_ns if self.at is None else options.at_ns(self.at))
 
     def at_times(self, own: str | None, times_ns: Any) -> Components:
-        """Return columns of the same; nan where there is no data."""
+        """Return columns of these transforms at many times; nan where there is no data."""
         return self.lookups.many(self.target, self.start(own), times_ns)
 
 
 def _settled(own: str | None, source: str | None) -> str | None:
-    """Decide which frame a record is expressed in: where both it and the command say, they must agree."""
+    """Return the frame in which a record is expressed; raise ValueInvalid if record and command name different ones."""
     if own and source is not None and own != source and not {own, source} <= {*EARTH_FRAMES}:
         remedy = "leave SOURCE out to use each record's own frame"
         raise ValueInvalid(f"a record is expressed in {shown(own)}, not in {shown(source)}; {remedy}")
@@ -358,17 +358,17 @@ def _settled(own: str | None, source: str | None) -> str | None:
 
 
 def is_record(argument: str) -> bool:
-    """Distinguish a record from a frame's name."""
+    """Return True for a record, False for a frame's name."""
     return argument == "-" or is_inline(argument) or "\n" in argument
 
 
 def begins_number(argument: str) -> bool:
-    """Return True for what is meant as one number of a point."""
+    """Return True for an argument that begins as one number of a point."""
     return argument.lstrip("-+.")[:1].isdigit() and "," not in argument
 
 
 def _is_apart(argument: str) -> bool:
-    """Return True for what is not a number of a point: a record, a pasted text, or nothing."""
+    """Return True for an argument that is not a number of a point: a record, pasted text, or empty."""
     return not argument or is_record(argument) or (not begins_number(argument) and is_pasted(argument))
 
 

@@ -1,4 +1,4 @@
-"""Commands in one process: `frametool.run` in a program, a notebook or a page, and `frametool batch`, one a line.
+"""Run commands in one process: `frametool.run` from a program, a notebook or a page, and `frametool batch` from lines.
 
 Each runs as it would alone in a pipe. In a batch, NAME = COMMAND keeps the result, as JSON text, instead of printing
 it; $NAME is then replaced by it.
@@ -33,11 +33,11 @@ from frametool.text.shell_words import NAME, goes_on, has_words, pipeline, split
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-_ONE_AT_A_TIME = Lock()  # standard streams and the current folder are those of the whole process
+_ONE_AT_A_TIME = Lock()  # standard streams and the current folder belong to the whole process
 
 
 class Ran(NamedTuple):
-    """The output of a command, its messages, its exit status, and what it wrote into the folder of its files."""
+    """The output of a command, its messages, its exit status, and the files that it wrote."""
 
     out: bytes
     err: str
@@ -48,12 +48,12 @@ class Ran(NamedTuple):
 def run(
     line: str | Sequence[object], stdin: bytes = b"", files: Mapping[str, bytes] | None = None, *, columns: int = 0
 ) -> Ran:
-    """Run a command in this process as a shell would: what is wrong with it is a message and a status, never an exit.
+    """Run a command in this process as a shell would; errors become messages and a status, and never exit.
 
-    line: as it is typed, `|` between commands, or the list of its words; `frametool` may come first
-    stdin: what the command finds on standard input
-    files: name -> content; the command runs in a folder that holds these, without them in the current one
-    columns: width of the terminal that the output is laid out for; 0 for a pipe
+    line: as typed, with `|` between commands, or the list of its words; `frametool` may come first
+    stdin: the standard input of the command
+    files: name -> content; the command runs in a new folder with these files; None: in the current folder
+    columns: width of the terminal for which the output is formatted; 0 for a pipe
     Standard streams are replaced while it runs, so calls from several threads wait for each other.
     """
     commands = pipeline(line) if isinstance(line, str) else [line]
@@ -78,7 +78,7 @@ def _no_value(name: str) -> str:
 
 
 class Terminal(BytesIO):
-    """Output that commands lay out for people."""
+    """Output that commands format as for a terminal."""
 
     def isatty(self) -> bool:
         """Return True."""
@@ -91,14 +91,14 @@ def reader(raw: Any) -> TextIO:
 
 
 def writer(buffer: Any, errors: str = "strict") -> TextIOWrapper:
-    """Return a standard output that writes into a stream of bytes, which stays open."""
+    """Return a standard output that writes into a stream of bytes, which is not closed."""
     by_line = buffer.isatty() or errors != "strict"
     return TextIOWrapper(buffer, "utf-8", errors=errors, newline="\n", line_buffering=by_line)
 
 
 @contextmanager
 def streams(stdin: Any, stdout: TextIO, stderr: TextIO | None = None) -> Iterator[None]:
-    """Replace the standard streams while commands run; what they change of the process is changed back."""
+    """Replace the standard streams while commands run; then restore them, the warnings and the recursion limit."""
     before, limit = (sys.stdin, sys.stdout, sys.stderr), sys.getrecursionlimit()
     sys.stdin, sys.stdout, sys.stderr = stdin, stdout, stderr or sys.stderr
     try:
@@ -116,7 +116,7 @@ def streams(stdin: Any, stdout: TextIO, stderr: TextIO | None = None) -> Iterato
 
 @contextmanager
 def _terminal_of(columns: int) -> Iterator[None]:
-    """Let the environment say how wide the terminal is; 0 for a pipe."""
+    """Set the width of the terminal in the environment; 0 for a pipe."""
     before = os.environ.get("COLUMNS")
     if columns:
         os.environ["COLUMNS"] = str(columns)
@@ -130,7 +130,7 @@ def _terminal_of(columns: int) -> Iterator[None]:
 
 @contextmanager
 def _folder_of(files: Mapping[str, bytes] | None) -> Iterator[dict[str, bytes]]:
-    """Enter a folder with these files; yield what holds, at the end, those that were written there."""
+    """Enter a temporary folder with these files; yield a mapping, filled at the end with new and changed ones."""
     written: dict[str, bytes] = {}
     if files is None:
         yield written
@@ -152,9 +152,9 @@ _ASSIGNMENT = re.compile(rf"[ \t]*({NAME})[ \t]*=[ \t]*")
 
 
 def command_lines(stream: BinaryIO) -> Iterator[tuple[int, str, str]]:
-    """Yield the commands of a batch, each as soon as its last line is there; a backslash joins the next line to one.
+    """Yield the commands of a batch, each as soon as its last line arrives; a line ending in a backslash is continued.
 
-    Of each: the number of its first line, the name that its result is kept by, "" if it is printed, and its text.
+    Yields the number of its first line, the name of its result, "" if it is printed, and its text.
     """
     begin, text = 0, ""
     for number, data in enumerate(chain(iter(stream.readline, b""), [b""]), 1):
@@ -170,12 +170,12 @@ def command_lines(stream: BinaryIO) -> Iterator[tuple[int, str, str]]:
         begin, text = 0, ""
 
 
-READABLE = (None, "json", "yaml")  # the same numbers; other formats are for printing
+READABLE = (None, "json", "yaml")  # formats that kept results replace by JSON; others are for printing
 KEPT_ARE = "a name keeps one pose, point, number or tree"
 
 
 def print_as_json(name: str, context: click.Context) -> None:
-    """Let a command that is about to run print what can be kept; raise Misused where it cannot."""
+    """Set the format of a command that is about to run to JSON; raise Misused if its result cannot be kept."""
     formats: Any = next((each.type for each in context.command.params if each.name == "format_name"), None)
     if "json" not in getattr(formats, "choices", ()):
         raise Misused(f"{name}: {context.info_name} has no result that can be kept; {KEPT_ARE}")
@@ -185,7 +185,7 @@ def print_as_json(name: str, context: click.Context) -> None:
     params["format_name"] = "json"
 
 
-FINISHED = (0, ROWS_SKIPPED)  # a command that skipped rows, as --on-error says, has come to its end
+FINISHED = (0, ROWS_SKIPPED)  # a command that skipped rows by --on-error has not failed
 REFUSED = {
     "batch": "a batch runs no batch; put the lines of that one here",
     "frametool": "omit the word `frametool`: a line begins with the command",
@@ -194,27 +194,27 @@ NO_INPUT = "standard input is not for the lines of a batch; name a file, or keep
 
 
 class LineFailed(FrametoolError):
-    """Report a command that said itself what is wrong, by its status."""
+    """Report a command that has reported its error itself, by its status."""
 
 
 class CommandBatch:
-    """The commands of a batch, and what they leave for those behind them: kept results, trees, the exit status.
+    """Runs the commands of a batch; holds what they share: kept results, trees, the exit status.
 
-    source: the batch as messages name it
-    skips: go on behind a line that fails
+    source: the name of the batch in messages
+    skips: continue after a line that fails
     """
 
     def __init__(self, source: str, *, skips: bool) -> None:
-        """Create a batch of which nothing has run."""
+        """Create a batch before its first line."""
         self.source = source
         self.skips = skips
-        self.kept: dict[str, str | int] = {}  # name -> its result as JSON, or the line that sets it and has failed
+        self.kept: dict[str, str | int] = {}  # name -> its result as JSON, or the number of its line if that failed
         self.context = click.Context(group, info_name="frametool", obj=ReadCache())
         self.count = self.failed = self.status = 0
-        self.in_json = True  # as all lines that failed wanted their errors
+        self.in_json = True  # all lines that failed have -f json
 
     def run(self, stream: BinaryIO) -> int:
-        """Run the commands of a stream as they come and return the exit status of all."""
+        """Run the commands of a stream as they arrive and return the exit status of the batch."""
         piped = _Pipe(sys.stdout.buffer, "utf-8", newline="\n") if sys.stdout.isatty() else sys.stdout
         with streams(_NoInput(), piped):  # standard input has the lines of the batch
             for number, name, text in command_lines(stream):
@@ -237,7 +237,7 @@ class CommandBatch:
         return ROWS_SKIPPED
 
     def _run_line(self, text: str, name: str, number: int) -> int:
-        """Run one command, whose result may be kept by a name, and report what goes wrong; return its status."""
+        """Run one command, whose result may be kept under a name, and report its error; return its status."""
         words: list[str] = []
         status = 0
         problem: FrametoolError
@@ -247,7 +247,7 @@ class CommandBatch:
             words = split(text, self._value_of)
             if not words:
                 raise Misused(f"no command behind {name} =")
-            status = self._called(words, name)
+            status = self._call(words, name)
             if status in FINISHED:
                 return status
             problem = LineFailed(f"{words[0]} ended with status {status}", status=status)
@@ -263,8 +263,8 @@ class CommandBatch:
         say_error(problem, in_json=in_json, fate="line skipped" if self.skips else "")
         return status or TROUBLE.get(words[0] if words else "", problem.exit_code)
 
-    def _called(self, words: list[str], name: str) -> int:
-        """Call a command; with a name keep what it prints."""
+    def _call(self, words: list[str], name: str) -> int:
+        """Call a command and return its status; with a name keep its result."""
         if words[0] in REFUSED:
             raise Misused(REFUSED[words[0]])
         self.context.meta.clear()
@@ -293,7 +293,7 @@ class CommandBatch:
 
 
 class _Pipe(TextIOWrapper):
-    """A standard output that is never taken for a terminal."""
+    """A standard output that is not a terminal."""
 
     def isatty(self) -> bool:
         """Return False."""
@@ -301,7 +301,7 @@ class _Pipe(TextIOWrapper):
 
 
 class _NoInput(TextIOBase):
-    """A standard input that refuses whoever reads from it."""
+    """A standard input that raises Misused when it is read."""
 
     @property
     def buffer(self) -> BinaryIO:

@@ -41,9 +41,9 @@ LIKE_A_FILE = r"(?!row\.)[^\s(){}\[\]*<>\"']*\.[A-Za-z]\w*"
 
 
 def file_named_in(inputs: Inputs, text: str, scope: Scope) -> Term | None:
-    """Bind the name of `NAME=FILE` to what the file, or `-`, holds, and return it; None for everything else.
+    """Bind the name of `NAME=FILE` to the content of the file, or of `-`, and return it; None for other texts.
 
-    What looks like the name of a file is read as one, and refused if there is none.  Raises FileProblem, FormatError.
+    A text that looks like a file name must be an existing file.  Raises FileProblem, FormatError.
     """
     head, equals, tail = text.partition("=")
     name, path = head.strip(), tail.strip()
@@ -58,7 +58,7 @@ def file_named_in(inputs: Inputs, text: str, scope: Scope) -> Term | None:
     if path != "-":
         from frametool.formats.detect import detect
 
-        with opened(path) as file:  # what is neither a table nor a document may be a tree
+        with opened(path) as file:  # neither a table nor a document: a tree
             fmt = detect(file.read(HEAD), "tree", "rows", "records", name=path, otherwise=fmt)
     found, source = None, None
     if "rows" in FORMATS[fmt].reads:
@@ -76,7 +76,7 @@ def file_named_in(inputs: Inputs, text: str, scope: Scope) -> Term | None:
 
 
 def _offer_words(ctx: click.Context, incomplete: str) -> Mapping[str, str]:
-    """Offer what its last word may become."""
+    """Offer completions of the last word."""
     scope, trees, inputs = Scope(), ctx.params.get("trees"), Inputs(ctx.params, {})
     scope.tree = load_tree(inputs, trees[0], trees[1:]) if trees else None
     for each in ctx.params.get("arguments") or ():
@@ -90,7 +90,7 @@ EXPRESSION = Text(offers=_offer_words)
 
 
 def plain_result(term: Term, style: Style) -> Any:
-    """Return a value as a result: a pose as a Result, a number bare, anything else as a mapping."""
+    """Return a value as a result: a pose as a Result, a number as a float, others as a mapping."""
     type_, numbers = term.type, numbers_in(term, degrees=style.degrees)
     frame = {} if type_.target is None else {"frame": type_.target}
     if type_.kind == POSE:
@@ -107,9 +107,9 @@ def plain_result(term: Term, style: Style) -> Any:
 
 
 def value_texts(terms: Iterable[Term], style: Style) -> Iterator[str]:
-    """Yield the text of each value in the format of a style, what parts it from the one before included.
+    """Yield the text of each value in the format of a style, with its separator.
 
-    Each is written before the next one is looked at, but for the rows of a table, which share their columns.
+    Each is yielded before the next one is computed, except for the rows of a table, which share their columns.
     """
     values = (item for term in terms for item in (term.items if term.type.kind == LIST else (wanted(term),)))
     if style.format == "csv":
@@ -127,7 +127,7 @@ def value_texts(terms: Iterable[Term], style: Style) -> Iterator[str]:
 
 
 def _for_people(term: Term, style: Style) -> str:
-    """Describe one value."""
+    """Return one value as text for people."""
     from frametool.view.text import write_points, write_poses
 
     def text(values: Sequence[float]) -> str:
@@ -140,7 +140,7 @@ def _for_people(term: Term, style: Style) -> str:
         return write_poses([result], style)
     if type_.kind == POSE:
         return f"{type_}\n{write_poses([Result(result.pose._replace(name=None, parent=None), result.extras)], style)}"
-    if type_.kind in (POINT, VECTOR):  # at a place on the Earth a mapping
+    if type_.kind in (POINT, VECTOR):  # a geodetic position is a mapping
         return (write_points if type_.kind in result else write_documents)([result], style)
     if type_.unit == RADIAN:
         return f"{degrees} deg  ({radians} rad)\n" if style.degrees else f"{radians} rad  ({degrees} deg)\n"
@@ -153,7 +153,7 @@ def _for_people(term: Term, style: Style) -> str:
 
 
 def _for_programs(term: Term, style: Style) -> str:
-    """Write one value as a document or line of a machine format."""
+    """Return one value as a document or line of a machine-readable format."""
     fmt, result, kind = style.format, plain_result(term, style), term.type.kind
     if kind == POSE and is_trajectory(fmt):
         from frametool.stream.as_poses import poses_text
@@ -183,7 +183,7 @@ def _cells(term: Term, style: Style) -> Any:
 
 
 def shown_of(values: Iterable[tuple[Line, Term]]) -> Iterator[Term]:
-    """Yield the values of lines; one that is bound to a name is shown only where nothing follows it."""
+    """Yield the values of lines; a value that is bound to a name is only shown if it is the last."""
     last = None
     for line, term in values:
         last = term if line.name else None
@@ -196,7 +196,7 @@ def shown_of(values: Iterable[tuple[Line, Term]]) -> Iterator[Term]:
 def calculate_lines(stream: Task, scope: Scope) -> int:
     """Write the value of each line of standard input.
 
-    Ends at the first error, or with --on-error skip goes on behind it, and then returns 3.
+    Stops at the first error; with --on-error skip it continues after errors and returns 3.
     """
     bad, count = stream.policy("stdin"), 0
 
@@ -223,7 +223,7 @@ LONGEST_HISTORY = 1000  # lines
 
 
 def talk(inputs: Inputs, scope: Scope, output: Output) -> int:
-    """Answer lines until Ctrl-D; errors go on, Ctrl-C forgets the line."""
+    """Evaluate lines until Ctrl-D; continue after errors; Ctrl-C discards the line."""
     refuse(output.path is not None, "-o FILE is for expressions on the command line or in a pipe, not for the prompt")
     prompt = "> " if sys.stdout.isatty() else ""
     with _readline(scope):
@@ -250,7 +250,7 @@ def talk(inputs: Inputs, scope: Scope, output: Output) -> int:
 
 @contextmanager
 def _readline(scope: Scope) -> Iterator[None]:
-    """Complete words and keep a history while lines are read; without readline lines are just read."""
+    """Complete words and keep a history while lines are read, if readline is available."""
     try:
         import readline
     except ImportError:
@@ -283,10 +283,10 @@ KINDS = ("point", "vector", "pose")
 
 
 class CalcCommand(Command):
-    """A command whose arguments may be expressions that begin with a minus: -(..), -[..], -norm(..)."""
+    """The command, whose arguments may be expressions that begin with a minus: -(..), -[..], -norm(..)."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Put a blank before such arguments, which click takes for options."""
+        """Put a space before such arguments, which click would take for options."""
         shielded = []
         for each in args:
             behind = each[1:].lstrip("- ")
@@ -327,17 +327,17 @@ def calc_command(inputs: Inputs) -> int:
         from frametool.cli.earth import earth
 
         scope.earth = earth(inputs)
-    alone = () if inputs.arguments == ("-",) else inputs.arguments  # a lone - is standard input, read in any case
+    alone = () if inputs.arguments == ("-",) else inputs.arguments  # a single - is standard input
     texts = [text.strip() for text in alone if file_named_in(inputs, text, scope) is None]
     named = [(InputFile(each[1:]).text if each.startswith("@") else each).strip() for each in inputs.expressions]
     lines = [read_line(text) for text in (*texts, *named)]
     if inputs.trees:
         scope.tree = load_tree(inputs, inputs.trees[0], inputs.trees[1:], streams=True)
-    elif os.environ.get("FRAMETOOL_TREE"):  # read where a bare look-up asks for it
+    elif os.environ.get("FRAMETOOL_TREE"):  # only read if an expression has a lookup without a tree's name
         asks = any(branch.kind == "lookup" and not branch.value[1] for line in lines for branch in walk(line.tree))
         scope.tree = load_tree(inputs, ".", streams=True) if asks or not lines else None
     if not lines:
-        inputs.ask(*OF_EARTH)  # whatever comes
+        inputs.ask(*OF_EARTH)  # any line may use them
         refuse(task.path is not None, "-i FILE needs an expression over row")
         is_prompt = sys.stdin is not None and sys.stdin.isatty()
         return talk(inputs, scope, output) if is_prompt else calculate_lines(task, scope)
@@ -349,9 +349,9 @@ def calc_command(inputs: Inputs) -> int:
 
 
 def _over_rows(lines: Sequence[Line], behind: int, scope: Scope, task: Task) -> Request:
-    """Return what is asked of rows: lines whose results are written, those of -e or the last; others bind names.
+    """Return the request for rows: the results of -e, or of the last line, are written; other lines bind names.
 
-    behind: so many lines come before those of -e
+    behind: the number of lines before those of -e
     """
     from frametool.calc.rows import RowExpressions
     from frametool.stream.request import Operation, Timed

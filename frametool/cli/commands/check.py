@@ -1,4 +1,4 @@
-"""What is to be said of files: `check` finds mistakes, `diff` differences, `monitor` gaps; `formats` what they mean."""
+"""Inspect files: `check` finds mistakes, `diff` differences, `monitor` gaps; `formats` explains file formats."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MARKS = (r"(?m)^\S.*?: (?P<red>error): ", r"(?m)^\S.*?: (?P<magenta>warning): ")
 
 
 def _rules(formatter: click.HelpFormatter, everything: bool) -> None:
-    """Write the rules, with --help-all their levels and what they are about."""
+    """Write the rules, with --help-all their levels and meanings."""
     if everything:
         with formatter.section("Rules"):
             formatter.write_dl([(f"{rule} ({level})", about) for rule, (level, about) in RULES.items()])
@@ -65,7 +65,7 @@ def check_command(inputs: Inputs) -> int:
     fmt, strict = inputs.fmt, inputs.strict
     refuse_two_readers((*files, *measured))
     findings: list[Finding] = []
-    if inputs.each:  # that a file holds no frames, or is of an unknown format, is a warning
+    if inputs.each:  # a file without frames, or of an unknown format, is a warning
         for number, name in enumerate(files):
             try:
                 recordings = opened(inputs, [name], behind=number, of=len(files))
@@ -100,7 +100,7 @@ def check_command(inputs: Inputs) -> int:
 def _with_loops(
     files: Sequence[FrameFile], rows: Sequence[Measurement], tolerance: Tolerance | None, *, normalize: bool
 ) -> list[Finding]:
-    """Return what is wrong with files, then the measurements that do not agree; report what was not compared."""
+    """Return the findings on files, then the measurements that do not agree; report those that were not compared."""
     if not rows:
         return check(files, normalize=normalize)
     from frametool.fit.measured_tree import loops
@@ -160,7 +160,7 @@ def diff_command(inputs: Inputs) -> int:
     if output.style.format == "github":
         from frametool.formats.load import lines_of
 
-        # each at the line where B says where the frame is, or else A
+        # each at the line of the frame in B, or else in A
         known = {each.frame: of_other.get(each.frame) or of_one.get(each.frame) for each in comparison.differences}
         placed = {frame: place for frame, place in known.items() if place is not None}
         where = dict(zip(placed, lines_of([*placed.values()]), strict=True))
@@ -182,7 +182,7 @@ def diff_command(inputs: Inputs) -> int:
     return DIFFERENT if comparison.differences else 0
 
 
-MOST_TOLD = 3  # frames that come by the topics of two robots
+MOST_REPORTED = 3  # frames that are published on the topics of two robots
 YEAR_S = 31_557_600
 
 
@@ -217,7 +217,7 @@ def monitor_command(inputs: Inputs) -> int:
     inputs.ask("time_offset")
     state(inputs, files)
     tell = partial(say_error, in_json=output.chosen == "json")
-    say_first(clashes, MOST_TOLD, "frames come by two topics", tell)
+    say_first(clashes, MOST_REPORTED, "frames come by two topics", tell)
     if any(abs(each["delay_max_s"] or 0.0) > YEAR_S for each in report):
         say("note: stamps and the recorder's clock are years apart (simulated time?): the delays say nothing")
     output.report(report)

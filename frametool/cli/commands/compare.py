@@ -1,4 +1,4 @@
-"""Trajectories: `compare` with a reference, `align` with it, `resample` at other times."""
+"""Trajectories: `compare` with a reference, `align` to it, `resample` at other times."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ def _read_offset(text: str) -> tuple[int | str, float | None]:
 
 
 def _read_limit(text: str) -> tuple[bool, int]:
-    """Read `12.5` on the reference's clock, or `+5s` after the first pair."""
+    """Parse `12.5` on the reference's clock, or `+5s` after the first pair: True and the time."""
     return (True, options.read_span(text[1:])) if text.startswith("+") else (False, parse_stamp(text))
 
 
 def read_delta(text: str, *units: str) -> Delta:
-    """Read a step in one of some units, all without any; a number of frames needs no unit."""
+    """Parse a step in one of the units, all by default; a number of frames needs no unit."""
     from frametool.fit.comparison import parse_delta
 
     return parse_delta(f"{text}frames" if text.isdigit() and "frames" in units else text, *[units] * bool(units))
@@ -158,7 +158,7 @@ def compare_command(inputs: Inputs) -> int:
 
 
 def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], rows: str | None) -> None:
-    """Write rows, a table, or each comparison by itself."""
+    """Write rows, a table, or the comparisons."""
     from frametool.fit.comparison import rows as rows_of
     from frametool.view.comparison_report import write_comparison, write_table
 
@@ -250,7 +250,7 @@ def resample_command(inputs: Inputs) -> int:
         stamps = stamps_every(found, every)
     elif rate:
         stamps = stamps_at_rate(found, rate)
-    else:  # those of a trajectory, or a list of times
+    else:  # the stamps of a trajectory, or a list of times
         import numpy as np
 
         try:
@@ -275,7 +275,7 @@ def resample_command(inputs: Inputs) -> int:
 
 
 def trajectory(inputs: Inputs, argument: str, fmt: str = "", on_error: str = STOP) -> tuple[Trajectory, str, bool]:
-    """Read a trajectory of the command line; return it with what it is called, and whether rows were skipped."""
+    """Read a trajectory of the command line; return it, its name in messages, and True if rows were skipped."""
     from frametool.stream.trajectories import read_trajectory, split_name
 
     made: list[BadRows] = []
@@ -298,7 +298,7 @@ def trajectory(inputs: Inputs, argument: str, fmt: str = "", on_error: str = STO
 
 
 def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Comparison], bool]:
-    """Compare estimates with a reference as the options say, with warnings. Also: whether rows were skipped."""
+    """Compare estimates with a reference by the options, with warnings; also return True if rows were skipped."""
     from frametool.fit.comparison import EVO, SETTINGS, Settings, compared
 
     refuse_two_readers([ref, *ests])
@@ -326,7 +326,7 @@ def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Com
 
 
 def _mount(inputs: Inputs, text: str) -> Any:
-    """Read the mount: auto, a pose, or FILE:BODY:POINT, the pose of a point on a body of a tree."""
+    """Read --mount: auto, a pose, or FILE:BODY:POINT, the pose of the frame POINT in BODY."""
     if text == "auto":
         return text
     if poses.is_pasted(text):
@@ -342,7 +342,7 @@ def _mount(inputs: Inputs, text: str) -> Any:
 
 
 def write_trajectory(output: Output, found: Trajectory) -> None:
-    """Write poses, or positions, in any format that holds them; frames are named if somebody called them something."""
+    """Write poses, or positions, in any format that holds them; default names of frames are omitted."""
     from frametool.frames.trajectory import BODY, WORLD
 
     world, body = (found.world, found.body) if (found.world, found.body) != (WORLD, BODY) else (None, None)

@@ -106,7 +106,7 @@ def convert_command(inputs: Inputs) -> int:
 
 
 def _source_of(values: Sequence[str], default: Notation | None, pose: Pose) -> Source:
-    """Return an argument with the meaning of bare numbers; the pose of named axes, and of a heading without a place."""
+    """Return a source with the mapping of bare numbers; with `pose` if there are none, or for a heading."""
     from frametool.documents.writers import dump_json
     from frametool.grammar.pasted import mapping_of_numbers
 
@@ -116,7 +116,7 @@ def _source_of(values: Sequence[str], default: Notation | None, pose: Pose) -> S
 
 
 def _are_numbers(values: Sequence[str], *, has_from: bool) -> bool:
-    """Distinguish bare numbers from mappings and files; one that is alone is a number where --from says of what."""
+    """Return True for bare numbers, False for mappings and files; a single one is a number only with --from."""
     if not values or poses.is_inline(values[0]):
         return False
     with suppress(ValueInvalid):
@@ -125,7 +125,7 @@ def _are_numbers(values: Sequence[str], *, has_from: bool) -> bool:
 
 
 def _found(poses: Sequence[Pose], find: str, tolerance: float, style: Style) -> Style:
-    """Return a style that writes the Euler conventions in which three angles are a rotation."""
+    """Return a style with the Euler conventions in which three angles are the rotation of a pose."""
     from frametool.geometry.conventions import find_euler
     from frametool.geometry.transform import Rotation
 
@@ -140,7 +140,7 @@ def _found(poses: Sequence[Pose], find: str, tolerance: float, style: Style) -> 
 
 
 def _change_of_axes(axes: str | None, world: str | None, both: str | None) -> tuple[str | None, str | None, Operation]:
-    """Return what --axes and --world-axes name, or --all-axes for both, and the operation that it is."""
+    """Return the conventions of --axes and --world-axes, or --all-axes for both, and their operation."""
     from frametool.geometry.conventions import both_sides, sides_of
 
     if both is not None:
@@ -154,7 +154,7 @@ def _change_of_axes(axes: str | None, world: str | None, both: str | None) -> tu
 
 
 def _named_change(axes: str | None, world: str | None, operation: Operation) -> OtherAxes | None:
-    """Return the change of axes for a derivation, None without one."""
+    """Return the change of axes for a derivation, None if there is none."""
     from frametool.explain.derive import OtherAxes
 
     left = (world, operation.left[3:]) if world and operation.left else None
@@ -165,9 +165,9 @@ def _named_change(axes: str | None, world: str | None, operation: Operation) -> 
 def _say_of_axes(
     axes: str | None, world: str | None, read_as: Notation | None, output: Output, *, is_anew: bool
 ) -> None:
-    """Report what changes the other frame's axes, where conventions come in pairs, and what engines call by one name.
+    """Report which axes changed and which did not, and where units and angles of engines differ from ours.
 
-    What is written anew is in the units of an engine.
+    is_anew: the result is not a stream, so that positions can be written in the unit of the engine
     """
     from frametool.geometry.conventions import ENGINE_ANGLES, IN_CENTIMETRES, other_side
 

@@ -1,4 +1,4 @@
-"""What comes with the program: `help` on subjects, commands and words, the cookbook, and the files of `examples`."""
+"""Show what is shipped with the program: `help` on topics, commands and words, the cookbook, the example files."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 PACKAGE = os.path.dirname(os.path.dirname(os.path.dirname(__file__)))
 EXAMPLES = os.path.join(PACKAGE, "examples")
-if not os.path.isdir(EXAMPLES):  # they are next to the package in its sources
+if not os.path.isdir(EXAMPLES):  # in the source tree they are next to the package
     EXAMPLES = os.path.join(os.path.dirname(PACKAGE), "examples")
 
 
@@ -37,13 +37,13 @@ def names() -> list[str]:
 
 
 def example(name: str) -> bytes:
-    """Return what is in an example file."""
+    """Return the content of an example file."""
     with open(os.path.join(EXAMPLES, name), "rb") as file:
         return file.read()
 
 
 FOLDER = os.path.join(os.path.dirname(os.path.dirname(__file__)), "topics")
-MADE = {  # topics that are no file of their own
+MADE = {  # topics without a file of their own
     "common": "The options that many commands share, each with its meaning",
     "cookbook": "Questions with commands and what they print: help cookbook [WORD..]",
     "skill": "The whole tool in brief, for an assistant or a program",
@@ -52,29 +52,29 @@ MADE = {  # topics that are no file of their own
 
 
 def topics() -> dict[str, str]:
-    """Return the subjects there are: name -> what it is about, the first line of its file."""
+    """Return the topics: name -> the first line of its file."""
     names = sorted(name.removesuffix(".txt") for name in os.listdir(FOLDER) if name.endswith(".txt"))
     return {name: topic(name).partition("\n")[0] for name in names}
 
 
 def topic(name: str) -> str:
-    """Return the text of a subject."""
+    """Return the text of a topic."""
     with open(os.path.join(FOLDER, f"{name}.txt"), encoding="utf-8") as file:
         return file.read()
 
 
 def questions() -> dict[str, str]:
-    """Return the questions of the cookbook, each with its answer; commands are indented, as in the topics."""
+    """Return the questions of the cookbook with their answers; commands are indented, as in topics."""
     text = re.sub(r"(?m)^## .*\n+", "", example("COOKBOOK.md").decode()).partition("\n### ")[2]
     text = re.sub(r"(?ms)^```\w*\n(.*?)^```\n", lambda block: re.sub(r"(?m)^(?=.)", "  ", block[1]), text)
     return {title: answer.strip("\n") for title, _, answer in (each.partition("\n") for each in text.split("\n### "))}
 
 
 def finder(words: Iterable[str]) -> Callable[[str], bool]:
-    """Return the test whether a text holds all these words, in any case and number; `y-up` is one word."""
+    """Return a predicate for texts with all these words, in any case, singular or plural; `y-up` is one word."""
     found = re.findall(r"\w+(?:-\w+)*", " ".join(words).lower())
     stems = []
-    for each in found:  # in any number; a short one must be a whole word
+    for each in found:  # singular or plural; a short one must be a whole word
         parts = [
             re.sub(r"s$", "", re.sub(r"(ies|y)$", "(?:ie|y)", part)) if len(part) > 3 else rf"{part}s?\b"
             for part in each.split("-")
@@ -84,7 +84,7 @@ def finder(words: Iterable[str]) -> Callable[[str], bool]:
 
 
 def _listed(rows: dict[str, str]) -> str:
-    """Return names with what they are about, each in a line or several in the width of the terminal."""
+    """Return a list of names with their descriptions, wrapped at the width of the terminal."""
     width = max(map(len, rows), default=0)
     return "".join(_wrapped(f"  {each:{width}}  {about}", width + 4) for each, about in rows.items())
 
@@ -100,7 +100,7 @@ def _titles(label: str, titles: list[str], most: int = 12) -> str:
 
 
 def cookbook(words: tuple[str, ...]) -> str:
-    """Return the answers whose question has these words, else those that have them in their text; or all questions."""
+    """Return the answers whose questions have these words, else answers that have them; without words all questions."""
     known, holds = questions(), finder(words)
     if not words:
         return _titles("Questions of the cookbook (frametool help cookbook WORD shows them)", list(known), len(known))
@@ -124,14 +124,14 @@ def _commands(ctx: click.Context, names: Iterable[str] = COMMANDS) -> dict[str, 
 
 
 def _search(ctx: click.Context, name: str) -> str:
-    """Return the topics, commands, formats and questions that hold these words, those about them first."""
+    """Return the topics, commands, formats and questions with these words, those with them in the title first."""
     known, asked, holds = topics(), questions(), finder([name])
     for each in known:
-        if holds(each) and abs(len(each) - len(name)) <= len("ies") - len("y"):  # the same in another number
+        if holds(each) and abs(len(each) - len(name)) <= len("ies") - len("y"):  # the same, singular or plural
             return topic(each)
     about = sorted((each for each in known if holds(f"{each} {topic(each)}")), key=lambda each: not holds(known[each]))
     calls = []
-    for each, one in _commands(ctx).items():  # what a command says of itself, and of each of its own options
+    for each, one in _commands(ctx).items():  # the help of a command and of its own options
         own = shared.option_groups(one, ctx)["Options"]
         texts = [f"{one.name} {one.help}", *(f"{option.opts[-1]} {option.help}" for option in own)]
         calls += [each] * (each != "help" and any(map(holds, texts)))
@@ -155,7 +155,7 @@ def _search(ctx: click.Context, name: str) -> str:
 
 
 def described(name: str, command: click.Command, ctx: click.Context) -> dict[str, Any]:
-    """Return all that there is to say of a command for a program."""
+    """Return the description of a command for -f json."""
     lines = [line.strip() for line in (command.help or "").replace("\b\n", "").split("\n")]
     groups = shared.option_groups(command, ctx).items()
     return {
@@ -224,7 +224,7 @@ def help_command(ctx: click.Context, inputs: Inputs) -> None:
             "formats": [*map(format_entry, FORMATS)], "exit_codes": _exit_codes(EXIT_CODES),
         }  # fmt: skip
         text = f"{dump_json(every[0] if named else whole)}\n"
-    elif named and name not in topics():  # calc and formats are subjects too
+    elif named and name not in topics():  # calc and formats are topics too
         shared.show_help(click.Context(named, parent=ctx.parent, info_name=name), paged=True)
         return
     elif not words:
@@ -236,7 +236,7 @@ def help_command(ctx: click.Context, inputs: Inputs) -> None:
         from frametool.formats.trees.schema import schema
 
         text = f"{dump_json(schema())}\n"
-    elif name == "common":  # the options that are in groups, each as the first command has it that does
+    elif name == "common":  # the options under a common heading, each as in the first command that has it
         first, found = shared.HEADINGS[0], dict[str, Any]()
         for command in _commands(ctx).values():
             shared_by_several = [each for each in command.params if getattr(each, "under", first) != first]
@@ -252,7 +252,7 @@ def help_command(ctx: click.Context, inputs: Inputs) -> None:
 
 
 def _read_example(text: str) -> str:
-    """Refuse an unknown one with the nearest."""
+    """Return the name of an example; raises ValueInvalid with the nearest for an unknown one."""
     name = text.removeprefix("examples/")
     if name not in names():
         raise ValueInvalid(f"no example {shown(name)}{any_near(name, names(), '`frametool examples` lists all')}")
@@ -286,7 +286,7 @@ def examples_command(inputs: Inputs) -> None:
             os.makedirs(output, exist_ok=True)
     else:
         targets = {name: output}
-    for path in targets.values():  # all of them first: nothing is copied by half
+    for path in targets.values():  # all of them first: copy all or nothing
         refuse_existing(path, force=force)
     for each, path in targets.items():
         with writing(path, force=force) as write:

@@ -1,4 +1,4 @@
-"""Where one frame is seen from another: `lookup`, as a recording goes by `echo`, for rows of joint values `fk`."""
+"""The pose of one frame in another: `lookup` in a tree, `echo` over a recording, `fk` for rows of joint values."""
 
 from __future__ import annotations
 
@@ -37,21 +37,21 @@ MOST_REPORTED = 10  # times without a result
 
 
 class Skipped:
-    """Times that are left out: the first are reported, all are counted."""
+    """Times without a result: the first are reported, all are counted."""
 
     def __init__(self, *, in_json: bool) -> None:
-        """Create an empty count; `in_json` says how errors are written."""
+        """Start at 0; `in_json`: write errors as JSON."""
         self.in_json, self.count = in_json, 0
         self.errors: list[FrametoolError] = []
 
     def add(self, error: FrametoolError | None, count: int = 1) -> None:
-        """Count one time, or several in a row; keep why they are left out if that will be reported."""
+        """Count one or several times; store the error if it will be reported."""
         self.count += count
         if error is not None and len(self.errors) < MOST_REPORTED:
             self.errors.append(error)
 
     def finish(self, found: int) -> int:
-        """Report what was left out next to so many results; return the exit status."""
+        """Report the skipped times; return the exit status.  found: the number of times with a result."""
         if not self.count:
             return 0
         for error in self.errors:
@@ -62,7 +62,7 @@ class Skipped:
         return total.exit_code
 
 
-# columns with what each row has, in a table of many look-ups
+# columns of a table of lookups: what a row has, the heading in the help, excluded options
 _COLUMNS = (("TARGET", "Rows", ()), ("SOURCE", "Rows", ()), ("time", "Time", ("at",)))
 _ONE = ("times", "source_at", "fixed", "explain")
 
@@ -133,7 +133,7 @@ def lookup_command(inputs: Inputs) -> int:
 
 
 def _many(task: Task, lookups: algebra.Lookups, target: str, source: str) -> int:
-    """Print the results at --times, or at those of all samples; with --on-error skip report the others."""
+    """Print the results at --times, or at all samples; with --on-error skip report times without a result."""
     inputs, tree, window = task.inputs, lookups.tree, task.window
     times, skipped = inputs.times, Skipped(in_json=task.output.chosen == "json")
     skip = times is not None and inputs.on_error == SKIP
@@ -147,7 +147,7 @@ def _many(task: Task, lookups: algebra.Lookups, target: str, source: str) -> int
             raise NoDataAt(f"no sample of {target} -> {source} from --start to --stop")
 
     def miss(at_ns: int) -> None:
-        is_full = len(skipped.errors) == MOST_REPORTED  # to say why takes longest
+        is_full = len(skipped.errors) == MOST_REPORTED  # finding the reason is slow
         skipped.add(None if is_full else algebra.why_missing(tree, target, source, at_ns))
 
     unread = skipped.count
@@ -160,7 +160,7 @@ def _many(task: Task, lookups: algebra.Lookups, target: str, source: str) -> int
 
 
 def _by_row(task: Task, lookups: algebra.Lookups, target: str | None, source: str | None) -> int:
-    """Add the pose of SOURCE in TARGET to every row; a frame named on the command line is every row's."""
+    """Add the pose of SOURCE in TARGET to every row; a frame on the command line applies to all rows."""
     from frametool.stream.request import Operation, Timed
 
     inputs, tree, place = task.inputs, lookups.tree, task.output.style.place
@@ -180,7 +180,7 @@ def _by_row(task: Task, lookups: algebra.Lookups, target: str | None, source: st
     def ends_of(names: str | None) -> tuple[str, str]:
         cells = (names or "").split("\0") if len(frames) == 2 else [names or ""]
         if len(cells) > max(len(frames), 1):
-            raise UnknownFrame(names or "", known=tree.frames)  # a NUL in a cell is no end of a name
+            raise UnknownFrame(names or "", known=tree.frames)  # a cell holds a NUL, the separator of names
         return fixed_target or cells[0], fixed_source or cells[-1]
 
     def edge_of(names: str | None, own: int | None = at) -> Components:
@@ -237,7 +237,7 @@ def echo_command(inputs: Inputs) -> int:
     skipped, found = Skipped(in_json=out.chosen == "json"), 0
 
     def results() -> Iterator[Result]:
-        """Yield the answers and count the errors; raise the first error where no time has data."""
+        """Yield the poses and count the errors; raise the first error if no time has data."""
         nonlocal found
         for at_ns, answer, steps in replayed:
             if isinstance(answer, NoDataAt):
@@ -296,6 +296,6 @@ def fk_command(inputs: Inputs) -> int:
         wanted, header = "a key for each joint, or JointState messages", not inputs.no_header
         names = names_in(begin, fmt, stream.name, wanted, header=header)
         rows.bind(names, stream.name, fixed=frozenset(file.answers.joints))
-        file.tally.assumed = ""  # rows say where each joint on the way is
+        file.tally.assumed = ""  # rows have the values of all joints of the chain
         state(inputs, [file])
         return stream.run(stream.request(operation=Operation(moves=True, formula=rows), poses=0))

@@ -1,4 +1,4 @@
-"""Cameras: `project`, points into the picture of one, and `unproject`, its pixels as rays, points, other pixels."""
+"""Cameras: `project` points into an image, and `unproject` pixels to rays, points or other pixels."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ AXES = ("optical", "opengl", "flu")
 
 
 def _offer_cameras(_ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:
-    """Offer the names of the cameras in a file that is there."""
+    """Offer the names of the cameras behind a file and its colon."""
     path, colon, _ = incomplete.rpartition(":")
     if not colon:
         return None
@@ -43,7 +43,7 @@ def _offer_cameras(_ctx: click.Context, incomplete: str) -> Mapping[str, str] | 
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """Read W,H; raises ValueInvalid."""
+    """Parse W,H; raises ValueInvalid."""
     width, _, height = (each.strip() for each in text.partition(","))
     if not (width.isdecimal() and height.isdecimal()):
         raise ValueInvalid(f"a size is W,H in pixels, found {shown(text)}")
@@ -110,18 +110,18 @@ def project_command(inputs: Inputs) -> int:
 
 
 class CameraTask(Task):
-    """What the arguments and options of both commands say: the camera, how rows move, which records there are."""
+    """The task of `project` or `unproject`: the camera, the transform of rows, the records."""
 
     def __init__(self, inputs: Inputs, output: Output, named: str) -> None:
-        """Read tree and camera; named: the arguments that lead to the camera, if there is a tree."""
+        """Read tree and camera; named: the names of the arguments up to the camera, if there is a tree."""
         super().__init__(inputs, output=output)
-        holds_clouds = self.messages() is None and self.path and is_bag(self.path)  # of a bag, --topic is streamed
+        holds_clouds = self.messages() is None and self.path and is_bag(self.path)  # of a bag, --topic is for records
         refuse(holds_clouds, f"write the clouds of {self.path} as files first: apply -o '{{stamp_ns}}.pcd'")
         self.way: apply.TreeWay | None = None
         self.rest: tuple[str, ...] = inputs.arguments
         _, colon, name = (inputs.camera or "").rpartition(":")
         self.camera_name = name if colon and not is_inline(inputs.camera) else ""
-        # two numbers or records have no tree before them; one of both may be a tree that is written inline
+        # two numbers or records are not a tree; a single one may be an inline tree
         if inputs.camera is None or not all(is_record(each) or begins_number(each) for each in self.rest[:2]):
             *before, _ = names = named.split()
             if len(self.rest) < len(names) or begins_number(self.rest[0]):
@@ -136,7 +136,7 @@ class CameraTask(Task):
             camera = resized(tree.camera(self.camera_name, inputs.size), inputs.size, inputs.arguments[0])
         else:
             camera = load_camera(inputs.camera, model=inputs.model, size=inputs.size)
-            if not (is_inline(inputs.camera) and "axes" in inputs.camera):  # those of a file are of its own frame
+            if not (is_inline(inputs.camera) and "axes" in inputs.camera):  # axes in a file apply to its own frame
                 own = None if tree is None else tree.cameras.get(self.camera_name)
                 axes = "optical" if own is None else own.axes
                 axes = axes if tree is None else tree.camera_axes.get(self.camera_name, axes)
@@ -144,19 +144,19 @@ class CameraTask(Task):
         self.camera: Camera = camera.changed(axes=inputs.camera_axes) if inputs.camera_axes else camera
 
     def rectified(self) -> Camera:
-        """Return the camera of the rectified picture, if that is wanted."""
+        """Return the camera, or with --rectified that of the rectified image."""
         inputs = self.inputs
         return self.camera.rectified(from_first=bool(inputs.from_first)) if inputs.rectified else self.camera
 
     def adds(self, formula: Formula, **asked: Any) -> Request:
-        """Return what is done with rows, to which the results of a formula are added."""
+        """Return the request for rows to which the results of a formula are added."""
         self.inputs.ask("keep")
         if self.way is not None:
             return self.way.request(formula, **asked)
         return self.request(operation=Operation(moves=True, formula=formula), **asked)
 
     def finish(self, request: Request, records: Sequence[Source | str], seen: Seen) -> int:
-        """Write the rows of the stream, or the results of records; then say what became of them."""
+        """Write the rows of the stream, or the results of records; then report a summary."""
         status, output = 0, self.output
         if self.is_stream:
             self.read_clouds_as_rows()
@@ -204,7 +204,7 @@ def unproject_command(inputs: Inputs) -> int:
     task.camera = raw if inputs.undistort else rectified
     into = None if not inputs.undistort else rectified if inputs.rectified else raw.flat()
     records: list[Source] = []
-    if not task.is_stream:  # mappings, or the numbers of one pixel
+    if not task.is_stream:  # mappings, and the numbers of one pixel
         numbers = [each for each in task.rest if not is_record(each)]
         records = [Source("argument", each) for each in task.rest if is_record(each)]
         wrong = f"a pixel is U V or U V DEPTH, found {len(numbers)}; more pixels are rows"
@@ -230,10 +230,10 @@ def unproject_command(inputs: Inputs) -> int:
 
 
 class GroundWay(apply.TreeWay):
-    """Move by two poses: of the ground in TARGET, of the camera over the ground, at one time."""
+    """Looks up two poses at one time: of the ground in TARGET, and of the camera in the ground's frame."""
 
     def __init__(self, way: apply.TreeWay, ground: str, camera: str) -> None:
-        """Take the tree and the times of a way."""
+        """Copy the tree and the times of a way."""
         vars(self).update(vars(way))
         ground = frame_name(ground, self.tree)
         self.pairs = ((self.target, ground), (ground, frame_name(camera, self.tree)))
@@ -241,22 +241,22 @@ class GroundWay(apply.TreeWay):
             self.timed = self.timed._replace(many=self.at_times, one=self.from_frame, width=2 * EXACT)
 
     def from_frame(self, _own: str | None, own_ns: int | None = None) -> Components:
-        """Return both at a time, or at the latest that both have."""
+        """Return both poses at a time, or at the latest common one."""
         stamp_ns, tree = own_ns if self.at is None else options.at_ns(self.at), self.tree
         if stamp_ns is None:
             stamp_ns = min((each for pair in self.pairs if (each := tree.latest(*pair)) is not None), default=None)
         return tuple(part for pair in self.pairs for part in tree.lookup(*pair, stamp_ns).components)
 
     def at_times(self, _own: str | None, times_ns: Any) -> Components:
-        """Return columns of both; nan where one has no data."""
+        """Return columns of both poses; nan where one has no data."""
         first, second = (self.tree.lookup_many(*pair, times_ns, missing="nan").components for pair in self.pairs)
         return *first[:6], first[6] + 0.0 * second[6], *second
 
 
 def _columns(task: CameraTask, records: Sequence[Source]) -> Sequence[str]:
-    """Return the columns or keys of u and v, and of how far away it is where there is one; raises FormatError.
+    """Return the columns or keys of u, v and, if present, depth or range; raises FormatError without u and v.
 
-    They are those of the first record, where there are some, and else of the stream.
+    They are those of the first record, or else of the stream.
     """
     from frametool.stream.formulas import names_in
 
@@ -272,7 +272,7 @@ def _columns(task: CameraTask, records: Sequence[Source]) -> Sequence[str]:
         columns: Sequence[str] = [each.strip() for each in inputs.columns[0].split(",")]
         refuse(len(columns) not in (2, 3), "--columns names those of u and v, and of a depth if there is one")
         return columns
-    if names[:2] == ("1", "2"):  # without names
+    if names[:2] == ("1", "2"):  # no header
         return names[:3]
     if not ({"u", "v"} <= {*names} or "pixel" in names):
         message = f"no columns u and v among: {listing(names)}; name them with --columns"

@@ -1,4 +1,4 @@
-"""`frametool record`: a recording with something changed, and every other message as it is."""
+"""`frametool record`: copy a recording with changes; all other messages are unchanged."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from frametool.stream.faults import ON_ERROR, STOP, BadRows
 from frametool.view.text import progress_bar
 
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 messages skipped, 4 lookup, 5 file."
-TRANSFORMS = ("tf", "tf_static")  # how topics of transforms are called, in any namespace
+TRANSFORMS = ("tf", "tf_static")  # the topics of transforms, in any namespace
 
 
 def _between(text: str) -> tuple[int, int]:
-    """Read two times with a comma between them, the second not before the first."""
+    """Parse START,STOP: two times separated by a comma, in order."""
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != len(("START", "STOP")):
         raise ValueInvalid(f"{shown(text)} is not START,STOP: two times with a comma between them")
@@ -82,7 +82,7 @@ def record_command(inputs: Inputs) -> int:
     new = Path(place).resolve()
     for each in filter(os.path.exists, (path, *map(tree_file, more))):
         read = Path(each).resolve()
-        if read.is_relative_to(new) or new.is_relative_to(read):  # a file, its folder, or what is in that
+        if read.is_relative_to(new) or new.is_relative_to(read):  # the same file, or a file and its folder
             changes = f"would change {printable(each)}, which is read; give another name"
             raise FileProblem(f"{printable(place)}: {changes}")
     tally, edges = Diagnostics(), load_tree(inputs, more[0], more[1:]) if more else None

@@ -1,4 +1,4 @@
-"""`frametool sim`: the turtles: a leader and followers, a scene of a file, keys in the terminal."""
+"""`frametool sim`: turtles: a leader and followers, a scene from a file, keys in the terminal."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ _of_turtles = partial(option, under="Turtles")
 
 
 def parse_duration(text: str) -> float:
-    """Read seconds, or inf."""
+    """Parse seconds, or inf."""
     return math.inf if text == "inf" else parse_number(text)
 
 
 def follow_options(duration: str) -> Callable[[Any], Any]:
-    """Add to a command the options of followers; `duration` is how long it runs by default."""
+    """Return the options of a command on followers; duration: the default of --duration."""
     return together(
         option("--followers N", "each follows the previous one, the first follows turtle1", click.IntRange(0, 1000),
                default=1),
@@ -68,7 +68,7 @@ def follow_options(duration: str) -> Callable[[Any], Any]:
     )  # fmt: skip
 
 
-output_options = together(  # what is shown of a run
+output_options = together(
     option("--emit", "velocity commands of followers, poses of all turtles, or transforms for `lookup -`", EMITS,
            default="commands"),
     _of_turtles("--reach D", "distance in metres at which the target is reached", parse_number, default=0.5),
@@ -86,14 +86,14 @@ output_options = together(  # what is shown of a run
 
 
 def _paced(start: float) -> Watch:
-    """Return what keeps simulated time from running ahead of the clock."""
+    """Return a function that keeps simulated time from running ahead of real time."""
     return lambda step: sleep(max(0.0, step.t_ns / BILLION - (monotonic() - start)))
 
 
 def show_run(inputs: Inputs, scene: Scene, *, leaders: bool = False) -> None:
-    """Run a scene to its end, show of it what the options say, and sum it up on stderr.
+    """Run a scene to its end, write or draw it by the options, and write a summary to stderr.
 
-    Raises click.UsageError, FileProblem before anything runs; KeyboardInterrupt, if it came, after the summary.
+    Raises click.UsageError, FileProblem before anything runs; KeyboardInterrupt, if interrupted, after the summary.
     """
     style, live, emit, reach = Output(inputs, "report").style, inputs.live, inputs.emit, inputs.reach
     plot, view, force = inputs.plot, inputs.view, inputs.force
@@ -108,7 +108,7 @@ def show_run(inputs: Inputs, scene: Scene, *, leaders: bool = False) -> None:
         if not os.path.isdir(os.path.dirname(path) or "."):
             raise FileProblem(f"{path}: no directory {os.path.dirname(path)}")
     summary, interrupted = RunSummary(scene, reach), False
-    # what is written after the run, by file: what watches the steps, and what then makes the content
+    # file written after the run -> function called with each step, and function that returns the content
     pictures: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
     if plot:
         from frametool.view.exports import run_picture
@@ -123,7 +123,7 @@ def show_run(inputs: Inputs, scene: Scene, *, leaders: bool = False) -> None:
 
         pictures[view] = run_page()
     try:
-        with ExitStack() as stack:  # closes what the steps go to
+        with ExitStack() as stack:  # closes the screen and the output
             watchers: list[Watch] = [summary.watch, *[_paced(monotonic())] * bool(inputs.realtime or live)]
             if live:
                 from frametool.view.terminal import Screen
@@ -137,14 +137,14 @@ def show_run(inputs: Inputs, scene: Scene, *, leaders: bool = False) -> None:
                 several = emit == "poses" or len(scene.followers) > 1
                 records_of = step_writer(emit, style, leaders=leaders, labelled=leaders or several)
                 write = stack.enter_context(writing(output, force=force))
-                # each record at once, so that a reader at the other end of a pipe sees it
+                # each record at once, for the reader of a pipe
                 watchers.append(lambda step: [write(text) for text in records_of(step)])
             watchers += [watch for watch, _ in pictures.values()]
             inputs.refuse_idle()
             for step in simulate(scene):
                 for watch in watchers:
                     watch(step)
-    except KeyboardInterrupt:  # leaves no file: what it holds is not the whole run
+    except KeyboardInterrupt:  # --output FILE is not written: it would be incomplete
         interrupted = True
     for line in summary.lines():
         say(line)
@@ -225,7 +225,7 @@ def follow(inputs: Inputs) -> None:
 
 
 def scene_of(inputs: Inputs, leader: MakeLeader) -> Scene:
-    """Return the scene of a leader and followers; what cannot be is a usage error."""
+    """Return the scene of a leader and followers; raises click.UsageError for invalid options."""
     chosen = {name: getattr(inputs, name) for name in SCENE_OPTIONS}
     holonomic = chosen["turtlesim"] == "ros2" and inputs.holonomic  # in ROS 1 linear.y always counts
     with misuse():
@@ -262,7 +262,7 @@ def run(inputs: Inputs) -> None:
         read = read_scene(source_of(inputs.scene), seed=inputs.seed)
     with misuse():
         chosen = read if duration is None else read._replace(duration_ns=duration_ns(duration))
-    # a call acts at the first tick after its time
+    # a call is executed at the first tick after its time
     last_ns = math.inf if chosen.duration_ns is None else chosen.duration_ns // TICK_NS * TICK_NS
     if late := [call for call in chosen.calls if call.t_ns >= last_ns]:
         end = f"{(chosen.duration_ns or 0) / BILLION:g} s"

@@ -1,4 +1,4 @@
-"""`frametool solve`: the transforms that measurements mean."""
+"""`frametool solve`: estimate transforms from measurements."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ if TYPE_CHECKING:
 
 NAMES = ("base", "gripper", "camera", "target")
 ROW_KEYS = ("place", "row", "id", "parent", "child", "distance", "angle", "u", "used", "checked", "fits")
-UNSURE = 1.2  # times: sigmas of the input that are smaller than that are reported
+UNSURE = 1.2  # input sigmas that are too small by this factor are reported
 
 
 def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
-    """Solve the tree of the measurements in files, with its fixed edges."""
+    """Estimate the tree of the measurements in files, with the edges of --fix."""
     from frametool.fit.measured_tree import parted, solve_tree
     from frametool.stream.measurements import read_measurements, without
 
@@ -60,7 +60,7 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
         warn(f"the sigmas of the input are {found.sigma_factor:.2g} times too small for what the used rows are off")
     poses, exact = [], {name for name in found.frames if fixed and fixed.track(name)}
     for name in sorted(found.frames, key=lambda name: name != found.root):
-        track = found.tree.track(name)  # in the root, or as --fix has it
+        track = found.tree.track(name)  # its parent is the root, or that in --fix
         parent, pose = (track.parent, track.components) if track else (None, IDENTITY)
         poses.append(_pose(name, parent, pose, found.tree.covariances.get(name)))
     unknown = [str(each.name) for each in poses if each.parent and each.name not in exact and not each.covariance]
@@ -73,12 +73,12 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
 
 
 def _pose(name: str, parent: str | None, components: Iterable[Any], covariance: Iterable[float] | None) -> Pose:
-    """Return the pose of a frame; none of its numbers is -0.0."""
+    """Return the pose of a frame, with 0.0 for -0.0."""
     return Pose.of((*(float(part) + 0.0 for part in components), *(covariance or ())), name, parent)
 
 
 def _side(parent: str, name: str, pose: Transform, covariance: Array | None) -> list[Pose]:
-    """Return a root and the one frame in it."""
+    """Return a root and the pose of the one frame in it."""
     listed = None if covariance is None else covariance.ravel().tolist()
     return [_pose(parent, None, IDENTITY, None), _pose(name, parent, pose.components, listed)]
 
@@ -87,9 +87,9 @@ def _solution(
     shape: str, found: Any, poses: list[Pose], labels: Iterable[tuple[Any, ...]], root: str | None,
     fixed: Collection[str | None] = (),
 ) -> Solution:  # fmt: skip
-    """Return what was found with its rows: how far each is off in metres, and in radians where it has turned.
+    """Return the solution with the residuals of its rows, in metres and, for poses, in radians.
 
-    labels: place, id, parent and child of each row
+    labels: location, id, parent and child of each row
     """
 
     def of(name: str, otherwise: Any = None) -> Any:
@@ -113,12 +113,12 @@ def _solution(
         "sigma": sigma and dict(zip(("xyz", "rpy"), sigma, strict=True)), "noise_at": of("noise_at"),
         "scale_sigma": of("scale_sigma"), "frames": frames, "measurements": rows,
     }  # fmt: skip
-    gone = of("left_out", ~found.used).tolist()  # not what has no weight
+    gone = of("left_out", ~found.used).tolist()  # without those of weight 0
     return Solution(numbers, poses, [*compress(rows, gone)], fixed, of("turns"))
 
 
 def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
-    """Solve where a camera is on a hand, or next to a robot: two files of poses, or one of samples."""
+    """Estimate the pose of a camera on a gripper, or next to a robot: two files of poses, or one of samples."""
     from frametool.fit.calibration import solve_hand_eye
     from frametool.stream.samples import paired_samples, read_samples
 
@@ -154,7 +154,7 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
 
 
 def solved_points(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
-    """Solve the transform between two files of matched points."""
+    """Estimate the transform between two files of matched points."""
     from frametool.fit.calibration import solve_points
     from frametool.stream.samples import matched, read_points
 
@@ -213,7 +213,7 @@ def solve_command(inputs: Inputs) -> None:
     by row or by their stamps; SAMPLES are {gripper, target}, columns gripper_x .. target_qw, or of moveit_calibration
     or easy_handeye. Points are matched by id, else by row; a column weight counts.
     """
-    for library in ("OPENBLAS", "OMP", "MKL"):  # sums come out in one order: the same bytes each run
+    for library in ("OPENBLAS", "OMP", "MKL"):  # a fixed order of sums: the same bytes in each run
         os.environ[f"{library}_NUM_THREADS"] = "1"
     hand_eye, points, files = inputs.hand_eye, inputs.points, inputs.files
     refuse_two_readers(files)
@@ -242,7 +242,7 @@ def solve_command(inputs: Inputs) -> None:
 
 
 def _write(output: Output, found: Solution, *, on_hand: bool) -> None:
-    """Write the result: a tree, or entries where there is a scale; as hand-eye calibration only the camera."""
+    """Write the result: a tree, entries as CSV or with a scale, or for handeye only the camera."""
     if output.style.format == "csv" or found.numbers["scale_sigma"] is not None:
         output.values([Result(each, uncertain(each.covariance)) for each in found.poses if each.parent])
     elif output.style.format == "handeye" and found.numbers["shape"] == "hand-eye":

@@ -1,4 +1,4 @@
-"""The frames of a tree: `tree` draws or writes them, `static` as arguments of a program of ROS, `view` plots them."""
+"""The frames of a tree: `tree` draws or writes them, `static` writes static_transform_publisher, `view` plots them."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def static_command(inputs: Inputs) -> None:
 
 FORMS = ("text", "html", "svg", "glb", "png")
 SUFFIXES = {".html": "html", ".htm": "html", ".svg": "svg", ".glb": "glb", ".png": "png", ".txt": "text"}
-PIPE_SIZE = (100, 30)  # columns and lines where nobody says how many there are
+PIPE_SIZE = (100, 30)  # columns and lines, if not known
 
 
 def _eye(text: str) -> Eye:
@@ -155,7 +155,7 @@ def view_command(inputs: Inputs) -> None:
         from frametool.view.pictures import require_matplotlib
 
         require_matplotlib()
-    overlay, eye = inputs.overlay, inputs.peek("eye") if chosen == "glb" else inputs.eye  # a glb is seen from anywhere
+    overlay, eye = inputs.overlay, inputs.peek("eye") if chosen == "glb" else inputs.eye  # a glb has no view point
     refuse(overlay and (source or not target), "--overlay takes two trees: frametool view AFTER BEFORE --overlay")
     refuse(inputs.path_only and not (target and source), "--path draws the way between TARGET and SOURCE; name both")
     frames = load_tree(inputs, tree, inputs.more)
@@ -166,7 +166,7 @@ def view_command(inputs: Inputs) -> None:
     named: Any = {key: name and frame_name(name, frames) for key, name in names.items()}
     scene = FrameScene(frames, at_ns=options.at_ns(inputs.at), only=inputs.only, path_only=inputs.path_only, **named)
     gone = [name for name, track in scene.tracks.items() if not track.covers(scene.at_ns or 0)]
-    if gone and chosen != "html":  # which goes to the nearest time
+    if gone and chosen != "html":  # a page shows their nearest time
         say(f"note: no data of {listing(gone, 5)} at {format_stamp(scene.at_ns or 0)}: not drawn, nor what hangs there")
     before = None
     if overlay:
@@ -198,7 +198,7 @@ def view_command(inputs: Inputs) -> None:
 
 
 def _format(fmt: str | None, output: str | None, *, opens: bool) -> str:
-    """Choose the format: that of --format, else by the file's suffix, else text; a browser shows pages."""
+    """Choose the format: that of --format, else by the file's suffix, else text; with --open html."""
     suffix = os.path.splitext(output or "")[1].lower()
     chosen = fmt or SUFFIXES.get(suffix) or ("html" if opens else None)
     if chosen is None and suffix and output != "-":
@@ -210,7 +210,7 @@ def _format(fmt: str | None, output: str | None, *, opens: bool) -> str:
 def _content(
     inputs: Inputs, scene: FrameScene, fmt: str, eye: Eye, before: FrameScene | None, *, sliders: bool
 ) -> str | bytes:
-    """Return the picture in a format, and say what a still one does not show."""
+    """Return the picture in a format, and report what a still picture does not show."""
     tree: str = inputs.tree
     title, other = (os.path.basename(each) if len(each) < 200 else "tree" for each in (tree, str(inputs.target)))
     if fmt == "html":
@@ -240,7 +240,7 @@ def _content(
 
 
 def _solids(inputs: Inputs, tree: str) -> list[Solid]:
-    """Return the solids of a robot's file, and say which are not drawn as they are; its frames were read before."""
+    """Return the solids of a robot's file; report those that are not drawn, or as boxes."""
     from frametool.formats.robots.model import read_solids
 
     if not os.path.isfile(tree_file(tree)):
