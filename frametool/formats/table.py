@@ -140,6 +140,12 @@ _KITTI = (
     r"(?:P[0-3]|Tr\w*|R0_rect|R_rect|R):?(?:[ \t]+[^\s:]+){5})"
 )
 
+# numbers without a comment that names its columns otherwise
+_UNNAMED = r"(?m)\A\ufeff?(?:[ \t]*(?:#(?!(?=.*\b(?:%s)\b)%s[ \t\r]*$).*)?\r?\n)*+[ \t]*"
+_LIKE_EUROC = _UNNAMED % ("q_?w|roll|yaw", r"(?:[^,\n]*+,){7}(?:(?:[^,\n]*+,){9})?[^,\n]*")
+_LIKE_KITTI = _UNNAMED % (r"r1[13][ \t]+r21|z[ \t]+r11|r33[ \t]+t?x", r"(?:[ \t]*+\S++){12}")
+_CELL = rf"\s*,\s*{NUMBER}"
+
 _KEY = r"""(?:\s|\{|#[^\n]*\n)*+["']?(?:%s)["']?:[ \t]*+"""
 _PARTS = "linear|angular|force|torque|position|translation"  # of a message
 _FIRST = r"""(?m)^[ \t{]*+["']?[\w./-]+["']?:[ \t]*+"""  # no lines before it: the search begins at each line
@@ -256,7 +262,7 @@ FORMATS = {
         "EuRoC ground truth", _TABLE,
         magic=(
             ("text", r"\A\ufeff?#\s*timestamp[^\n]*q_RS_w"),
-            ("line", rf"\d{{19}}(?:\s*,\s*{NUMBER}){{7}}(?:(?:\s*,\s*{NUMBER}){{9}})?\s*$"),
+            ("text", rf"{_LIKE_EUROC}\d{{19}}(?:{_CELL}){{7}}(?:(?:{_CELL}){{9}})?\s*$"),
         ),
         conventions="world<-body (R<-S), nanoseconds, metres, quaternion w x y z", required_options=("frames",),
         rows=Rows(",", _EUROC, (8, 17), "wxyz"),
@@ -278,7 +284,7 @@ FORMATS = {
     ),
     "kitti": _trajectory(
         "KITTI poses", _TABLE,
-        magic=(("line", rf"(?:{NUMBER}[ \t]+){{11}}{NUMBER}\s*$"),), conventions="world<-cam0, metres",
+        magic=(("text", rf"{_LIKE_KITTI}(?:{NUMBER}[ \t]+){{11}}{NUMBER}\s*$"),), conventions="world<-cam0, metres",
         rows=Rows(
             "", ("r11", "r12", "r13", "tx", "r21", "r22", "r23", "ty", "r31", "r32", "r33", "tz"), (12,), "matrix",
             axes="optical", frames=("world", "cam0"), counted="numbers of pictures",

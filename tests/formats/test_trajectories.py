@@ -816,3 +816,18 @@ def test_a_damaged_line_is_refused_or_told_and_never_shifts_a_pose(form: str, ru
             found = poses_in(done.out)
             assert set(found) <= set(whole), made
             assert len(found) == len(whole) or "left out" in done.err, made
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "# x y z r11 r12 r13 r21 r22 r23 r31 r32 r33\n1 2 3 -1 0 0 0 -1 0 0 0 1\n",
+        "# r11 r21 r31 r12 r22 r32 r13 r23 r33 tx ty tz\n-1 0 0 0 -1 0 0 0 1 1 2 3\n",
+        "#timestamp [ns],tx,ty,tz,qx,qy,qz,qw\n1700000000000000000,1,2,3,0,0,1,0\n",
+        "# timestamp_ns, x, y, z, qw, qx, qy, qz\n1700000000000000000, 1, 2, 3, 0, 0, 0, 1\n",
+        "#poses, w first\n1700000000000000000,1,2,3,0,0,0,1\n",  # EuRoC
+    ],
+)
+def test_a_comment_that_names_the_columns_goes_before_the_order_of_a_trajectory(text: str, run: Run) -> None:
+    found = json.loads(run("convert", "--to", "xyzw", "-f", "json", stdin=text).out)
+    assert (found["xyz"], found["xyzw"]) == ([1, 2, 3], [0, 0, 1, 0])
