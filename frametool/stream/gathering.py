@@ -6,6 +6,7 @@ import re
 from functools import reduce
 from itertools import chain
 from math import degrees, sqrt
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from frametool.stream.record_results import BlockResults
 from frametool.stream.record_values import read_poses
 from frametool.stream.request import COMBINED, Request
 from frametool.stream.row_layout import NOWHERE
-from frametool.stream.rows import RowPoses, block_of, is_typed, kept, objects, plain_cells, read_each, texts_of
+from frametool.stream.rows import RowPoses, block_of, codes_of, is_typed, kept, objects, plain_cells, read_each
 from frametool.text.numbers import parse_number
 from frametool.text.parse import parse_floats
 from frametool.text.spans import Spans, without_quotes
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import Source
     from frametool.stream.as_poses import Step
-    from frametool.text.spans import Floats
+    from frametool.text.spans import Floats, Ints
 
 POSITION = 3  # numbers
 
@@ -118,6 +119,7 @@ def gathered(steps: Iterable[Step], bad: BadRows, keys: Sequence[str] = ()) -> R
 class MeanRows(Gathered):
     """The rows of means, and the poses of arguments, with a weight or a label each, if a column or key holds such.
 
+    extra: for each block the weights, or the numbers that `labels` has for the labels
     place: names a line of the stream; named: the places of the poses of arguments
     """
 
@@ -127,6 +129,7 @@ class MeanRows(Gathered):
         self.key, self.by = by or weights, by
         self.uncertain = self.stamped = False
         self.extra: list[Any] = []
+        self.labels: dict[str, int] = {}
         self.named: list[str] = []
         self.place: Callable[[int], str] = str
 
@@ -157,10 +160,12 @@ class MeanRows(Gathered):
         if self.key is None or self.named:
             return rows, outcome
         values, reasons = self._values(rows, self.key)
-        good = np.delete(np.arange(len(values)), [*reasons])
-        self.extra.append(values[good])
         faults = [Fault(int(rows.lines[row]), self.key, reason) for row, reason in reasons.items()]
-        return kept(rows, good), outcome._replace(faults=sorted([*outcome.faults, *faults]))
+        if reasons:
+            good = np.delete(np.arange(len(values)), [*reasons])
+            rows, values = kept(rows, good), values[good]
+        self.extra.append(values)
+        return rows, outcome._replace(faults=sorted([*outcome.faults, *faults]))
 
     def _values(self, rows: RowPoses, key: str) -> tuple[Any, dict[int, str]]:
         """Return the weights or labels of rows, and why some have none."""
@@ -174,19 +179,33 @@ class MeanRows(Gathered):
         size, missing, numbers = len(rows.numbers), dict[int, str](), np.zeros(len(rows.numbers))
         if not (isinstance(cells, Spans) or is_typed(cells)):
             none = f"no key {shown(key)}{did_you_mean(key, rows.extras)}"
-            missing = {row: none for row in range(size) if cells[row] is None}
+            missing = {row: none for row, cell in enumerate(cells.tolist()) if cell is None}
         if self.by is not None:
-            return np.array(texts_of(cells), object), missing
+            texts, codes = codes_of(cells)
+            own = [self.labels.setdefault(text, len(self.labels)) for text in texts]
+            return np.array(own)[codes], missing
         unread = np.arange(size)
         if isinstance(cells, Spans):
             numbers, unread = parse_floats(without_quotes(cells))
         elif is_typed(cells):
             numbers, unread = cells.astype(np.float64), np.flatnonzero(~np.isfinite(cells))
-        texts = texts_of(cells) if len(unread) else []
+        texts = codes_of(cells).each() if len(unread) else []
         there = (row for row in unread.tolist() if row not in missing)
         reasons = missing | read_each(numbers, there, lambda row: parse_number(texts[row]))
         negative = np.flatnonzero(numbers < 0.0).tolist()
         return numbers, reasons | {row: f"weight {numbers[row]:g} is negative" for row in negative}
+
+    def groups(self, size: int) -> Iterator[tuple[str | None, Ints]]:
+        """Yield the rows of each label, by the first row that has it; without labels all that there are."""
+        if self.by is None:
+            yield None, np.arange(size)
+            return
+        if not self.extra:
+            raise ValueInvalid("what was pasted has no columns or keys to group it by; leave --by out")
+        labels, codes = [*self.labels], np.concatenate(self.extra)
+        order = np.argsort(codes, kind="stable")
+        for rows in sorted(np.split(order, np.flatnonzero(np.diff(codes[order])) + 1), key=itemgetter(0)):
+            yield labels[codes[rows[0]]], rows
 
 
 def _below(value: Any, key: str) -> Any:
@@ -203,23 +222,17 @@ def means_of(rows: MeanRows, values: list[float] | None, *, robust: bool) -> Ite
 
     if not rows.blocks:
         raise ValueInvalid("no poses to take the mean of")
-    by, (numbers, _, lines, parents, names, *_) = rows.by, rows.rows("")
+    by, (numbers, _, lines, *named) = rows.by, rows.rows("")[:5]
     placed, turned = (not np.isnan(part).all() for part in (numbers[:, 0], numbers[:, POSITION]))
     poses = Transform.of(*np.where(np.isnan(numbers), NOWHERE, numbers).T.copy())
-    extra = np.concatenate(rows.extra) if rows.extra else None
-    counted = {each for each in {*parents} if each is None or each.isdecimal()}  # which are no frames
-    rows_of: dict[str, Any] = {}
-    if by is not None:
-        if extra is None:
-            raise ValueInvalid("what was pasted has no columns or keys to group it by; leave --by out")
-        for row, label in enumerate(extra.tolist()):
-            rows_of.setdefault(label, []).append(row)
-    weights = None if by is not None else extra if values is None else values
-    for label, at in (rows_of or {"": range(len(poses))}).items():
-        frames, bodies = {parents[row] for row in at} - counted, {names[row] for row in at}
+    parents, names = (np.array(each, object) for each in named)
+    weights = np.concatenate(rows.extra) if by is None and rows.extra else values
+    for label, at in rows.groups(len(poses)):
+        frames, bodies = ({*each[at].tolist()} for each in (parents, names))
+        frames = {each for each in frames if each is not None and not each.isdecimal()}  # which are no frames
         if len(frames) > 1 and not frames.issubset(EARTH_FRAMES):
             raise ValueInvalid(f"the poses are in {first_of(sorted(map(str, frames)), 3)}; use one frame for all")
-        found = solve_mean(poses[at] if rows_of else poses, weights=weights, robust=robust)
+        found = solve_mean(poses if by is None else poses[at], weights=weights, robust=robust)
         (metres, radians), (farthest, widest), covariance = found.rms, found.most, found.covariance
         extras: dict[str, Any] = {} if by is None else {by: label}
         extras |= {"count": len(found.used)} | ({"used": int(found.used.sum())} if robust else {})

@@ -10,7 +10,7 @@ import re
 from importlib import import_module
 from math import isnan
 from operator import itemgetter
-from types import MappingProxyType
+from types import MappingProxyType, NoneType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -126,6 +126,11 @@ def coded(cells: Spans) -> Coded:
     data = column.data.tobytes()
     spans = zip(column.starts.tolist(), column.ends.tolist(), strict=True)
     return coded_texts([data[start:end] for start, end in spans], _text)
+
+
+def codes_of(cells: Cells) -> Coded:
+    """Return cells (n,), not none, as the distinct texts of `texts_of` and the number of each row's."""
+    return coded(cells) if isinstance(cells, Spans) else coded_texts(texts_of(cells))
 
 
 def one_text(column: Spans) -> bytes | None:
@@ -456,12 +461,9 @@ def _block(
 def objects(values: Iterable[Any]) -> NDArray[Any]:
     """Return plain values as a column (n,): texts, None, mappings and lists; numbers and truth values as written."""
     found = list(values)
-    column = np.empty(len(found), object)
-    for at, value in enumerate(found):
-        is_number = isinstance(value, (int, float))
-        text = str(value).lower() if isinstance(value, bool) else repr(value)
-        column[at] = Verbatim(text) if is_number else value
-    return column
+    if not {*map(type, found)} <= {str, Verbatim, NoneType}:
+        found = [Verbatim(repr(each).lower()) if isinstance(each, (int, float)) else each for each in found]
+    return np.fromiter(found, object, len(found))
 
 
 def values_of(block: RowPoses, place: Place | None = None) -> list[Any]:
