@@ -1,6 +1,6 @@
-"""Reports of comparisons: as text, as tables for papers, and as pictures of paths and errors over time.
+"""Write reports of comparisons: text, tables for papers, and pictures of paths and errors over time.
 
-The pictures are an HTML page with all numbers, or an SVG of one comparison.
+The pictures are in an HTML page with all numbers, or in an SVG of one comparison.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ if TYPE_CHECKING:
     from frametool.fit.comparison import Comparison
     from frametool.view.pictures import Place, Point
 
-NAME, LONGEST_NAME = 18, 24  # characters; a longer one does not push the rest aside
+NAME, LONGEST_NAME = 18, 24  # characters; longer names do not widen the column
 STATISTICS = ("rmse", "mean", "median", "p95", "max")
 ABSOLUTE = {
     "m": "ate m", "deg": "ate deg", "rot": "ate rot", "full": "ate full",
     "along_m": "  along m", "across_m": "  across m", "up_m": "  up m",
 }  # fmt: skip
-# the columns of a table: their names for people and in CSV
+# the columns of a table: their titles and their names in CSV
 TITLES = {
     "est": "est", "ate": "ate_m", "max": "max_m", "deg": "ate_deg", "along": "along_m", "across": "across_m",
     "up": "up_m", "rpe": "rpe_percent", "kitti": "kitti_percent", "scale": "scale", "paired": "paired",
@@ -51,7 +51,7 @@ ESCAPED = {"text": {}, "markdown": str.maketrans({"|": "&#124;"}), "latex": str.
 
 
 def write_comparison(found: dict[str, Any]) -> str:
-    """Write one comparison: pairs, alignment, errors."""
+    """Return the text of one comparison: pairs, alignment, errors."""
     poses, settings, kitti, path = found["poses"], found["settings"], found["kitti"], found["path_m"]["ref"]
     duration = "" if found["ref_duration_s"] is None else f", {found['ref_duration_s']:.3f} s"
     share = 100 * poses["paired"] / max(poses["possible"], 1)
@@ -84,10 +84,10 @@ def write_comparison(found: dict[str, Any]) -> str:
         lines.append(_statistics(f"rpe {row['delta']} m", row["m"]) + percent)
         other = ("  distance m", "distance_m") if row["deg"] is None else (f"rpe {row['delta']} deg", "deg")
         lines.append(_statistics(other[0], row[other[1]]))
-    stretches = f"-  ({path:.1f} m of path, {min(settings['segments_m']):g} m asked)"
+    segments = f"-  ({path:.1f} m of path, {min(settings['segments_m']):g} m asked)"
     if kitti:
-        stretches = f"{kitti['percent']:.4f} %  {kitti['deg_per_m']:.6f} deg/m  ({kitti['segments']} segments)"
-    return "\n".join([*lines, f"{'kitti':{NAME}}{stretches}", ""])
+        segments = f"{kitti['percent']:.4f} %  {kitti['deg_per_m']:.6f} deg/m  ({kitti['segments']} segments)"
+    return "\n".join([*lines, f"{'kitti':{NAME}}{segments}", ""])
 
 
 def _statistics(label: str, summed: dict[str, float] | None) -> str:
@@ -95,7 +95,7 @@ def _statistics(label: str, summed: dict[str, float] | None) -> str:
 
 
 def write_table(found: Sequence[dict[str, Any]], fmt: str = "text") -> str:
-    """Write one row per comparison: `csv`, or `text`, `markdown`, `latex` with the best value of each column marked."""
+    """Return one row per comparison: `csv`, or `text`, `markdown`, `latex` with the best value of each column marked."""
     rows = [[number_at(each, PATHS.get(title, title)) for title in TITLES] for each in found]
     if fmt == "csv":
         return write_points([dict(zip(TITLES.values(), row, strict=True)) for row in rows], Style("csv"))
@@ -117,17 +117,17 @@ def write_table(found: Sequence[dict[str, Any]], fmt: str = "text") -> str:
 
 
 WIDE, HIGH = 412.0, 112.0  # pixels of a chart
-LEFT, TOP, RIGHT, BOTTOM, GAP = 54.0, 40.0, 14.0, 42.0, 68.0  # around it, and between two of a column
-ROW = 38.0  # pixels of an estimate's box and its name
-STRETCHES, FEWEST = 200, 20  # of all paths together, and of one at least, each drawn by its extremes
-LEVELS, BINS = 12, 30  # of error: colours along a path, columns of a histogram
-ERROR_STOPS = ((47, 108, 216), (190, 90, 190), (235, 94, 20))  # seen on white paper and on dark
+LEFT, TOP, RIGHT, BOTTOM, GAP = 54.0, 40.0, 14.0, 42.0, 68.0  # around a chart, and between two of a column
+ROW = 38.0  # pixels for the box of an estimate and its name
+STRETCHES, FEWEST = 200, 20  # of all paths together, and at least of each; only extremes of a stretch are drawn
+LEVELS, BINS = 12, 30  # of the error: colours along a path, columns of a histogram
+ERROR_STOPS = ((47, 108, 216), (190, 90, 190), (235, 94, 20))  # visible on white and on dark
 SHADES = [pictures.shade_of(level / (LEVELS - 1), ERROR_STOPS) for level in range(LEVELS)]
-STILL = 1e-6  # metres: below, a path is a point
+STILL = 1e-6  # metres: a smaller path is a point
 
 
 class Curve(NamedTuple):
-    """A comparison to draw: its name, its colour, the indices of the pairs drawn and their times."""
+    """A comparison to draw: its name and colour, the indices of the pairs that are drawn, and their times."""
 
     found: Comparison
     name: str
@@ -136,7 +136,7 @@ class Curve(NamedTuple):
     times: list[float]
 
     def line(self, name: str, colour: str, values: Any) -> ChartLine:
-        """Return the line of a value of the pairs drawn over their times."""
+        """Return the line of a value over time, at the pairs that are drawn."""
         return ChartLine(name, colour, [*zip(self.times, values[self.chosen].tolist(), strict=True)], 1.2)
 
 
@@ -181,7 +181,7 @@ def write_report(found: Sequence[Comparison], fmt: str, command: str) -> str:
 
 
 def _curve(found: Comparison, at: int, count: int) -> Curve:
-    """Choose what is drawn of a comparison: the minimum and maximum of each stretch, and both ends."""
+    """Choose the pairs of a comparison that are drawn: the minimum and maximum of each stretch, and both ends."""
     ate, stamps = found.ate, found.pairs.ref.stamps_ns
     chosen = np.arange(found.pairs.ref.size)
     times = chosen if stamps is None else (stamps - stamps[0]) / 1e9
@@ -203,19 +203,19 @@ def _figure(high: float, shapes: Sequence[SvgElement]) -> Picture:
 def _path(curves: Sequence[Curve]) -> tuple[Picture, Callable[[Any], list[Point]]]:
     """Draw the paths, seen along the axis of least extent; a single estimate is coloured by its error.
 
-    Returns also what maps positions to pixels.
+    Also returns a function from positions to pixels.
     """
     first, ref = curves[0].found, curves[0].found.pairs.ref
     every = np.concatenate([xyz for each in curves for xyz in (each.found.pairs.ref.xyz, each.found.moved.xyz)])
     axes = np.sort(np.argsort(np.ptp(every, axis=0), kind="stable")[1:])
     low, high = every[:, axes].min(0), every[:, axes].max(0)
     span = (high - low).max() if (high - low).max() > STILL else 1.0
-    base = np.where(np.abs(low) > 1e3 * span, np.round(low), 0.0)  # of a path far from 0
+    base = np.where(np.abs(low) > 1e3 * span, np.round(low), 0.0)  # subtracted from a path far from 0
     names = [f"{'xyz'[axis]}{f' - {at:.0f}' if at else ''} (m)" for axis, at in zip(axes, base, strict=True)]
     wide, tall = np.maximum(high - low, 1e-9)
     area = LEFT, TOP, WIDE, WIDE * min(max(float(tall / wide), 0.5), 1.0)
     pixels = np.array(area[2:])
-    reach = ((high - low + 0.06 * span) / pixels).max() * pixels / 2.0  # metres, at one scale
+    reach = ((high - low + 0.06 * span) / pixels).max() * pixels / 2.0  # metres, with one scale for both axes
     middle = (low + high) / 2.0 - base
     ends = [*zip((middle - reach).tolist(), (middle + reach).tolist(), strict=True)]
 
@@ -245,7 +245,7 @@ def _path(curves: Sequence[Curve]) -> tuple[Picture, Callable[[Any], list[Point]
 def _over_time(curves: Sequence[Curve], along: str) -> tuple[Picture, Place]:
     """Draw the errors over time: in position, in rotation, and for one estimate along and across its path.
 
-    Returns also what maps a time and an error in position to pixels.
+    Also returns a function from a time and an error in position to pixels.
     """
     ate, one = curves[0].found.ate, len(curves) == 1
     position = [each.line(each.name * (not one), each.colour, each.found.ate.m) for each in curves]
@@ -262,7 +262,7 @@ def _over_time(curves: Sequence[Curve], along: str) -> tuple[Picture, Place]:
 
 
 def _distribution(curves: Sequence[Curve]) -> Picture:
-    """Draw the distribution of the error: of one estimate as a histogram, of several as boxes."""
+    """Draw the distribution of the error: a histogram for one estimate, boxes for several."""
     if len(curves) == 1:
         errors = curves[0].found.ate.m
         counts, edges = np.histogram(errors, BINS, (0.0, errors.max() or 1.0))
@@ -286,7 +286,7 @@ def _distribution(curves: Sequence[Curve]) -> Picture:
 
 
 def _by_length(curves: Sequence[Curve], numbers: Sequence[dict[str, Any]]) -> Picture | None:
-    """Draw errors by length, of KITTI or else of the deltas in metres; None for fewer than three lengths."""
+    """Draw errors by length, of KITTI or else of deltas in metres; return None for fewer than three lengths."""
     lines = []
     for curve, each in zip(curves, numbers, strict=True):
         points = [(row["length_m"], row["percent"]) for row in (each["kitti"] or {"lengths": []})["lengths"]]
@@ -298,7 +298,7 @@ def _by_length(curves: Sequence[Curve], numbers: Sequence[dict[str, Any]]) -> Pi
 
 
 def _samples(curve: Curve, on_path: Callable[[Any], list[Point]], on_errors: Place) -> dict[str, Any]:
-    """Return the pixels of the drawn pairs in both charts and the values shown on hover."""
+    """Return the pixels of the drawn pairs in both charts, and the values shown on hover."""
     ate, chosen = curve.found.ate, curve.chosen
     errors = [on_errors(*point) for point in zip(curve.times, ate.m[chosen].tolist(), strict=True)]
     pixels = {"path": on_path(curve.found.moved.xyz[chosen]), "errors": errors}

@@ -1,8 +1,8 @@
-"""Frames and runs of turtles as files and for notebooks: still pictures, an interactive HTML page, glTF 2.0 (.glb).
+"""Draw frames and runs of turtles for files and notebooks: still pictures, an interactive HTML page, glTF 2.0 (.glb).
 
 The page is self-contained and makes no network requests.  Its script and style are the files in the folder `page`,
-joined in the order of SCRIPTS and EXTRAS; its policy lets nothing else run.  Poses are stored as doubles, stamps as
-64-bit integers of nanoseconds.  A run of turtles is shown as its followers saw it in tf.
+joined in the order of SCRIPTS and EXTRAS; its content security policy allows nothing else.  Poses are stored as
+doubles, stamps as 64-bit integers of nanoseconds.  A run of turtles is shown by the transforms it broadcasts.
 
 A .glb has one node per frame, with its name, its parent and coloured axes; moving frames are animated, in seconds
 after their first stamp.  glTF has y up, so the root node rotates z up.
@@ -44,18 +44,18 @@ if TYPE_CHECKING:
     from frametool.view.pictures import Point, SvgElement
     from frametool.view.scene import Eye
 
-    Stroke = tuple[str, Pen, list[Point]]  # of a turtle, a line drawn with one pen; metres, y up
+    Stroke = tuple[str, Pen, list[Point]]  # turtle, pen, and a line drawn with it; metres, y up
 
-PIECES, LAST_SHADE = 24, 0.85  # of a trail, from dark when it begins to a green that white paper still shows
+PIECES, LAST_SHADE = 24, 0.85  # of a trail, from dark at its beginning to a green that is visible on white
 WIDTH, HEIGHT = 1000.0, 700.0
 SIZE = Size(WIDTH, HEIGHT, margin=70.0, axes=(14.0, 46.0), cell=(4, 4), line=16.0, measure=text_width)
-CORNER = 46.0  # pixels from the corner to the little axes
+CORNER = 46.0  # pixels from the corner to the origin of the legend's axes
 
 
 def still_picture(
     scene: FrameScene, eye: Eye = EYES["slanted"], title: str = "", other: FrameScene | None = None,
 ) -> Picture:  # fmt: skip
-    """Draw a scene from a direction, azimuth and elevation in radians; its notes say what it does not show.
+    """Draw a scene from a direction, azimuth and elevation in radians; the picture's notes list what it does not show.
 
     other: another tree in the same frame; its frames with the same names are drawn faintly, with a line to them.
     """
@@ -112,28 +112,28 @@ def _legend(flat: Projection, step: float) -> Iterator[SvgElement]:
 
 WINDOW, METRE = 500.0, 45.0  # pixels, as turtlesim's
 MARGIN = 30.0
-LEFT = WINDOW + 110.0  # where the curves begin
+LEFT = WINDOW + 110.0  # left edge of the charts
 PANEL_WIDTH, PANEL_GAP = 420.0, 50.0
 SIDE = WINDOW + 2.0 * MARGIN
-PANELS = ("distance (m)", "linear.x (m/s)", "angular.z (rad/s)")  # as the numbers of curves after the times
+PANELS = ("distance (m)", "linear.x (m/s)", "angular.z (rad/s)")  # in the order of the numbers in `curves`
 # circles of a turtle: pixels ahead and to the left, radius: feet, head, shell
 BODY = (*((x, y, 4.0) for x in (-9.0, 9.0) for y in (-11.0, 11.0)), (17.0, 0.0, 5.0), (0.0, 0.0, 13.0))
 
 
 def run_picture(scene: Scene) -> tuple[Callable[[SimulationStep], None], Callable[[], Picture]]:
-    """Return what collects a run by steps, and what then draws it; turtles that do not move take no memory.
+    """Return a function that collects the steps of a run, and one that then draws it; turtles at rest take no memory.
 
-    It draws the world with trails and the turtles at the end, and charts if there are followers.
+    The picture shows the world with trails, the turtles at the end, and charts if there are followers.
     """
     strokes: list[Stroke] = []
-    current: dict[str, Stroke] = {}  # the last one of each turtle
+    current: dict[str, Stroke] = {}  # the last stroke of each turtle
     turtles: dict[str, TurtleState] = {}
-    # of each follower, for each control step: seconds, metres, m/s, rad/s
+    # follower -> for each control step: seconds, metres, m/s, rad/s
     curves: dict[str, list[tuple[float, ...]]] = {name: [] for name in scene.followers}
     clears = 0
 
     def watch(step: SimulationStep) -> None:
-        """Extend the strokes of the turtles, or begin one with a new pen."""
+        """Extend the strokes of the turtles; begin a new one if the pen changes."""
         nonlocal clears, turtles
         if step.is_tick:
             if step.clears != clears:
@@ -182,9 +182,9 @@ def run_picture(scene: Scene) -> tuple[Callable[[SimulationStep], None], Callabl
 
 
 def html_of(value: Any) -> str | None:
-    """Return the HTML of a transform, rotation, tree, trajectory or comparison; None if its repr is all there is."""
+    """Return the HTML of a transform, rotation, tree, trajectory or comparison; None for arrays and empty trees."""
     if isinstance(value, Frames) and value.frames:
-        # a picture of its own, for the style of an SVG element would count in the whole notebook
+        # as an image, because the style of an SVG element would apply to the whole notebook
         svg = b64encode(pictures.write_svg(still_picture(FrameScene(value), title=value.name)).encode()).decode()
         return f'<img alt="frames of {escape(value.name)}" src="data:image/svg+xml;base64,{svg}">'
     if hasattr(value, "as_dict"):
@@ -207,9 +207,9 @@ def html_of(value: Any) -> str | None:
     return f"<pre>{escape(write_poses([Result(pose)], Style('text')))}</pre>"
 
 
-THICK = 0.02  # half the width of a bar, where its length is 1
+THICK = 0.02  # half the width of a bar of length 1
 COLOURS = [(*bytes.fromhex(PALETTE[axis][0][1:]), 255) for axis in "xyz"]
-SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))  # of a box, outwards
+SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))  # facing outwards
 Z_UP = (-0.7071067811865476, 0.0, 0.0, 0.7071067811865476)
 COMPONENTS = {"f": 5126, "H": 5123, "B": 5121}
 VERTICES, INDICES = 34962, 34963
@@ -222,7 +222,7 @@ def write_glb(scene: FrameScene) -> bytes:
     data, views, accessors = bytearray(), list[dict[str, int]](), list[dict[str, Any]]()  # the binary part
 
     def add(letter: str, rows: Sequence[Sequence[float]], *, target: int | None = None, **more: Any) -> int:
-        """Append rows of numbers, each of a type of the module struct; return the index of their accessor."""
+        """Append rows of numbers of a type of the module struct; return the index of their accessor."""
         packed = _packed(letter, chain.from_iterable(rows))
         view = {"buffer": 0, "byteOffset": len(data), "byteLength": len(packed)}
         views.append(view if target is None else view | {"target": target})
@@ -239,7 +239,7 @@ def write_glb(scene: FrameScene) -> bytes:
     add("B", [colour for colour in COLOURS for _ in range(8)], target=VERTICES, normalized=True)
     add("H", corners, target=INDICES)
     flat = Projection(scene, SIZE)
-    # a node of each frame and one of its axes; a frame without a drawn parent is placed in `fixed`
+    # a node for each frame and one for its axes; a frame whose parent is not drawn is a child of the root
     index = {name: 1 + 2 * number for number, name in enumerate(flat.poses)}
     nodes: list[dict[str, Any]] = [{"name": "z up", "rotation": Z_UP, "children": []}]
     for name, node in index.items():
@@ -248,8 +248,8 @@ def write_glb(scene: FrameScene) -> bytes:
     for name, pose in flat.poses.items():
         parent, track = scene.tree.parent(name, scene.at_ns), scene.tree.track(name)
         edge = None if track is None else track.at(scene.at_ns or 0)
-        above, place = (index[parent], edge) if parent in index and edge is not None else (0, pose)
-        nodes[above]["children"].append(index[name])
+        holder, place = (index[parent], edge) if parent in index and edge is not None else (0, pose)
+        nodes[holder]["children"].append(index[name])
         nodes[index[name]] |= {"translation": place[:3], "rotation": place[3:]}
     animation = _animation(scene, index, add)
     document: dict[str, Any] = {
@@ -265,14 +265,14 @@ def write_glb(scene: FrameScene) -> bytes:
 
 
 def _animation(scene: FrameScene, index: dict[str, int], add: Callable[..., int]) -> dict[str, Any] | None:
-    """Return the animation of the frames that move below one drawn parent; `add` appends numbers."""
+    """Return the animation of the moving frames with a single parent that is drawn; `add` appends numbers."""
     channels: list[dict[str, Any]] = []
     samplers: list[dict[str, Any]] = []
     for name, track in scene.tracks.items():
         drawn = name in index and track.parent in index and not track.varies
         if not drawn or not all(can_be_drawn(sample[:3]) for _, _, sample in track.walk()):
             continue
-        keys: dict[float, Rigid] = {}  # by seconds of float32, which must increase
+        keys: dict[float, Rigid] = {}  # float32 seconds -> pose; glTF needs increasing times
         for stamp_ns, _, sample in track.walk():
             keys.setdefault(single((stamp_ns - scene.span_ns[0]) / BILLION), sample)
         rotations: list[Sequence[float]] = []  # with continuous signs
@@ -287,8 +287,8 @@ def _animation(scene: FrameScene, index: dict[str, int], add: Callable[..., int]
 
 
 SCRIPTS = ("begin", "kernels", "frames", "state", "camera", "picture", "labels", "panel", "hands")
-EXTRAS = ("joints", "solids")  # where the page has some
-PACKED = 48_000  # bytes of numbers, from where on they are compressed
+EXTRAS = ("joints", "solids")  # only in pages that have these
+PACKED = 48_000  # bytes; larger arrays of numbers are compressed
 
 
 def write_page(
@@ -338,13 +338,13 @@ def write_page(
 
 
 def _packed(letter: str, numbers: Iterable[float]) -> bytes:
-    """Return numbers of a type of the module struct as bytes, little-endian."""
+    """Return numbers as little-endian bytes; letter: their type in the module struct."""
     found = [*numbers]
     return struct.pack(f"<{len(found)}{letter}", *found)
 
 
 def run_page() -> tuple[Callable[[SimulationStep], None], Callable[[], str]]:
-    """Return what collects the transforms of a run by steps, and what then makes a page of them, seen from above."""
+    """Return a function that collects the transforms of a run, and one that then returns their page."""
     buffer = TransformBuffer(name="run")
 
     def watch(step: SimulationStep) -> None:
@@ -378,12 +378,12 @@ def joint_sliders(scene: FrameScene) -> dict[str, list[dict[str, Any]]]:
     return {"joints": sliders, "links": moved}
 
 
-MESH_PART = 0.35  # of the usual distance between frames is the least edge of a box
+MESH_PART = 0.35  # smallest edge of a mesh's box, in median distances between frames
 
 
 def _drawn_solids(scene: FrameScene, solids: Sequence[Solid]) -> dict[str, Any]:
-    """Return the solids of known frames; a mesh becomes a box around the child frames of its frame."""
-    ends = {name: [IDENTITY[:3]] for name in scene.names}  # of the links that begin at a frame
+    """Return the solids of the drawn frames; a mesh becomes a box around the origins of its frame and its children."""
+    ends = {name: [IDENTITY[:3]] for name in scene.names}  # frame -> its origin and those of its children in it
     for track in scene.tree.tracks():
         ends[track.parent].append(track.components[:3])
     lengths = sorted(filter(None, (math.hypot(*end) for held in ends.values() for end in held)))

@@ -1,7 +1,7 @@
-"""Static pictures: elements of SVG in pixels with y down, written as SVG, HTML or PNG; overlays on camera images.
+"""Draw static pictures of SVG elements in pixels with y down, and write SVG, HTML or PNG; overlays on camera images.
 
-A colour is `#rrggbb` or a name in PALETTE, which has light and dark values.  Only PNG needs a library, matplotlib.
-Also here: charts, and the HTML shell of all pages.
+A colour is `#rrggbb` or a name in PALETTE, with a light and a dark value.  Only PNG needs a library, matplotlib.
+Also charts, and the HTML shell of all pages.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ PALETTE = {
     "y": ("#12873d", "#51cf66"),
     "z": ("#1a5fd0", "#5c9dff"),
 }
-# the same of the lines of several things of one kind, on pages
+# the same, for several lines of one kind on pages
 SERIES = {
     "blue": ("#2563eb", "#7aa7ff"),
     "orange": ("#c2410c", "#fb923c"),
@@ -55,7 +55,7 @@ SERIES = {
 }
 NAMED = PALETTE | SERIES
 
-# viridis at five places, dark for little
+# five colours of viridis, from dark to light
 STOPS = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))
 
 
@@ -70,8 +70,8 @@ def shade_of(part: float, stops: Sequence[tuple[int, int, int]] = STOPS) -> str:
 class SvgElement(NamedTuple):
     """An element of SVG.
 
-    kind: path, circle, rect, text or image.  look: its attributes but the colour.  points: of a path.
-    text: that of a text, the tooltip of anything else.
+    kind: path, circle, rect, text or image.  look: its attributes except the colour.  points: of a path.
+    text: the content of a text, or the tooltip of other elements.
     """
 
     kind: str
@@ -85,7 +85,7 @@ def line(
     points: Sequence[Point], colour: str, width: float = 1.0, alpha: float = 1.0,
     dashes: tuple[float, ...] = (), title: str = "",
 ) -> SvgElement:  # fmt: skip
-    """Return a polyline; dashes: pixels drawn and skipped in turn; title: its tooltip."""
+    """Return a polyline; dashes: pixels that are drawn and skipped in turn; title: its tooltip."""
     look = {"stroke-width": width, "opacity": alpha, "stroke-dasharray": dashes}
     return SvgElement("path", colour, look, points, title)
 
@@ -102,13 +102,13 @@ def box(x: float, y: float, width: float, height: float, colour: str) -> SvgElem
 
 def words(x: float, y: float, text: str, colour: str = "ink", anchor: str = "start", size: float = 12.0,
           weight: str = "normal", halo: str = "") -> SvgElement:  # fmt: skip
-    """Return one line of text, vertically centred at y; anchor: the part of it at x; halo: colour of its outline."""
+    """Return one line of text, vertically centred at y; anchor: start, middle or end is at x; halo: outline colour."""
     look = {"x": x, "y": y, "text-anchor": anchor, "font-size": size, "font-weight": weight, "stroke": halo}
     return SvgElement("text", colour, look, text=text)
 
 
 class Picture(NamedTuple):
-    """Shapes from back to front; corner: the coordinates of its upper left corner; decimals: of coordinates in SVG."""
+    """Shapes from back to front; corner: the coordinates of the upper left corner; decimals: of coordinates in SVG."""
 
     width: float
     height: float
@@ -120,7 +120,7 @@ class Picture(NamedTuple):
 
 
 USUAL = {"stroke-width": 1.0, "opacity": 1.0, "text-anchor": "start", "font-size": 12.0, "font-weight": "normal"}
-CLASSES = {"path": "-line", "text": " paper-line"}  # after the name of a colour
+CLASSES = {"path": "-line", "text": " paper-line"}  # appended to the name of a colour
 FONT = 'font-family="DejaVu Sans, Verdana, sans-serif" font-size="12" dominant-baseline="central" role="img"'
 SHARED = """\
 path {fill: none; stroke-linecap: round; stroke-linejoin: round}
@@ -130,7 +130,7 @@ image {image-orientation: none}
 
 
 def write_svg(picture: Picture, more: str = "") -> str:
-    """Return the picture as an SVG document; more: elements drawn below it."""
+    """Return the picture as an SVG document; more: elements behind it."""
     rule = ".{name} {{fill: {colour}}} .{name}-line {{stroke: {colour}}}\n".format
     light, dark = ("".join(rule(name=name, colour=each[scheme]) for name, each in PALETTE.items()) for scheme in (0, 1))
     style = f"<style>\n{SHARED}{light}@media (prefers-color-scheme: dark) {{\n{dark}}}\n</style>\n"
@@ -138,9 +138,9 @@ def write_svg(picture: Picture, more: str = "") -> str:
 
 
 def svg_element(picture: Picture, before: str = "", place: str = "") -> str:
-    """Return the picture as an SVG element without styles; names of colours are classes.
+    """Return the picture as an SVG element without styles, with colour names as classes.
 
-    before: elements drawn below it.  place: its x and y attributes inside another SVG.
+    before: elements behind it.  place: its x and y attributes inside another SVG.
     """
     width, height, (left, top) = f"{picture.width:g}", f"{picture.height:g}", picture.corner
     size = f'width="{width}" height="{height}" viewBox="{left:g} {top:g} {width} {height}"'
@@ -161,7 +161,7 @@ def svg_element(picture: Picture, before: str = "", place: str = "") -> str:
 
 
 def _attribute(value: Any, decimals: int) -> str:
-    """Write a number with some decimals, several with blanks between them; a text stays."""
+    """Return the text of a number with some decimals, of several separated by spaces, or of a string."""
     if isinstance(value, str):
         return value
     if isinstance(value, tuple):
@@ -181,7 +181,7 @@ def _text(text: str) -> str:
 def write_html(
     title: str, body: str, *, style: str = "report.css", script: str = "", data: Mapping[str, str] | None = None
 ) -> str:
-    """Return a self-contained page whose policy allows its own script and style only.
+    """Return a self-contained page whose content security policy allows only its own script and style.
 
     style, script: names of files in the folder `page`.  data: JSON texts by element id.
     """
@@ -201,7 +201,7 @@ def write_html(
     return filled("shell.html", policy=policy, title=_text(title), body=body, data=scripts, **texts)
 
 
-HARMLESS = {ord(letter): f"\\u{ord(letter):04x}" for letter in "<>&"}  # JSON that no name in it can end
+HARMLESS = {ord(letter): f"\\u{ord(letter):04x}" for letter in "<>&"}  # so that no name in JSON ends the script
 
 
 def page_file(name: str) -> str:
@@ -211,12 +211,12 @@ def page_file(name: str) -> str:
 
 
 def filled(name: str, **texts: str) -> str:
-    """Return the text of a file in the folder `page` with texts in their places."""
+    """Return the text of a file in the folder `page` with texts for its placeholders."""
     return Template(page_file(name)).substitute(texts)
 
 
 def write_picture(picture: Picture, suffix: str) -> str | bytes:
-    """Return a picture as .png, .svg or .html."""
+    """Return the picture in the format of a suffix: .png, .svg or .html."""
     if suffix == ".png":
         return write_png(picture)
     if suffix == ".svg":
@@ -224,11 +224,11 @@ def write_picture(picture: Picture, suffix: str) -> str | bytes:
     return write_html(picture.title, f"<main>\n<figure>\n{svg_element(picture)}</figure>\n</main>\n")
 
 
-LEAST_SPAN, FURTHEST = 1e-300, 1e300  # of values on an axis; what is beyond is drawn at its end
+LEAST_SPAN, FURTHEST = 1e-300, 1e300  # of values on an axis; those beyond are drawn at its end
 
 
 class ChartLine(NamedTuple):
-    """A line in data coordinates; a line without a name is not in the legend."""
+    """A line in data coordinates; without a name it is not in the legend."""
 
     name: str
     colour: str
@@ -242,12 +242,12 @@ def chart(
     area: Box, names: tuple[str, str], lines: Sequence[ChartLine] = (), ends: Sequence[Point] = (), *,
     is_scaled: bool = True,
 ) -> tuple[list[SvgElement], Place]:  # fmt: skip
-    """Draw two axes, lines and a legend: each name after its line; a long one has only the dashed lines.
+    """Draw two axes, lines and a legend; if the legend is too long it has only the dashed lines.
 
     area: left, top, width and height without the labels.  names: titles of the x and the y axis, with units.
-    ends: least and greatest x and y; by default 0 and those of the lines, in y rounded to ticks.
-    is_scaled: whether the y axis has ticks.
-    Returns the shapes, and what maps data to pixels; values beyond the y axis are clamped to its ends.
+    ends: smallest and largest x and y; by default 0 and those of the lines, in y rounded to ticks.
+    is_scaled: draw ticks on the y axis.
+    Returns the shapes, and a function from data to pixels; values beyond the y axis are clamped to its ends.
     """
     left, top, width, height = area
     right, bottom, above = left + width, top + height, top - 14.0
@@ -293,10 +293,10 @@ def chart(
 def stacked(
     area: Box, gap: float, along: str, kinds: Mapping[str, Sequence[ChartLine]]
 ) -> tuple[list[SvgElement], Place]:
-    """Draw charts one below the other over the same x axis, which the last one names, as `chart` does.
+    """Draw charts one below the other over one x axis, whose title is below the last, as `chart` does.
 
-    area: of the first, whose mapping is returned.  along: title of the x axis.
-    kinds: the lines of each by the title of its y axis
+    area: of the first chart, whose function from data to pixels is returned.  along: title of the x axis.
+    kinds: title of the y axis -> lines
     """
     left, top, width, height = area
     charts = [
@@ -315,7 +315,7 @@ def ticks(low: float, high: float) -> list[float]:
     return [count * step for count in range(first, max(last, first + 1) + 1)]
 
 
-POINTS = 72 / 100  # of a pixel at 100 dots an inch
+POINTS = 72 / 100  # per pixel, at 100 dots per inch
 ANCHORS = {"start": "left", "middle": "center", "end": "right"}
 
 
@@ -346,7 +346,7 @@ def write_png(picture: Picture) -> bytes:
     axes: Any = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.axis("off")
     for order, (kind, run) in enumerate(groupby(picture.shapes, key=attrgetter("kind"))):
-        if kind == "circle":  # at once, for there may be many
+        if kind == "circle":  # all at once, because there may be many
             found = ((*each.look.values(), NAMED.get(each.colour, (each.colour,))[0]) for each in run)
             xs, ys, radii, colours = zip(*found, strict=True)
             sizes = [(2.0 * radius * POINTS) ** 2 for radius in radii]
@@ -367,7 +367,7 @@ def write_png(picture: Picture) -> bytes:
                 axes.text(look["x"], look["y"], text, fontsize=look["font-size"] * POINTS, **style)
             elif kind == "rect":
                 axes.add_patch(Rectangle((look["x"], look["y"]), look["width"], look["height"], linewidth=0.0, **style))
-            else:  # a gray image stays gray
+            else:  # an image; imshow would colour a gray one
                 suffix, _, data = look["href"].removeprefix("data:image/").partition(";base64,")
                 pixels = imread(io.BytesIO(b64decode(data)), format=suffix)
                 gray = {"cmap": "gray", "vmin": 0.0, "vmax": 1.0 if pixels.dtype.kind == "f" else 255.0}
@@ -377,7 +377,7 @@ def write_png(picture: Picture) -> bytes:
     axes.set(xlim=(left, left + picture.width), ylim=(top + picture.height, top), aspect="auto")
     stream = io.BytesIO()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of letters that matplotlib's font lacks: it draws boxes
+        warnings.simplefilter("ignore", UserWarning)  # matplotlib draws boxes for letters that its font lacks
         figure.savefig(stream, format="png", metadata={"Software": None})
     return stream.getvalue()
 
@@ -385,9 +385,9 @@ def write_png(picture: Picture) -> bytes:
 # --- overlays: projected points on the camera's image, coloured by depth; pixels, the centre of the first one at 0, 0
 
 SUFFIXES = (".svg", ".html", ".png")
-MOST, FEW = 20_000, 1000  # points that are drawn, and that are drawn large
-CORNER = (-0.5, -0.5)  # of a picture, whose first pixel has its middle at 0, 0
-SHADES = 24  # of the scale
+MOST, FEW = 20_000, 1000  # largest number of points drawn, and of points drawn large
+CORNER = (-0.5, -0.5)  # of an image, whose first pixel has its centre at 0, 0
+SHADES = 24  # colours of the scale
 PNG, JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
 FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}  # the markers of JPEG that are followed by a size
 
@@ -416,7 +416,7 @@ class Overlay:
         while not kind and at + 9 < len(data) and data[at] == 0xFF:
             if data[at + 1] in FRAMES:
                 kind, (height, width) = "jpeg", struct.unpack_from(">HH", data, at + 5)
-            is_filled = data[at + 1] == 0xFF  # before a marker there may be more of its first byte
+            is_filled = data[at + 1] == 0xFF  # the first byte of a marker may be repeated
             at += 1 if is_filled else 2 + int.from_bytes(data[at + 2 : at + 4], "big")
         if not kind:
             raise FormatError("neither a PNG nor a JPEG; an overlay is drawn over one of these", source=image)
@@ -456,7 +456,7 @@ class Overlay:
         return write_picture(Picture(wide, high, shapes, "overlay", CORNER, 3), self.suffix)
 
     def summary(self) -> str:
-        """Return what was drawn."""
+        """Return a sentence on the points drawn."""
         thinned = f", 1 in {self.every} of {self.count}" if self.every > 1 else ""
         points = f"{len(self.points)} point{'s' * (len(self.points) != 1)}"
         return f"{self.path}: {points} over {self.image}{thinned}"

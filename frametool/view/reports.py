@@ -1,4 +1,4 @@
-"""Reports as text within 80 columns: trees, edges of a recording, differences, file formats, solutions."""
+"""Write reports as text within 80 columns: trees, edges of a recording, differences, file formats, solutions."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ if TYPE_CHECKING:
     from frametool.grammar.pose import Pose
 
 
-LARGE, NOTHING = 1e6, 1e-9  # from where on numbers have an exponent, and below which they are rounding
-BELOW = str.maketrans("├└─", "│  ")  # the lines of a drawing, a line further down
+LARGE, NOTHING = 1e6, 1e-9  # larger numbers have an exponent; smaller ones are rounding errors
+BELOW = str.maketrans("├└─", "│  ")  # the lines of a drawing -> those in the next row
 
 
 def columns(rows: Sequence[Sequence[str]], left: Sequence[bool]) -> str:
-    """Return rows as lines of aligned cells, within WIDTH or the terminal's if possible; empty columns are left out.
+    """Return rows as lines of aligned cells, within WIDTH or the terminal's if possible; empty columns are omitted.
 
-    left: which columns are aligned to the left; if the last one is, it holds remarks, of any length.
-    A first cell that leaves its row no room has a line of its own, and so has a remark.
+    left: which columns are aligned to the left; if the last one is, it has remarks of any length.
+    A first cell or a remark that does not fit has a line of its own.
     """
     width = max(WIDTH, get_terminal_size((WIDTH, 0)).columns)
     widths = [max(map(cells, column)) for column in zip(*rows, strict=True)]
@@ -68,7 +68,7 @@ def folded(text: str, indent: str = "") -> Iterator[str]:
 
 
 def short(name: str, width: int) -> str:
-    """Shorten a name to some columns, keeping both ends."""
+    """Shorten a name to some columns, preserving both ends."""
     name = printable(name)
     if cells(name) <= width:
         return name
@@ -77,7 +77,7 @@ def short(name: str, width: int) -> str:
 
 
 def fixed(value: float | None, decimals: int) -> str:
-    """Write a number with some decimals; with an exponent where that says nothing or too much; no minus zero."""
+    """Return a number with some decimals, or an exponent if it is too small or too large for them; 0 instead of -0."""
     if value is None:
         return "-"
     is_plain = abs(value) < NOTHING or 0.5 * 10.0**-decimals <= abs(value) < LARGE
@@ -89,9 +89,9 @@ TREE_MARKS = (r"(?m)^(?P<green>[^│├└ \n].*)", r"(?m)^(?P<dim>[│├└─
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Draw a tree: each frame below its parent, with its newest pose there, how uncertain that is, and how it moves.
+    """Draw a tree: each frame below its parent, with its newest pose there, its sigmas, and its motion.
 
-    Children are in the order they were added; a stack, so that no tree is too deep for Python.
+    Children are in the order they were added; a stack avoids Python's recursion limit.
     """
     children: dict[str, list[Track]] = {}
     for each in tree.tracks():
@@ -120,13 +120,13 @@ HEADINGS = {
     "parent": "parent <- child", "rate_hz": "rate Hz", "first_ns": "first", "last_ns": "last", "gap_s": "gap s",
     "delay_mean_s": "delay s", "delay_max_s": "max s", "backward": "back", "parent_changes": "parents",
 }  # fmt: skip
-HIDDEN = (  # of a table of edges; what moves has a sentence of its own
+HIDDEN = (  # keys that are no columns of the table of edges; sentences show some of them
     "kind", "child", "gap_until_ns", "parents", "overlap", "length_m", "duration_s", "speed_mean", "speed_max", "gaps",
 )  # fmt: skip
 
 
 def write_report(entries: Sequence[dict[str, Any]]) -> str:
-    """Return the edges as a table without empty columns, then sentences on those that move and on the chain."""
+    """Return a table of the edges without empty columns, then sentences on moving edges and on the chain."""
     edges = [entry for entry in entries if entry["kind"] != "chain"]
     keys = [key for key in entries[0] if key not in HIDDEN]
     shown = [key for key in keys if any(entry[key] or (entry[key] == 0 and key != "parent_changes") for entry in edges)]
@@ -163,7 +163,7 @@ def _edge(entry: dict[str, Any]) -> str:
 
 
 def _cell(key: str, entry: dict[str, Any]) -> str:
-    """Write a value; its key ends with its unit."""
+    """Return the text of a value, whose key ends with its unit."""
     if key == "parent":
         return _edge(entry)
     value = entry[key]
@@ -175,7 +175,7 @@ def _cell(key: str, entry: dict[str, Any]) -> str:
 
 
 def write_diff(found: Iterable[Difference]) -> str:
-    """Return a sentence for each difference but motion, and tables of what has moved."""
+    """Return sentences on all differences except motion, and tables of the frames that moved."""
     every = [*found]
     moved = [each for each in every if each.kind in ("moved", SAME)]
     parts = ["".join(f"{line}\n" for each in every if each not in moved for line in folded(each.sentence))]
@@ -191,7 +191,7 @@ def write_diff(found: Iterable[Difference]) -> str:
 
 
 def _distance(apart: Apart | None) -> tuple[str, str]:
-    """Write the distance of two poses in mm and degrees; rounding errors are 0."""
+    """Return the distance of two poses in mm and degrees; rounding errors are 0."""
     if apart is None:
         return "-", "-"
     metres = 0.0 if apart.metres <= apart.rounding else apart.millimetres
@@ -203,14 +203,14 @@ LIST_LABEL = 15  # columns, the indent included
 
 
 def write_formats(entries: Sequence[dict[str, Any]]) -> str:
-    """Return the list of formats, those that are only written last."""
+    """Return the list of formats, with those that are only written last."""
     read = "".join(_described(entry) for entry in entries if entry["reads"])
     written = "".join(_described(entry) for entry in entries if not entry["reads"])
     return f"read:\n{read}\nonly written:\n{written}"
 
 
 def write_format(entry: dict[str, Any]) -> str:
-    """Describe one format: also what it is recognised by, of a regular expression only the kind, and an example."""
+    """Describe one format, also how it is detected, of regular expressions only the kind, and with an example."""
     shown_as = re.compile(r"[\w./*|-]+").fullmatch
     magic = FORMATS[entry["name"]].magic
     signs = [f"{kind} {what}" if isinstance(what, str) and shown_as(what) else kind for kind, what in magic]
@@ -219,7 +219,7 @@ def write_format(entry: dict[str, Any]) -> str:
 
 
 def _described(entry: dict[str, Any], more: str = "") -> str:
-    """Return wrapped lines on a format, with its name before the first."""
+    """Return wrapped lines on a format, the first one after its name."""
     suffixes = f" ({' '.join(entry['suffixes'])})" if entry["suffixes"] else ""
     uses = (("read as", entry["reads"]), ("written from", entry["writes"]))
     texts = [f"{entry['summary']}{suffixes}", "; ".join(f"{use} {', '.join(what)}" for use, what in uses if what)]
@@ -230,11 +230,11 @@ def _described(entry: dict[str, Any], more: str = "") -> str:
 
 
 class Solution(NamedTuple):
-    """What was solved.
+    """The result of `solve`.
 
-    numbers: the report for programs, of the fit, its frames and its measurements; `shape` tree, hand-eye or points
+    numbers: the report on the fit, its frames and its measurements; `shape` is tree, hand-eye or points
     poses: of the frames in their parents; roots too.  left_out: the rejected measurements
-    fixed: the frames of --fix.  turns: rms about the two main axes, radians
+    fixed: the frames of --fix.  turns: rms rotation about the two main axes, radians
     """
 
     numbers: dict[str, Any]
@@ -253,7 +253,7 @@ def sigma_entry(pose: Pose) -> dict[str, list[float]] | None:
 
 
 def write_solution(found: Solution) -> str:
-    """Write the summary, the frames in their parents, which are named unless they are the root, and the rejected."""
+    """Return the summary, the poses of the frames in their parents, and the rejected measurements."""
     numbers, last = found.numbers, found.poses[-1]
     count = f"{numbers['used']} of {numbers['count']}"
     rms = f"rms {_off(numbers['rms_distance'], numbers['rms_angle'])}"
@@ -297,7 +297,7 @@ def _off(metres: float, radians: float | None) -> str:
 
 
 def write_left_out(found: Solution) -> str:
-    """Write a table of the rejected measurements: where each is, what it measures, how far it is off."""
+    """Return a table of the rejected measurements: location, frames, residual."""
     if not found.left_out:
         return ""
     in_tree = found.numbers["shape"] == "tree"

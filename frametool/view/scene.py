@@ -1,4 +1,4 @@
-"""The scene: which frames of a tree are drawn, in which fixed frame, at which time; poses and trails in metres.
+"""Choose the frames of a tree to draw, in a fixed frame and at a time, with poses and trails in metres.
 
 Shared by the page, SVG, PNG, GLB and the terminal.  Also the orthographic projection to pixels, and the placement of
 names without overlaps, in a grid of cells.
@@ -33,21 +33,21 @@ if TYPE_CHECKING:
 
     Point = tuple[float, float, float]
     Eye = tuple[float, float]  # azimuth and elevation, radians
-    Ground = tuple[str, Rigid]  # the replacement of the Earth's frame: level axes, x east and y north, at a frame
+    Ground = tuple[str, Rigid]  # replaces ecef: a name, and the pose in ecef of axes east, north, up at a frame
     Box = tuple[float, float, float, float]  # left, top, right, bottom
     Label = tuple[str, "Flat", Box, float]  # a name, the point it labels, its box in whole cells, its distance in lines
 
-PARTS = 8  # of the way between two stamps, so that a trail is round where a frame turns
-FEW_STAMPS = 500  # above, a trail has one point a stamp
-FURTHEST = 1e30  # metres; beyond, nothing is drawn: programs that read GLB have float32
-STILL = 1e-9  # metres: a frame that stays within has no trail
-MOST_STAMPS = 4000  # of a trail; of more, every second, third, .. is taken
+PARTS = 8  # points of a trail per stamp, so that it is round where a frame turns
+FEW_STAMPS = 500  # with more, a trail has one point per stamp
+FURTHEST = 1e30  # metres; nothing is drawn beyond, because GLB has float32
+STILL = 1e-9  # metres: a frame that moves less has no trail
+MOST_STAMPS = 4000  # of a trail; if there are more, only every second, third, .. is used
 
 
 def _on_ground(tree: Frames, ground: Ground | None) -> tuple[Ground | None, Frames]:
-    """Return the ground and the tree with it instead of the Earth's frame.
+    """Return the ground, and the tree with the ground instead of ecef; (None, tree) without frames on the Earth.
 
-    ground: by default at the first frame on the Earth, a static one if there is any
+    ground: by default at the first frame in ecef, a static one if there is any
     """
     earth, found = tree.resolve_name(EARTH), TransformBuffer(name=tree.name)
     if ground is None:
@@ -72,14 +72,14 @@ def _on_ground(tree: Frames, ground: Ground | None) -> tuple[Ground | None, Fram
 class FrameScene:
     """The frames of a tree to draw.
 
-    tree: what they come from
-    names: every frame, parents before children by the first parents; index: their numbers
-    tracks: of the frames that move, by name
-    fixed: the frame that everything is drawn in
-    at_ns: the time; None where nothing moves; span_ns: the first and the last stamp
-    target, source: the two frames whose transform is asked for, if any
+    tree: the tree, with the ground instead of ecef
+    names: all frames, parents before children by the first parents; index: name -> position in this list
+    tracks: name -> track, of the moving frames
+    fixed: the frame in which everything is drawn
+    at_ns: the time, None if nothing moves; span_ns: the first and the last stamp
+    target, source: the two frames whose transform is shown, if any
     chosen: the frames that are drawn
-    path_only: whether only those between target and source are drawn
+    path_only: draw only the frames between target and source
     """
 
     def __init__(
@@ -89,17 +89,17 @@ class FrameScene:
     ) -> None:  # fmt: skip
         """Choose what is drawn.
 
-        fixed: by default the target, or `below`, or the root of most frames; on the Earth the ground.
-        ground: that of another scene; by default at the first frame on the Earth.
-        at_ns: by default the first time that all moving edges have.
-        below: only this frame and those that hang from it.  only: a regular expression that names must match.
-        Raises UnknownFrame; ValueInvalid for an empty tree, a bad expression, or one that matches nothing.
+        fixed: by default the target, or `below`, or the root of most frames.
+        ground: that of another scene; by default at the first frame in ecef.
+        at_ns: by default the first time at which all moving edges have data.
+        below: only this frame and its descendants.  only: a regular expression that names must match.
+        Raises UnknownFrame; ValueInvalid for an empty tree, an invalid expression, or one that matches nothing.
         """
         if not tree.frames:
             raise ValueInvalid("no frames in it: nothing to draw")
         self.ground: Ground | None = None
         if tree.resolve_name(EARTH) not in (fixed, below, target, source):
-            # nothing is seen from the Earth's centre
+            # from the Earth's centre nothing could be seen
             self.ground, tree = _on_ground(tree, ground)
         tree.require(*filter(None, (fixed, below, target, source)))
         self.tree = tree
@@ -136,9 +136,9 @@ class FrameScene:
 
     @cached_property
     def trails(self) -> dict[str, list[list[Point]]]:
-        """Return the path in `fixed` of each chosen frame that moves, in metres.
+        """Return the path in `fixed` of each chosen moving frame, in metres.
 
-        It is cut into stretches where its parent changes or data are missing.
+        It is split into stretches where parents change or data are missing.
         """
         found = {}
         for name in (name for name in self.tracks if name in self.chosen):
@@ -150,7 +150,7 @@ class FrameScene:
             stamps = stamps[:: -(-len(stamps) // MOST_STAMPS) or 1]
             parts = 1 if len(stamps) > FEW_STAMPS else PARTS
             times = [a + (b - a) * part // parts for a, b in pairwise(stamps) for part in range(parts)] + stamps[-1:]
-            with np.errstate(over="ignore", invalid="ignore"):  # what is too far is not drawn
+            with np.errstate(over="ignore", invalid="ignore"):  # points too far away are not drawn
                 points = self.tree.lookup_many(self.fixed, name, times, missing="nan").xyz
             known = np.abs(points).max(axis=1) < FURTHEST
             changes = sorted(stamp for mover in movers for stamp in self.tracks[mover].changes())
@@ -164,7 +164,7 @@ class FrameScene:
     def _movers_above(self, name: str) -> set[str]:
         """Return the moving frames on any path from a frame to a root."""
         seen, waiting = {name}, [name]
-        for each in waiting:  # it grows as it is walked
+        for each in waiting:  # the list grows in the loop
             if track := self.tree.track(each):
                 above = {parent for _, parent, _ in track.walk()} if track.varies else {track.parent}
                 waiting += above - seen
@@ -173,7 +173,7 @@ class FrameScene:
 
 
 def can_be_drawn(point: Sequence[float]) -> bool:
-    """Return True if a point is near enough to be drawn."""
+    """Return True if a point is not too far away to be drawn."""
     return all(abs(value) < FURTHEST for value in point)
 
 
@@ -189,7 +189,7 @@ def _in_order(tree: Frames) -> list[str]:
     return [*dict.fromkeys([*order, *tree.frames])]  # those in a cycle of first parents last
 
 
-# name -> azimuth and elevation of the eye, radians: from where one looks along -x, along +y, and down
+# name -> azimuth and elevation of the eye, radians; front looks along -x, side along +y, top down
 EYES = {
     "slanted": (-0.9, 0.5),
     "front": (0.0, 0.0),
@@ -199,7 +199,7 @@ EYES = {
 
 
 def parse_eye(text: str) -> Eye:
-    """Read a name of EYES, or AZ,EL in degrees, and return azimuth and elevation in radians.
+    """Parse a name of EYES, or AZ,EL in degrees, and return azimuth and elevation in radians.
 
     Raises ValueInvalid.
     """
@@ -214,15 +214,15 @@ def parse_eye(text: str) -> Eye:
     return azimuth, elevation
 
 
-AXIS_PART = 0.55  # of the usual distance between a frame and its parent
-USUAL_LINK = 0.5  # metres, where there is none
-LEAST = 1e-9  # metres; below, frames lie on one point
-# frames lie together within REACH times the distance that NEAR_PART of them keep, if one is VERY_FAR times as far
+AXIS_PART = 0.55  # length of a drawn axis, in median distances between a frame and its parent
+USUAL_LINK = 0.5  # metres, if there is no such distance
+LEAST = 1e-9  # metres; closer frames are on one point
+# the cluster reaches REACH times the distance within which NEAR_PART of the frames are, if one is VERY_FAR times as far
 REACH, NEAR_PART, VERY_FAR, FEWEST = 2.5, 0.7, 4.0, 4
 
 
 class Flat(NamedTuple):
-    """A point on the picture: across and down in pixels, and metres toward the eye."""
+    """A point in the picture: pixels to the right and down, and metres toward the eye."""
 
     x: float
     y: float
@@ -233,9 +233,9 @@ class Size(NamedTuple):
     """A picture's size.
 
     width, height: in pixels, or dots of a terminal.
-    margin: pixels left free on each side, for names.
-    axes: the least and the greatest length of drawn axes, in pixels.
-    cell: width and height of the cells that names are placed in; line: height of a name, whole cells.
+    margin: pixels for names on each side.
+    axes: minimum and maximum length of drawn axes, in pixels.
+    cell: width and height of the cells in which names are placed; line: height of a name, whole cells.
     measure: returns the width of a text.
     """
 
@@ -251,10 +251,10 @@ class Size(NamedTuple):
 class Projection:
     """The projection of a scene: pixels of its frames, and the length of their axes.
 
-    poses: of the drawn frames in `fixed`, by name
-    trails: of the moving ones
-    links: (parent, child) where both are drawn
-    origins: their pixels; nearest_last: the frames from the farthest to the nearest
+    poses: name -> pose in `fixed`, of the drawn frames
+    trails: of the moving frames
+    links: (parent, child) if both are drawn
+    origins: name -> pixels; nearest_last: the names from the farthest to the nearest
     axis: length of a drawn axis in metres
     scale: pixels per metre
     view: the directions right, up and toward the eye
@@ -284,7 +284,7 @@ class Projection:
         self.scale = min(
             room[0] / max(right - left, LEAST),
             room[1] / max(up - down, LEAST),
-            0.4 * min(size[:2]) / (AXIS_PART * usual),  # one frame alone is not blown up
+            0.4 * min(size[:2]) / (AXIS_PART * usual),  # do not magnify a single frame
         )
         self.origins = {name: self.at(pose[:3]) for name, pose in self.poses.items()}
         self.nearest_last = sorted(self.poses, key=lambda name: self.origins[name].depth)
@@ -292,7 +292,7 @@ class Projection:
         self.axis = min(max(AXIS_PART * usual, shortest), longest)
 
     def cluster(self) -> list[str]:
-        """Return the frames that lie together where most are; all if no frame is far from them."""
+        """Return the frames of the cluster in which most are; all if no frame is far from it."""
         middle = [sorted(column)[len(self.poses) // 2] for column in zip(*self.poses.values(), strict=True)][:3]
         away = {name: math.dist(pose[:3], middle) for name, pose in self.poses.items()}
         far = sorted(away.values())
@@ -330,7 +330,7 @@ class Projection:
     def label(
         self, words: str, length: float, point: Flat, left: float, middle: float, away: float = 0.0
     ) -> Iterator[Label]:
-        """Yield the label of some length at a place, moved to the nearest cells, if it is inside the picture."""
+        """Yield a label at a position, moved to the nearest cells, if it is inside the picture."""
         (wide, high), line = self.size.cell, self.size.line
         left, top = wide * round(left / wide), high * round((middle - line / 2.0) / high)
         right, bottom = left + wide * math.ceil(length / wide), top + line
@@ -338,7 +338,7 @@ class Projection:
             yield words, point, (left - MARGIN, top, right + MARGIN, bottom), away
 
     def ground(self) -> tuple[float, list[tuple[Point, Point, bool]]]:
-        """Return the grid on z = 0: its spacing in metres, and its lines with whether they pass the origin."""
+        """Return the grid on z = 0: its spacing in metres, and its lines with True for those through the origin."""
         wide = max(self.high[0] - self.low[0], self.high[1] - self.low[1], 4.0 * self.axis)
         step = nice(wide / 8.0)
         first = [math.floor(low / step - 0.6) for low in self.low]
@@ -350,14 +350,14 @@ class Projection:
 
 
 def nice(length: float) -> float:
-    """Return a round length near another: 1, 2 or 5 times a power of ten."""
+    """Return a length rounded to 1, 2 or 5 times a power of ten."""
     power = 10.0 ** math.floor(math.log10(length))
     factor = length / power
     return (1.0 if factor < 1.5 else 2.0 if factor < 3.5 else 5.0 if factor < 7.5 else 10.0) * power
 
 
 def _bounds(points: Iterable[Sequence[float]]) -> tuple[list[float], list[float]]:
-    """Return the bounding box of some points; zeros if there are none."""
+    """Return the bounding box of points; zeros without points."""
     columns = list(zip(*points, strict=True)) or [(0.0,)] * 3
     return [min(column) for column in columns], [max(column) for column in columns]
 
@@ -365,7 +365,7 @@ def _bounds(points: Iterable[Sequence[float]]) -> tuple[list[float], list[float]
 DISTANCES = (0.6, 1.1, 1.75, 2.7, 3.9, 5.4)  # lines from a frame to its name
 SIDES = ((1.0, -0.6), (1.0, 0.6), (-1.0, -0.6), (-1.0, 0.6), (0.0, -1.3), (0.0, 1.3), (1.0, 0.0), (-1.0, 0.0))
 SAME = 3.0  # pixels within which frames share a name
-MOST_SHARED = 2  # names that are side by side
+MOST_SHARED = 2  # names in one label
 MARGIN = 2.0  # pixels on both sides of a name
 LONGEST = 60  # characters of a name
 WIDE, THIN = "mwMW_@", "il.·tfjrI "
@@ -376,10 +376,10 @@ def placed_names(
 ) -> tuple[list[Label], int]:
     """Place a name next to each group of frames on one point inside the picture, nearest first.
 
-    Names cover neither one another nor, if possible, an axis: each is at its first free spot, or else at the first
-    that covers axes only.
-    blocked: boxes that stay free.  outside: spots for further names, best first, which are placed before the others
-    Returns the labels, and the number of names without room.
+    Names never overlap each other and, if possible, no axis: each is at the first free spot, or else at the first
+    one that overlaps only axes.
+    blocked: boxes without names.  outside: spots for further names, best first, which are placed before the others
+    Returns the labels, and the number of names without a spot.
     """
     (wide, high), line, measure = flat.size.cell, flat.size.line, flat.size.measure
 
@@ -391,7 +391,7 @@ def placed_names(
         return product(across, down)
 
     def spots(point: Flat, names: list[str]) -> Iterator[Label]:
-        """Yield the labels around a point, best first; at a side the name begins or ends there."""
+        """Yield the labels around a point, best first; a label at a side begins or ends at its spot."""
         words = words_of(names)
         length = measure(words)
         for away, (dx, dy) in product(DISTANCES, SIDES):
@@ -423,12 +423,12 @@ def placed_names(
 
 
 def text_width(words: str, size: float = 12.0) -> float:
-    """Estimate the width of a text in pixels, rather too wide than too narrow."""
+    """Return an upper estimate of the width of a text in pixels."""
     return size * sum(0.9 if letter in WIDE else 0.36 if letter in THIN else 0.62 for letter in words) + 2.0
 
 
 def words_of(names: list[str]) -> str:
-    """Return the label of frames on one point: some of their names, and the number of others."""
+    """Return the label of frames on one point: some of their names, and the number of the others."""
     shown_names = map(printable, names[:MOST_SHARED])
     words = " · ".join(name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in shown_names)
     return words + (f" +{len(names) - MOST_SHARED}" if len(names) > MOST_SHARED else "")

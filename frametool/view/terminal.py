@@ -1,4 +1,4 @@
-"""Frames and turtles in the terminal: pictures of braille characters."""
+"""Draw frames and turtles in the terminal with braille characters."""
 
 from __future__ import annotations
 
@@ -36,19 +36,19 @@ class Canvas:
     """A grid of cells with eight dots and one colour each; a terminal's cell is about twice as high as wide."""
 
     def __init__(self, lines: int, columns: int) -> None:
-        """Create an empty one."""
+        """Create an empty canvas."""
         self.lines, self.columns = lines, columns
         self.cells: dict[Spot, tuple[int, str]] = {}  # dots and colour
 
     def mark(self, across: int, down: int, colour: str) -> None:
-        """Set a dot by column and row; the last one in a cell gives its colour."""
+        """Set a dot by column and row; the last one in a cell determines its colour."""
         if 0 <= across < 2 * self.columns and 0 <= down < 4 * self.lines:
             cell = down // 4, across // 2
             dots, _ = self.cells.get(cell, (0, ""))
             self.cells[cell] = dots | DOTS[down % 4][across % 2], colour
 
     def runs(self, line: int, over: Mapping[Spot, Run]) -> list[Run]:
-        """Return a line as runs of one colour; over: letters that replace cells."""
+        """Return a line as runs of one colour; over: letters that replace cells, and their style."""
         drawn = []
         for column in range(self.columns):
             dots, colour = self.cells.get((line, column), (0, ""))
@@ -61,7 +61,7 @@ ARROWS = "→↗↑↖←↙↓↘"
 
 
 def terminal_lines(scene: FrameScene, columns: int, lines: int, eye: Eye = EYES["slanted"]) -> list[list[Run]]:
-    """Draw a scene in some columns and lines, each as runs of one style; the last line is the scale."""
+    """Draw a scene and return its lines as runs of one style; the last line is the scale."""
     canvas = Canvas(max(lines, 4) - 1, max(columns, 20))
     wide, high = 2.0 * canvas.columns, 4.0 * canvas.lines
     margin = min(14.0, wide / 8.0, high / 8.0)
@@ -81,7 +81,7 @@ def terminal_lines(scene: FrameScene, columns: int, lines: int, eye: Eye = EYES[
     for words, _, (left, top, *_), away in labels:
         row, column = int(top) // 4, int(left) // 2 + 1
         style = "bold" if away else "dim"
-        drawn = (each for letter in words for each in (letter, *[""] * (cells(letter) - 1)))  # wide ones take two
+        drawn = (each for letter in words for each in (letter, *[""] * (cells(letter) - 1)))  # wide letters take two
         letters |= {(row, column + at): (letter, style) for at, letter in enumerate(drawn)}
     # the scale, the direction of view, and the number of names without room
     metres, stamp_ns, hidden = nice(24.0 / flat.scale), scene.at_ns, hidden + len(outside[12:])
@@ -102,7 +102,7 @@ def terminal_text(scene: FrameScene, columns: int, lines: int, eye: Eye = EYES["
 
 
 def print_terminal(scene: FrameScene, eye: Eye = EYES["slanted"], color: str = "auto") -> None:
-    """Print a picture of the terminal's size, in colour where it has any, or as `color` says: always or never."""
+    """Print a picture of the terminal's size, in colour if it has colours, or by `color`: always or never."""
     from rich.text import Text
 
     columns, lines = get_terminal_size()
@@ -111,7 +111,7 @@ def print_terminal(scene: FrameScene, eye: Eye = EYES["slanted"], color: str = "
 
 
 def _mark_line(canvas: Canvas, flat: Projection, begin: Flat, end: Flat, colour: str, gap: int = 1) -> None:
-    """Set every dot, or every second, third, .. of a line; a line that leaves the picture is cut."""
+    """Draw a line, with `gap` only every second, third, .. dot; a line that leaves the picture is cut."""
     if not flat.holds(begin):
         begin, end = end, begin
     if not flat.holds(begin):
@@ -126,7 +126,7 @@ def _mark_line(canvas: Canvas, flat: Projection, begin: Flat, end: Flat, colour:
 
 
 def _at_edge(flat: Projection, name: str) -> Iterator[Label]:
-    """Yield the places at an edge for a frame beyond it: its name and distance with an arrow, the nearest first."""
+    """Yield labels at the edge for a frame outside the picture, with distance and arrow, best position first."""
     x, y, _ = flat.origins[name]
     half_wide, half_high = flat.size.width / 2.0, flat.size.height / 2.0
     across, down = x - half_wide, y - half_high
@@ -143,14 +143,13 @@ def _at_edge(flat: Projection, name: str) -> Iterator[Label]:
         yield from flat.label(text, length, flat.origins[name], left, middle)
 
 
-# where pens have all one colour, curves and turtles still differ: one colour a turtle, in the order of their names;
-# the second is how it shows on white
+# one colour per turtle, also if their pens have one colour, in the order of their names: on the picture -> on white
 ON_WHITE = {
     "#f4d35e": "#c79a00", "#ee964b": "#d4691b", "#7bdff2": "#1593ad", "#b2f7ef": "#2a9d8f",
     "#f7a1c4": "#d6458b", "#c3f584": "#5a9a16", "#d0bdf4": "#7d5fc7", "#ffffff": "#666666",
 }  # fmt: skip
 BACKGROUND = (69, 86, 255)  # turtlesim's
-TALK = 3  # lines of messages below the turtles
+LOGGED = 3  # lines of messages below the turtles
 
 
 def colours_of(turtles: Iterable[str]) -> dict[str, str]:
@@ -159,23 +158,23 @@ def colours_of(turtles: Iterable[str]) -> dict[str, str]:
 
 
 class Screen:
-    """Draw the steps of a run as they come; `live` is a context manager that takes and restores the terminal."""
+    """Draws the steps of a run as they arrive; the context manager `live` takes over and restores the terminal."""
 
     def __init__(self, scene: Scene, *, to_stderr: bool = False, console: Console | None = None) -> None:
-        """Choose where to draw; the picture fits the terminal."""
+        """Choose the terminal of stdout or stderr; the picture fits it."""
         from rich.live import Live
 
         from frametool.sim.simulate import SimulationStep
 
         console = console or coloured_console(stderr=to_stderr)
-        room = console.height - TALK - 3 - len(scene.followers)
+        room = console.height - LOGGED - 3 - len(scene.followers)
         lines = max(5, min(room, (console.width - 4) // 2, 40))
         self._canvas = Canvas(lines, 2 * lines)
-        self._talk: list[str] = []
+        self._log: list[str] = []
         self._last: dict[str, IssuedCommand] = {}
-        self._tick = SimulationStep(0)  # the last one
+        self._tick = SimulationStep(0)  # the last tick
         self._drawn = -math.inf
-        # what goes to stdout next to the picture is data and must not be caught
+        # results on stdout must not be redirected into the picture
         self.live = Live(
             get_renderable=self._picture, console=console, auto_refresh=False, redirect_stdout=False,
             redirect_stderr=False,
@@ -183,7 +182,7 @@ class Screen:
 
     def watch(self, step: SimulationStep) -> None:
         """Add a step to the picture, and show it if enough time has passed."""
-        self._talk = [*self._talk, *step.log, *map(str, step.walls)][-TALK:]
+        self._log = [*self._log, *step.log, *map(str, step.walls)][-LOGGED:]
         self._last.update((command.turtle, command) for command in step.commands)
         if not step.is_tick:
             return
@@ -198,13 +197,13 @@ class Screen:
             self._drawn = monotonic()
 
     def _dot(self, state: TurtleState) -> tuple[int, int]:
-        """Return column and row of the dot at a turtle; at the walls it is the last one."""
+        """Return column and row of the dot of a turtle, inside the canvas also at the walls."""
         dots = 4 * self._canvas.lines
         across, down = (min(int(part * dots / SIZE), dots - 1) for part in (state.x, SIZE - state.y))
         return across, down
 
     def _picture(self) -> Panel:
-        """Return the whole picture."""
+        """Return the picture with its messages."""
         from rich.panel import Panel
         from rich.text import Text
 
@@ -222,5 +221,5 @@ class Screen:
             ahead, turning, _ = command.twist
             moves = f"{command.distance or 0.0:.2f} m, linear {ahead:.2f}, angular {turning:+.2f}"
             text.append(f"{printable(command.turtle)}: {moves}\n")
-        text.append("\n".join(self._talk), "dim")
+        text.append("\n".join(self._log), "dim")
         return Panel(text, title=f"{self._tick.t_ns / BILLION:.1f} s", width=self._canvas.columns + 4)

@@ -1,6 +1,6 @@
-"""Text for people: poses and points with every notation aligned on the decimal point, and blocks as tf2_echo has them.
+"""Write text for people: poses and points, aligned on the decimal points, and blocks like those of tf2_echo.
 
-Also the terminal through rich: in which colours, and progress bars on stderr for jobs longer than two seconds.
+Also the terminal by rich: its colours, and progress bars on stderr for jobs longer than two seconds.
 """
 
 from __future__ import annotations
@@ -29,25 +29,25 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    Line = tuple[str, Sequence[tuple[str, float]], str]  # what it is, its numbers with their names, their unit
+    Line = tuple[str, Sequence[tuple[str, float]], str]  # label, numbers with their names, unit
 
 
 OVERVIEW = [name + unit for name, row in ROTATIONS.items() for unit in row.overview]
 
 
 WIDTH = 80
-DECIMALS = 6  # of an overview
+DECIMALS = 6  # in an overview of several representations
 GLUE = "\0"
-ENDLESS = 1e9  # where that many decimals say nothing
+EXPONENT_FROM = 1e9  # larger numbers have an exponent
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Describe the results, parted by blank lines."""
+    """Return the text of results, separated by blank lines."""
     return "\n".join(_describe(result, style) for result in results)
 
 
 def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
-    """Return one line a point, aligned, with its frame."""
+    """Return one aligned line per point or vector, with its frame."""
     frames, rows = [], []
     for record in records:
         frame = f"m in {record['frame']}" if record.get("frame") else "m"
@@ -100,13 +100,13 @@ def _describe(result: Result, style: Style) -> str:
             lines.append(("sigma", [], " ".join(each.replace(" ", GLUE) for each in sigmas)))
         elif key not in TIMES and value is not None:
             lines.append((key, [], _said(value)))
-    if style.place is not None and style.place.origin is not None:  # of its axes, not of the Earth's
+    if style.place is not None and style.place.origin is not None:  # in the axes at the origin, not in ecef
         result = Result(result.pose._replace(parent=f"{style.place.name} at the origin"), result.extras)
     return _heading(result) + (_layout(lines, style) if lines else "  identity\n")
 
 
 def _place_lines(entry: dict[str, Any]) -> Iterator[Line]:
-    """Yield the lines of a position on the Earth as a mapping has it, a number each."""
+    """Yield the lines of a geodetic position, one for each number of its mapping."""
     for key, value in (entry | entry.get("utm", {})).items():
         if isinstance(value, float):
             unit = "deg" if key in ("lat", "lon", "convergence_deg") else "m"
@@ -120,7 +120,7 @@ def _place_lines(entry: dict[str, Any]) -> Iterator[Line]:
 
 
 def _heading(result: Result) -> str:
-    """Return in words which frame is seen from which, and when."""
+    """Return a sentence on the frames and times of a pose."""
     pose = result.pose
     at, source_at, fixed = (result.extras.get(key) for key in TIMES)
     if pose.name is None or pose.parent is None:
@@ -135,20 +135,20 @@ def _heading(result: Result) -> str:
 
 
 def in_width(text: str, more: str, *, gap: str = " ") -> str:
-    """Return one line, or two where one is wider than the terminal."""
+    """Return one line, or two if it is wider than the terminal."""
     width = get_terminal_size((WIDTH, 0)).columns
     return f"{text}{gap}{more}\n" if len(text) + len(gap) + len(more) <= width else f"{text}\n  {more}\n"
 
 
 def _earth_lines(pose: Pose) -> Iterator[Line]:
-    """Yield the lines of where a pose or point in ecef is on the Earth, and where its x points; nothing of no place."""
+    """Yield lines with the geodetic position and heading of a pose or point in ecef; none if it is not finite."""
     from frametool.grammar.place import overview
 
     yield from ((label, [], said) for label, said in overview(pose))
 
 
 def _sigmas(key: str, value: Any) -> list[str]:
-    """Write the roots of the diagonal of a covariance, two digits each; nothing of any other value."""
+    """Return the sigmas of a covariance, two digits each; [] for any other value."""
     if key != "covariance" or not isinstance(value, list) or len(value) not in (36, 9):
         return []
     try:
@@ -162,12 +162,12 @@ def _sigmas(key: str, value: Any) -> list[str]:
 
 
 def sigmas_of(covariance: Sequence[float]) -> list[float]:
-    """Return the roots of the diagonal of a covariance: of a pose, or of a point."""
+    """Return the standard deviations of a covariance, those of a pose or of a point."""
     return [math.sqrt(max(entry, 0.0)) for entry in covariance[:: math.isqrt(len(covariance)) + 1]]
 
 
 def largest_sigmas(entries: Sequence[float]) -> str:
-    """Return how uncertain a pose is along its worst axis, and about its worst: `±10 mm 1.0 deg`."""
+    """Return the largest sigmas of a pose in position and rotation: `±10 mm 1.0 deg`."""
     roots = sigmas_of(entries)
     return f"±{_length(max(roots[:3]))} {_two_digits(math.degrees(max(roots[3:])), 'deg')}"
 
@@ -177,23 +177,23 @@ def _length(metres: float) -> str:
 
 
 def _two_digits(value: float, unit: str) -> str:
-    """Write a sigma with its unit: `2.1 mm`, `12 m`; what is tiny with an exponent."""
+    """Return a sigma with its unit: `2.1 mm`, `12 m`; tiny and huge ones have an exponent."""
     value = value if value > ROUNDED_TO_ZERO else 0.0
-    if value and not 0.001 <= value < ENDLESS:
+    if value and not 0.001 <= value < EXPONENT_FROM:
         return f"{value:.1e} {unit}"
     decimals = max(1 - math.floor(math.log10(value)), 0) if value else 0
     return f"{value:.{decimals}f} {unit}"
 
 
 def _said(value: Any) -> str:
-    """Write what accompanies numbers."""
+    """Return the text of an extra value."""
     return printable(dump_json(value) if isinstance(value, (dict, list)) else "" if value is None else str(value))
 
 
 def _layout(lines: Sequence[Line], style: Style, label: int = 0) -> str:
-    """Align names and numbers in columns; where that is too wide each part by itself, and what is still too wide wraps.
+    """Align names and numbers in columns; if that is too wide, each part by itself; wrap lines that are still too wide.
 
-    label: width of the labels, at least
+    label: minimum width of the labels
     """
     label, width = max([label, *(len(each) for each, _, _ in lines)]), get_terminal_size((WIDTH, 0)).columns
     numbers = _aligned([[_number(value, style) for _, value in cells] for _, cells, _ in lines])
@@ -201,7 +201,7 @@ def _layout(lines: Sequence[Line], style: Style, label: int = 0) -> str:
     sizes = [max(len(name) for name, _ in column) for column in columns]
     texts = []
     for (own, cells, unit), row in zip(lines, numbers, strict=True):
-        named = [  # GLUE for blanks at which they must not be wrapped
+        named = [  # GLUE for spaces at which lines must not be wrapped
             f"{name:>{size}} {text}".replace(" ", GLUE) if size else text
             for (name, _), text, size in zip(cells, row, sizes, strict=False)
         ]
@@ -218,10 +218,10 @@ def _layout(lines: Sequence[Line], style: Style, label: int = 0) -> str:
 
 
 def _number(value: float, style: Style) -> str:
-    """Write a number for a person: some decimals in an overview, all digits of what was asked for, no minus zero."""
+    """Return a number for people: DECIMALS in an overview, else all digits; 0 instead of -0."""
     text = style.number(value + 0.0)
     if style.precision is None and not style.full and len(style.notations) != 1:
-        text = f"{value:.{DECIMALS}f}" if abs(value) < ENDLESS else f"{value:.{DECIMALS}e}"
+        text = f"{value:.{DECIMALS}f}" if abs(value) < EXPONENT_FROM else f"{value:.{DECIMALS}e}"
     return text.removeprefix("-") if not float(text) else text
 
 
@@ -241,7 +241,7 @@ ECHOED = (("quaternion", "Quaternion"), ("rpy_rad", "RPY (radian)"), ("rpy_deg",
 
 
 def write_blocks(results: Iterable[Result], target: str, source: str, style: Style) -> Iterator[str]:
-    """Yield the blocks as they come; the first begins by saying in words which frame is seen from which."""
+    """Yield blocks like those of tf2_echo as results arrive; the first begins with a sentence on the frames."""
     heading = in_width(f"{source} seen from {target}", f"(maps points in {source} to points in {target})")
     decimals = 3 if style.precision is None else style.precision
     number = style.changed(precision=decimals).number
@@ -259,14 +259,14 @@ def write_blocks(results: Iterable[Result], target: str, source: str, style: Sty
         heading = ""
 
 
-PATIENCE, BETWEEN = 2.0, 0.1  # seconds before anything is shown, and from then on
+PATIENCE, BETWEEN = 2.0, 0.1  # seconds before the bar is shown, and between updates
 
 
 @contextmanager
 def progress_bar(
     total: int | None, *, quiet: bool = False, counted: str = "rows"
 ) -> Iterator[Callable[[int, int], None]]:
-    """Yield what counts rows and bytes, and shows them if stderr is a terminal and the job takes longer than PATIENCE.
+    """Yield a function that counts rows and bytes; on a terminal they are shown if the job takes longer than PATIENCE.
 
     total: bytes, if known; counted: the unit of the count
     """
@@ -293,15 +293,15 @@ def progress_bar(
     try:
         yield advance
     finally:
-        with suppress(OSError):  # a terminal that has gone does not change what the data is worth
+        with suppress(OSError):  # the results are valid even if the terminal is gone
             if bar is not None:
                 bar.stop()
 
 
 def coloured_console(color: str = "auto", *, stderr: bool = False) -> Console:
-    """Return an output, in colour where the terminal has any, or as `color` says: always or never.
+    """Return a rich console, in colour if the terminal has colours, or by `color`: always or never.
 
-    Where there is no colour, also by NO_COLOR, nothing is bold or dim either.
+    Without colour, also by NO_COLOR, nothing is bold or dim either.
     """
     from rich.console import Console
 
