@@ -95,7 +95,7 @@ def _statistics(label: str, summed: dict[str, float] | None) -> str:
 
 
 def write_table(found: Sequence[dict[str, Any]], fmt: str = "text") -> str:
-    """Return one row per comparison: `csv`, or `text`, `markdown`, `latex` with the best value of each column marked."""
+    """Return a row per comparison: `csv`, or `text`, `markdown`, `latex` with the best value of each column marked."""
     rows = [[number_at(each, PATHS.get(title, title)) for title in TITLES] for each in found]
     if fmt == "csv":
         return write_points([dict(zip(TITLES.values(), row, strict=True)) for row in rows], Style("csv"))
