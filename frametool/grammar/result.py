@@ -167,13 +167,21 @@ def with_entries(extras: dict[str, Any]) -> dict[str, Any]:
 
 def in_columns(extras: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return the extras of poses or points as columns: a covariance as c11 .. c66, or c11 .. c33."""
-    entries = extras.get("covariance")
-    if not (isinstance(entries, list) and len(entries) in (36, 9)):
+    entries = in_one_list(extras.get("covariance"))
+    if entries is None:
         return extras
     from frametool.grammar.covariance import columns
 
     found = {key: value for key, value in extras.items() if key != "covariance"}
     return found | dict(zip(columns(len(entries)), entries, strict=True))
+
+
+def in_one_list(covariance: Any) -> list[Any] | None:
+    """Return the entries of a covariance that is a list, or a list of rows; None for anything else."""
+    entries = covariance if isinstance(covariance, list) else []
+    if entries and all(isinstance(row, list) and len(row) == len(entries) for row in entries):
+        entries = [entry for row in entries for entry in row]
+    return entries if len(entries) in (36, 9) else None
 
 
 def tree_entries(tree: Frames, style: Style) -> Iterator[dict[str, Any]]:

@@ -19,6 +19,7 @@ from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.formats.rows.column_file import STAMP_NS, WHOLE, Made, OutColumn, not_finite
 from frametool.formats.table import FORMATS
 from frametool.geometry import arrays
+from frametool.grammar.result import in_one_list
 from frametool.stream.row_layout import POSE, SIX, TWIST, WRENCH, six_names
 from frametool.stream.rows import NO_STAMP, is_typed, objects, plain_cells, text_of, texts_of
 from frametool.stream.writers import PoseWriter
@@ -241,8 +242,9 @@ class ArrayWriter(PoseWriter):
             none = block.stamps_ns == NO_STAMP
             made["stamp_ns"] = Made(block.stamps_ns.astype(STAMP_NS), none if none.any() else None)
         for name, cells in block.extras.items():
-            values = plain_cells(cells) if name == "covariance" and not isinstance(cells, Spans) else []
-            sizes = {len(each) if isinstance(each, list) else 0 for each in values if each is not None}
+            lists = plain_cells(cells) if name == "covariance" and not isinstance(cells, Spans) else []
+            values = [each if each is None else in_one_list(each) or [] for each in lists]
+            sizes = {len(each) for each in values if each is not None}
             if sizes not in ({36}, {9}):
                 made.setdefault(name, Made(cells))
                 continue

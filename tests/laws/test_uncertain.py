@@ -303,3 +303,16 @@ def test_points_that_are_inverted_have_the_covariance_of_their_position_in_every
     found = json.loads(run("invert", "-f", "json", stdin=text).out)
     assert found == {"point": [-1.0, -2.0, -3.0], "covariance": [0.25, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0, 0.0, 0.25]}
     assert run("invert", "-o", "new.npy", stdin=text).status == 0
+
+
+@pytest.mark.parametrize("form", ["csv", "npy", "parquet"])
+@pytest.mark.parametrize("kind", ["pose", "point"])
+def test_a_covariance_in_rows_becomes_the_same_columns_as_one_in_a_list(run: Any, kind: str, form: str) -> None:
+    size, key = (6, POSE) if kind == "pose" else (3, {"point": [1.0, 2.0, 3.5]})
+    rows = np.reshape(WHOLE, (6, 6))[:size, :size]
+    texts = [json.dumps(key | {"covariance": each}) + "\n" for each in (rows.tolist(), rows.ravel().tolist())]
+    (status,) = {run("convert", "-f", form, "-o", f"{at}.{form}", stdin=text).status for at, text in enumerate(texts)}
+    assert status == 0
+    found = [run("apply", "--transform", EXACT, "-f", "json", "-i", f"{at}.{form}").out for at in range(2)]
+    assert found[0] == found[1]
+    assert len(json.loads(found[0])["covariance"]) == size**2
