@@ -371,6 +371,14 @@ class EdgePlace(NamedTuple):
         return f"line {line}" if other.file.name == self.file.name else f"{self.file.name}:{line}"
 
 
+def checked_answers(answers: dict[str, Any]) -> dict[str, Any]:
+    """Return answers about a format; raise ValueInvalid for words that are none of their choices."""
+    for ask, choices in CHOICES.items():
+        if (answer := answers.get(ask)) and answer not in choices:
+            raise ValueInvalid(f"{ask} is {' or '.join(choices)}, not {shown(answer)}")
+    return answers
+
+
 def load(
     *paths: str | PathLike[str],
     moving: bool = False,
@@ -399,10 +407,7 @@ def load(
     by_name = {} if joints is None or isinstance(joints, str | PathLike) else joints
     values = {name: value if isinstance(value, str) else repr(float(value)) for name, value in by_name.items()}
     joint_files = () if joints is None or by_name is joints else (str(joints),)
-    known = Answers(tuple(frames), joints=values, joint_files=joint_files, **answers)
-    for ask, choices in CHOICES.items():
-        if (answer := answers.get(ask)) and answer not in choices:
-            raise ValueInvalid(f"{ask} is {' or '.join(choices)}, not {shown(answer)}")
+    known = Answers(tuple(frames), joints=values, joint_files=joint_files, **checked_answers(answers))
     files = opened_together(FrameFile(path, fmt=format, topics=chosen, answers=known) for path in paths)
     for ask in ("frames", *answers):
         if getattr(known, ask) and not any(ask in file.required_options for file in files):

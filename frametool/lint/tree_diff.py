@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import re
 from math import degrees
+from os import PathLike
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import FrametoolError, ValueInvalid, listing, shown
+from frametool.formats.load import load
 from frametool.frames.stamps import format_stamp
 from frametool.frames.topology import Snapshot, motion
 from frametool.geometry import floats, rigid
@@ -170,15 +172,17 @@ class TreeComparison(NamedTuple):
 
 
 def diff(
-    a: Frames, b: Frames, *, at_ns: int | None = None, seen_from: str | None = None,
-    tolerance: tuple[float, float] = Tolerance(),
+    a: Frames | str | PathLike[str], b: Frames | str | PathLike[str], *, at_ns: int | None = None,
+    seen_from: str | None = None, tolerance: tuple[float, float] = Tolerance(),
 ) -> TreeComparison:  # fmt: skip
     """Compare two trees, or two recordings at one time: a frame moves from its pose in A to its pose in B.
 
+    a, b: trees, or the paths of their files as for `load`
     at_ns: the time; None is the latest of each.  seen_from: a frame of both; None is the root of each part of A, or
     the nearest frame to it that is in both.  tolerance: metres and radians that do not count.
     Raises UnknownFrame for a `seen_from` that is not in both.
     """
+    a, b = (load(each) if isinstance(each, str | PathLike) else each for each in (a, b))
     pair = _Pair(a, b, at_ns, Tolerance(*tolerance), seen_from)
     common = frozenset(pair.common)
     found = [

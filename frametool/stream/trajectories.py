@@ -20,9 +20,10 @@ import numpy as np
 from frametool.documents.source import InputFile
 from frametool.errors import FileProblem, FormatError, ValueInvalid, alternatives, shown, warn
 from frametool.formats.detect import by_sign, detect, of_folder
-from frametool.formats.load import FrameFile, Rules, load_sources, opened_together
+from frametool.formats.load import FrameFile, Rules, checked_answers, load_sources, opened_together
 from frametool.formats.table import BAG, FORMATS, by_suffix
-from frametool.frames.stamps import BILLION, FURTHEST_NS
+from frametool.frames.lookups import checked_rate
+from frametool.frames.stamps import BILLION, FURTHEST_NS, parse_time
 from frametool.frames.trajectory import BODY, WORLD, Trajectory
 from frametool.geometry.transform import Rotation
 from frametool.grammar.edges import Answers, Diagnostics, Names
@@ -47,12 +48,17 @@ if TYPE_CHECKING:
     from frametool.fit.comparison import Comparison
     from frametool.frames.buffer import TransformBuffer
     from frametool.geometry.transform import Transform
+    from frametool.geometry.types import Array
     from frametool.grammar.edges import Report
     from frametool.stream.rows import RowPoses
     from frametool.text.lines import ByteStream
 
     TrajectoryLike: TypeAlias = Trajectory | str | PathLike[str]
 
+WORDS = {  # what the settings of `compare` may be as text
+    "align": ("se3", "sim3", "yaw", "origin", "origin+scale", "none"), "mount": ("auto",), "like": ("evo",),
+    "match": ("interpolate", "nearest"), "pairs_from": ("reference", "estimate"),
+}  # fmt: skip
 RECORDINGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
 TREE = rb"""(?m)^[^\S\n]*+(?:---\s*+)?+(?:\{\s*+)?+["']?(?:frames|transforms|angles)["']?\s*:"""  # of a tree
 
@@ -71,7 +77,9 @@ def load_trajectory(
     format, topic, frames, answers: as `frametool.load` has them.
     Raises FormatError with the line of what cannot be read, ValueInvalid where there is not one trajectory.
     """
-    known = Answers(tuple(frames), **answers)
+    if format and format not in FORMATS:
+        raise ValueInvalid(f"no trajectories are read from {format!r}{alternatives(format, FORMATS, 'formats')}")
+    known = Answers(tuple(frames), **checked_answers(answers))
     return read_trajectory(str(path), fmt=format or "", topics=[topic] if topic else [], answers=known)
 
 
@@ -289,15 +297,16 @@ def compare(
     """
     from frametool.fit.comparison import AUTO, EVO, SETTINGS, Settings, compared, parse_delta
 
-    if like not in (None, "evo"):
-        raise ValueInvalid(f"like {like!r}: only evo is known")
     argument = {"align": align, "mount": mount, **more}
+    for name, words in WORDS.items():
+        if isinstance(given := {"like": like, **argument}.get(name), str) and given not in words:
+            raise ValueInvalid(f"{name} {shown(given)} is not known{alternatives(given, words, 'words')}")
     if unknown := [name for name in argument if name not in SETTINGS]:
         raise TypeError(f"compare has no {unknown[0]!r}{alternatives(unknown[0], SETTINGS, 'settings')}")
     if offset is not None:
-        argument["offset"] = AUTO if offset == AUTO else round(float(offset) * BILLION)
+        argument["offset"] = AUTO if offset == AUTO else parse_time(str(offset))
     if deltas is not None:
-        argument["deltas"] = tuple(map(parse_delta, deltas))
+        argument["deltas"] = tuple(map(parse_delta, [deltas] if isinstance(deltas, str) else deltas))
     if isinstance(first := argument.get("align_first"), str):
         argument["align_first"] = parse_delta(first, ("m", "s", "frames"))
     chosen = {name: value for name, value in argument.items() if value is not None}
@@ -329,10 +338,10 @@ def resample(
     if argument.stamps_ns is None:
         raise ValueInvalid("a trajectory without stamps is not resampled")
     if rate is not None:
-        stamps = stamps_at_rate(argument, rate)
+        stamps = stamps_at_rate(argument, checked_rate(rate))
     else:
         step = None if every is None else parse_delta(every, ("m", "deg"))
-        stamps = np.asarray(at, np.int64) if step is None else stamps_every(argument, step)
+        stamps = _nanoseconds(at, "at") if step is None else stamps_every(argument, step)
     return between(argument, stamps, max_gap_ns)[0]
 
 
@@ -351,10 +360,15 @@ def _taken(argument: TrajectoryLike, name: str) -> Trajectory:
     if xyz.ndim != 2 or xyz.shape[1] != 3 or not len(xyz) or not np.isfinite(xyz).all():
         raise ValueInvalid(f"{name}.xyz: finite positions of shape (n, 3) are wanted, found shape {xyz.shape}")
     xyzw = None if argument.xyzw is None else np.stack(Rotation.from_quaternion(argument.xyzw).components, -1)
-    stamps = None if argument.stamps_ns is None else np.asarray(argument.stamps_ns)
+    stamps = None if argument.stamps_ns is None else _nanoseconds(argument.stamps_ns, f"{name}.stamps_ns")
     for field, values in (("xyzw", xyzw), ("stamps_ns", stamps)):
         if values is not None and len(values) != len(xyz):
             raise ValueInvalid(f"{name}.{field}: {len(values)} rows for {len(xyz)} positions")
-    if stamps is not None and stamps.dtype.kind not in "iu":
-        raise ValueInvalid(f"{name}.stamps_ns: integer nanoseconds are wanted, found {stamps.dtype}")
-    return argument._replace(xyz=xyz, xyzw=xyzw, stamps_ns=None if stamps is None else stamps.astype(np.int64))
+    return argument._replace(xyz=xyz, xyzw=xyzw, stamps_ns=stamps)
+
+
+def _nanoseconds(values: Any, name: str) -> Array:
+    stamps = np.asarray(values)
+    if stamps.dtype.kind not in "iu" and stamps.size:
+        raise ValueInvalid(f"{name}: integer nanoseconds are wanted, found {stamps.dtype}")
+    return stamps.astype(np.int64)

@@ -325,6 +325,36 @@ def test_the_python_face_gives_what_the_command_prints(run: Run, tmp_path: Path)
         frametool.compare(ref, est, aling="yaw")
 
 
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"align": "se2"}, "align 'se2' is not known; did you mean 'se3'?"),
+        ({"match": "closest"}, "match 'closest' is not known; words: interpolate, nearest"),
+        ({"mount": "antenna"}, "mount 'antenna' is not known; words: auto"),
+        ({"like": "kitti"}, "like 'kitti' is not known; words: evo"),
+        ({"offset": "soon"}, "'soon' is not a time"),
+        ({"offset": float("nan")}, "'nan' is not a time"),
+    ],
+)
+def test_words_that_no_setting_has_are_refused_in_python(tmp_path: Path, settings: dict[str, Any], message: str) -> None:
+    ref, est = ((tmp_path / name, (tmp_path / name).write_bytes(FILES[name]))[0] for name in DRONE)
+    with pytest.raises(frametool.FrametoolError, match=re.escape(message)):
+        frametool.compare(ref, est, **settings)
+
+
+def test_settings_in_python_are_what_the_options_are(tmp_path: Path) -> None:
+    ref, est = ((tmp_path / name, (tmp_path / name).write_bytes(FILES[name]))[0] for name in DRONE)
+    each, same = (frametool.compare(ref, est, **given) for given in ({"offset": "20ms", "deltas": "2m"}, {"offset": 0.02, "deltas": ["2m"]}))
+    assert each.as_dict() == same.as_dict()
+    for given in ({"rate": 0}, {"rate": -2}, {"rate": float("inf")}, {"at": [0.5]}):
+        with pytest.raises(frametool.FrametoolError):
+            frametool.resample(ref, **given)
+    with pytest.raises(frametool.FrametoolError, match="did you mean 'tum'"):
+        frametool.load_trajectory(ref, format="tumm")
+    with pytest.raises(frametool.FrametoolError, match="camera_axes is optical or opengl"):
+        frametool.load_trajectory(ref, camera_axes="opencv")
+
+
 def test_view_draws_the_path_coloured_by_time_and_several_side_by_side(run: Run, tmp_path: Path) -> None:
     files = {name: FILES[name] for name in DRONE}
     done = run("view", "drone-ref.tum", "--with", "drone-est.tum", "--frames", "world,ref", "--frames", "world,est", "-o", "paths.svg", files=files)

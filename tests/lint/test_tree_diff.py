@@ -13,6 +13,7 @@ from frametool.errors import UnknownFrame
 from frametool.lint.tree_diff import KINDS
 
 if TYPE_CHECKING:
+    from pathlib import Path
     from typing import Any
 
     from frametool.lint.tree_diff import Difference
@@ -90,6 +91,12 @@ def test_frames_of_one_tree_only_are_told_with_their_parents() -> None:
     assert (told["old"].kind, told["old"].parent_a, told["old"].parent_b) == ("only-in-a", "a", None)
     assert (told["new"].kind, told["new"].parent_a, told["new"].parent_b) == ("only-in-b", None, "b")
     assert told["old"].note == told["new"].note == ""
+
+
+def test_files_are_compared_by_their_paths(tmp_path: Path) -> None:
+    for name, x in (("a.yaml", 1), ("b.yaml", 2)):
+        (tmp_path / name).write_text(f"frames: {{base: {{lidar: {{xyz: [{x}, 0, 0]}}}}}}\n")
+    assert [each.frame for each in diff(tmp_path / "a.yaml", str(tmp_path / "b.yaml")).differences] == ["lidar"]
 
 
 def test_one_robot_built_in_two_ways_is_compared_from_its_root() -> None:

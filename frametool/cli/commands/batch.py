@@ -46,19 +46,20 @@ class Ran(NamedTuple):
 
 
 def run(
-    line: str | Sequence[object], stdin: bytes = b"", files: Mapping[str, bytes] | None = None, *, columns: int = 0
-) -> Ran:
+    line: str | Sequence[object], stdin: bytes | str = b"", files: Mapping[str, bytes] | None = None, *,
+    columns: int = 0,
+) -> Ran:  # fmt: skip
     """Run a command in this process as a shell would; errors become messages and a status, and never exit.
 
     line: as typed, with `|` between commands, or the list of its words; `frametool` may come first
-    stdin: the standard input of the command
+    stdin: the standard input of the command, text or bytes
     files: name -> content; the command runs in a new folder with these files; None: in the current folder
     columns: width of the terminal for which the output is formatted; 0 for a pipe
     Standard streams are replaced while it runs, so calls from several threads wait for each other.
     """
     commands = pipeline(line) if isinstance(line, str) else [line]
     errors = Terminal() if columns else BytesIO()
-    data, status = stdin, 0
+    data, status = stdin.encode() if isinstance(stdin, str) else stdin, 0
     with _ONE_AT_A_TIME, _folder_of(files) as written, _terminal_of(columns):
         for number, command in enumerate(commands, 1):
             out = Terminal() if columns and number == len(commands) else BytesIO()
