@@ -56,7 +56,7 @@ NEAREST = 5  # names listed first in a shortened list
 class FrametoolError(Exception):
     """Base class of all errors.
 
-    exit_code: of commands that end with it
+    exit_code: the exit code of a command that it ends
     rule: the rule of `check` that is violated, if any
 
     """
@@ -251,7 +251,7 @@ def did_you_mean(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str
 
 
 def nearest(name: str, known: Iterable[str], *, cutoff: float = 0.6, behind: float = 0.2) -> list[str]:
-    """Return the most similar known names, the best first, and those not far behind it; empty if there is none."""
+    """Return the most similar known names, the best first, and those not far behind it; empty if none is similar."""
     from bisect import bisect
     from difflib import SequenceMatcher, get_close_matches
 
@@ -295,7 +295,7 @@ def first_of(
 ) -> str:
     """Return the first names and how many more there are; all lists are shortened by it.
 
-    A single last one is named: it needs no more space than a word about it.
+    A single remaining one is named instead of counted.
     count: the total number of names, if these are not all
     """
     count = len(names) if count is None else count

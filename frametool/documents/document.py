@@ -135,7 +135,7 @@ def format_error(
 
 
 def file_error(file: InputFile, what: str, line: int, path: Path, kind: type[FormatError] = FormatError) -> FormatError:
-    """Return the error for a path from the top of a file's document, or where there is none for a line."""
+    """Return the error for a path from the top of a file's document, or for a line if the path is empty."""
     return format_error(file.source, path, what, error=kind) if path else file.error(what, line, kind=kind)
 
 
@@ -209,7 +209,7 @@ def parse_nodes(text: str) -> list[Node]:
 
 
 def nodes_of(events: Iterable[Event]) -> list[Node]:
-    """Return the trees of all documents; what the events leave open ends with them."""
+    """Return the trees of all documents; lists and maps that are still open end with the last event."""
     roots: list[Node] = []
     opened: list[tuple[Event, list[Node]]] = []  # lists and maps that are not complete yet, with their nodes
     for event in chain(events, repeat((END, "", 0, 0, "", 0))):
@@ -246,7 +246,7 @@ def looks_like_json(text: str) -> bool:
 
 
 def parse_json(source: Source) -> list[Any] | None:
-    """Return the values of a text of one or several JSON objects or arrays; None if it is none, or not JSON.
+    """Return the values of a text of one or several JSON objects or arrays; None for other text.
 
     Numbers and booleans remain text, null is None.  Raises FormatError for JSON that is not accepted: a duplicate key,
     half a surrogate pair, too deep, too much.

@@ -97,7 +97,7 @@ State: TypeAlias = tuple[str, int, int, int, int]  # name, time of change, size,
 
 
 def states_of(path: str) -> list[State]:
-    """Return what differs after a change of a file; for a folder, of each file in it.  Raises OSError."""
+    """Return the state of a file, which differs after a change; for a folder, those of its files.  Raises OSError."""
     found = [(each.name, each.stat()) for each in os.scandir(path)] if os.path.isdir(path) else [("", os.stat(path))]
     return sorted((name, at.st_ctime_ns, at.st_size, at.st_dev, at.st_ino) for name, at in found)
 
@@ -141,7 +141,7 @@ class ReadCache:
             if not plain or max((changed for _, changed, *_ in states), default=0) >= time.time_ns() - SETTLED_NS:
                 return value
             found = value, noted, size + sum(state[2] for state in states)
-        self._values[key] = found  # as the youngest
+        self._values[key] = found  # as the newest
         while len(self._values) > MOST_KEPT or sum(size for *_, size in self._values.values()) > MOST_KEPT_BYTES:
             del self._values[next(iter(self._values))]
         return found[0]
@@ -259,13 +259,13 @@ def error_at(source: Source, offset: int, message: str, error: type[FormatError]
 
 
 def line_of(text: str, line: int) -> str:
-    """Return a line of the text without its end; of later ones the last."""
+    """Return a line of the text without its end; the last one if there are fewer lines."""
     lines = re.split(_LINE_END, text, maxsplit=line)
     return lines[min(line, len(lines)) - 1]
 
 
 def pointer(line: str, column: int) -> str:
-    """Return the line with a caret below the column: tabs kept, wide characters count twice, long lines cut."""
+    """Return the line, shortened if long, with a caret below the column; wide characters count twice."""
     if len(line) > _WIDEST_SNIPPET:  # a window around the column
         begin = max(0, min(column - _WIDEST_SNIPPET // 2, len(line) - _WIDEST_SNIPPET))
         end, head = begin + _WIDEST_SNIPPET, "..." if begin else ""

@@ -65,7 +65,7 @@ class Element:
         return next(self.all(tag), None)
 
     def text_of(self, tag: str) -> str:
-        """Return the text of the first child of a kind; "" if there is none."""
+        """Return the text of the first child of a kind; "" without such a child."""
         found = self.first(tag)
         return "" if found is None else found.text
 

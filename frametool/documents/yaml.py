@@ -1,4 +1,4 @@
-"""YAML text to plain values, and to places, through the parser's events: knows YAML, no meaning.
+"""Convert YAML text to plain values and their places, by the parser's events; knows syntax only.
 
 The library's constructors are not used: they convert names to numbers, dates and booleans, and allow a small text to
 grow without bound.  The loop here keeps every scalar as text and counts depth and aliases; the parser's errors become

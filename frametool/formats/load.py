@@ -188,7 +188,7 @@ class TreeBuilder:
         """Create an empty builder; `name` is that of the source, for messages."""
         self.name = name
         self.rules = rules or Rules()
-        self.earth, self._one_earth = self.rules.earth, False  # the Earth's name; warned of an edge to itself
+        self.earth, self._one_earth = self.rules.earth, False  # the Earth's name; an edge to itself is reported
         self.tree = FrameTree(name)
         self.buffer: TransformBuffer | None = None
         self.first: dict[str, tuple[str, Rigid, EdgePlace]] = {}  # child -> its first definition
@@ -333,7 +333,7 @@ class TreeBuilder:
             ((name, line),) = lines_of([place])
             what = f"frame {shown(child)} has two poses at {format_stamp(place.edge.stamp_ns or 0)}; the last one holds"
             warn(f"{name}:{line}: {what}{more_like_it(len(self._replaced))}")
-        tree = FrameTree(self.name)  # which checks its rules
+        tree = FrameTree(self.name)  # checks the rules of static trees
         for frame in buffer.frames:
             tree.add_root(frame)
         for track in buffer.tracks():
@@ -385,7 +385,7 @@ def load(
     keep_ns: int | None = None,
     normalize: bool = False,
     topics: Iterable[str] = (),
-    format: str | None = None,  # noqa: A002 - what it is
+    format: str | None = None,  # noqa: A002 - public name
     joints: Mapping[str, float | str] | str | PathLike[str] | None = None,
     frames: Sequence[str] = (),
     **answers: Any,

@@ -41,7 +41,7 @@ class Format(NamedTuple):
         intrinsics too
     writes: what is written in it, by `write_poses` (also a `trajectory`: the poses of one frame over time),
         `write_points` (also for a `report`), `write_tree` of `writer`; as `arrays` by its `create`, with
-        columns of `texts` if it has them; if all poses are written alike, a RowForm in `ROWS` of `writer` replaces
+        columns of `texts` if it has them; if all poses have one notation, a RowForm in `ROWS` of `writer` replaces
         `write_poses`; as messages of a `recording`, whose trees are written by `tree_pieces` of `writer`
     magic: how it begins, as (kind, what); `frametool.formats.detect` defines the kinds
     conventions: the meaning of its numbers (frames, units, order)
@@ -69,7 +69,7 @@ class Format(NamedTuple):
 
 
 def _trajectory(summary: str, reader: str, **fields: Any) -> Format:
-    """Return the row of a format that lists poses of one frame, all written alike."""
+    """Return the row of a format that lists poses of one frame, all in one notation."""
     known: dict[str, Any] = {"reader": reader, "required_options": ("frames", "stamps", "camera_axes")}
     known |= {"reads": ("tree", "trajectory", "rows"), "writes": ("poses", "trajectory")}
     return Format(summary, writer="frametool.formats.rows.pose_rows", **known | fields)
@@ -469,7 +469,7 @@ def option_of(ask: str) -> str:
 def example_of(name: str, width: int) -> list[str]:
     """Return the indented lines in the docstring of the format's reader, or else its writer.
 
-    In a module of several formats lines that follow the names of others are theirs.  Longer ones are cut to the width.
+    In a module of several formats, lines belong to the formats named before them.  Longer lines are cut to the width.
     """
     import re
     from importlib import import_module

@@ -153,7 +153,7 @@ def read_sigmas(value: Any, reading: Reading) -> list[float]:
     return sigmas
 
 
-def _sigma(text: Any, degrees: bool | None) -> float:  # noqa: FBT001 - None: it is no angle
+def _sigma(text: Any, degrees: bool | None) -> float:  # noqa: FBT001 - None: not an angle
     if type(text) is not str:
         raise Misfit(f"expected a number, found {kind(text)}")
     number = read_number_or_angle(text, degrees)
@@ -188,7 +188,7 @@ def of_sigmas(sigmas: Sequence[Any]) -> Components:
 
 
 def of_position(entries: Components) -> Components:
-    """Return the covariance of a position out of that of a pose."""
+    """Return the covariance of the position, a block of that of a pose."""
     return tuple(entries[6 * i + j] for i in range(3) for j in range(3))
 
 

@@ -162,7 +162,7 @@ class Diagnostics:
         yield from self.notes.values()
 
 
-PROJECTED_IN_SILENCE = 1e-9  # the deviation from orthonormal that seventeen digits and a few products explain
+PROJECTED_IN_SILENCE = 1e-9  # deviation from orthonormal after a few products of numbers with 17 digits
 
 
 def projection(off: float) -> str:
@@ -187,7 +187,7 @@ class Topics:
         return not self.chosen or topic.strip("/") in self.chosen
 
     def chooses(self, topic: str) -> bool:
-        """Return True if a topic was named; only then are messages read that are poses and not transforms."""
+        """Return True if a topic is chosen by name; only then are its poses read, not just transforms."""
         return topic.strip("/") in self.chosen
 
     def conflict(self, topic: str, child: str) -> str:

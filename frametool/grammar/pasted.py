@@ -6,8 +6,8 @@
     Quaternion(x=0.0, ..)                  a repr with names; <Euler (x=0, ..), order='XYZ'> of Blender
     R = .. p = ..                          a rotation and a position
 
-Printed 3x3, 3x4 and 4x4 arrays are matrices, other rows what the caller states.  Each number remains its text.  None
-means that a text is nothing of the kind; an ambiguous meaning returns the bare list that the grammar refuses.
+Printed 3x3, 3x4 and 4x4 arrays are matrices, other rows have the notation that the caller states.  Numbers remain text.
+Readers return None for other texts; for an ambiguous one they return the bare list, which the grammar refuses.
 
 By hand: single numbers, and lists under various names:
 
@@ -84,7 +84,7 @@ def number_rows(text: str, *, any_text: bool = False) -> Rows | None:
     body = body[scale.end() :] if scale else body
     before, *blocks = re.split(_COLUMNS, body)
     lines = [[line for line in block.splitlines() if line.strip()] for block in blocks]
-    if blocks and not before.strip() and len({*map(len, lines)}) == 1:  # the columns of a wide matrix, some at a time
+    if blocks and not before.strip() and len({*map(len, lines)}) == 1:  # a wide matrix printed in blocks of columns
         body = "\n".join(map(" ".join, zip(*lines, strict=True)))
     if "..." in body and re.search(r"[0-9]\.?[\s,]*+\.\.\.", body):
         raise ValueInvalid("the print was cut at '...'; print all numbers")

@@ -167,7 +167,7 @@ def heights(named: dict[str, str]) -> tuple[str, ...]:
 
 
 def _heights(named: dict[str, str], reading: Reading, *path: str) -> tuple[str, ...]:
-    """Return the same; note that there is none."""
+    """Return the fields as `heights` does; record a warning if there is no height."""
     if not (found := heights(named)):
         reading.note(NO_ALT, *path, rule="no-alt")
     return found
@@ -282,7 +282,7 @@ def refuse_not_read(own: dict[str, Any]) -> None:
 
 
 def _incomplete(own: dict[str, Any]) -> str:
-    """Return an error that lists what is missing of a position."""
+    """Return an error that lists the keys of an incomplete position, and what it needs."""
     names = ", ".join(own)
     whole = "lat, lon, alt, or ecef: [x, y, z], or utm: {zone, easting, northing}"
     return f"{names}: half a place on the Earth; write {whole}"
@@ -310,8 +310,8 @@ def _numbers_of(frame: str | None, position: Sequence[float], place: Place, read
     x, y, z = position
     place.settle(x, y, z)
     place.check_result(x, y, z)
-    stays = read is not None and read.ecef == (x, y, z)
-    return [number + 0.0 for number in place.numbers(x, y, z, read if stays else None)]
+    is_unchanged = read is not None and read.ecef == (x, y, z)
+    return [number + 0.0 for number in place.numbers(x, y, z, read if is_unchanged else None)]
 
 
 def _written(pose: Pose, place: Place) -> tuple[list[float], Pose]:

@@ -356,7 +356,7 @@ def own_key(key: str, value: Any) -> str:
 def read_rotation(key: str, value: Any, reading: Reading, *, check: bool = True) -> WrittenRotation:
     """Read the value of a rotation key; of several notations that agree the first, without places.
 
-    check: False for the multiple of a matrix, whose rotation is then none
+    check: False for a multiple of a rotation matrix; the returned rotation is then the identity
     Raises Misfit or ValueInvalid: wrong shape, not a number, not a rotation, or several that do not agree.
     """
     several = type(value) is list and key != readers.AXES_KEY and ROTATION_KEYS[key].representation.axes == NAMED_AXES
@@ -454,7 +454,7 @@ FEW_DIGITS = "a rotation is off by {:.2g}, which its few digits explain, and was
 def as_meant(notation: Notation, numbers: list[float], texts: Sequence[str], reading: Reading) -> list[float]:
     """Return the nearest rotation to numbers written with few digits, if rounding alone makes them invalid.
 
-    Beyond 1e-3 this is a note all the same.
+    Beyond 1e-3 it is recorded as a warning.
     """
     row, rule = notation.representation, notation.representation.batch
     if rule is None or rule.explained is None:
@@ -475,7 +475,7 @@ def as_meant(notation: Notation, numbers: list[float], texts: Sequence[str], rea
 def _read_one_by_one(
     notation: Notation, texts: Sequence[Any], places: Sequence[Path], *, degrees: bool, bare: bool
 ) -> tuple[list[float], bool]:
-    """Read components if an angle has its own unit or one is not a number: then the error states where.
+    """Read components if an angle has its own unit or one is not a number; an error has the path of the component.
 
     The result is in degrees if all angles other than 0 are, else in radians.
     """

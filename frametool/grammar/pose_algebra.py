@@ -157,7 +157,7 @@ class Lookups:
     def __init__(self, tree: Frames, *, carried: bool) -> None:
         """Start without results."""
         self.tree, self.carried = tree, carried
-        self.edges: set[str] = set()  # by their children
+        self.edges: set[str] = set()  # used edges, by their children
         self.widest: Sequence[float] = ()
 
     def result(self, target: str, source: str, at_ns: int | None) -> Result:
@@ -173,7 +173,7 @@ class Lookups:
     ) -> Iterator[Result]:
         """Look up at many times, in their order, block by block.
 
-        miss: receives each time without data, which has no result; without it the first one raises an error.
+        miss: called with each time without data; without it the first one raises an error.
         """
         for begin in range(0, len(times), BLOCK):
             block = times[begin : begin + BLOCK]
@@ -191,7 +191,7 @@ class Lookups:
         return *found.pose.components, *found.extras.get("covariance", ())
 
     def many(self, target: str, source: str, times_ns: Any) -> Components:
-        """Return the same at times, as columns; nan where there are no data."""
+        """Return these components at many times, as columns; nan where there are no data."""
         found = self._columns(target, source, times_ns, "nan")
         for at_ns in islice((at_ns for at_ns, w in zip(times_ns, found[6], strict=True) if isfinite(w)), self.carried):
             self.edges |= {track.child for track in self.tree.way(target, source, int(at_ns))}
@@ -211,10 +211,10 @@ class Lookups:
 
         way = self.tree.way(result.pose.parent or "", result.pose.name or "", result.extras.get("stamp_ns"))
         self.edges |= {track.child for track in way}
-        self.widest = max(self.widest, result.extras["covariance"], key=widest_turn)  # no edge is wider
+        self.widest = max(self.widest, result.extras["covariance"], key=widest_turn)  # at least that of each edge
         return result
 
-    def granted(self) -> str:
+    def assumptions(self) -> str:
         """Return the assumptions about covariances, or ""; warn about rotations too uncertain for the first order."""
         if not self.edges:
             return ""

@@ -42,7 +42,7 @@ RATES = r"(?i)((?:body[_.])?[vw])[xyz]([ _\[(].*)?"
 RATE_KEYS = rf"{RATES}|(?:linear_|angular_)?velocity"  # of records
 STAMP_KEYS = ("stamp_ns", "stamp", "timestamp", "time", "t")
 NANOSECONDS = ("%time", "field.header.stamp")  # names that `rostopic echo -p` writes
-# compiled at first use, not at start-up
+# compiled at first use
 _STAMP = r"(?i)[#% ]*+(?:.*[._])?(?:stamp|timestamp|time|t)(?:_[nmuµ]?s)?\s*(?:[\[(].*)?"
 _UNIT = r"_([nmuµ]?s)$|[\[(]\s*+((?:\s*+[^\[\]()\s]++)*+)\s*+[\])]$"
 _WHOLE_SECONDS = r"(|.*[._])(?:secs?|seconds)"

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Rigid, Three
 
 INFINITE = float("inf")
-ROUNDED_TO_ZERO = 1e-12  # below it, on a screen
-SEEN = ("text", "yaml")  # what a screen shows where no format is asked for
+ROUNDED_TO_ZERO = 1e-12  # smaller numbers, on a screen
+SEEN = ("text", "yaml")  # formats with rounded numbers on a screen
 
 
 class RecordingStyle(NamedTuple):
@@ -49,12 +49,12 @@ class Style(NamedTuple):
     """How results are written: format, notations, unit of bare angles, digits, sign of quaternions.
 
     precision: decimals; None for the shortest text that reads back
-    full: that text for people too, who otherwise see a rounded overview, or 9 digits on a screen
-    screen: whether a terminal shows the result, in no format that was asked for
+    full: this text for people too, who otherwise get a rounded overview, or 9 digits on a screen
+    screen: the result is shown on a terminal, in the default format
     axes: of the camera whose poses are written, `optical` or `opengl`; "" if unknown
-    in_camera: whether the reference frame is the same camera at another time
+    in_camera: the reference frame is the same camera at another time
     place: how positions on the Earth are written, None for x, y, z
-    in_cm: whether positions are xyz_cm, for axes of tools that use centimetres
+    in_cm: positions are written as xyz_cm, for axes of tools that use centimetres
     recording: how results are written to a recording
     """
 
@@ -83,7 +83,7 @@ class Style(NamedTuple):
             raise ValueInvalid(f"a result is {value}: too large for a double, or not finite to begin with")
         if self.precision is not None:
             return f"{value:z.{self.precision}f}"
-        if self.screen and self.format in SEEN and not self.full:  # what rounding errors leave of a zero is zero
+        if self.screen and self.format in SEEN and not self.full:  # 9 digits, and 0 for rounding errors
             value = float(f"{value:.9g}") if abs(value) >= ROUNDED_TO_ZERO else 0.0
         return repr(value + 0.0)
 
@@ -356,7 +356,7 @@ def refuse_motion(tree: Frames, fmt: str) -> None:
 
 
 def static_edges(tree: Frames, fmt: str) -> list[tuple[str, str, Rigid]]:
-    """Return parent, child and pose of the edges of a tree; warns about frames that nothing is connected to.
+    """Return parent, child and pose of the edges of a tree; warns about frames without any edge.
 
     Raises ValueInvalid if it moves, or has none.
     """
@@ -382,7 +382,7 @@ def angles_of(rotation: Quaternion) -> Three[float]:
 
 
 def of_angles(angles: Iterable[float]) -> Quaternion:
-    """Return the rotation that roll, pitch and yaw are read as."""
+    """Return the rotation of roll, pitch and yaw, as it is read back."""
     roll, pitch, yaw = angles
     return floats.canonical_sign(*euler.to_quaternion(roll, pitch, yaw, "sxyz", floats))
 

@@ -1,6 +1,6 @@
-"""The samples of edges in order of arrival: their rate, first and last stamp, gaps, jumps and backward stamps.
+"""Analyse the samples of edges in order of arrival: rate, first and last stamp, gaps, jumps and backward stamps.
 
-Also the report of `monitor`, as plain mappings with units in their keys: one per edge, and one for a chain of edges.
+Also returns the report of `monitor`, plain mappings with units in their keys: one per edge, and one for a chain.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
     from frametool.lint.rules import Statement
 
 JUMP_FACTOR = 10.0  # a jump is a step of at least this many median steps of its edge ..
-JUMP_METRES, JUMP_RADIANS = 0.1, 0.2  # .. and longer than noise and low rates explain
+JUMP_METRES, JUMP_RADIANS = 0.1, 0.2  # .. and longer than noise or a low rate would cause
 GAP_FACTOR = 5.0  # a gap is a pause of at least this many median pauses
 LEAST_RETURNS = 3  # oscillations that are not an accident
 RETURN_FACTOR = 0.1  # an oscillation ends this close to its start, relative to its step
 
 
 class SampleStep(NamedTuple):
-    """The step from one stamp to the next: its end, distance and duration, and whether it leads back.
+    """The step from one stamp to the next: its end, distance and duration.
 
     Between different parents there is no distance: metres and radians are 0.  `returns` is True if the last two steps
     are both large and the second ends near the start of the first.
@@ -49,8 +49,8 @@ class SampleStep(NamedTuple):
 class EdgeLog:
     """The samples of one child frame, in order of arrival; stamps in nanoseconds.
 
-    parent: that of the last one
-    changes: how many are under another parent than the one before; backward: how many arrive after a later stamp
+    parent: that of the last sample
+    changes: samples with another parent than the previous one; backward: samples that arrive after a later stamp
     """
 
     def __init__(self, first: Edge | Statement) -> None:
@@ -90,7 +90,7 @@ class EdgeLog:
 
     @cached_property
     def steps(self) -> list[SampleStep]:
-        """Return the steps between stamps in order of time, once all are in; the last of equal stamps counts."""
+        """Return the steps between stamps in order of time, once all are in; of equal stamps the last is used."""
         last = {stamp: at for at, stamp in enumerate(self._stamps)}
         order = [last[stamp] for stamp in sorted(last)]
         if len(order) < 2:
@@ -134,13 +134,13 @@ class EdgeLog:
         return [step for step in self.steps if step.metres > far or step.radians > turned]
 
     def returns(self) -> list[SampleStep]:
-        """Return the steps back if an edge oscillates all the time, as with two publishers that disagree."""
+        """Return the steps back of an edge that oscillates, as with two publishers that disagree."""
         back = [step for step in self.steps if step.returns]
         return back if len(back) >= max(LEAST_RETURNS, len(self.steps) / 3) else []
 
 
 def _apart(poses: Array, under: Indices, by: int) -> Array:
-    """Return metres and radians between poses in rows and those so many further on; 0 between different parents."""
+    """Return metres and radians between each pose and the one `by` rows later; 0 between different parents."""
     import numpy as np
 
     from frametool.geometry import arrays
@@ -169,7 +169,7 @@ def chain(logs: dict[str, EdgeLog], target: str, source: str) -> FramePath:
 def monitor(
     files: Sequence[FrameFile], *ends: str, normalize: bool = False, clashing: Report = stop
 ) -> list[dict[str, Any]]:
-    """Describe every edge of some files; or, for `ends` (target, source), those between the two and their chain.
+    """Describe every edge of files; or, for `ends` (target, source), the edges between the two and their chain.
 
     clashing: receives the errors about frames on the topics of two robots, whose samples then count as one
     Raises FormatError for files without transforms, UnknownFrame, NotConnected.
@@ -231,7 +231,7 @@ def edge_entry(log: EdgeLog) -> dict[str, Any]:
     }
 
 
-# of the values of its edges, that of a chain
+# key -> the value of a chain, from those of its edges
 OF_CHAIN: dict[str, Callable[..., Any]] = {
     "count": sum, "rate_hz": min, "gap_s": max, "delay_max_s": max, "jumps": sum, "backward": sum,
     "parent_changes": sum,

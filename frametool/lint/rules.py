@@ -1,4 +1,4 @@
-"""The rules of `check`: mistakes in single entries, which do not hide others, then the shape of the tree and motion.
+"""The rules of `check`: mistakes in single entries, which do not hide others, then the tree and its motion.
 
 Findings are written as compilers do:
     robot.yaml:9:17: error: quaternion 0 0 0 0.9 has norm 0.9; .. [denormalized]
@@ -79,7 +79,7 @@ def level(finding: Finding) -> str:
 
 
 def write_text(findings: Iterable[Finding]) -> str:
-    """Return one line per finding, as compilers do; findings of a file with equal words are combined."""
+    """Return one line per finding, as compilers do; equal findings in a file are combined."""
     alike: dict[tuple[str, str, str], list[Finding]] = {}
     for each in findings:
         alike.setdefault((each.source, each.rule, each.message), []).append(each)
@@ -212,7 +212,7 @@ def _read_tree(source: Source, find: Find, *, normalize: bool) -> list[tuple[Edg
     return edges
 
 
-FLICKER = 3  # this many changes of parent are not a pick-and-place
+FLICKER = 3  # changes of parent that pick-and-place does not explain
 
 
 def check(
@@ -221,7 +221,7 @@ def check(
     """Return all findings in files, combined into one tree, in the order of the files and lines.
 
     tree: receives the static edges
-    others: other files are allowed; a file without any sign of frames only gets the finding that it has none
+    others: allow files of other kinds; a file without any frames only gets the finding that it has none
     """
     findings: list[Finding] = []
     findings += lint(_statements(files, findings, normalize=normalize, others=others), tree)
@@ -234,7 +234,7 @@ def _statements(
 ) -> Iterator[Statement]:
     """Read all files; unreadable parts become findings.
 
-    The Earth's frame gets the first of its names; the identity between the two is no edge.
+    The Earth's frame gets the first of its names; the identity between the two is not an edge.
     """
     earth = ""
     for file in files:
@@ -256,8 +256,8 @@ def _statements(
 class Child(EdgeLog):
     """All data of one child frame, and the samples that violate a rule.
 
-    newest: the last one
-    irregular: by rule, the samples under another parent than the one before, at a known stamp, and after a later stamp
+    newest: the last sample
+    irregular: rule -> samples with another parent than the previous one, at a known stamp, or after a later stamp
     """
 
     def __init__(self, first: Statement, number: int) -> None:
@@ -265,13 +265,13 @@ class Child(EdgeLog):
         super().__init__(first)
         self.first = self.newest = first
         self.irregular: dict[str, list[Statement]] = {}
-        self.since = (number, first)  # the first with the newest parent
+        self.since = (number, first)  # the first sample with the newest parent
         self.static: Statement | None = None
         self.stamps: dict[int, tuple[int, int]] = {}  # stamp -> hash of the sample, its line
         self.other_pose: Statement | None = None
 
     def take(self, seen: Statement, number: int) -> None:
-        """Add one more."""
+        """Add a sample."""
         if seen.stamp_ns is None:
             self.static = self.static or seen
         else:
@@ -306,7 +306,7 @@ def lint(everything: Iterable[Statement], tree: FrameTree | None = None) -> Iter
         child.take(seen, number)
     for child in children.values():
         stamps = len(child.stamps) + (child.static is not None)
-        if tree is not None and (stamps < 2 or not (child.changes or child.other_pose)):  # it has one pose
+        if tree is not None and (stamps < 2 or not (child.changes or child.other_pose)):  # with a single pose
             with suppress(BadTopology):  # which a rule reports
                 tree.add_components(*child.first[:3])
         yield from _child(child)
@@ -314,7 +314,7 @@ def lint(everything: Iterable[Statement], tree: FrameTree | None = None) -> Iter
     roots = {
         child.newest.parent: child.first for child in reversed(children.values()) if child.newest.parent not in children
     }
-    if len(roots) > 1:  # at the first edge of the second
+    if len(roots) > 1:  # reported at the first edge of the second
         names = sorted(roots)
         yield roots[names[1]].finding("several-roots", f"{len(roots)} roots: {first_of(names, 10, quote=repr)}")
 
@@ -337,9 +337,9 @@ def _child(child: Child) -> Iterator[Finding]:
 
 
 def _moving(child: Child, frame: str) -> Iterator[Finding]:
-    """Apply the rules about a moving frame: changes of parent, by pick-and-place or by two publishers, and stamps.
+    """Apply the rules about a moving frame: changes of parent, by pick-and-place or two publishers, and stamps.
 
-    Then those about pauses and distances between samples.
+    Then the rules about pauses and distances between samples.
     """
     for rule in filter(child.irregular.get, ("reparented", "repeated", "repeated-stamp", "backward")):
         samples = child.irregular[rule]

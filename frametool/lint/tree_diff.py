@@ -1,6 +1,6 @@
-"""Differences between two trees: missing frames, other parents, and the displacement of each common frame.
+"""Find the differences between two trees: missing frames, other parents, and the displacement of common frames.
 
-Signs of quaternions and the order of names do not count.  Moving trees are compared at one time.
+Signs of quaternions and the order of names are ignored.  Moving trees are compared at one time.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def parse_tolerance(text: str, otherwise: Tolerance = Tolerance()) -> Tolerance:
 
 
 class Apart(NamedTuple):
-    """The distance of two poses, in metres and radians, and how much of each may be rounding; 0 in one edge."""
+    """The distance of two poses, in metres and radians, and its maximum rounding error; 0 for a single edge."""
 
     metres: float
     radians: float
@@ -100,7 +100,7 @@ class Apart(NamedTuple):
         return degrees(self.radians)
 
     def __str__(self) -> str:
-        """Format it in mm and degrees, with four digits or all before the point."""
+        """Return it in mm and degrees, with four digits, or all before the point."""
         far = self.millimetres
         return f"{far:{'.0f' if 1e3 <= far < 1e9 else '.4g'}} mm and {self.degrees:.4g} deg"
 
@@ -179,7 +179,7 @@ def diff(
 
     a, b: trees, or the paths of their files as for `load`
     at_ns: the time; None is the latest of each.  seen_from: a frame of both; None is the root of each part of A, or
-    the nearest frame to it that is in both.  tolerance: metres and radians that do not count.
+    the nearest frame to it that is in both.  tolerance: metres and radians that are ignored.
     Raises UnknownFrame for a `seen_from` that is not in both.
     """
     a, b = (load(each) if isinstance(each, str | PathLike) else each for each in (a, b))
@@ -193,7 +193,7 @@ def diff(
     order = {kind: number for number, kind in enumerate((*KINDS, SAME))}
     limit = pair.tolerance
 
-    def rank(each: Difference) -> tuple[float, ...]:  # what only went along with its parent comes behind
+    def rank(each: Difference) -> tuple[float, ...]:  # frames that only moved with their parent are last
         own = -1.0 if limit.covers(each.own) else limit.times(each.own)
         return order[each.kind], -own, -limit.times(each.seen)
 
@@ -223,7 +223,7 @@ class _Pair:
     """Two trees at one time, side by side."""
 
     def __init__(self, a: Frames, b: Frames, at_ns: int | None, tolerance: Tolerance, start: str | None) -> None:
-        """Get both at that time; compare all frames relative to `start`, or each part relative to its own frame."""
+        """Take both trees at a time; compare all frames relative to `start`, or each part relative to its own frame."""
         self.a, self.b = Snapshot(a, at_ns), Snapshot(b, at_ns)
         self.tolerance = tolerance
         in_b = frozenset(b.frames)
@@ -324,7 +324,7 @@ def _cameras(tree: Frames) -> dict[str, Camera | Callable[..., Camera]]:
 
 
 def _intrinsics(known: Camera | Callable[..., Camera]) -> dict[str, str]:
-    """Return what a camera has, by name, as text without digits that may be rounding."""
+    """Return the intrinsics of a camera by name, as text without digits that may be rounding errors."""
     camera = known() if callable(known) else known
     fields = {**camera.mapping(), **dict(zip(("fx", "fy", "cx", "cy"), camera.numbers, strict=False))}
     for key in ("K", "axes"):

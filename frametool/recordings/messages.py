@@ -175,7 +175,7 @@ def open_records(path: str, chosen: Collection[str], tally: Diagnostics) -> Buff
 def open_trajectory(path: str, chosen: Collection[str], tally: Diagnostics) -> tuple[BufferedReader, str] | None:
     """Open the poses of the chosen topic, or of the only moving one, as JSON lines; return the topic too.
 
-    None for other topics, and if none was chosen and there are transforms too.
+    None for other topics, and if no topic was chosen and there are transforms too.
     """
     with ExitStack() as opened:
         reader = opened.enter_context(opened_recording(path, tally))
@@ -199,7 +199,7 @@ def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[by
                     lines.append(known.get(place) or text_of(reader.types, each.channel, each.data))
             finally:
                 number += len(lines)
-                if any(lines):  # an empty piece would be the end
+                if any(lines):  # an empty piece would end the stream
                     yield b"".join(lines)
     except FormatError:
         raise
@@ -254,7 +254,7 @@ MOST_LAYOUTS = 16  # of messages of one length
 CDR_LE = b"\0\1"
 HOLE = b"\0"  # a placeholder for a number; no JSON text contains it
 STRING_OR_NUMBER = re.compile(rb'("(?:[^"\\]|\\.)*")|-?\d[-+.\de]*')
-POINT_ZERO = 2  # the characters `.0` that an integer written as a float has too many
+POINT_ZERO = 2  # characters `.0` to remove from an integer written as a float
 
 
 class BinaryLayout(NamedTuple):
@@ -269,9 +269,9 @@ class BinaryLayout(NamedTuple):
     sample: bytes
 
     def values(self, messages: Sequence[bytes]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return the numbers of messages of equal length, (n, k), and which differ from the sample in nothing else.
+        """Return the numbers of messages of equal length, (n, k), and the mask of those that only differ in them.
 
-        Those with numbers that are not finite do not count as alike.
+        Messages with numbers that are not finite are not in the mask.
         """
         text = b"".join(messages)
         rows = np.frombuffer(text, np.uint8).reshape(len(messages), -1)
@@ -300,9 +300,9 @@ def _repeated(text: bytes, count: int) -> Spans:
 
 
 def numbers_in(types: MessageTypes, kind: str, data: bytes) -> tuple[list[tuple[int, str]], list[slice]]:
-    """Return the places and types of the numbers in a message, and the parts that other messages must share with it.
+    """Return the positions and types of the numbers in a message, and the parts that other messages must share.
 
-    Raises ValueError or KeyError if one of its parts has no fixed place.
+    Raises ValueError or KeyError if one of its parts has no fixed position.
     """
     from rosbags.interfaces import Nodetype
 
@@ -357,7 +357,7 @@ def layout_of(types: MessageTypes, channel: Channel, data: bytes) -> BinaryLayou
 def alike(
     types: MessageTypes, messages: Sequence[Recorded]
 ) -> Iterator[tuple[list[int], BinaryLayout, NDArray[np.float64]]]:
-    """Yield the places of messages of one layout, and their numbers, (n, k); those whose layout varies are left."""
+    """Yield the indices of messages of one layout, and their numbers, (n, k); others are not yielded."""
     groups: dict[Any, list[int]] = {}
     for at, each in enumerate(messages):
         groups.setdefault((each.channel, len(each.data)), []).append(at)
@@ -479,7 +479,7 @@ def _transforms(reader: RecordingReader, message: Recorded, number: int, answers
 def _columns(
     rows: Sequence[tuple[RawTransform, int, Recorded]], path: str, options: Options
 ) -> Iterator[EdgeColumns]:  # fmt: skip
-    """Yield the edges of many messages at once; raises FormatError for the first invalid one, behind those before it.
+    """Yield the edges of many messages at once; raises FormatError for the first invalid one, after those before it.
 
     rows: transforms, each with the number of its message among those with transforms
     """

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 BAG1, BAG2, MCAP = "bag1", "bag2", "mcap"
 CDR = "cdr"
 METADATA, INFORMATION = "metadata.yaml", "rosbag2_bagfile_information"
-ITSELF, SERIALIZED = "rosbag2", "serialized_metadata"  # of rosbag2, in an MCAP file about itself
+ITSELF, SERIALIZED = "rosbag2", "serialized_metadata"  # metadata of rosbag2 in an MCAP file, about the file
 QOS, HASH = "offered_qos_profiles", "topic_type_hash"  # metadata of rosbag2 about a channel of MCAP
 MOST = 1 << 28  # bytes of a chunk: a larger one is not unpacked
 LOST = "SELECT count(*) FROM messages WHERE topic_id NOT IN (SELECT id FROM topics)"
@@ -47,8 +47,8 @@ class Channel:
     """The common properties of the messages of one publisher.
 
     topic, type: as ROS 2 writes them, `/pose` and `geometry_msgs/msg/PoseStamped`
-    encoding: of its messages: `cdr`, `ros1`, or another
-    schema: name, encoding and text of the definition of its type, as in MCAP; None if there is none
+    encoding: of its messages, `cdr`, `ros1`, or another
+    schema: name, encoding and text of the definition of its type, as in MCAP, if there is one
     said: further metadata: quality of service in ROS 2, callerid and latching in ROS 1
     digest: the hash of the type
     """
@@ -79,7 +79,7 @@ class Recorded(NamedTuple):
 class McapFile:
     """An MCAP file.
 
-    compression: of its chunks; stated: the number of messages by channel, total: of all, None if it does not state them
+    compression: of its chunks; stated: channel -> number of messages, total: of all; None if not stated
     """
 
     def __init__(self, path: Path, opened: ExitStack, tally: Diagnostics) -> None:
@@ -162,7 +162,7 @@ class McapFile:
 
         size = chunk.uncompressed_size
         if chunk.compression == "zstd" and size <= MOST:
-            size = max(size, zstandard.frame_content_size(chunk.data))  # so much memory would be asked for
+            size = max(size, zstandard.frame_content_size(chunk.data))  # the memory needed to unpack it
         if size > MOST:
             raise ValueError(f"a chunk of {size} bytes; {MOST} are read")
         stream, length = get_chunk_data_stream(chunk, validate_crc=True)
@@ -261,7 +261,7 @@ class Bag1File:
     head, compression, others = None, "", tuple  # there are no others
 
     def __init__(self, path: Path, opened: ExitStack, _tally: Diagnostics) -> None:
-        """Read what the end of the file says of its connections and chunks."""
+        """Read the index of connections and chunks at the end of the file."""
         from rosbags.rosbag1.reader import Reader
 
         class Unindexed(Reader):
@@ -320,7 +320,7 @@ class MessageTypes:
         from rosbags.typesys import Stores, get_typestore
 
         self.channels, self.ros1 = channels, ros1
-        self.layouts: dict[tuple[Channel, int], list[Any]] = {}  # that were learned, by channel and length of messages
+        self.layouts: dict[tuple[Channel, int], list[Any]] = {}  # channel and length of messages -> learned layouts
         self.store: Any = get_typestore(Stores.EMPTY)
         if ros1:  # whose seconds have no sign (wiki.ros.org/msg); the library has int32
             parts: Any = [(name, (Nodetype.BASE, ("uint32", 0))) for name in ("sec", "nanosec")]
@@ -368,7 +368,7 @@ class MessageTypes:
 class RecordingReader:
     """An open recording.
 
-    all: its channels, equal ones of several files merged; channels: those whose messages are encoded as ROS does
+    all: its channels, equal ones of several files merged; channels: those with an encoding of ROS
     metadata: of a folder, every value as text
     """
 
@@ -414,7 +414,7 @@ class RecordingReader:
         return chain.from_iterable(self.blocks(wanted))
 
     def blocks(self, wanted: Collection[Channel] | None = None) -> Iterator[Sequence[Recorded]]:
-        """Yield them in lists of any length."""
+        """Yield them in lists of varying length."""
         total, wanted = 0, None if wanted is None else {*wanted}
         for file in self.files:
             count, numbers = 0, {number for number, each in file.channels.items() if wanted is None or each in wanted}

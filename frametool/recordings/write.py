@@ -44,25 +44,25 @@ VERSION, VERSION_OF_NUMBERS = 9, 8  # of metadata: the newest, and the last with
 BY_NUMBERS = re.compile(r"\bhistory: *\d")  # in a quality of service
 SECONDS = {BAG1: (0, (1 << 32) - 1)}  # of a stamp; int32 in ROS 2
 SECONDS_ROS2 = (-(1 << 31), (1 << 31) - 1)
-_PROBE, _PROBE_NS = 1.2345678912345e-67, 1532698752_187654321  # numbers and a stamp that no other bytes equal
+_PROBE, _PROBE_NS = 1.2345678912345e-67, 1532698752_187654321  # a number and a stamp with unique bytes
 
 
 class Kind(NamedTuple):
-    """One kind of message, whose usual topic has its name: its type, and the count of numbers per stamp.
+    """One kind of message: its type, and the count of numbers per stamp; its name is the default topic.
 
     each: of a list, the type of its items
-    stays: it is latched, so that late subscribers get it too
+    latched: late subscribers get it too
     """
 
     type: str
     numbers: int
     each: str = ""
-    stays: bool = False
+    latched: bool = False
 
 
 STAMPED = "geometry_msgs/msg/TransformStamped"
 KINDS = {
-    "tf_static": Kind(TF, 7, STAMPED, stays=True),
+    "tf_static": Kind(TF, 7, STAMPED, latched=True),
     "tf": Kind(TF, 7, STAMPED),
     "pose": Kind("geometry_msgs/msg/PoseStamped", 7),
     "path": Kind("nav_msgs/msg/Path", 7, "geometry_msgs/msg/PoseStamped"),
@@ -110,7 +110,7 @@ def serialised(kind: Kind, fmt: str, samples: Iterable[Sample]) -> bytes:
     for stamp_ns, frames, numbers in samples:
         second, part = divmod(stamp_ns, BILLION)
         stamp = (second + (1 << 31)) % (1 << 32) - (1 << 31), part  # rosbags takes seconds of ROS 1 as int32
-        if kind.type == KINDS["fix"].type:  # by GPS, of unknown covariance
+        if kind.type == KINDS["fix"].type:  # status: GPS fix, unknown covariance
             whole.append([*stamp, frames[0], 0, 1, *numbers, np.zeros(9), 0])
         else:
             whole.append([*stamp, *frames[: 1 + (kind.type == TF)], *numbers])
@@ -158,7 +158,7 @@ class RecordingFile:
         self.format, self.log_ns = fmt, 0
         self.counts: dict[Channel, int] = {}
         self.span: tuple[int, int] | None = None  # of log times
-        self._itself: dict[str, Any] | None = None  # the metadata of rosbag2 in the source of a copy
+        self._itself: dict[str, Any] | None = None  # rosbag2's metadata in the source of a copy
         self._folder = folder
         self._numbers: dict[Any, Any] = {}  # of schemas and channels, or connections
         with room_in(folder):
@@ -314,7 +314,7 @@ def _samples(track: Track, style: Style) -> Iterator[Sample]:
 
 
 def _discarded(stream: IO[bytes], file: IO[bytes], folder: Path) -> None:
-    """Close what was opened for a recording, and remove what is left of it."""
+    """Close the streams of a recording, and remove its temporary files."""
     for each in (stream, file):
         with suppress(OSError):  # on a full disk the buffered data cannot be written
             each.close()
@@ -323,7 +323,7 @@ def _discarded(stream: IO[bytes], file: IO[bytes], folder: Path) -> None:
 
 @contextmanager
 def room_in(folder: str) -> Iterator[None]:
-    """Name the folder in which there is no room, or what else the system says of it."""
+    """Turn errors of the system into FileProblem with the folder, such as a full disk."""
     try:
         yield
     except FrametoolError:
@@ -334,14 +334,14 @@ def room_in(folder: str) -> Iterator[None]:
 
 
 def new_channel(kind: Kind, topic: str, *, ros1: bool, like: Iterable[Channel] = ()) -> Channel:
-    """Return a channel of messages that are made; like: others of the same recording, whose definition is taken."""
+    """Return a channel for new messages; like: channels of the same recording, whose type definition is used."""
     store, same = typestore(ros1=ros1), next((each for each in like if each.type == kind.type), None)
     definition, digest = store.generate_msgdef(kind.type, ros_version=2 - ros1)
     schema: Any = kind.type, f"ros{2 - ros1}msg", definition.encode()
-    said = {"latching": str(int(kind.stays))}
+    said = {"latching": str(int(kind.latched))}
     if not ros1:
         said, digest = {QOS: ""}, store.hash_rihs01(kind.type)
-    if kind.stays and not ros1:  # the quality of service of a topic that is there for who comes late
+    if kind.latched and not ros1:  # quality of service of a latched topic: transient local
         from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
         from rosbags.rosbag2.metadata import dump_qos_v8, dump_qos_v9
 

@@ -249,7 +249,7 @@ def _message_edges(message: TextMessage | FormatError, options: Options) -> Iter
 def _transforms(value: Any, path: Path, options: Options) -> Iterator[tuple[dict[str, Any], Path]]:
     """Yield every transform of a message, or of a list of messages; count messages without any.
 
-    A pose counts if its topic was chosen, or if topics are not named.
+    A pose counts as a transform if its topic was chosen, or if messages have no topics.
     """
     if type(value) is list:
         for index, item in enumerate(value):
@@ -294,7 +294,7 @@ def _block(fields: dict[str, Any], indent: str) -> str:
 
 
 ECHO_GROUPS = {
-    ":\n": ": ?\n",  # rostopic writes a blank where a block opens
+    ":\n": ": ?\n",  # rostopic writes a space before a nested block
     "-\n": "- ?\n",
     "NUMBER": "([-+0-9.eE]+)",
     "COUNT": "[0-9]+",
@@ -321,7 +321,7 @@ class MessageLayout(NamedTuple):
     """How a tool writes messages of transforms: the patterns of one transform, and of the text around it.
 
     opening: of a message, with a group if it names a topic; closing: of the last one; gap: between two transforms
-    lines: of one transform, 0 if a message is one line; first: the line that counts as its place
+    lines: of one transform, 0 if a message is one line; first: the line that errors name
     """
 
     opening: re.Pattern[str]
@@ -381,7 +381,7 @@ def plain_columns(text: str, line: int, tally: Diagnostics, *, normalize: bool =
         topics = accumulate(named, lambda before, topic: topic or before, initial=opened[1][1:-1])
     try:
         return edge_columns((parents, children), stamps, rows, lines, tally, normalize=normalize, topics=topics)
-    except ValueError:  # of what is refused, or no numbers
+    except ValueError:  # invalid values, or not numbers
         return None
 
 
@@ -397,7 +397,7 @@ def edge_columns(
     seconds, nanoseconds = stamps
     if not all(map(all, names)):
         raise ValueInvalid("an empty frame name")
-    if problem := stamp_problem(max(seconds), max(nanoseconds), STAMPS[0]):  # none is below its range
+    if problem := stamp_problem(max(seconds), max(nanoseconds), STAMPS[0]):  # none can be below the range
         raise problem
     rough: list[int] = []
     components = [unit_components(row, line, rough, normalize) for row, line in zip(rows, lines, strict=True)]
@@ -409,7 +409,7 @@ def edge_columns(
 def unit_components(numbers: Rigid, line: int, rough: list[int], normalize: bool) -> Rigid:  # noqa: FBT001 - fast
     """Return tx, ty, tz, x, y, z, w with a unit quaternion; raises ValueInvalid for numbers that every reader refuses.
 
-    normalize: accept any non-zero quaternion.  rough: gets the line of one that was off.
+    normalize: accept any non-zero quaternion.  rough: receives the line of one that was normalised.
     """
     tx, ty, tz, x, y, z, w = numbers
     squared = x * x + y * y + z * z + w * w

@@ -113,7 +113,7 @@ def read_transform(
 ) -> tuple[str, str, Vector, Quaternion, int | None]:
     """Read a TransformStamped, a FrameTransform or a stamped pose: parent, child, position, rotation, stamp_ns or None.
 
-    body: the child of a pose that names none
+    body: the child frame of a pose that does not name it
     """
     if "parent_frame_id" in message:  # a FrameTransform
         only(message, ("timestamp", "parent_frame_id", "child_frame_id", *_TRANSFORM))
@@ -154,7 +154,7 @@ def _warn_of_stale_angles(value: Any, rotation: Quaternion, reading: Reading) ->
 
 
 PATH = "nav_msgs/msg/Path"
-POSES = frozenset((  # over time
+POSES = frozenset((  # messages that make a trajectory
     "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped", "nav_msgs/msg/Odometry", PATH,
 ))  # fmt: skip
 
@@ -300,12 +300,12 @@ is_noise = partial(
     | \d{4}-\d\d-\d\d\ [\d:.]+\ \[[A-Z_]+\ \w+\].* | selected\ interface\ .*\ multicast.*
     | \$\ .* | \[exit\ \d+\] | \^C.* )""",
 )
-_ODD_START = r"(?m)^(?=[A-Z\t\[\d$^\ufeff])"  # no key that ROS prints begins like this
+_NOISE_START = r"(?m)^(?=[A-Z\t\[\d$^\ufeff])"  # no key that ROS prints begins like this
 
 
 def without_noise(text: str, line: int = 0, tally: Diagnostics | None = None) -> str:
-    """Blank the lines that are known not to be data, and record them; the others keep their places."""
-    if re.search(_ODD_START, text) is None:
+    """Blank the lines that are known not to be data, and record them; positions in the text are preserved."""
+    if re.search(_NOISE_START, text) is None:
         return text
     kept = text.split("\n")
     for index, each in enumerate(kept):
@@ -388,7 +388,7 @@ def new_header(frame: str | None, stamp_ns: int | None, style: Style) -> dict[st
 
 
 def new_stamp(stamp_ns: int, fmt: str) -> dict[str, int]:
-    """Return nanoseconds as a message has them; the second part is never negative."""
+    """Return nanoseconds as the fields of a stamp; the second one is never negative."""
     names = STAMPS[fmt == "ros1"]
     whole, rest = divmod(stamp_ns, BILLION)
     if problem := stamp_problem(whole, rest, names):

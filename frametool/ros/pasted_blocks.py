@@ -9,7 +9,7 @@
         [0.000000 -0.000000 1.570796]
     args="0 0 5 0 0 0 world odom 100"                                 x y z yaw pitch roll parent child ms
 
-All are converted to text of the grammar of poses, together with `pasted_poses`.  Of a block the quaternion is used:
+All are converted to text of the grammar of poses, as `pasted_poses` does.  Of a block the quaternion is used:
 its angles and its matrix are the same with as few digits.
 """
 
@@ -75,7 +75,7 @@ def may_be_pasted(text: str) -> bool:
 def in_grammar(
     source: Source, default: Notation | None = None, *, normalize: bool = False, points: bool = False
 ) -> Source | None:
-    """Return a pasted text as text of the grammar, one value per line; None if it is not one, or grammar already.
+    """Return a pasted text as text of the grammar, one value per line; None for other text, or if it already is.
 
     default: the notation of numbers that do not state theirs; normalize: accept any non-zero quaternion
     points: three numbers are a point
@@ -116,7 +116,7 @@ def _unless_grammar(source: Source, default: Notation | None, *, points: bool) -
 
 
 def _blocks(text: str) -> list[Any]:
-    """Read all blocks printed by tf2_echo; a block may lack its position or its time, and its first rotation counts."""
+    """Read all blocks printed by tf2_echo; position and time may be missing, and the first rotation is used."""
     names, values, stamp = _HEADING.search(text), list[dict[str, Any]](), 0
     known = {"name": names[1], "parent": names[2]} if names else {}
     for part in _PART.finditer(text):
@@ -125,7 +125,7 @@ def _blocks(text: str) -> list[Any]:
             stamp = parse_stamp(part[key])
             continue
         if key == "xyz" or not values:
-            values.append({**known, **({"stamp_ns": Verbatim(stamp)} if stamp else {})})  # 0 is that of a static one
+            values.append({**known, **({"stamp_ns": Verbatim(stamp)} if stamp else {})})  # 0: static
             stamp = 0
         if values[-1].keys().isdisjoint(("xyzw", "rpy", "rpy_deg")):
             numbers = re.compile(rf"\s*{_LIST}").match(text, part.end())

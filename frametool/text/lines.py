@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     ByteStream: TypeAlias = BufferedIOBase  # `read1` returns what has arrived, and blocks only if nothing has
 
 
-# a piece this large was not typed: more follows, and a short wait for it saves much work per block; but nothing that
-# has arrived is held back for longer than the second number
+# a piece this large was not typed: more follows, and a short wait for it saves much work per block; but no data that
+# have arrived are held back for longer than the last number
 BULK_BYTES = 1 << 14
 _PATIENCE_MS = 5
 _LONGEST_WAIT_S = 0.02

@@ -143,7 +143,7 @@ def number_or_none(text: str) -> float:
 
 
 def read_number_or_angle(
-    text: str, degrees: bool | None, *, metres: bool = False  # noqa: FBT001 - None: it is no angle
+    text: str, degrees: bool | None, *, metres: bool = False  # noqa: FBT001 - None: not an angle
 ) -> float:
     """Read a cell: a plain number, or one with a unit, an angle in degrees or radians, a length in metres.
 

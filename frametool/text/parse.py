@@ -245,10 +245,10 @@ def nanoseconds_of(seconds: Floats) -> tuple[Ints, Flags]:
 
 
 def parse_stamps(cells: Spans, *, in_ns: int) -> tuple[Ints, Flags]:
-    """Read cells (n,) of digits with at most a point among them as nanoseconds; give also which of them are sure.
+    """Read cells (n,) of digits with at most one point as nanoseconds; also return the mask of certain results.
 
-    in_ns: how many nanoseconds a whole number is; 0 are decimal seconds, or what its size says.  Blanks around a cell
-    and `ns` behind it are allowed.
+    in_ns: nanoseconds per unit of an integer; 0 for decimal seconds, or the unit that its size implies.  Blanks around
+    a cell and `ns` behind it are allowed.
     """
     data, (starts, ends) = cells.data, trimmed(*cells)
     suffixed = (data.take(ends - 1) == ord("s")) & (data.take(ends - 2) == ord("n")) & (ends - starts > 2)
@@ -258,11 +258,11 @@ def parse_stamps(cells: Spans, *, in_ns: int) -> tuple[Ints, Flags]:
     for word in reversed(range(_STAMP_WORDS - 1)):
         here = write.first_point(characters[:, word])
         before = np.where(here < 8, here, before + 8)
-    points = starts + np.minimum(before, ends - starts)  # all characters are before the point that is not there
+    points = starts + np.minimum(before, ends - starts)  # without a point, the end of the cell
     whole, sure = _read_integer(data, points, points - starts)
     decimals = np.maximum(ends - points - 1, 0)
     digits, fine = _read_integer(data, ends, decimals)
-    finer = TENS.take(decimals - NINE, mode="clip")  # what is finer than a nanosecond is not sure unless it is 0
+    finer = TENS.take(decimals - NINE, mode="clip")  # fractions of a nanosecond are uncertain unless 0
     below = digits // finer * TENS.take(NINE - decimals, mode="clip")
     sure &= fine & (digits % finer == 0) & (ends - starts <= 8 * _STAMP_WORDS) & (ends - starts > (points < ends))
     is_whole = points == ends
@@ -275,7 +275,7 @@ def parse_stamps(cells: Spans, *, in_ns: int) -> tuple[Ints, Flags]:
 
 
 def _read_integer(data: Bytes, ends: Ints, length: Ints) -> tuple[Ints, Flags]:
-    """Read so many digits before `ends`, and return which numbers are digits alone, not above 63 bits."""
+    """Read `length` digits before `ends`; also return the mask of numbers of only digits, within 63 bits."""
     characters = windows(data, 8 * _STAMP_WORDS)[ends - 8 * _STAMP_WORDS].view("<u8").reshape(-1, _STAMP_WORDS)
     words, wrong = [], np.zeros(len(ends), np.uint64)
     for word in range(_STAMP_WORDS):

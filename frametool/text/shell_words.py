@@ -39,7 +39,7 @@ _INSTEAD = "write one command a line, keep a result by NAME = COMMAND, name file
 
 
 def _tokens(line: str) -> Iterator[tuple[re.Match[str], bool]]:
-    """Yield the tokens of a line up to a comment, each with whether it begins a word."""
+    """Yield the tokens of a line up to a comment, each with True if it begins a word."""
     begins = True
     for token in _TOKEN.finditer(line):
         if begins and token[0] == "#":

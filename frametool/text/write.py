@@ -1,4 +1,4 @@
-"""Floats to text in bulk: the shortest that reads back the same, or a fixed number of decimals, aligned at the point.
+"""Convert floats to text in bulk: the shortest that reads back the same, or with a fixed number of decimals.
 
 The same bytes as `repr` and `{:z.{precision}f}`; for floats of 32 bits the shortest text that reads back to them.
 
@@ -35,7 +35,7 @@ TENS: Ints = 10 ** np.arange(19, dtype=np.int64)
 
 
 def halves(value: Floats) -> tuple[Floats, Floats]:
-    """Split floats into two of 26 bits each, whose sum they are; |value| below 1e300."""
+    """Split floats into sums of two floats of 26 bits each; |value| below 1e300."""
     stretched = value * _SPLITTER
     high = stretched - (stretched - value)
     return high, value - high
@@ -252,7 +252,7 @@ class Fields:
     bytes  0 .. 14   sign and whole part, right-aligned     0 ..  7, 8 .. 15   two words of characters
     byte  15         the point
     bytes 16 .. 32   fraction, left-aligned                16 .. 23, 24 .. 31, 32 .. 39   three words
-    A number begins at its first digit or sign and ends at its last wanted digit: what is outside is never copied, so
+    A number begins at its first digit or sign and ends at its last needed digit; the rest is never copied, so
     that neither leading nor trailing zeros have to be moved.
     """
 

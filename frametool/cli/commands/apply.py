@@ -225,7 +225,7 @@ def apply_command(inputs: Inputs) -> int:
             inputs.ask("from_rep")
         output.values(values_of(list(sources_of(inputs, rest, kind, task.place)), request, output))
     if isinstance(way, TreeWay):  # report what was assumed
-        inputs.note(way.lookups.granted())
+        inputs.note(way.lookups.assumptions())
     else:
         warn_if_wide([way.pose.covariance or ()] * way.uncertain)
     return status

@@ -113,7 +113,7 @@ def lookup_command(inputs: Inputs) -> int:
     lookups, at = lookups_in(inputs, tree, carried=covariance), options.at_ns(inputs.at)
     if by_row:
         status = _by_row(task, lookups, target, source)
-        inputs.note(lookups.granted())
+        inputs.note(lookups.assumptions())
         return status
     target, source = frame_name(target, tree), frame_name(source, tree)
     source_at, fixed = options.at_ns(inputs.source_at), inputs.fixed and frame_name(inputs.fixed, tree)
@@ -128,7 +128,7 @@ def lookup_command(inputs: Inputs) -> int:
         output.values([algebra.looked_up_across(tree, target, at, source, source_at, fixed)])
     else:
         output.values([lookups.result(target, source, at)])
-    inputs.note(lookups.granted())
+    inputs.note(lookups.assumptions())
     return status
 
 

@@ -104,7 +104,7 @@ def static_command(inputs: Inputs) -> None:
     output.tree(tree)
 
 
-FORMS = ("text", "html", "svg", "glb", "png")
+PICTURES = ("text", "html", "svg", "glb", "png")
 SUFFIXES = {".html": "html", ".htm": "html", ".svg": "svg", ".glb": "glb", ".png": "png", ".txt": "text"}
 PIPE_SIZE = (100, 30)  # columns and lines, if not known
 
@@ -127,7 +127,7 @@ def _eye(text: str) -> Eye:
 @option("--path", "only the frames between TARGET and SOURCE", name="path_only")
 @option("--from EYE", "slanted, front, side, top, or AZ,EL in degrees", _eye, name="eye", default="slanted")
 @options.moving_options
-@option("-f --format", "format of the picture  [default: by the suffix of --output, else text]", FORMS, name="fmt")
+@option("-f --format", "format of the picture  [default: by the suffix of --output, else text]", PICTURES, name="fmt")
 @options.place_options
 @option("--overlay", "compare TREE with a second tree, TARGET: what has moved?")
 @option("--no-sliders", "leave out the sliders for the joints of a robot", name="no_sliders")
@@ -202,7 +202,7 @@ def _format(fmt: str | None, output: str | None, *, opens: bool) -> str:
     suffix = os.path.splitext(output or "")[1].lower()
     chosen = fmt or SUFFIXES.get(suffix) or ("html" if opens else None)
     if chosen is None and suffix and output != "-":
-        raise click.UsageError(f"no format has the suffix {shown(suffix)}; give --format {'|'.join(FORMS)}")
+        raise click.UsageError(f"no format has the suffix {shown(suffix)}; give --format {'|'.join(PICTURES)}")
     refuse(opens and (chosen != "html" or output == "-"), "--open shows a page: give -o FILE.html, or no -o")
     return chosen or "text"
 

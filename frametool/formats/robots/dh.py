@@ -115,14 +115,14 @@ def rows_of(file: InputFile, tally: Diagnostics) -> list[DhRow]:
 
 
 def _cells(items: Iterable[Item], others: dict[str, None]) -> dict[str, Cell]:
-    """Return the cells of a row by the names of columns; `others` receives the names of what is not read."""
+    """Return the cells of a row by the names of columns; `others` receives the names of columns that are not read."""
     cells: dict[str, Cell] = {}
     known = [each for names in COLUMNS.values() for each in names if len(each) > 1]
     for written, value, fail in items:
         name, unit = column_of(written) or ("", "")
         if not name:
             near = did_you_mean(written.strip().lower(), known, cutoff=0.75)
-            if near or value is None:  # the half of a number with a decimal comma is a key without a value
+            if near or value is None:  # the part behind a decimal comma is a key without a value
                 raise fail(f"unknown column {shown(written)}{near}; a row has {', '.join(COLUMNS)}")
             others[written] = None
         elif name in cells:

@@ -147,7 +147,7 @@ class JointState:
         return JointValue(one.plain + (two.plain - one.plain) * fraction)
 
     def _take_file(self, path: str) -> None:
-        """Read all values of a file: constant ones are a single value, and without times the last counts."""
+        """Read all values of a file: constant ones as a single value; without times the last one is used."""
         found: dict[str, list[tuple[int | None, Value]]] = {}
         sample = None
         for sample in read_joint_file(path, self.joints):

@@ -97,7 +97,7 @@ class Joint(NamedTuple):
 
     @property
     def start(self) -> Value:
-        """Return the value without one of its own or of a leader; of a mimic the one that follows 0."""
+        """Return the default value of the joint; that of a mimic follows a leader at 0."""
         if self.mimic:
             return followed(self, JointValue(0.0))
         return self.rest_pose if self.posed else JointValue(self.rest)
@@ -201,7 +201,7 @@ def followed(joint: Joint, leader: Value) -> Value:
 def leaders_first(
     names: Iterable[str], joints: Mapping[str, Joint], valued: Collection[str] = (), file: str = ""
 ) -> dict[str, str]:
-    """Return joints and those that they mimic, leaders first: each with its leader, "" for none and if it has a value.
+    """Return joints and those that they mimic, leaders first: joint -> leader, "" without one or if it has a value.
 
     Raises FormatError, in a file, for joints that mimic each other in a circle.
     """
@@ -264,13 +264,13 @@ def read_value(joint: Joint, value: Any, source: Source, *, normalize: bool = Fa
 
 SIZES = {"box": 3, "cylinder": 2, "capsule": 2, "sphere": 1}  # numbers of each
 SHAPES = (*SIZES, "mesh")
-PARTS = {"size": 3, "radius": 1, "length": 1}  # what states how large a shape is, and with how many numbers
+PARTS = {"size": 3, "radius": 1, "length": 1}  # attributes with the size of a shape -> the count of their numbers
 
 
 class Solid(NamedTuple):
-    """A solid in a frame: a kind of SHAPES, its pose, and its size in metres; axes are z, the middle is the origin.
+    """A solid in a frame: a kind of SHAPES, its pose, and its size in metres; centred at the origin, with axis z.
 
-    size: lengths of the edges of a box; radius and length, a capsule's without its caps; radius; of a mesh nothing
+    size: edge lengths of a box; radius and length, for a capsule without its caps; radius; () for a mesh
     """
 
     frame: str
@@ -280,13 +280,13 @@ class Solid(NamedTuple):
 
 
 def read_solids(file: InputFile, fmt: str) -> list[Solid]:
-    """Return the solids of a file whose frames were read; none of a format without any.  Raises FormatError."""
+    """Return the solids of a file whose frames were read; [] for formats without solids.  Raises FormatError."""
     read = getattr(import_module(FORMATS[fmt].reader), "read_solids", None)
     return [*read(file)] if read else []
 
 
 def solids_of(name: str, link: Element, pose_of: Callable[[Element], Rigid]) -> list[Solid]:
-    """Return what a link shows; of one that shows only meshes the simple shapes it collides with, if there are any."""
+    """Return the visual shapes of a link; if these are only meshes, its simple collision shapes, if any."""
 
     def size(shape: Element) -> Iterator[float]:
         for part, count in PARTS.items():  # attributes in URDF, elements in SDF

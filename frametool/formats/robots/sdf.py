@@ -93,7 +93,7 @@ class SdfFrame:
         self.placement: SdfFrame | None = None
 
     def way(self) -> list[SdfFrame]:
-        """Return the frames on the path up from this one to the world, without that."""
+        """Return the frames on the path from this one up to, but not including, the world."""
         way, frame = [], self
         while frame is not frame.scope:
             way.append(frame)
@@ -111,7 +111,7 @@ UNLIMITED = 1e15  # SDF writes 1e16 for no limit
 class SdfJoint(NamedTuple):
     """The connection of two bodies, links or the world.
 
-    motions: what moves, outermost first; empty for a fixed joint
+    motions: its single-axis joints, outermost first; empty for a fixed joint
     """
 
     frame: SdfFrame
@@ -131,7 +131,7 @@ class SdfTree:
     all: the frames by their names with scopes
     names: the names of joints for their values, without scopes if these are unique
     hung: link -> the joint above it
-    carried: model -> the link above its frame, if it is not the other way round
+    carried: model -> the link above its frame, for models that a joint moves
     """
 
     def __init__(self, root: Element, options: Options) -> None:
@@ -151,7 +151,7 @@ class SdfTree:
         for frame in [*frames, *self.sensors]:
             self._read(frame)
         self.tree = FrameTree()
-        self.seen: dict[str, dict[str, Rigid]] = {}  # frame -> those below it, seen from it: chains cost no square
+        self.seen: dict[str, dict[str, Rigid]] = {}  # frame -> poses of those below it: keeps long chains linear
         for frame in frames:
             placed = frame.placement or frame
             if not self.tree.hang(frame.relative_to.name, placed.name, frame.pose):
@@ -250,7 +250,7 @@ class SdfTree:
         return self.find(holder.text, joint.scope, holder, "")
 
     def find(self, name: str, scope: SdfFrame, holder: Element, attribute: str) -> SdfFrame:
-        """Return the frame that a name means in a scope.
+        """Return the frame that a name refers to in a scope.
 
         Raises FormatError with the names that exist.
         """
@@ -308,7 +308,7 @@ class SdfTree:
         return current
 
     def _joint(self, frame: SdfFrame) -> SdfJoint:
-        """Read a joint: the bodies that it connects, and what moves between them."""
+        """Read a joint: the bodies that it connects, and its axes."""
         holder = frame.holder
         kind = holder.attribute("type")
         if kind not in KINDS:

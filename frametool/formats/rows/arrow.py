@@ -58,7 +58,7 @@ def kind_of(arrow_type: Any) -> Kind | None:
 
 
 def is_floating(arrow_type: Any) -> bool:
-    """Return True if a type of Arrow is one of floating point."""
+    """Return True for a floating-point type of Arrow."""
     kind = kind_of(arrow_type)
     return kind is not None and kind.kind in column_file.FLOATS
 
@@ -71,7 +71,7 @@ def in_one(column: Any) -> Any:
 
 
 def nulls_of(column: Any) -> Flags | None:
-    """Return which rows are null, (n,); None if none is."""
+    """Return the null mask, (n,); None without nulls."""
     if not column.null_count:
         return None
     nulls: Flags = column.is_null().to_numpy(zero_copy_only=False)
@@ -160,7 +160,7 @@ def _of_json(text: str | None) -> Any:
 BEGINNINGS = {b"PAR1": "parquet", b"ARROW1": "arrow"}
 NEW_GROUP = 1 << 20  # rows of a group if the input has none
 HEADROOM, LEAST_ROOM = 3, 1 << 26  # memory for writing a group: this multiple of its size, and these additional bytes
-NULLS = True  # its columns may hold nulls
+NULLS = True  # columns may hold nulls
 AT_ONCE = 1 << 16  # rows of a batch: results stay near the cache
 CODECS = {b"\x04\x22\x4d\x18": "lz4", b"\x28\xb5\x2f\xfd": "zstd"}  # of Arrow's batches, by their magic numbers
 BUFFER = 1 << 20  # bytes of a column of Parquet that are read at once
@@ -248,7 +248,7 @@ class ArrowFile(column_file.ColumnFile):
             group = self.reader.metadata.row_group(0)
             stored = [group.column(at) for at in range(group.num_columns)]
             codecs = {each.path_in_schema: each.compression.replace("UNCOMPRESSED", "NONE") for each in stored}
-            repeating = []  # that a dictionary made smaller; for others trying costs time
+            repeating = []  # columns that a dictionary made smaller; trying it for others costs time
             for each in stored:
                 plain = SIZES.get(each.physical_type, 0) * each.num_values
                 if not DICTIONARIES.isdisjoint(each.encodings) and not 0 < plain <= each.total_uncompressed_size:
@@ -308,7 +308,7 @@ class GroupWriter:
         fields = []
         for column in columns:
             own = [] if column.passed is None else [column.passed]
-            if of_input is not None and not own:  # it may replace one
+            if of_input is not None and not own:  # it may replace an input column
                 own = of_input.get_all_field_indices(column.name)
             if own:
                 fields.append(of_input.field(own[0]))
@@ -387,7 +387,7 @@ open_columns = ArrowFile
 # --- points moved inside of engines ---
 
 XYZ = ("x", "y", "z")
-COLUMNS = {"point": XYZ, "vector": XYZ, "pose": (*XYZ, "qx", "qy", "qz", "qw")}  # as_ -> where none are named
+COLUMNS = {"point": XYZ, "vector": XYZ, "pose": (*XYZ, "qx", "qy", "qz", "qw")}  # as_ -> default columns
 
 
 def apply_arrow(
@@ -401,13 +401,13 @@ def apply_arrow(
     source: str = "",
     time_column: str | None = None,
 ) -> Any:
-    """Move the points of a pyarrow RecordBatch or Table; return the same type, all other columns as they are.
+    """Move the points of a pyarrow RecordBatch or Table; return the same type, with all other columns unchanged.
 
-    transform: one, or one a row; or `tree`, `target`, `source`: looked up at the latest time, with `time_column` at
+    transform: one, or one per row; or `tree`, `target`, `source`: looked up at the latest time, with `time_column` at
     each row's (timestamps, integer nanoseconds, float seconds).
     as_: "point" or "vector", columns x, y, z unless named, or "pose", columns x, y, z, qx, qy, qz, qw.
-    A row with a null among its columns is null in all.  float32 is computed in float64 and rounded once.
-    Raises ValueInvalid for columns that are no floating point and for the first row, from 0, that is not finite.
+    A null in one of these columns makes all of them null in its row.  float32 is computed in float64 and rounded once.
+    Raises ValueInvalid for columns that are not floating point, and for the first row, from 0, that is not finite.
     """
     pa = require_pyarrow("apply_arrow")
     if not isinstance(data, (pa.RecordBatch, pa.Table)):
@@ -429,7 +429,7 @@ def apply_arrow(
     moved: Components
     if as_ == "pose":
         rows = np.stack(numbers, axis=-1, dtype=np.float64)
-        if nulls is not None:  # what null rows hold has no meaning
+        if nulls is not None:  # values of null rows are arbitrary
             rows[nulls] = rigid.IDENTITY
         poses = mover @ Transform.from_arrays(rows[:, :3], rows[:, 3:])
         moved = (*poses.components[:3], *poses.xyzw.T)
@@ -439,7 +439,7 @@ def apply_arrow(
         moved = arrays.run(rigid.apply, 3, (*mover.components, *numbers))
     new = list(data.columns)
     for place, each, field in zip(places, moved, fields, strict=True):
-        with np.errstate(over="ignore"):  # what is too large becomes infinite
+        with np.errstate(over="ignore"):  # numbers that are too large become infinite
             values = np.asarray(each, kind_of(field.type))
         if nulls is not None and not field.nullable:
             row = int(np.argmax(nulls))
@@ -457,7 +457,7 @@ def apply_arrow(
 
 
 def _place_of(name: str, names: Sequence[str]) -> int:
-    """Return the place of a column; raises ValueInvalid for one that is not there, or twice."""
+    """Return the index of a column; raises ValueInvalid if it is missing or appears twice."""
     if name not in names:
         raise ValueInvalid(f"no column {shown(name)}{alternatives(name, names, 'columns')}")
     if names.count(name) > 1:
@@ -469,7 +469,7 @@ def _mover(
     data: Any, transform: Transform | None, tree: Frames | None, target: str, source: str, time_column: str | None,
     nulls: Flags | None,
 ) -> Transform:  # fmt: skip
-    """Return what moves the rows: one transform, or one a row; those of null rows are not looked up."""
+    """Return the transform of the rows, one or one per row; for null rows nothing is looked up."""
     if tree is None:
         lacks_tree, rows = target or source or time_column, data.num_rows
         if lacks_tree or not isinstance(transform, Transform):

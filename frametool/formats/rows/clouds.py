@@ -60,10 +60,10 @@ class CloudFile(column_file.RecordFile):
     """The points of a file whose header has been read: records, or rows of text.
 
     at: in text, the positions of its columns among the `cells` numbers of a row; None for records
-    line: that of the next row of text, from 1
-    behind: what was read after the last point
-    header: from columns and a count to the header with changes, and everything before the points; raises ValueInvalid
-    record_with: from columns to the type of a point with these; raises ValueInvalid for what the format cannot hold
+    line: the line of the next row of text, from 1
+    behind: the bytes that were read after the last point
+    header: returns the changed header, and everything before the points, for columns and a count; raises ValueInvalid
+    record_with: returns the type of a point with some columns; raises ValueInvalid for what the format cannot hold
     """
 
     vectors = NORMALS
@@ -261,7 +261,7 @@ def encode_text(
 
 # --- PLY ---
 
-FORMS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+ENCODINGS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
     "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
@@ -272,7 +272,7 @@ NEW_NAMES = {code: name for code, name in NAMES.items() if code not in ("i8", "u
 NEW_NAMES |= {"b1": "uchar", "f2": "float"}
 PROPERTY = rf"(?:list (?:{'|'.join(name for name, code in TYPES.items() if code[0] != 'f')}) )?(?:{'|'.join(TYPES)})"
 LINES = {
-    "format": f"one format: {', '.join(FORMS)}, and 1.0",
+    "format": f"one format: {', '.join(ENCODINGS)}, and 1.0",
     "element": "element NAME COUNT, each name once",
     "property": "property TYPE NAME below an element, or property list INTEGER TYPE NAME, each name once; "
     f"types: {', '.join(TYPES)}",
@@ -286,7 +286,7 @@ class PlyElement(NamedTuple):
     """One element of a file.
 
     instances: their number; line: in the header
-    properties: by name the type of a value, and for a list the type of its count, else ""
+    properties: name -> the type of a value, and for a list the type of its count, else ""
     """
 
     name: str
@@ -311,7 +311,7 @@ def read_head(file: InputFile) -> tuple[bytes, str, list[PlyElement]]:
                 continue
             case ["end_header", *_]:
                 break
-            case ["format", name, "1.0"] if name in FORMS and not fmt:
+            case ["format", name, "1.0"] if name in ENCODINGS and not fmt:
                 fmt = name
             case ["element", name, number] if name not in elements:
                 count = count_in(number, f"{shown(number)} of element {shown(name)}", file, len(text))
@@ -325,8 +325,8 @@ def read_head(file: InputFile) -> tuple[bytes, str, list[PlyElement]]:
                 expected = LINES.get(word, f"{', '.join(LINES)}, comment, obj_info or end_header at its beginning")
                 raise file.error(f"{shown(' '.join(words))}: expected {expected}", len(text))
     if not fmt:
-        raise file.error(f"the header has no format; formats: {', '.join(FORMS)}", len(text))
-    return b"".join(text), FORMS[fmt], list(elements.values())
+        raise file.error(f"the header has no format; formats: {', '.join(ENCODINGS)}", len(text))
+    return b"".join(text), ENCODINGS[fmt], list(elements.values())
 
 
 class PlyFile(CloudFile):

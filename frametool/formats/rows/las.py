@@ -121,7 +121,7 @@ class LasFile(column_file.ColumnFile):
             probe = laspy.ScaleAwarePointRecord.zeros(1, header=header)
             kinds = [np.array(probe[name]) for name in self.names]
         self.width = len(self.names)
-        self.kinds = [each.dtype if each.ndim == 1 else None for each in kinds]  # several in one are not a number
+        self.kinds = [each.dtype if each.ndim == 1 else None for each in kinds]  # None: several values
 
     def moved_by(self, pose: Components | None) -> None:
         """Warn that a coordinate system is preserved."""
@@ -168,7 +168,7 @@ class LasWriter:
         columns = [each for each in self.columns if each.passed is None]
         new = {column.name: np.asarray(each.values) for column, each in zip(columns, made, strict=True)}
         new |= {name: new[name].astype(np.float64) for name in XYZ if name in new}
-        moved = [np.isfinite(new[name]) for name in XYZ if name in new]  # none where all of them stay
+        moved = [np.isfinite(new[name]) for name in XYZ if name in new]  # empty if all are unchanged
         there = np.all(moved or [np.ones(batch.size if rows is None else len(rows), np.bool_)], axis=0)
         if not there.all():
             self.left_out += int(np.count_nonzero(~there))

@@ -74,7 +74,7 @@ class PcdField(NamedTuple):
 def layout_of(fields: Sequence[PcdField]) -> tuple[list[str], list[int], Kind]:
     """Return the columns of fields, one per value: names, cells in a row, and the type of a point.
 
-    Padding is no column, but occupies bytes.
+    Padding is not a column, but occupies bytes.
     """
     values = [(field, place) for field in fields for place in range(field.values)]
     offsets = [0, *accumulate(field.size for field, _ in values)]
@@ -149,8 +149,8 @@ class PcdFile(CloudFile):
 
     text: the header byte for byte, including its last line end
     words: the values of each key; lines: the number of its line
-    sensor: the seven numbers of VIEWPOINT; None if there are none.  viewpoint: their words, once they are transformed
-    grid: what WIDTH and HEIGHT become where the number of points changes; None for a single row
+    sensor: the seven numbers of VIEWPOINT, if present.  viewpoint: their words, once they are transformed
+    grid: the new WIDTH and HEIGHT if the number of points changes; None for a single row
     """
 
     viewpoint = ""

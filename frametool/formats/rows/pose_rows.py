@@ -70,9 +70,9 @@ class RowForm(NamedTuple):
 
     row: constant text, `Numbers`, and other fields of a pose: `seconds`, `nanoseconds`, `number` (counted from
         `first`), `image` (the name of its image, else its seconds)
-    numbers: from tx, ty, tz, x, y, z, w to the numbers in the order of the file
+    numbers: converts tx, ty, tz, x, y, z, w to the numbers in the order of the file
     head, between, tail: text before the first pose, between two, and after the last
-    constants: what else is written for readers of the format, for a note
+    constants: describes columns with constants, which readers of the format need, for a message
     """
 
     row: tuple[str | bytes | Numbers, ...]
@@ -85,7 +85,7 @@ class RowForm(NamedTuple):
 
 
 def turned(style: Style, pose: Components) -> Components:
-    """Convert a camera's axes to those of a format if both are known, and those of a camera as reference frame."""
+    """Convert the axes of a camera, also as reference frame, to those of the format if both are known."""
     if not is_turned(style):
         return pose
     tx, ty, tz, x, y, z, w = pose
@@ -303,14 +303,14 @@ def _colmap(file: InputFile, _options: Options) -> Iterator[Written]:
     """Yield the poses of images.txt, or of frames.txt, as written."""
     comments, lines = True, text_lines(file)
     of_frames = False
-    numbered = set[bool]()  # whether names of images begin with a number and a blank
+    numbered = set[bool]()  # True: the name of an image begins with a number and a space; False: another one
     for line, text in lines:
         bare = text.strip()
         if not bare or bare.startswith("#"):
             of_frames |= comments and "Frame list" in bare
             continue
         comments = False
-        words = bare.split(maxsplit=9)  # the name of an image may contain blanks
+        words = bare.split(maxsplit=9)  # the name of an image may contain spaces
         data = bare.split()[9:] if of_frames else []  # a count, and three words per item
         expected = FRAME_LINE if of_frames else f"10 words ({IMAGE_LINE})"
         if len(words) < 10 - of_frames:

@@ -233,7 +233,7 @@ def _read_named(file: InputFile, options: Options) -> Iterator[Edge]:
         path: Path = ()
         if "angles" in top:
             reading.degrees = read_angle_unit(top.pop("angles"))
-        if len(top) == 1 and (wrapper := next(iter(top))) in ("transforms", "extrinsics"):  # which is no name
+        if len(top) == 1 and (wrapper := next(iter(top))) in ("transforms", "extrinsics"):  # not a name
             value, path = top[wrapper], (wrapper,)
             top = dict(enumerate(value)) if type(value) is list else as_mapping(value, "poses by the names of frames")
         for name, entry in top.items():
@@ -336,7 +336,7 @@ def kitti_lines(file: InputFile, options: Options) -> dict[str, KittiLine]:
         column, problem = 1, ""
         if not words or not re.fullmatch(r"\w+", name):
             problem = f"expected NAME: numbers, found {text.strip()[:40]!r}"
-        elif name == "calib_time":  # which is no number
+        elif name == "calib_time":  # not a number
             continue
         elif name in found:
             problem = f"{name} appears twice; first in line {found[name].line}"
@@ -405,7 +405,7 @@ def _read_kitti(file: InputFile, options: Options) -> Iterator[Edge]:
 
 
 def _ends(file: InputFile, lines: dict[str, KittiLine], options: Options) -> tuple[str, str]:
-    """Return parent and child of the pose of R: and T: of the raw recordings, by the file's name or contents."""
+    """Return parent and child of the pose R: and T: of the raw recordings, by the file's name or contents."""
     for name, other in (("R", "T"), ("T", "R")):
         if name not in lines:
             raise file.error(f"missing {name}: together with {other}:")
@@ -499,7 +499,7 @@ def _kalibr_pose(text: str, head: re.Match[str], reading: Reading) -> Rigid:
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Return the tree as Autoware or easy_handeye has it, or by names; raises ValueInvalid for what cannot be held."""
+    """Return the tree as in Autoware or easy_handeye, or by names; raises ValueInvalid for trees that do not fit."""
     edges = static_edges(tree, style.format)
     if style.format == "named":
         text = ""
@@ -525,7 +525,7 @@ def write_tree(tree: Frames, style: Style) -> str:
 
 
 def write_mount(parent: str, child: str, pose: Rigid, style: Style, *, on_hand: bool) -> str:
-    """Return the pose of a camera on the hand, or fixed to the base, as easy_handeye has it."""
+    """Return the pose of a camera on the hand, or fixed to the base, in the format of easy_handeye."""
     turned = quaternion.from_quaternion(*pose[3:], floats)
     mount = EFFECTOR if on_hand else BASE
     frames = f"  eye_on_hand: {str(on_hand).lower()}\n  {mount}: {quoted(parent)}\n  {CHILD}: {quoted(child)}\n"

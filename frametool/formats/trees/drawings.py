@@ -127,7 +127,7 @@ def write_tree(tree: Frames, style: Style) -> str:
 
 
 def _escaped(text: str) -> str:
-    """Write characters with a meaning in mermaid or HTML as character codes (`#quot;`)."""
+    """Escape characters with a meaning in mermaid or HTML by character codes (`#quot;`)."""
     return "".join(
         character if character.isalnum() or character in " _-/.:,+" else f"#{ord(character)};" for character in text
     )

@@ -103,7 +103,7 @@ def _is_reported(action: Action) -> bool:
 
 
 def _call(action: Action) -> tuple[str | Sequence[str], list[str]]:
-    """Return the arguments of a call, as one text for a shell or as words, and the conditions that are left open.
+    """Return the arguments of a call, as one text for a shell or as words, and its conditions that are not constant.
 
     Raises Misfit, also for a condition that is never met.
     """

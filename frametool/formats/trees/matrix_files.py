@@ -65,7 +65,7 @@ KEYS = (
     ("T<letter><letter>", "<a>", "<b>"),  # ORB-SLAM3: Tbc
 )
 # these name two frames, and both directions are in use
-ASKED = (("(?:T_)?<a>_to_<b>", "<a>", "<b>"), ("(?:T_)?<a>2<b>", "<a>", "<b>"))
+AMBIGUOUS = (("(?:T_)?<a>_to_<b>", "<a>", "<b>"), ("(?:T_)?<a>2<b>", "<a>", "<b>"))
 # two keys, a rotation (3x3, or a rotation vector of three numbers) and a translation, and their frames: together they
 # map points of the second to the first; without frames, the direction must be set
 PAIRS = (
@@ -75,7 +75,7 @@ PAIRS = (
     (r"R", "[Tt]", "", "", ""),
     (r"(?i:rotation(?:_?matrix)?)", "(?i:translation(?:_?vector)?)", "", "", ""),
 )
-# keys next to a matrix that name its frames, target first (OpenLORIS-Scene, tf); whether they are so must be set
+# keys next to a matrix that name its frames, target first (OpenLORIS-Scene, tf); the direction must be set
 FRAME_KEYS = (
     ("parent_frame", "child_frame"), ("parent_frame_id", "child_frame_id"), ("frame_id", "child_frame_id"),
     ("parent", "child"), ("target_frame", "source_frame"), ("destination_frame", "source_frame"),
@@ -107,7 +107,7 @@ def meaning_of(key: str, known: Mapping[str, str], frames: Sequence[str] = ()) -
     known: names for the braces; frames: names set by the user, which may be parts of the key.
     """
     last = key.rpartition(".")[2]
-    for row in (*ASKED, *KEYS):
+    for row in (*AMBIGUOUS, *KEYS):
         pattern, target, source = row
         if ways := _ways(pattern, last, frames):
             if len(ways) > 1:
@@ -115,7 +115,7 @@ def meaning_of(key: str, known: Mapping[str, str], frames: Sequence[str] = ()) -
                 return Unclear(f"{bare(key)} may name its two frames in several ways; give --frames {said}", key=True)
             names = {"<a>": ways[0][0], "<b>": ways[0][1]} | {f"{{{name}}}": frame for name, frame in known.items()}
             child = names["{me}" if "{me}" in (target, source) else source]
-            return Meaning(names[target], names[source], child, said=row not in ASKED)
+            return Meaning(names[target], names[source], child, said=row not in AMBIGUOUS)
     return None
 
 
@@ -172,7 +172,7 @@ class Grid(NamedTuple):
         return f"{self.rows} x {self.columns}" if self.columns else f"{self.rows} rows of different lengths"
 
     def holds(self, count: int) -> bool:
-        """Return True if it is a row or a column of this many numbers."""
+        """Return True if it is a row or a column of `count` numbers."""
         return 1 in (self.rows, self.columns) and len(self.texts) == count
 
 

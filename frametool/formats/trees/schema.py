@@ -1,4 +1,4 @@
-"""The JSON Schema of our trees in YAML and JSON, for editors: which keys there are, what their values look like.
+"""The JSON Schema of frametool's trees in YAML and JSON, for editors: their keys, and the types of values.
 
 A schema accepts more than the reader, and never less: texts such as `90deg` stand for numbers, names may look like
 numbers, and what keys mean together is checked when a file is read.
@@ -84,14 +84,14 @@ def _ref(name: str) -> Schema:
 
 
 def _entry(also: Collection[str], without: Collection[str] = ()) -> Schema:
-    """Return what an entry may hold: the keys of poses, and those of its place in the tree."""
+    """Return the schema of an entry: the keys of poses, and those of its place in the tree."""
     keys = (KEYS - NAMES).union(also).difference(without)
     properties = {key: {"$ref": f"#/$defs/keys/properties/{key}"} for key in sorted(keys)}
     return {"type": ["object", "null"], "properties": properties, "additionalProperties": False}
 
 
 def _of_key(key: str) -> Schema:
-    """Return what is known of the value of a key; nothing of those whose value decides what they are."""
+    """Return the schema of the value of a key; {} for keys whose meaning depends on their value."""
     if key in ("samples", "children", "camera"):
         return {"type": "array", "items": _ref("sample")} if key == "samples" else _ref(key)
     if key in NAMES:
