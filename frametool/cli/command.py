@@ -42,16 +42,16 @@ OF_MESSAGES = ("quiet", "verbose")
 class Inputs:
     """The arguments and options of a command, by the names of its parameters; reading one marks it as used.
 
-    idle: the options that were passed and are not used yet
+    unused: the options that were passed and are not used yet
     peek: returns a value without marking it as used
     reads_trees: files of frames are opened, so --in applies to these too
     earth: the options on geodetic positions, set when first needed
     """
 
-    def __init__(self, values: dict[str, Any], idle: dict[Any, Option]) -> None:
+    def __init__(self, values: dict[str, Any], unused: dict[Any, Option]) -> None:
         """Store the values, and the options that were passed."""
         values |= WITHOUT | values
-        self._values, self.idle = values, idle
+        self._values, self.unused = values, unused
         self.peek: Callable[[str], Any] = values.get
         self.reads_trees = False
         self.earth: Earth | None = None
@@ -60,31 +60,31 @@ class Inputs:
         """Return the value of an argument or option and mark it as used; None if the command does not have it."""
         if name.startswith("_"):
             raise AttributeError(name)
-        self.idle.pop(name, None)
+        self.unused.pop(name, None)
         return self._values.get(name)
 
-    def ask(self, *names: str) -> None:
+    def use(self, *names: str) -> None:
         """Mark options as used."""
         for name in names:
-            self.idle.pop(name, None)
+            self.unused.pop(name, None)
 
-    def leave(self, **values: Any) -> None:
+    def update(self, **values: Any) -> None:
         """Replace values by the part of them that is left for other readers."""
         self._values |= values
 
-    def but(self, **values: Any) -> Inputs:
+    def changed(self, **values: Any) -> Inputs:
         """Return these inputs with other values."""
-        return Inputs(self._values | values, self.idle)
+        return Inputs(self._values | values, self.unused)
 
     def note(self, *texts: str | None) -> None:
         """Report what is assumed of the input, unless --quiet; empty texts are skipped."""
         for text in () if self.quiet else filter(None, texts):
             say(text)
 
-    def refuse_idle(self, *names: str) -> None:
+    def refuse_unused(self, *names: str) -> None:
         """Raise a usage error for options, or some of them, that were passed but not used."""
-        if idle := [option.opts[-1] for name, option in self.idle.items() if not names or name in names]:
-            raise click.UsageError(f"{', '.join(idle)} {'has' if len(idle) == 1 else 'have'} no effect here")
+        if unused := [option.opts[-1] for name, option in self.unused.items() if not names or name in names]:
+            raise click.UsageError(f"{', '.join(unused)} {'has' if len(unused) == 1 else 'have'} no effect here")
 
 
 class Option(click.Option):
@@ -131,13 +131,13 @@ def misuse(where: str = "") -> Iterator[None]:
         raise click.UsageError(f"{where}{error}") from None
 
 
-def asking(inputs: Inputs, kind: type[Record], options: Mapping[str, Sequence[str]]) -> type[Record]:
+def marking_use(inputs: Inputs, kind: type[Record], options: Mapping[str, Sequence[str]]) -> type[Record]:
     """Return a subclass of a record type; reading a field that is not empty marks its options as used."""
 
     def look_at(record: Record, name: str) -> Any:
         value = kind.__getattribute__(record, name)
         if value and name in options:
-            inputs.ask(*options[name])
+            inputs.use(*options[name])
         return value
 
     return type(kind.__name__, (kind,), {"__getattribute__": look_at, "__slots__": ()})
@@ -397,7 +397,7 @@ class Command(WithHelp):
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; all options that were passed must be used before something is written."""
         passed: Inputs = ctx.meta[INPUTS]
-        CHECKS.append(passed.refuse_idle)
+        CHECKS.append(passed.refuse_unused)
         try:
             result = ctx.invoke(self.callback or (lambda _: 0), passed)
         except FormatError as error:
@@ -407,7 +407,7 @@ class Command(WithHelp):
             raise
         finally:
             CHECKS.pop()
-        passed.refuse_idle()
+        passed.refuse_unused()
         return result
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -134,7 +134,7 @@ class Output:
         self.style = self.style._replace(axes=axes, in_camera=operation is not None and operation.looks_back)
         row = table.FORMATS.get(self.style.format)
         if self.style.axes and row and row.rows.axes:
-            self._inputs.ask("camera_axes")
+            self._inputs.use("camera_axes")
 
     def take_axes_in(self, tree: Frames, source: str) -> None:
         """Set the camera axes of a frame of a tree; if the tree has no cameras, --camera-axes applies to this frame."""
@@ -171,7 +171,7 @@ class Output:
             text_module = "frametool.view.text" if is_plain else table.FORMATS["yaml"].writer
             text, others = self._module(text_module).write_points(mappings, self.style), {*chain.from_iterable(placed)}
         else:
-            keys = {key for each in poses for key in each.said(self.style)}
+            keys = {key for each in poses for key in each.all_extras(self.style)}
             if len(poses) > 1 or "covariance" in keys:
                 self._shorten()
             if "scale" in keys:
@@ -189,7 +189,7 @@ class Output:
         if self.style.screen and not self.style.notations:
             self.style = self.style._replace(notations=(notation("quaternion"), notation("rpy_deg")))
 
-    def poses_as_they_come(self, results: Iterator[Result]) -> None:
+    def stream_poses(self, results: Iterator[Result]) -> None:
         """Write poses that have the same keys, in batches."""
         self._shorten()
         self._refuse_places()
@@ -221,7 +221,7 @@ class Output:
         if self.style.format in ("csv", "json", "yaml"):
             return CsvTable(self.style) if self.style.format == "csv" else Documents(self.style)
         if not self._in_blocks:
-            return AllTogether(self)
+            return CollectingWriter(self)
         from frametool.stream.as_poses import Blocks
 
         return Blocks(self.style)
@@ -281,7 +281,7 @@ class Output:
     def pieces(self, pieces: Iterable[str | bytes]) -> None:
         """Write pieces of text as they arrive; a file is written atomically."""
         if not table.holds(self.style.format, "arrays", "recording"):
-            self._inputs.ask("precision")
+            self._inputs.use("precision")
         with self.opened() as write:
             for piece in pieces:
                 write(self.shown(piece) if isinstance(piece, str) else piece)
@@ -317,7 +317,7 @@ class Output:
         self.pieces([text])
 
 
-class AllTogether:
+class CollectingWriter:
     """Collect results for formats that need all of them at once."""
 
     def __init__(self, output: Output) -> None:

@@ -136,12 +136,12 @@ def _inverses(source: Source, request: Request) -> Source:
     from frametool.stream.request import Operation, Request, RowOptions
 
     own = request.operation
-    asked = Request(
+    inverses = Request(
         Operation(similar=own.similar, multiples=own.multiples), earth=request.earth,
         rows=RowOptions(kind="pose", degrees=request.rows.degrees, normalize=request.rows.normalize),
     ).of_inverses()  # fmt: skip
     style = Style("json", (notation("quaternion"),), keep_sign=True)
-    found: Iterable[Any] = results(source, asked, style)
+    found: Iterable[Any] = results(source, inverses, style)
     return Pasted(source.name, "\n".join(dump_json(each.mapping(style)) for each in found))
 
 
@@ -249,11 +249,11 @@ def _read_argument(argument: str | Source, request: Request) -> ArgumentPoses:
     from frametool.stream.record_values import read_given
     from frametool.stream.request import COMBINED
 
-    asked = request.operation
-    request = request._replace(operation=COMBINED._replace(similar=asked.similar, multiples=asked.multiples))
+    own = request.operation
+    request = request._replace(operation=COMBINED._replace(similar=own.similar, multiples=own.multiples))
     warnings: list[tuple[Any, ...]] = []
-    with heard_by(lambda *said: warnings.append(said)):
-        read = read_with(argument, request, lambda *asked: [ArgumentPoses(asked[0], *read_given(*asked), warnings)])
+    with heard_by(lambda *warning: warnings.append(warning)):
+        read = read_with(argument, request, lambda *text: [ArgumentPoses(text[0], *read_given(*text), warnings)])
         found: ArgumentPoses = next(read)
     return found
 

@@ -121,13 +121,13 @@ def show(text: str, *, paged: bool) -> None:
     """Write a help text to standard output; on a terminal with styles, and paged if longer than the screen."""
     from shutil import get_terminal_size
 
-    is_seen = sys.stdout.isatty() and os.environ.get("TERM") != "dumb"
-    if is_seen and paged and text.count("\n") >= get_terminal_size().lines:
+    on_terminal = sys.stdout.isatty() and os.environ.get("TERM") != "dumb"
+    if on_terminal and paged and text.count("\n") >= get_terminal_size().lines:
         check()
         click.echo_via_pager(in_colour(text, HELP_MARKS).removesuffix("\n"))
         return
     with writing(None) as write:
-        write(in_colour(text, HELP_MARKS) if is_seen else text)
+        write(in_colour(text, HELP_MARKS) if on_terminal else text)
 
 
 def check() -> None:
@@ -233,7 +233,7 @@ def _remove(part: str) -> None:
         os.unlink(part)
 
 
-PLACES: list[dict[str, Any]] = []  # source and line of a batch; all messages begin with the last one
+LOCATIONS: list[dict[str, Any]] = []  # source and line of a batch; all messages begin with the last one
 
 
 def tell(text: str) -> None:
@@ -248,7 +248,7 @@ def tell(text: str) -> None:
 
 def say(text: str) -> None:
     """Write a message to stderr after the program's name, wrapped on a terminal."""
-    where = "{source}:{line}: ".format(**PLACES[-1]) if PLACES else ""
+    where = "{source}:{line}: ".format(**LOCATIONS[-1]) if LOCATIONS else ""
     text = printable(f"frametool: {where}{text}")
     tell(folded(text) if sys.stderr is not None and sys.stderr.isatty() else text)
 
@@ -290,10 +290,10 @@ def say_error(error: FrametoolError, *, in_json: bool = False, fate: str = "") -
         from frametool.documents.writers import dump_json
 
         message, details = str(error), dict(error.details())
-        if PLACES:
+        if LOCATIONS:
             own = {key: details.pop(key) for key in ("source", "line", "column") if key in details}
-            message = f"{'{source}:{line}: '.format(**PLACES[-1])}{message}"
-            details = {**PLACES[-1], **({"input": own} if own else {}), **details}
+            message = f"{'{source}:{line}: '.format(**LOCATIONS[-1])}{message}"
+            details = {**LOCATIONS[-1], **({"input": own} if own else {}), **details}
         tell(dump_json({"error": error.kind, "message": f"{message}{fate}", **details}))
         return
     say(f"{error}{getattr(error, 'remedy', '')}{fate}")

@@ -108,7 +108,7 @@ class Task:
     def opened(self) -> BufferedReader:
         """Open the input once, because a pipe cannot be read twice; raises FileProblem."""
         if self._opened is None:
-            self.inputs.ask("input_path")
+            self.inputs.use("input_path")
             name = "-" if self.path is None else self.path
             say_if_typed(name)
             self._opened = self.messages() or opened(name)
@@ -137,7 +137,7 @@ class Task:
 
             self._opened = open_records(self.path, self.inputs.topics, Diagnostics())
             self.within = "json"
-            self.inputs.leave(topics=())
+            self.inputs.update(topics=())
         return self._opened
 
     def read_clouds_as_rows(self) -> None:
@@ -206,7 +206,7 @@ class Task:
         """
         from frametool.formats.detect import with_hint
 
-        self.inputs.ask("input_path", "on_error", "max_errors")
+        self.inputs.use("input_path", "on_error", "max_errors")
         with self.opened() as source:
             head = source.peek()
             try:
@@ -228,7 +228,7 @@ class Task:
         if may_be_pasted and not (fmt or is_table):
             pasted, stream = pasted_stream(stream, self.name, request, self.notation, self.place)
             if pasted is not None:
-                self.inputs.ask("from_rep")
+                self.inputs.use("from_rep")
                 if rows is None:
                     output.values(values_of([pasted], request, output))
                 else:
@@ -297,8 +297,8 @@ class Task:
         listed = holds(fmt, "arrays") or (is_trajectory(fmt) and not FORMATS[fmt].is_table)
         is_kindred = chosen == "csv" and fmt in ("tsv", "semicolon")
         # a trajectory cannot hold more columns, or other ones
-        asked = output.notations or output.style.place
-        no_room = output.is_trajectory and bool(asked or request.operation.extras(Shape(POSE)))
+        is_rewritten = output.notations or output.style.place
+        no_room = output.is_trajectory and bool(is_rewritten or request.operation.extras(Shape(POSE)))
         turns = output.style.axes and not output.notations and is_turned(output.style.changed(format=chosen or fmt))
         converts = not (is_kindred or fmt in RECORDS) and (chosen not in (None, fmt) or no_room or turns)
         if listed or converts:
@@ -349,8 +349,8 @@ class Task:
         from frametool.stream.column_stream import OtherColumns, run_columns
 
         output = self.output
-        is_seen = output.path is None and sys.stdout.isatty()
-        refuse(is_seen, f"{fmt} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
+        on_terminal = output.path is None and sys.stdout.isatty()
+        refuse(on_terminal, f"{fmt} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
         columns = open_columns(InputFile(self.path or "-", stream), fmt)
         style = output.style.changed(format=output.chosen or fmt)
         request = request.with_results(by_default=not output.notations)
@@ -373,47 +373,47 @@ class Task:
         if (is_table or request.operation.only_adds) and alone:
             request = request.with_results(prefix=inputs.prefix or "")
         if request.rows.poses:
-            inputs.ask("from_rep", *FORMATS[fmt].required_options)
+            inputs.use("from_rep", *FORMATS[fmt].required_options)
             request = request.with_rows(columns=inputs.columns)
         several = not is_table and "," in ",".join(request.rows.columns)
         refuse(several, "--columns names one key of records, as detections.pose")
         if not holds(output.chosen or fmt, "arrays", "recording"):
-            inputs.ask("precision")
+            inputs.use("precision")
         place = output.style.changed(format=output.chosen or fmt).place
         on_error = SKIP if inputs.on_error == NULL and not alone else inputs.on_error  # no empty rows to collect
         return request._replace(on_error=on_error).with_results(place=place)
 
-    def request(self, *, notations: tuple[Any, ...] = (), **asked: Any) -> Request:
+    def request(self, *, notations: tuple[Any, ...] = (), **fields: Any) -> Request:
         """Return the request for rows and records by the options.
 
-        asked: further fields of Request and RowOptions
+        fields: further fields of Request and RowOptions
         """
         from frametool.stream.request import Request, ResultOptions, RowOptions
 
         inputs, style = self.inputs, self.output.style
         if self.window:
-            inputs.ask("start", "stop")
-            asked["extra_column"] = asked.get("extra_column") or ""
+            inputs.use("start", "stop")
+            fields["extra_column"] = fields.get("extra_column") or ""
         for name in ("values", "poses", "pose", "a", "b"):
-            said = inputs.peek(name) or ()
-            for text in [said] if isinstance(said, str) else said:
+            value = inputs.peek(name) or ()
+            for text in [value] if isinstance(value, str) else value:
                 bare = without_inverse(text)[0].strip()
                 if not (bare.startswith("{") and ":" in bare):  # not a mapping, whose keys name the representation
-                    inputs.ask("from_rep")
-        if says_earth := bool(style.place or self.place or any(map(inputs.peek, options.OF_EARTH))):
+                    inputs.use("from_rep")
+        if is_on_earth := bool(style.place or self.place or any(map(inputs.peek, options.OF_EARTH))):
             from frametool.cli.earth import earth
 
-            asked["earth"] = earth(inputs)
-        asked = {
+            fields["earth"] = earth(inputs)
+        fields = {
             "given": self.notation, "given_place": self.place, "degrees": style.degrees, "normalize": self.normalize,
-            "offset_ns": 0 if inputs.reads_trees else inputs.time_offset or 0, "window": self.window, **asked,
+            "offset_ns": 0 if inputs.reads_trees else inputs.time_offset or 0, "window": self.window, **fields,
         }  # fmt: skip
-        rows = RowOptions(**{name: asked.pop(name) for name in RowOptions._fields if name in asked})
+        rows = RowOptions(**{name: fields.pop(name) for name in RowOptions._fields if name in fields})
         results = ResultOptions(
-            notations or self.output.notations, says_earth and not self.output.notations, place=style.place,
+            notations or self.output.notations, is_on_earth and not self.output.notations, place=style.place,
             precision=style.precision, keep_sign=style.keep_sign,
         )  # fmt: skip
-        made = Request(rows=rows, results=results, **asked)
+        made = Request(rows=rows, results=results, **fields)
         self.output.take_axes("", made.operation)
         return made
 
@@ -421,7 +421,7 @@ class Task:
         """Mark --in as used if one of the arguments is a file; raise a usage error if -i is set too."""
         refuse(self.path is not None, "-i FILE and arguments are two inputs; give one")
         if any(isinstance(each, str) and os.path.exists(each) for each in arguments):
-            self.inputs.ask("input_formats")
+            self.inputs.use("input_formats")
 
     def streamed(self, arguments: Sequence[str], request: Request) -> Request | None:
         """Return the request for the stream if the only argument is `-`, a table, or their inverse; else None."""

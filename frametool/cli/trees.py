@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import Inputs, Text, asking, refuse, refuse_two_readers, say_if_typed
+from frametool.cli.command import Inputs, Text, marking_use, refuse, refuse_two_readers, say_if_typed
 from frametool.cli.options import input_formats, tree_on_the_line
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.sink import say
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import Frames
 
 # field of Answers -> its parameters; whether the others have an effect depends on formats and moving frames
-ASKED_OUTSIDE = ("time_offset", "frames", "camera_axes")
-ANSWERED: dict[str, tuple[str, ...]] = {name: (name,) for name in Answers._fields if name not in ASKED_OUTSIDE}
-ANSWERED["order"] = "order", "from_rep"
+USED_ELSEWHERE = ("time_offset", "frames", "camera_axes")
+ANSWER_OPTIONS: dict[str, tuple[str, ...]] = {name: (name,) for name in Answers._fields if name not in USED_ELSEWHERE}
+ANSWER_OPTIONS["order"] = "order", "from_rep"
 OF_FILES = (*Answers._fields, "named_frames", "from_rep", "input_formats", "topics", "quiet", "verbose")
 
 
@@ -73,16 +73,16 @@ def _load(
     """
     from frametool.formats.load import load_sources
 
-    idle = {*inputs.idle}
+    before = {*inputs.unused}
 
     def read() -> tuple[tuple[Frames, dict[str, EdgePlace]], set[str]]:
         files = opened(inputs, arguments, **how)
         places: dict[str, EdgePlace] = {}
         tree = load_sources(files, rules, places if placed else None)
         if tree.moves:
-            inputs.ask("time_offset")
+            inputs.use("time_offset")
         state(inputs, files)
-        return (tree, places), idle - inputs.idle.keys()
+        return (tree, places), before - inputs.unused.keys()
 
     context = click.get_current_context(silent=True)
     cache = None if context is None else context.find_object(ReadCache)
@@ -92,8 +92,8 @@ def _load(
     named = [each if is_inline(each) else tree_file(each) for each in arguments]
     key = tuple(named), f"{rules!r} {how} {[inputs.peek(name) for name in OF_FILES]}"
     paths = [each for each in named if not is_inline(each) and os.path.exists(each)]
-    found, asked = cache.read(key, paths, sum(map(len, {*named} - {*paths})), read)
-    inputs.ask(*asked)
+    found, used = cache.read(key, paths, sum(map(len, {*named} - {*paths})), read)
+    inputs.use(*used)
     return found
 
 
@@ -111,7 +111,7 @@ def state(inputs: Inputs, files: Sequence[FrameFile]) -> None:
     """
     for file in files:
         if file.topics.counts or file.topics.seen:
-            inputs.ask("topics")
+            inputs.use("topics")
         if inputs.verbose:
             say(f"{file.name}: {FORMATS[file.format].summary}")
         inputs.note(file.tally.assumed and f"{file.name}: {file.tally.assumed}")
@@ -154,7 +154,7 @@ def opened(
     lacking = []
     for file in found:
         lacking += [file] * ("frames" in file.required_options)
-        inputs.ask(*{"camera_axes"}.intersection(file.required_options))
+        inputs.use(*{"camera_axes"}.intersection(file.required_options))
     if len(named) not in (0, 1, len(lacking), files):
         for file in found:
             file.close()
@@ -163,7 +163,7 @@ def opened(
         lacking = [file for file in lacking if "rows" in FORMATS[file.format].reads] or lacking
     for file, names in zip(found if len(named) == files else lacking, named[behind:] or named, strict=False):
         file.answers = file.answers._replace(frames=names)
-    inputs.ask(*["named_frames"] * bool(lacking))
+    inputs.use(*["named_frames"] * bool(lacking))
     return found
 
 
@@ -182,7 +182,7 @@ def answers(inputs: Inputs) -> Answers:
     for name in Answers._fields:
         if name not in ("joints", "frames") and (value := inputs.peek(name)):
             named[name] = value
-    return asking(inputs, Answers, ANSWERED)(**named)
+    return marking_use(inputs, Answers, ANSWER_OPTIONS)(**named)
 
 
 def tree_file(argument: str) -> str:

@@ -319,14 +319,14 @@ def _kitti(file: InputFile) -> Found:
     rect = "_rect" if any(name in numbers for name in RECTIFICATIONS) else ""
     for at, camera in enumerate(CAMERAS):
         raw = ("K", "K"), ("D", "D"), ("size", "S"), ("R", "R_rect"), ("P", "P_rect")
-        said = {key: each for key, line in raw if (each := numbers.get(f"{line}_0{at}"))}
-        if "K" in said:
-            yield kitti_name(camera, options), {"model": "plumb_bob", **said}
+        stated = {key: each for key, line in raw if (each := numbers.get(f"{line}_0{at}"))}
+        if "K" in stated:
+            yield kitti_name(camera, options), {"model": "plumb_bob", **stated}
         more = {"size": each} if (each := numbers.get(f"S_rect_0{at}")) else {}
-        for name, p in ((f"{camera}{rect}", numbers.get(f"P{at}")), (f"{camera}_rect", said.get("P"))):
+        for name, p in ((f"{camera}{rect}", numbers.get(f"P{at}")), (f"{camera}_rect", stated.get("P"))):
             fields: dict[str, Any] = {"model": "pinhole", "K": p and [p[0:3], p[4:7], p[8:11]], "P": p, **more}
-            if p and "R" in said and (t := numbers.get(f"T_0{at}")):  # the part of P beyond the pose of the frame
-                turn, centre = said["R"], Camera(**fields).rectified(from_first=True).fields["shift"]
+            if p and "R" in stated and (t := numbers.get(f"T_0{at}")):  # the part of P beyond the pose of the frame
+                turn, centre = stated["R"], Camera(**fields).rectified(from_first=True).fields["shift"]
                 fields["shift"] = [c - sum(turn[3 * i + k] * t[k] for k in range(3)) for i, c in enumerate(centre)]
             if p:
                 yield kitti_name(name, options), fields

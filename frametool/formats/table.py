@@ -476,12 +476,12 @@ def example_of(name: str, width: int) -> list[str]:
 
     for module in filter(None, (FORMATS[name].reader, FORMATS[name].writer)):
         formats = {other for other, row in FORMATS.items() if module in (row.reader, row.writer)}
-        said, lines = formats if len(formats) == 1 else set[str](), list[str]()
+        named, lines = formats if len(formats) == 1 else set[str](), list[str]()
         for line in (import_module(module).__doc__ or "").split("\n"):
             if line.startswith("    "):
-                lines += [line[4:]] * (name in said)
+                lines += [line[4:]] * (name in named)
             elif line:
-                said = formats.intersection(re.findall(r"[\w-]+", line.lower())) or said
+                named = formats.intersection(re.findall(r"[\w-]+", line.lower())) or named
         if lines:
             return [line if len(line) <= width else f"{line[: width - 3].rstrip()} .." for line in lines]
     return []

@@ -70,7 +70,7 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
     spots = _spots(own, reading)
     if not spots:
         raise Misfit(_incomplete(own), (next(iter(own)),), key=True)
-    said, axes = AXES_KEY in mapping, take_axes(mapping, reading, spots[0].place.name)
+    states_axes, axes = AXES_KEY in mapping, take_axes(mapping, reading, spots[0].place.name)
     check_parent(mapping, own)
     if "inverse" in mapping:
         raise Misfit("a position on the Earth is in ecef; remove inverse", ("inverse",), key=True)
@@ -80,7 +80,7 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
     position = spots[0].ecef
     if AT not in own and inner.position is not None:
         _agree(position, inner.position)
-        if not said:  # also stated in ecef: then the rotation is relative to it
+        if not states_axes:  # also stated in ecef: then the rotation is relative to it
             return inner._replace(parent=inner.parent or ECEF)
         inner = inner._replace(position=None)
     rotation = turn or inner.rotation
@@ -358,19 +358,19 @@ def overview(pose: Pose) -> list[tuple[str, str]]:
     lat, lon, alt = wgs84.lla(x, y, z, floats)
     if not isfinite(alt):
         return []
-    said = [("lat lon alt", f"{round(lat, 9) + 0.0:.9f} {round(lon, 9) + 0.0:.9f} deg  {round(alt, 4) + 0.0:.4f} m")]
+    lines = [("lat lon alt", f"{round(lat, 9) + 0.0:.9f} {round(lon, 9) + 0.0:.9f} deg  {round(alt, 4) + 0.0:.4f} m")]
     if SOUTH <= lat <= NORTH:
         zone = standard_zone(lat, lon, floats)
         easting, northing, convergence, _ = utm(zone, lat, lon, floats)
         grid = f"{ZONES[int(zone)]} {easting:.4f} {northing:.4f} m  convergence {round(convergence, 6) + 0.0:.6f} deg"
-        said.append(("utm", grid))
+        lines.append(("utm", grid))
     if pose.rotation is not None:
         qx, qy, qz, qw = Place(LLA, POSITIONS[LLA].names, ENU).local(x, y, z, pose.rotation)
         east, north, _ = quaternion.rotate(qx, qy, qz, qw, 1.0, 0.0, 0.0)
         level = hypot(east, north)
         heading = round(floats.bearing(east, north, level, floats) * floats.RADIAN, 6) % 360.0 if level > LEVEL else 0.0
-        said.append(("heading", f"x {heading:.6f} deg from true north" if level > LEVEL else "none: x is upright"))
-    return said
+        lines.append(("heading", f"x {heading:.6f} deg from true north" if level > LEVEL else "none: x is upright"))
+    return lines
 
 
 def frame_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:

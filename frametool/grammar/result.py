@@ -99,7 +99,7 @@ class Result(NamedTuple):
         pose = self.pose
         entry: dict[str, Any] = {"name": pose.name} if pose.name else {}
         entry |= {"parent": pose.parent} if pose.parent else {}
-        extras = self.said(style)
+        extras = self.all_extras(style)
         if style.place is not None:
             from frametool.grammar.place import placed_entry
 
@@ -122,7 +122,7 @@ class Result(NamedTuple):
                 extras = {"gimbal_lock": True} | extras
         return entry | extras
 
-    def said(self, style: Style) -> dict[str, Any]:
+    def all_extras(self, style: Style) -> dict[str, Any]:
         """Return the extras of a pose, and its scale unless the only matrix that is written contains it."""
         extras = with_entries(self.extras) if self.extras else {}
         return extras if self.pose.scale == 1.0 or holds_scale(style.notations) else {SCALE: self.pose.scale} | extras

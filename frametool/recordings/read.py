@@ -49,7 +49,7 @@ class Channel:
     topic, type: as ROS 2 writes them, `/pose` and `geometry_msgs/msg/PoseStamped`
     encoding: of its messages, `cdr`, `ros1`, or another
     schema: name, encoding and text of the definition of its type, as in MCAP, if there is one
-    said: further metadata: quality of service in ROS 2, callerid and latching in ROS 1
+    metadata: quality of service in ROS 2, callerid and latching in ROS 1
     digest: the hash of the type
     """
 
@@ -57,7 +57,7 @@ class Channel:
     type: str
     encoding: str = CDR
     schema: tuple[str, str, bytes] | None = None
-    said: dict[str, str] = field(default_factory=dict)
+    metadata: dict[str, str] = field(default_factory=dict)
     digest: str = ""
 
     @property
@@ -91,14 +91,14 @@ class McapFile:
         self.channels: dict[int, Channel] = {}
         reader = SeekingReader(self.stream)
         self.head, summary = reader.get_header(), reader.get_summary()
-        said, chunks = (summary.statistics, summary.chunk_indexes) if summary else (None, [])
-        if said is None:
+        statistics, chunks = (summary.statistics, summary.chunk_indexes) if summary else (None, [])
+        if statistics is None:
             tally.note(NO_SUMMARY.format(path.name), 1)
-        self.said, self.total = said, said.message_count if said else None
-        self.stated = (said.channel_message_counts if said else None) or None  # an empty map states nothing
-        self._chunks = chunks if said and said.chunk_count == len(chunks) else []
+        self.statistics, self.total = statistics, statistics.message_count if statistics else None
+        self.stated = (statistics.channel_message_counts if statistics else None) or None  # an empty map states nothing
+        self._chunks = chunks if statistics and statistics.chunk_count == len(chunks) else []
         self.compression = self._chunks[0].compression if self._chunks else ""
-        if summary and said and said.channel_count == len(summary.channels):
+        if summary and statistics and statistics.channel_count == len(summary.channels):
             self._register(*summary.schemas.values(), *summary.channels.values())
         else:
             for _ in self.found(set()):
@@ -108,7 +108,7 @@ class McapFile:
         """Yield its attachments and metadata, as records of mcap."""
         from mcap.records import Attachment, Metadata
 
-        if self.said is None or self.said.attachment_count or self.said.metadata_count:
+        if self.statistics is None or self.statistics.attachment_count or self.statistics.metadata_count:
             yield from (each for each in self._all() if isinstance(each, Attachment | Metadata))
 
     def _all(self) -> Iterator[Any]:
@@ -228,11 +228,11 @@ class DatabaseFile:
 
         self.database = connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)
         opened.callback(self.database.close)
-        ((said,),) = self.database.execute("PRAGMA quick_check(1)").fetchall()
-        ((lost,),) = self.database.execute(LOST).fetchall() if said == "ok" else [[0]]
-        if said != "ok" or lost:
-            said = f"{lost} messages belong to no topic" if lost else " ".join(said.split())[:100]
-            raise FormatError(f"the bag is damaged: {said}", source=str(path))
+        ((answer,),) = self.database.execute("PRAGMA quick_check(1)").fetchall()
+        ((lost,),) = self.database.execute(LOST).fetchall() if answer == "ok" else [[0]]
+        if answer != "ok" or lost:
+            problem = f"{lost} messages belong to no topic" if lost else " ".join(answer.split())[:100]
+            raise FormatError(f"the bag is damaged: {problem}", source=str(path))
         rows = self.database.cursor()
         rows.row_factory = Row
         has = "SELECT 1 FROM sqlite_master WHERE name = 'message_definitions'"
@@ -241,9 +241,9 @@ class DatabaseFile:
         self.channels = {}
         for topic in map(dict, rows.execute("SELECT * FROM topics ORDER BY id").fetchall()):
             kind, digest = topic["type"], topic.get("type_description_hash") or ""
-            said = {QOS: topic.get(QOS) or ""} | ({HASH: digest} if digest else {})
+            metadata = {QOS: topic.get(QOS) or ""} | ({HASH: digest} if digest else {})
             schema = (kind, defined[kind][0], defined[kind][1].encode()) if kind in defined else None
-            made = Channel(topic["name"], kind, topic["serialization_format"], schema, said, digest)
+            made = Channel(topic["name"], kind, topic["serialization_format"], schema, metadata, digest)
             self.channels[topic["id"]] = made
 
     def found(self, numbers: set[int]) -> Iterator[list[Recorded]]:
@@ -256,7 +256,7 @@ class DatabaseFile:
 
 
 class Bag1File:
-    """A ROS 1 bag; chunks are read whole, so that the index of their messages is not."""
+    """A ROS 1 bag; chunks are read whole, without the index of their messages."""
 
     head, compression, others = None, "", tuple  # there are no others
 
@@ -271,7 +271,7 @@ class Bag1File:
         self.reader: Any = opened.enter_context(Unindexed(path))
         self.channels = {}
         for each in self.reader.connections:
-            about = {name: str(said) for name, said in each.ext._asdict().items() if said is not None}
+            about = {name: str(value) for name, value in each.ext._asdict().items() if value is not None}
             schema = each.msgtype, "ros1msg", each.msgdef.data.encode()
             self.channels[each.id] = Channel(each.topic, each.msgtype, "ros1", schema, about, each.digest)
         self.stated = sum((Counter(each.connection_counts) for each in self.reader.chunk_infos), Counter[int]())
@@ -397,7 +397,7 @@ class RecordingReader:
         known: dict[tuple[Any, ...], Channel] = {}
         for each in self.files:
             for number, one in each.channels.items():
-                key = one.topic, one.type, one.encoding, one.schema, *one.said.items()
+                key = one.topic, one.type, one.encoding, one.schema, *one.metadata.items()
                 each.channels[number] = known.setdefault(key, one)
         topics = self.metadata.get("topics_with_message_count") or ()
         self._topics = [{**each["topic_metadata"], "count": each["message_count"]} for each in topics]
@@ -493,5 +493,5 @@ def broken(path: str) -> Iterator[None]:
     except (FrametoolError, BrokenPipeError):
         raise
     except Exception as error:  # noqa: BLE001 - see above
-        said = f"{type(error).__name__}: {error}"[:100].replace("\n", " ")
-        raise FormatError(f"the bag cannot be read; is it whole, and its suffix right? ({said})", source=path) from None
+        why = f"{type(error).__name__}: {error}"[:100].replace("\n", " ")
+        raise FormatError(f"the bag cannot be read; is it whole, and its suffix right? ({why})", source=path) from None

@@ -191,17 +191,17 @@ class RecordingFile:
         for each in channels:
             if each in self.counts:
                 continue
-            said, schema = each.said, each.schema
+            known, schema = each.metadata, each.schema
             if self.format == BAG1:
                 number = self._writer.add_connection(
                     each.topic, each.type, msgdef=schema[2].decode() if schema else "", md5sum=each.digest or "*",
-                    callerid=said.get("callerid"), latching=int(said["latching"]) if said.get("latching") else None,
+                    callerid=known.get("callerid"), latching=int(known["latching"]) if known.get("latching") else None,
                 )  # fmt: skip
             else:
                 if schema and schema not in self._numbers:
                     self._numbers[schema] = self._writer.register_schema(*schema)
                 of_schema = self._numbers[schema] if schema else 0
-                number = self._writer.register_channel(each.topic, each.encoding, of_schema, said)
+                number = self._writer.register_channel(each.topic, each.encoding, of_schema, known)
             self.counts[each], self._numbers[each] = 0, number
 
     def write(self, messages: Iterable[tuple[Channel, int, bytes]]) -> None:
@@ -264,10 +264,10 @@ class RecordingFile:
         from rosbags.rosbag2.metadata import dump_qos_v9, parse_qos
 
         first, last = self.span or (0, 0)
-        by_numbers = any(BY_NUMBERS.search(each.said.get(QOS, "")) for each in self.counts)
+        by_numbers = any(BY_NUMBERS.search(each.metadata.get(QOS, "")) for each in self.counts)
         topics: dict[tuple[str, ...], dict[str, Any]] = {}
         for each, count in self.counts.items():
-            qos: Any = each.said.get(QOS, "")
+            qos: Any = each.metadata.get(QOS, "")
             if not by_numbers:
                 with suppress(Exception):  # metadata that cannot be parsed are unchanged
                     qos = dump_qos_v9(parse_qos(qos or []))
@@ -329,8 +329,8 @@ def room_in(folder: str) -> Iterator[None]:
     except FrametoolError:
         raise
     except OSError as error:
-        said = (error.strerror or str(error)).lower()
-        raise FileProblem(f"{printable(folder or gettempdir())}: {said}") from None
+        problem = (error.strerror or str(error)).lower()
+        raise FileProblem(f"{printable(folder or gettempdir())}: {problem}") from None
 
 
 def new_channel(kind: Kind, topic: str, *, ros1: bool, like: Iterable[Channel] = ()) -> Channel:
@@ -338,9 +338,9 @@ def new_channel(kind: Kind, topic: str, *, ros1: bool, like: Iterable[Channel] =
     store, same = typestore(ros1=ros1), next((each for each in like if each.type == kind.type), None)
     definition, digest = store.generate_msgdef(kind.type, ros_version=2 - ros1)
     schema: Any = kind.type, f"ros{2 - ros1}msg", definition.encode()
-    said = {"latching": str(int(kind.latched))}
+    metadata = {"latching": str(int(kind.latched))}
     if not ros1:
-        said, digest = {QOS: ""}, store.hash_rihs01(kind.type)
+        metadata, digest = {QOS: ""}, store.hash_rihs01(kind.type)
     if kind.latched and not ros1:  # quality of service of a latched topic: transient local
         from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
         from rosbags.rosbag2.metadata import dump_qos_v8, dump_qos_v9
@@ -348,8 +348,8 @@ def new_channel(kind: Kind, topic: str, *, ros1: bool, like: Iterable[Channel] =
         for_ever = QosTime(9223372036, 854775807)
         made = Qos(QosHistory.KEEP_LAST, 1, QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL, for_ever, for_ever,
                    QosLiveliness.AUTOMATIC, for_ever, avoid_ros_namespace_conventions=False)  # fmt: skip
-        by_numbers = any(BY_NUMBERS.search(each.said.get(QOS, "")) for each in like)
-        said[QOS] = str(dump_qos_v8([made])) if by_numbers else dump_yaml(dump_qos_v9([made]))
+        by_numbers = any(BY_NUMBERS.search(each.metadata.get(QOS, "")) for each in like)
+        metadata[QOS] = str(dump_qos_v8([made])) if by_numbers else dump_yaml(dump_qos_v9([made]))
     if same:
         schema, digest = same.schema, same.digest
-    return Channel(topic, kind.type, "ros1" if ros1 else read.CDR, schema, said, digest)
+    return Channel(topic, kind.type, "ros1" if ros1 else read.CDR, schema, metadata, digest)

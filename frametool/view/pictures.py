@@ -451,8 +451,8 @@ class Overlay:
             colour = shade_of(1.0 - at / (SHADES - 1))
             shapes.append(box(left + at * part, top, 1.05 * part, 0.015 * wide, colour))
         for share, unit in ((0.0, ""), (0.5, ""), (1.0, " m")):
-            x, said = left + share * SHADES * part, f"{near + share * (far - near):.3g}{unit}"
-            shapes.append(words(x, top - 0.018 * wide, said, "#ffffff", "middle", 0.022 * wide, halo="#000000"))
+            x, text = left + share * SHADES * part, f"{near + share * (far - near):.3g}{unit}"
+            shapes.append(words(x, top - 0.018 * wide, text, "#ffffff", "middle", 0.022 * wide, halo="#000000"))
         return write_picture(Picture(wide, high, shapes, "overlay", CORNER, 3), self.suffix)
 
     def summary(self) -> str:

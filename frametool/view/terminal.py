@@ -132,8 +132,8 @@ def _at_edge(flat: Projection, name: str) -> Iterator[Label]:
     across, down = x - half_wide, y - half_high
     arrow = ARROWS[round(math.atan2(-down, across) / (math.pi / 4.0)) % 8]
     away = math.dist(flat.poses[name][:3], flat.centre)
-    said = f"{words_of([name])} {away:.0f} m" if away >= 10.0 else f"{words_of([name])} {away:.2g} m"
-    text = f"{said} {arrow}" if across > 0.0 else f"{arrow} {said}"
+    label = f"{words_of([name])} {away:.0f} m" if away >= 10.0 else f"{words_of([name])} {away:.2g} m"
+    text = f"{label} {arrow}" if across > 0.0 else f"{arrow} {label}"
     part = min(half_wide / max(abs(across), 1e-9), half_high / max(abs(down), 1e-9))
     length = flat.size.measure(text)
     left = half_wide + across * part - (length if across > 0.0 else 0.0)

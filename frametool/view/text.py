@@ -54,7 +54,7 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
         at = "" if record.get("stamp_ns") is None else f" at {format_stamp(record['stamp_ns'])}"
         kind, numbers = next(each for each in record.items() if isinstance(each[1], list))
         others = [
-            f"  sigma {' '.join(sigmas)}" if (sigmas := _sigmas(key, value)) else f"  {key} {_said(value)}"
+            f"  sigma {' '.join(sigmas)}" if (sigmas := _sigmas(key, value)) else f"  {key} {_extra_text(value)}"
             for key, value in record.items()
             if key not in (kind, "frame", "stamp_ns")
         ]
@@ -92,14 +92,14 @@ def _describe(result: Result, style: Style) -> str:
     if pose.parent in EARTH_FRAMES and not style.notations and style.place is None:
         lines += _earth_lines(pose)
     units = {"distance": "m", "angle": "rad", "linear": "m/s", "angular": "rad/s", "std": "m", "std_angle": "rad"}
-    for key, value in result.said(style).items():
+    for key, value in result.all_extras(style).items():
         if isinstance(value, float):
             unit = "deg" if key.endswith("_deg") else units.get(key) or units.get(key.partition("_")[0], "")
             lines.append((key.removesuffix("_deg"), [("", value)], unit))
         elif sigmas := _sigmas(key, value):
             lines.append(("sigma", [], " ".join(each.replace(" ", GLUE) for each in sigmas)))
         elif key not in TIMES and value is not None:
-            lines.append((key, [], _said(value)))
+            lines.append((key, [], _extra_text(value)))
     if style.place is not None and style.place.origin is not None:  # in the axes at the origin, not in ecef
         result = Result(result.pose._replace(parent=f"{style.place.name} at the origin"), result.extras)
     return _heading(result) + (_layout(lines, style) if lines else "  identity\n")
@@ -125,8 +125,8 @@ def _heading(result: Result) -> str:
     at, source_at, fixed = (result.extras.get(key) for key in TIMES)
     if pose.name is None or pose.parent is None:
         seen = f"a pose seen from {pose.parent}" if pose.parent else f"the pose of {pose.name}" if pose.name else ""
-        said = " ".join([seen or "a pose", f"at {format_stamp(at)}"] if at is not None else [seen])
-        return f"{printable(said)}\n" if said else ""
+        sentence = " ".join([seen or "a pose", f"at {format_stamp(at)}"] if at is not None else [seen])
+        return f"{printable(sentence)}\n" if sentence else ""
     name, parent = printable(pose.name), printable(pose.parent)
     source = name if source_at is None else f"{name} at {format_stamp(source_at)}"
     target = parent if at is None else f"{parent} at {format_stamp(at)}"
@@ -144,7 +144,7 @@ def _earth_lines(pose: Pose) -> Iterator[Line]:
     """Yield lines with the geodetic position and heading of a pose or point in ecef; none if it is not finite."""
     from frametool.grammar.place import overview
 
-    yield from ((label, [], said) for label, said in overview(pose))
+    yield from ((label, [], text) for label, text in overview(pose))
 
 
 def _sigmas(key: str, value: Any) -> list[str]:
@@ -185,7 +185,7 @@ def _two_digits(value: float, unit: str) -> str:
     return f"{value:.{decimals}f} {unit}"
 
 
-def _said(value: Any) -> str:
+def _extra_text(value: Any) -> str:
     """Return the text of an extra value."""
     return printable(dump_json(value) if isinstance(value, (dict, list)) else "" if value is None else str(value))
 

@@ -115,12 +115,12 @@ def test_each_option_has_an_effect_or_is_refused(run: Run, command: tuple[str, .
     assert ignored <= LEFT_OPEN
 
 
-def test_what_is_asked_of_inputs_is_a_parameter_of_a_command() -> None:
+def test_what_is_read_of_inputs_is_a_parameter_of_a_command() -> None:
     known = {each.name for command in every_command() for each in command.params}
-    asks = r"\b(?:inputs|said)\.(?:peek\(\"(\w+)|(\w+)\b(?!\())"
+    asks = r"\binputs\.(?:peek\(\"(\w+)|(\w+)\b(?!\())"
     texts = [path.read_text() for path in (ROOT / "frametool" / "cli").rglob("*.py")]
     asked = {name for text in texts for found in re.findall(asks, text) for name in found if name}
-    methods = {"reads_trees", "earth", "peek", "refuse_idle", "idle"}
+    methods = {"reads_trees", "earth", "peek", "refuse_unused", "unused"}
     assert {name for name in asked if not name.startswith("_")} - known - methods == set()
 
 

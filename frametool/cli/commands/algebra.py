@@ -156,16 +156,16 @@ def interpolate_command(inputs: Inputs) -> int:
     Fractions are numbers, or START:STOP:STEP; those outside 0 .. 1 extrapolate. The rotation takes the shorter arc.
     Unlike a screw motion, position and rotation are independent.
     """
-    task, asked = Task(inputs, "poses"), [each for some in inputs.fractions for each in some]
+    task, fractions = Task(inputs, "poses"), [each for some in inputs.fractions for each in some]
     if task.plan:
-        refuse(len(asked) != 1, f"--explain derives one fraction, found {len(asked)}")
-        return task.derive("interpolate", task.written(inputs.a), task.written(inputs.b), asked[0])
+        refuse(len(fractions) != 1, f"--explain derives one fraction, found {len(fractions)}")
+        return task.derive("interpolate", task.written(inputs.a), task.written(inputs.b), fractions[0])
     from frametool.grammar.pose_algebra import interpolated, shared_stamp
 
     pairs = poses.combinations((inputs.a, inputs.b), task.request())
     if any(pose.covariance for pair in pairs for pose in pair):
         warn(LEFT_OUT.format("interpolate"))
-    between = [interpolated(first, last, each) for first, last in pairs for each in asked]
+    between = [interpolated(first, last, each) for first, last in pairs for each in fractions]
     task.output.values([Result(pose, shared_stamp((pose,))) for pose in between])
     return 0
 

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from frametool.stream.written import ByTree
 
 
-PLACES: dict[str, Callable[[PointCloud], str]] = {
+PLACEHOLDERS: dict[str, Callable[[PointCloud], str]] = {
     "stamp_ns": lambda cloud: str(cloud.stamp_ns),
     "stamp": lambda cloud: format_stamp(cloud.stamp_ns),
     "number": lambda cloud: f"{cloud.number:06d}",
@@ -59,7 +59,7 @@ def bag_of_clouds(task: streaming.Task) -> Callable[[Way], int]:
     from frametool.stream.column_stream import moved_cloud
 
     inputs, output, path, chosen = task.inputs, task.output, task.name, task.inputs.topics
-    inputs.ask("input_path")
+    inputs.use("input_path")
     is_one = output.path in (None, "-") or not holds(output.chosen, "arrays")
     refuse(is_one, f"each cloud of a bag is a file: -o 'scan_{{stamp_ns}}.pcd'; {_WRITTEN}")
     tally, names = Diagnostics(), dict[str, int]()
@@ -68,10 +68,10 @@ def bag_of_clouds(task: streaming.Task) -> Callable[[Way], int]:
         topics = cloud_topics(reader, chosen)
         opened = opening.pop_all()
     clouds = {topic.strip("/") for topic in topics}
-    inputs.leave(topics=tuple(topic for topic in chosen if topic.strip("/") not in clouds))
+    inputs.update(topics=tuple(topic for topic in chosen if topic.strip("/") not in clouds))
 
     def write_one(cloud: PointCloud, pose: Components) -> int:
-        texts = {place: re.sub(r"[/\0]|^\.+", "_", text(cloud)) for place, text in PLACES.items()}  # stay in the folder
+        texts = {place: re.sub(r"[/\0]|^\.+", "_", text(cloud)) for place, text in PLACEHOLDERS.items()}  # no path
         name = re.sub(r"\{(\w+)\}", lambda found: texts.get(found[1], found[0]), str(output.path))
         if name in names:
             both = f"messages {names[name]} and {cloud.number} would both become {shown(name)}"
@@ -87,7 +87,7 @@ def bag_of_clouds(task: streaming.Task) -> Callable[[Way], int]:
 
     def move_all(way: Way) -> int:
         bad = task.policy(path, "message")
-        inputs.refuse_idle()
+        inputs.refuse_unused()
         count = points = 0
         once: Any = cache(say_warning)
         with opened, heard_by(once):
@@ -128,7 +128,7 @@ def several_clouds(task: streaming.Task) -> Callable[[Way], int]:
     passed, count = inputs.input_formats, len(paths)
     named = [fmt for fmt in passed if "arrays" in FORMATS[fmt].reads]
     formats, frames = options.for_each(named, count), [*chain.from_iterable(inputs.named_frames)]
-    inputs.leave(input_formats=[fmt for fmt in passed if fmt not in named], named_frames=())
+    inputs.update(input_formats=[fmt for fmt in passed if fmt not in named], named_frames=())
 
     def move_all(way: Way) -> int:
         is_open, on_error = way.has_source == bool(frames) or len(frames) not in (0, count), inputs.on_error
@@ -222,7 +222,7 @@ def apply_command(inputs: Inputs) -> int:
     else:
         task.only_arguments(rest)
         if task.place:
-            inputs.ask("from_rep")
+            inputs.use("from_rep")
         output.values(values_of(list(sources_of(inputs, rest, kind, task.place)), request, output))
     if isinstance(way, TreeWay):  # report what was assumed
         inputs.note(way.lookups.assumptions())
@@ -235,16 +235,16 @@ def _derived(task: streaming.Task, plan: Style, way: Way, record: str | Source, 
     """Write the derivation of one record."""
     from frametool.stream.written import ByTree, derive_record
 
-    asked, timeless = task.request(operation=Operation(moves=True)), task.inputs.at is not None
+    request, timeless = task.request(operation=Operation(moves=True)), task.inputs.at is not None
     if isinstance(way, TreeWay):
         mover: ByTree | WrittenPose = ByTree(way.tree, way.target, way.source, options.at_ns(way.at))
     else:
         mover = task.written(way.read, warned=True)
     with inline_misuse():
         rows = RowOptions(
-            kind=kind, degrees=asked.rows.degrees, normalize=task.normalize, frame_is_counter=way.counters
+            kind=kind, degrees=request.rows.degrees, normalize=task.normalize, frame_is_counter=way.counters
         )
-        made = derive_record(plan, mover, pose_source(record, asked), rows, timeless=timeless)
+        made = derive_record(plan, mover, pose_source(record, request), rows, timeless=timeless)
     task.output.text(made.render(task.inputs.explain))
     return 0
 
@@ -269,9 +269,9 @@ class Way:
         """Read the pose of --transform."""
         inputs = task.inputs
         self.task, self.uncertain, self.rest = task, bool(inputs.covariance), inputs.arguments
-        asked = task.request(operation=COMBINED._replace(similar=True, multiples=inputs.scale))
-        self.is_stream, self.read = self.rest in ((), ("-",)), pose_source(inputs.pose, asked)
-        pose = one_pose(self.read, asked)
+        request = task.request(operation=COMBINED._replace(similar=True, multiples=inputs.scale))
+        self.is_stream, self.read = self.rest in ((), ("-",)), pose_source(inputs.pose, request)
+        pose = one_pose(self.read, request)
         refuse(self.uncertain and pose.covariance is None, "--covariance: POSE has neither sigma nor covariance")
         if pose.covariance is not None and not self.uncertain:
             warn(f"{self.read.name}: its covariance is not used (--covariance)")
@@ -281,13 +281,13 @@ class Way:
 
     def from_frame(self, own: str | None, own_ns: int | None = None) -> Components:  # noqa: ARG002 - of a tree
         """Return the transform of records from a frame, at a time or the latest."""
-        _settled(own, self.source)
+        _agreed_frame(own, self.source)
         return self.pose.placed
 
-    def request(self, formula: Formula | None = None, **asked: Any) -> Request:
+    def request(self, formula: Formula | None = None, **fields: Any) -> Request:
         """Return the request to transform records from one frame, or each from its own.
 
-        asked: further fields of the request
+        fields: further fields of the request
         """
         inputs = self.task.inputs
         frame_column, time_column = (inputs.frame_column, inputs.time_column) if self.is_stream else (None, None)
@@ -297,7 +297,7 @@ class Way:
             operation=Operation(left=left, moves=True, uncertain=self.uncertain, formula=formula),
             frames=() if has_source else (frame_column or "",), frame_is_counter=self.counters, timed=self.timed,
             pose_from_frame=self.from_frame, rename=None if formula else lambda _parent, name: (self.target, name),
-            **asked,
+            **fields,
         )  # fmt: skip
 
 
@@ -336,9 +336,9 @@ class TreeWay(Way):
         """Return the frame in which records are expressed: SOURCE, or the one that they name."""
         if own and own not in self._resolved:
             self._resolved[own] = frame_name(own, self.tree)
-        if (settled := _settled(own and self._resolved[own], self.source)) is None:
+        if (frame := _agreed_frame(own and self._resolved[own], self.source)) is None:
             raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
-        return settled
+        return frame
 
     def from_frame(self, own: str | None, own_ns: int | None = None) -> Components:
         """Return the transform of records from a frame, at the time of all, at their own, or the latest."""
@@ -349,7 +349,7 @@ class TreeWay(Way):
         return self.lookups.many(self.target, self.start(own), times_ns)
 
 
-def _settled(own: str | None, source: str | None) -> str | None:
+def _agreed_frame(own: str | None, source: str | None) -> str | None:
     """Return the frame in which a record is expressed; raise ValueInvalid if record and command name different ones."""
     if own and source is not None and own != source and not {own, source} <= {*EARTH_FRAMES}:
         remedy = "leave SOURCE out to use each record's own frame"

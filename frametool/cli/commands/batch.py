@@ -24,7 +24,7 @@ import click
 from frametool import cli
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, say_if_typed
 from frametool.cli.commands import TROUBLE, answer, group
-from frametool.cli.sink import PLACES, TROUBLES, say_error, wants_json, words_of
+from frametool.cli.sink import LOCATIONS, TROUBLES, say_error, wants_json, words_of
 from frametool.documents.source import ReadCache, opened
 from frametool.errors import FileProblem, FrametoolError, Misused, ValueInvalid, alternatives
 from frametool.stream.faults import ROWS_SKIPPED, SKIP, STOP, RowsSkipped
@@ -220,11 +220,11 @@ class CommandBatch:
         with streams(_NoInput(), piped):  # standard input has the lines of the batch
             for number, name, text in command_lines(stream):
                 self.count += 1
-                PLACES.append({"source": self.source, "line": number})
+                LOCATIONS.append({"source": self.source, "line": number})
                 try:
                     status = self._run_line(text, name, number)
                 finally:
-                    PLACES.pop()
+                    LOCATIONS.pop()
                 if status in FINISHED:
                     self.status = self.status or status
                 elif self.skips:

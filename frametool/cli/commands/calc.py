@@ -337,7 +337,7 @@ def calc_command(inputs: Inputs) -> int:
         asks = any(branch.kind == "lookup" and not branch.value[1] for line in lines for branch in walk(line.tree))
         scope.tree = load_tree(inputs, ".", streams=True) if asks or not lines else None
     if not lines:
-        inputs.ask(*OF_EARTH)  # any line may use them
+        inputs.use(*OF_EARTH)  # any line may use them
         refuse(task.path is not None, "-i FILE needs an expression over row")
         is_prompt = sys.stdin is not None and sys.stdin.isatty()
         return talk(inputs, scope, output) if is_prompt else calculate_lines(task, scope)

@@ -88,8 +88,8 @@ def check_command(inputs: Inputs) -> int:
         state(inputs, recordings)
     text = WRITERS[fmt](findings)
     with writing(None) as write:
-        is_seen = fmt == "text" and sys.stdout.isatty()
-        write(in_colour("\n".join(map(folded, text.split("\n"))), MARKS) if is_seen else text)
+        on_terminal = fmt == "text" and sys.stdout.isatty()
+        write(in_colour("\n".join(map(folded, text.split("\n"))), MARKS) if on_terminal else text)
     counts = {kind: sum(level(each) == kind for each in findings) for kind in ("error", "warning", "note")}
     summary = ", ".join(f"{count} {kind}{'s' * (count != 1)}" for kind, count in counts.items() if count)
     if summary or (fmt == "text" and sys.stdout.isatty()):
@@ -214,7 +214,7 @@ def monitor_command(inputs: Inputs) -> int:
     files = opened(inputs, (inputs.recording, *inputs.more))
     clashes: list[FormatError] = []
     report = monitor(files, *frames, normalize=inputs.normalize, clashing=clashes.append)
-    inputs.ask("time_offset")
+    inputs.use("time_offset")
     state(inputs, files)
     tell = partial(say_error, in_json=output.chosen == "json")
     say_first(clashes, MOST_REPORTED, "frames come by two topics", tell)

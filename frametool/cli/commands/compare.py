@@ -132,8 +132,8 @@ def compare_command(inputs: Inputs) -> int:
     try:
         found, skipped = comparisons(inputs.ref, inputs.est, inputs)
         every = [each.as_dict() for each in found]
-        asked = [(each, limit) for each in every for limit in limits]
-        passed = [(each, limit, now) for each, limit in asked if (now := limit.passed(each)) is not None]
+        checked = [(each, limit) for each in every for limit in limits]
+        exceeded = [(each, limit, now) for each, limit in checked if (now := limit.passed(each)) is not None]
         for path in reports:
             import shlex
 
@@ -152,9 +152,9 @@ def compare_command(inputs: Inputs) -> int:
         if limits:
             error.exit_code = TROUBLE
         raise
-    for each, limit, now in passed:
+    for each, limit, now in exceeded:
         say(f"limit exceeded: {each['est']}: {limit.name} is {now:.6g}, {limit.text}")
-    return EXCEEDED if passed else (TROUBLE if limits else ROWS_SKIPPED) if skipped else 0
+    return EXCEEDED if exceeded else (TROUBLE if limits else ROWS_SKIPPED) if skipped else 0
 
 
 def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], rows: str | None) -> None:
@@ -198,7 +198,7 @@ def align_command(inputs: Inputs) -> int:
     p' = scale R p + t; such an entry cannot be part of a tree.
     """
     into = Output(inputs, "poses") if inputs.output else None
-    entry = Output(inputs.but(output=None, format_name=None) if into else inputs, "poses")
+    entry = Output(inputs.changed(output=None, format_name=None) if into else inputs, "poses")
     (found,), skipped = comparisons(inputs.ref, [inputs.est], inputs)
     from frametool.fit.comparison import worlds
 
@@ -261,7 +261,7 @@ def resample_command(inputs: Inputs) -> int:
             refuse(other.stamps_ns is None, f"--at {times}: the poses there have no stamps")
             stamps = in_order(other, other_name).stamps_ns
     if not counted and (window := options.window_of(inputs)):
-        inputs.ask("start", "stop")
+        inputs.use("start", "stop")
         stamps = stamps[(window[0] <= stamps) & (stamps <= window[1])]
     made = between(found, stamps, inputs.max_gap_ns)[0]
     if lost := len(stamps) - made.size:
@@ -290,7 +290,7 @@ def trajectory(inputs: Inputs, argument: str, fmt: str = "", on_error: str = STO
         normalize=bool(inputs.normalize),
     )  # fmt: skip
     if found.stamps_ns is not None:
-        inputs.ask("time_offset")
+        inputs.use("time_offset")
         found = found._replace(stamps_ns=found.stamps_ns + known.time_offset)
     file, inside = split_name(argument)
     name = ":".join(["stdin" if file == "-" else os.path.basename(file), *inside])
@@ -304,8 +304,8 @@ def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Com
     refuse_two_readers([ref, *ests])
     base = EVO if inputs.like else Settings()
     of_other_match = "max_gap_ns" if (inputs.match or base.pairing.match) == "nearest" else "max_diff_ns"
-    asked = (name for name in SETTINGS if name != of_other_match)
-    passed = {name: value for name in asked if (value := getattr(inputs, name)) is not None}
+    names = (name for name in SETTINGS if name != of_other_match)
+    passed = {name: value for name in names if (value := getattr(inputs, name)) is not None}
     if "offset" in passed:
         passed["offset"], limit = passed["offset"]
         passed |= {} if limit is None else {"offset_limit_s": limit}
@@ -349,7 +349,7 @@ def write_trajectory(output: Output, found: Trajectory) -> None:
     stamps = [None] * found.size if found.stamps_ns is None else found.stamps_ns.tolist()
     if found.xyzw is not None:
         rows = zip(zip(*(part.tolist() for part in found.poses.components), strict=True), stamps, strict=True)
-        output.poses_as_they_come(result_at(row, world, body, at) for row, at in rows)
+        output.stream_poses(result_at(row, world, body, at) for row, at in rows)
         return
     points = zip(found.xyz.tolist(), stamps, strict=True)
     output.values(

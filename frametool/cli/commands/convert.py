@@ -66,7 +66,7 @@ def convert_command(inputs: Inputs) -> int:
     notations = output.notations or QUATERNION
     request = task.request(operation=operation, extra_column=inputs.time_column, notations=notations)
     if operation.turns and (values or task.path or task.has_input()):
-        _say_of_axes(axes, world, request.rows.given, output, is_anew=bool(values) and values != ("-",))
+        _report_axes(axes, world, request.rows.given, output, is_anew=bool(values) and values != ("-",))
     is_numbers = _are_numbers(values, has_from=request.rows.given is not None or bool(request.rows.given_place))
     if is_numbers and request.rows.given_place:
         from frametool.cli.earth import mapping_of
@@ -162,7 +162,7 @@ def _named_change(axes: str | None, world: str | None, operation: Operation) -> 
     return OtherAxes(left, right, operation.mirrors) if left or right else None
 
 
-def _say_of_axes(
+def _report_axes(
     axes: str | None, world: str | None, read_as: Notation | None, output: Output, *, is_anew: bool
 ) -> None:
     """Report which axes changed and which did not, and where units and angles of engines differ from ours.
@@ -171,9 +171,9 @@ def _say_of_axes(
     """
     from frametool.geometry.conventions import ENGINE_ANGLES, IN_CENTIMETRES, other_side
 
-    changed, stays, option = ("world", "body", "--axes") if world else ("body", "world", "--world-axes")
+    changed, unchanged, option = ("world", "body", "--axes") if world else ("body", "world", "--world-axes")
     if not (axes and world) and (other := other_side(world or axes or "", of_world=bool(world))):
-        say(f"note: only the {changed} axes changed; the {stays} axes are as before ({option} {other})")
+        say(f"note: only the {changed} axes changed; the {unchanged} axes are as before ({option} {other})")
     into, _, out_of = (world or "").partition("_from_")
     if into == IN_CENTIMETRES:
         separate = not any(each.representation.whole for each in output.notations)

@@ -104,12 +104,12 @@ def cookbook(words: tuple[str, ...]) -> str:
     known, holds = questions(), finder(words)
     if not words:
         return _titles("Questions of the cookbook (frametool help cookbook WORD shows them)", list(known), len(known))
-    asked = [each for each in known if holds(each)]
-    inside = [each for each in known if each not in asked and holds(f"{each} {known[each]}")]
-    if not asked:
-        asked, inside = inside[:3], inside[3:]
-    refuse(not asked, f"no question has {shown(' '.join(words))}; `frametool help cookbook` lists all")
-    answers = "".join(f"{each}\n\n{known[each]}\n\n" for each in asked)
+    matching = [each for each in known if holds(each)]
+    inside = [each for each in known if each not in matching and holds(f"{each} {known[each]}")]
+    if not matching:
+        matching, inside = inside[:3], inside[3:]
+    refuse(not matching, f"no question has {shown(' '.join(words))}; `frametool help cookbook` lists all")
+    answers = "".join(f"{each}\n\n{known[each]}\n\n" for each in matching)
     files = "The files: `frametool examples -o examples` copies them into a folder `examples`.\n"
     return answers + (f"{_titles('Also in', inside)}\n" if inside else "") + files
 
@@ -125,7 +125,7 @@ def _commands(ctx: click.Context, names: Iterable[str] = COMMANDS) -> dict[str, 
 
 def _search(ctx: click.Context, name: str) -> str:
     """Return the topics, commands, formats and questions with these words, those with them in the title first."""
-    known, asked, holds = topics(), questions(), finder([name])
+    known, recipes, holds = topics(), questions(), finder([name])
     for each in known:
         if holds(each) and abs(len(each) - len(name)) <= len("ies") - len("y"):  # the same, singular or plural
             return topic(each)
@@ -136,7 +136,7 @@ def _search(ctx: click.Context, name: str) -> str:
         texts = [f"{one.name} {one.help}", *(f"{option.opts[-1]} {option.help}" for option in own)]
         calls += [each] * (each != "help" and any(map(holds, texts)))
     formats = [each for each, row in FORMATS.items() if holds(f"{each} {row.summary}")]
-    titles = sorted((each for each in asked if holds(f"{each} {asked[each]}")), key=lambda each: not holds(each))
+    titles = sorted((each for each in recipes if holds(f"{each} {recipes[each]}")), key=lambda each: not holds(each))
     if about and not (about[1:] or calls or formats or titles):
         return topic(about[0])
     if not (about or calls or formats or titles):

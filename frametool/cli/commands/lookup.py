@@ -56,8 +56,8 @@ class Skipped:
             return 0
         for error in self.errors:
             say_error(error, in_json=self.in_json, fate="skipped")
-        asked = found + self.count
-        total = RowsSkipped(f"{self.count} of {asked} times skipped", bad=self.count, rows=asked)
+        count = found + self.count
+        total = RowsSkipped(f"{self.count} of {count} times skipped", bad=self.count, rows=count)
         say_error(total, in_json=self.in_json)
         return total.exit_code
 
@@ -139,11 +139,11 @@ def _many(task: Task, lookups: algebra.Lookups, target: str, source: str) -> int
     skip = times is not None and inputs.on_error == SKIP
     refuse(times and inputs.on_error == NULL, "--on-error null is for tables; with --times it is stop or skip")
     report = skipped.add if skip else stop
-    asked = algebra.sample_stamps(tree, target, source) if times is None else options.read_times(times, report)
+    stamps = algebra.sample_stamps(tree, target, source) if times is None else options.read_times(times, report)
     if window is not None:
-        inputs.ask("start", "stop")
-        asked = [stamp for stamp in asked if window[0] <= stamp <= window[1]]
-        if not asked:
+        inputs.use("start", "stop")
+        stamps = [stamp for stamp in stamps if window[0] <= stamp <= window[1]]
+        if not stamps:
             raise NoDataAt(f"no sample of {target} -> {source} from --start to --stop")
 
     def miss(at_ns: int) -> None:
@@ -152,11 +152,11 @@ def _many(task: Task, lookups: algebra.Lookups, target: str, source: str) -> int
 
     unread = skipped.count
     try:
-        task.output.poses_as_they_come(lookups.results(target, source, asked, miss if skip else None))
+        task.output.stream_poses(lookups.results(target, source, stamps, miss if skip else None))
     except NoDataAt as error:
-        error.remedy = "; --on-error skip goes on" * (len(asked) > 1)  # type: ignore[attr-defined]
+        error.remedy = "; --on-error skip goes on" * (len(stamps) > 1)  # type: ignore[attr-defined]
         raise
-    return skipped.finish(len(asked) + unread - skipped.count)
+    return skipped.finish(len(stamps) + unread - skipped.count)
 
 
 def _by_row(task: Task, lookups: algebra.Lookups, target: str | None, source: str | None) -> int:
@@ -254,7 +254,7 @@ def echo_command(inputs: Inputs) -> int:
 
         out.pieces(write_blocks(shown, target, source, out.style))
     else:
-        out.poses_as_they_come(shown)
+        out.stream_poses(shown)
     return skipped.finish(found)
 
 

@@ -86,7 +86,7 @@ def project_command(inputs: Inputs) -> int:
     from frametool.stream.formulas import PixelsOfPoints
 
     overlay, image, path = None, inputs.image, inputs.output
-    own = inputs if image is None else inputs.but(output=os.devnull)  # the rows of an overlay are not written
+    own = inputs if image is None else inputs.changed(output=os.devnull)  # the rows of an overlay are not written
     output = Output(own, "points", otherwise="yaml")
     task = CameraTask(inputs, output, "TREE CAMERA")
     if image is not None:
@@ -148,12 +148,12 @@ class CameraTask(Task):
         inputs = self.inputs
         return self.camera.rectified(from_first=bool(inputs.from_first)) if inputs.rectified else self.camera
 
-    def adds(self, formula: Formula, **asked: Any) -> Request:
+    def adds(self, formula: Formula, **fields: Any) -> Request:
         """Return the request for rows to which the results of a formula are added."""
-        self.inputs.ask("keep")
+        self.inputs.use("keep")
         if self.way is not None:
-            return self.way.request(formula, **asked)
-        return self.request(operation=Operation(moves=True, formula=formula), **asked)
+            return self.way.request(formula, **fields)
+        return self.request(operation=Operation(moves=True, formula=formula), **fields)
 
     def finish(self, request: Request, records: Sequence[Source | str], seen: Seen) -> int:
         """Write the rows of the stream, or the results of records; then report a summary."""

@@ -90,12 +90,12 @@ def record_command(inputs: Inputs) -> int:
         raise BadAnswer(f"joints without a value would be static: {listing(resting)}; --joint NAME=VALUE gives it")
     if edges is not None and edges.covariances:
         warn(f"{copy}: covariances left out")
-    inputs.ask(*["normalize"] * bool(more or into))
+    inputs.use(*["normalize"] * bool(more or into))
     on_error = inputs.on_error if into else STOP
     bad = BadRows(path, on_error, tell=say_error, counted="message")
     request = (edges, inputs.replace, without_slash(into or ""), topics, inputs.between, normalize)
     quiet, force = inputs.quiet, inputs.force
-    inputs.refuse_idle()
+    inputs.refuse_unused()
     with writing(place, force=force, folder=copy in FOLDERS) as write, opened_recording(path, tally) as opened:
         run = RecordRun(opened, bad, *request)
         with progress_bar(None, quiet=quiet, counted="messages") as advance:

@@ -133,14 +133,14 @@ def show_run(inputs: Inputs, scene: Scene, *, leaders: bool = False) -> None:
                 stack.enter_context(screen.live)
             watchers.append(screen.watch if live else event_log(say))
             if output is not None or not (live and sys.stdout.isatty()):
-                inputs.ask("precision")
+                inputs.use("precision")
                 several = emit == "poses" or len(scene.followers) > 1
                 records_of = step_writer(emit, style, leaders=leaders, labelled=leaders or several)
                 write = stack.enter_context(writing(output, force=force))
                 # each record at once, for the reader of a pipe
                 watchers.append(lambda step: [write(text) for text in records_of(step)])
             watchers += [watch for watch, _ in pictures.values()]
-            inputs.refuse_idle()
+            inputs.refuse_unused()
             for step in simulate(scene):
                 for watch in watchers:
                     watch(step)
@@ -288,4 +288,4 @@ def teleop(inputs: Inputs) -> None:
     refuse(sys.stdin is None or not sys.stdin.isatty(), f"standard input is no terminal; {drivers.INSTEAD}")
     STATE.cleans_up = True  # the terminal's keys
     with drivers.keyboard(headings=inputs.turtlesim == "ros2") as leader:
-        show_run(inputs.but(live=True), scene_of(inputs, leader), leaders=True)
+        show_run(inputs.changed(live=True), scene_of(inputs, leader), leaders=True)

@@ -41,7 +41,7 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
     recordings = opened(inputs, files)
     rows = read_measurements(recordings, normalize=inputs.normalize)
     state(inputs, recordings)
-    inputs.refuse_idle("topics")
+    inputs.refuse_unused("topics")
     for each in recordings:
         own = [row for row in rows if parted(row.place)[0] == each.name]
         first = f": {own[0].parent}<-{own[0].child} .." if own else ""
@@ -99,9 +99,9 @@ def _solution(
     sigma = found.sigma if isinstance(found.sigma, tuple | None) else (found.sigma, None)
     own = found.u.tolist(), used, map(bool, of("checked", [found.dof > 0] * count)), of("fits", [None] * count)
     rows = []
-    for at, ((place, *names), off, *said) in enumerate(zip(labels, found.residuals.tolist(), *own, strict=True), 1):
+    for at, ((place, *names), off, *rest) in enumerate(zip(labels, found.residuals.tolist(), *own, strict=True), 1):
         angle = hypot(*off[3:]) if len(off) > 3 else None
-        rows.append(dict(zip(ROW_KEYS, (place, at, *names, hypot(*off[:3]), angle, *said), strict=True)))
+        rows.append(dict(zip(ROW_KEYS, (place, at, *names, hypot(*off[:3]), angle, *rest), strict=True)))
     frames = [
         {"name": each.name, "parent": each.parent, "sigma": sigma_entry(each),
          "rows": of("rows", {}).get(each.name, sum(used)), "checked": of("frame_checked", {}).get(each.name, True)}
@@ -231,10 +231,10 @@ def solve_command(inputs: Inputs) -> None:
         raise ValueInvalid(f"{output.style.format} has no place for a scale; write json, yaml or csv")
     solve = solved_hand_eye if hand_eye else solved_points if points else solved_tree
     found = solve(inputs, files, robust=not inputs.no_robust)
-    if said := (write_left_out if inputs.quiet else write_solution)(found):
-        tell(said.rstrip("\n"))
+    if summary := (write_left_out if inputs.quiet else write_solution)(found):
+        tell(summary.rstrip("\n"))
     if report:  # one document, or a table of the rows
-        into = Output(inputs.but(output=report, format_name=None, notations=(), precision=None), "report")
+        into = Output(inputs.changed(output=report, format_name=None, notations=(), precision=None), "report")
         into.report(found.numbers["measurements"] if into.chosen == "csv" else [found.numbers])
     _write(output, found, on_hand=not (hand_eye and inputs.eye_to_hand))
     if count := len(found.left_out):

@@ -52,8 +52,8 @@ def tree_command(inputs: Inputs) -> None:
     """
     output = Output(inputs, "tree", "trajectory")
     place, drawn = output.style.place, output.style.format in ("yaml", "json", "text", "dot", "mermaid")
-    is_unsaid = place is not None and (not drawn or place.origin is not None)
-    refuse(is_unsaid, f"--to {place and place.name}: trees say places by lla or utm, in yaml, json, text and drawings")
+    is_wrong = place is not None and (not drawn or place.origin is not None)
+    refuse(is_wrong, f"--to {place and place.name}: trees say places by lla or utm, in yaml, json, text and drawings")
     frames = load_tree(inputs, inputs.tree, inputs.more, drawings=True)
     stamp = options.at_ns(inputs.at)
     output.tree(frames if stamp is None else frames.tree_at(stamp), inputs.color)
@@ -165,9 +165,10 @@ def view_command(inputs: Inputs) -> None:
     names = ends | {"fixed": inputs.fixed, "below": inputs.below}
     named: Any = {key: name and frame_name(name, frames) for key, name in names.items()}
     scene = FrameScene(frames, at_ns=options.at_ns(inputs.at), only=inputs.only, path_only=inputs.path_only, **named)
-    gone = [name for name, track in scene.tracks.items() if not track.covers(scene.at_ns or 0)]
-    if gone and chosen != "html":  # a page shows their nearest time
-        say(f"note: no data of {listing(gone, 5)} at {format_stamp(scene.at_ns or 0)}: not drawn, nor what hangs there")
+    absent = [name for name, track in scene.tracks.items() if not track.covers(scene.at_ns or 0)]
+    if absent and chosen != "html":  # a page shows their nearest time
+        at = format_stamp(scene.at_ns or 0)
+        say(f"note: no data of {listing(absent, 5)} at {at}: not drawn, nor what hangs there")
     before = None
     if overlay:
         before = FrameScene(load_tree(inputs, str(target)), at_ns=scene.at_ns, fixed=scene.fixed, ground=scene.ground)
@@ -179,7 +180,7 @@ def view_command(inputs: Inputs) -> None:
             print_terminal(scene, eye, color)
             return
     sliders = chosen == "html" and not overlay and not inputs.no_sliders
-    inputs.refuse_idle()
+    inputs.refuse_unused()
     content = _content(inputs, scene, chosen, eye, before, sliders=sliders)
     path = output
     if inputs.opens and path is None:

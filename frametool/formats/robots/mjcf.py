@@ -71,19 +71,19 @@ class MjcfModel:
             nodes += node.children if node.tag in NESTING else ()
             if node.tag in ("include", "replicate", "attach"):
                 raise node.error(f"<{node.tag}> is not expanded here; {WHOLE}")
-        said: dict[str, Element] = {}  # of the compiler sections, anywhere in the file: the last value counts
+        attributes: dict[str, Element] = {}  # of the compiler sections, anywhere in the file: the last value counts
         for section in root.all("compiler"):
-            said |= own_attributes(section)
-        self.degrees = word(said, "angle", "degree", "radian") == "degree"
-        self.limits_apply = word(said, "autolimits", "true", "false") == "true"
-        self.aligns_free = word(said, "alignfree", "false", "true")
-        self.eulerseq = said["eulerseq"].attributes["eulerseq"] if "eulerseq" in said else "xyz"
+            attributes |= own_attributes(section)
+        self.degrees = word(attributes, "angle", "degree", "radian") == "degree"
+        self.limits_apply = word(attributes, "autolimits", "true", "false") == "true"
+        self.aligns_free = word(attributes, "alignfree", "false", "true")
+        self.eulerseq = attributes["eulerseq"].attributes["eulerseq"] if "eulerseq" in attributes else "xyz"
         if len(self.eulerseq) != len("xyz") or not set(self.eulerseq) <= set("xyzXYZ"):
             message = f"eulerseq {shown(self.eulerseq)}; expected three of xyz (moving axes) and XYZ (fixed axes)"
-            raise said["eulerseq"].error(message, "eulerseq")
-        if word(said, "coordinate", "local", "global") == "global":
+            raise attributes["eulerseq"].error(message, "eulerseq")
+        if word(attributes, "coordinate", "local", "global") == "global":
             message = "coordinate=global; MuJoCo reads it no more: save the model with MuJoCo 2.3.3 first"
-            raise said["coordinate"].error(message, "coordinate")
+            raise attributes["coordinate"].error(message, "coordinate")
         self.classes: dict[str, dict[str, Attributes]] = {MAIN: {}}
         self._read_classes(root)
         self.links: dict[str, Link] = {}
@@ -113,8 +113,8 @@ class MjcfModel:
             for child in node.all("default"):
                 inner = child.attribute("class")
                 if not inner or inner in self.classes:
-                    said = f"default class {shown(inner)} twice" if inner else "a <default> without class"
-                    raise child.error(said, "class" if inner else "")
+                    problem = f"default class {shown(inner)} twice" if inner else "a <default> without class"
+                    raise child.error(problem, "class" if inner else "")
                 self.classes[inner] = dict(mine)
                 pending.append((child, inner))
 
@@ -144,11 +144,12 @@ class MjcfModel:
         elif node.tag == "geom":
             self.geoms.append((node, inside))
         elif node.tag in ("site", "camera"):
-            said = self.attributes(node, inside.around)
-            name = self._place(node, inside, self.pose_of_site(said) if node.tag == "site" else self.pose(said))
+            attributes = self.attributes(node, inside.around)
+            pose_of = self.pose_of_site if node.tag == "site" else self.pose
+            name = self._place(node, inside, pose_of(attributes))
             if node.tag == "camera":
                 self.options.tally.axes[name] = self.options.answers.camera_axes or "opengl"
-            if "mode" in said and (mode := said["mode"].attribute("mode")) != "fixed":
+            if "mode" in attributes and (mode := attributes["mode"].attribute("mode")) != "fixed":
                 turns = f"{name} has the mode {shown(mode)}, in which MuJoCo rotates it over time"
                 self.options.tally.note_each(f"{turns}; its pose is as written", node.line)
         return None

@@ -358,8 +358,8 @@ class SdfTree:
                 raise mimic.error(f"{shown(leader.name)} is a {leader.kind}, no joint", "joint")
             name = self.names[leader.name] + (":2" if mimic.attribute("axis") == "axis2" else "")
             usual = {"multiplier": 1.0, "offset": 0.0, "reference": 0.0}
-            said = {part.tag: part.numbers(1)[0] for part in reversed([*mimic.all(*usual)])}  # the first of each
-            multiplier, offset, reference = (usual | said).values()
+            stated = {part.tag: part.numbers(1)[0] for part in reversed([*mimic.all(*usual)])}  # the first of each
+            multiplier, offset, reference = (usual | stated).values()
             joint = joint._replace(mimic=Mimic(name, multiplier, offset - multiplier * reference))
         return joint
 

@@ -421,8 +421,8 @@ class PlyFile(CloudFile):
         lines += bool(begun.strip())
         expected = sum(each.instances for each in self.after)
         if self.at is not None and lines != expected:
-            said = f"after the vertices there are {lines} lines, the header says {expected}; correct the header"
-            raise self.file.error(said)
+            problem = f"after the vertices there are {lines} lines, the header says {expected}; correct the header"
+            raise self.file.error(problem)
 
     def record_with(self, columns: Sequence[OutColumn]) -> Kind:
         """Return the type of a vertex with other columns."""

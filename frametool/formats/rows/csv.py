@@ -110,7 +110,7 @@ def _pose_cells(result: Result, style: Style) -> dict[str, Any]:
         cells |= rotation
     if isinstance(result, NoResult):
         cells |= dict.fromkeys(cells.keys() - NAMES)
-    for key, each in in_columns(result.said(style)).items():
+    for key, each in in_columns(result.all_extras(style)).items():
         extras |= _record_cells({key: each}) if key in SIX else {key: each}
     return cells | extras | cells
 

@@ -179,8 +179,8 @@ class PcdFile(CloudFile):
         if missing:
             raise self._problem("DATA", f"the header has no {', '.join(missing)}")
         self.fields = self._read_fields()
-        said = {key: " ".join(self.words[key]) for key in ("WIDTH", "HEIGHT", "POINTS") if key in self.words}
-        counts = {key: count_in(text, f"{key} {shown(text)}", file, self.lines[key]) for key, text in said.items()}
+        sizes = {key: " ".join(self.words[key]) for key in ("WIDTH", "HEIGHT", "POINTS") if key in self.words}
+        counts = {key: count_in(text, f"{key} {shown(text)}", file, self.lines[key]) for key, text in sizes.items()}
         if {"WIDTH", "HEIGHT"} <= counts.keys():
             points = counts["WIDTH"] * counts["HEIGHT"]
             if counts.setdefault("POINTS", points) != points:

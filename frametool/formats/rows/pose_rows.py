@@ -148,12 +148,12 @@ def rows_of(spec: str) -> RowForm | None:
 def describe(options: Options, spec: Rows, count: int, *, named: bool = True) -> None:
     """Record the assumptions about a trajectory, to be reported with the name of its file."""
     parent, child = options.answers.names(*spec.frames)
-    said = []
+    assumed = []
     if named and not options.answers.frames:
-        said.append(f"{count} {'pose' if count == 1 else 'poses'} of {child} in {parent} (--frames)")
+        assumed.append(f"{count} {'pose' if count == 1 else 'poses'} of {child} in {parent} (--frames)")
     if spec.counted and not options.answers.stamps:
-        said.append(f"seconds are {spec.counted} (--stamps)")
-    options.tally.assumed = ", ".join(said)
+        assumed.append(f"seconds are {spec.counted} (--stamps)")
+    options.tally.assumed = ", ".join(assumed)
 
 
 class StampFile:

@@ -134,9 +134,9 @@ def _handeye(value: Any, reading: Reading) -> Iterator[Edge]:
     mount = next((key for key in MOUNTS if key in parameters), None)
     if mount is None:
         raise Misfit("missing eye_on_hand (easy_handeye) or calibration_type (easy_handeye2)", path)
-    if str(said := parameters[mount]) not in MOUNTS[mount]:
-        raise Misfit(f"{mount} must be {' or '.join(MOUNTS[mount])}, found {kind(said)}", (*path, mount))
-    parent, child = (within(path, named, parameters, key) for key in (MOUNTS[mount][said], CHILD))
+    if str(value := parameters[mount]) not in MOUNTS[mount]:
+        raise Misfit(f"{mount} must be {' or '.join(MOUNTS[mount])}, found {kind(value)}", (*path, mount))
+    parent, child = (within(path, named, parameters, key) for key in (MOUNTS[mount][value], CHILD))
     key = next((key for key in POSES if key in calibration), None)
     if key is None:
         raise Misfit("missing transformation (easy_handeye) or transform (easy_handeye2)")
@@ -225,7 +225,7 @@ def _read_named(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield one edge per name of handwritten extrinsics."""
     frames = options.answers.frames
     base = options.answers.names("base")[0]
-    in_base, said, left = list[bool](), list[bool](), dict[str, None]()  # of each pose; remarks
+    in_base, with_parent, left = list[bool](), list[bool](), dict[str, None]()  # for each pose; keys left out
 
     def take(value: Any, reading: Reading) -> Iterator[Edge]:
         reading.bare_numbers = False
@@ -240,9 +240,9 @@ def _read_named(file: InputFile, options: Options) -> Iterator[Edge]:
             here: Path = (*path, name)
             reading.here = here
             try:
-                pose, (target, source, child, is_said) = _entry(name, entry, reading, options, left)
-                in_base.append(not is_said)
-                said.append(type(entry) is dict and not {*PARENTS}.isdisjoint(entry))
+                pose, (target, source, child, is_stated) = _entry(name, entry, reading, options, left)
+                in_base.append(not is_stated)
+                with_parent.append(type(entry) is dict and not {*PARENTS}.isdisjoint(entry))
                 if child != source:
                     pose = rigid.inverse(*pose)
                 yield Edge(source if child == target else target, child, pose, path=here)
@@ -250,7 +250,7 @@ def _read_named(file: InputFile, options: Options) -> Iterator[Edge]:
                 reading.refuse(misfit.below(*here))
 
     yield from document_edges(file, options, take)
-    if frames and all(said):
+    if frames and all(with_parent):
         options.tally.note(f"--frames {','.join(frames)} has no effect: each pose names its parent", 1)
     count = f"{sum(in_base)} {'pose' if sum(in_base) == 1 else 'poses'}"
     assumed = f"{count} in {bare(base)} (--frames says another)" if any(in_base) and not frames else ""
@@ -261,7 +261,7 @@ def _read_named(file: InputFile, options: Options) -> Iterator[Edge]:
 def _entry(
     name: str | int, entry: Any, reading: Reading, options: Options, left: dict[str, None]
 ) -> tuple[Rigid, Meaning]:
-    """Read one pose and its meaning, not `said` if only its own name is known; raises Misfit."""
+    """Read one pose and its meaning, with `is_stated` False if only its own name is known; raises Misfit."""
     if type(entry) is list:
         entry = {"value": entry}
     fields = as_mapping(entry, "a pose as {x: .., y: .., z: .., roll: .., pitch: .., yaw: ..}")
@@ -291,10 +291,10 @@ def _entry(
         raise meaning
     if meaning is None and (pair := [key for key in fields if key in _OF_CAMERAS]) and len(pair) == len(fields) == 2:
         meaning = directed(" and ".join(pair), (), options.answers.names("base")[0], child, options.answers)
-    elif meaning is not None and not meaning.said:
+    elif meaning is not None and not meaning.is_stated:
         meaning = directed(child, (), meaning.target, meaning.source, options.answers)
     if meaning is None or not (meaning.target and meaning.source):
-        meaning = Meaning(options.answers.names("base")[0], child, child, said=False)
+        meaning = Meaning(options.answers.names("base")[0], child, child, is_stated=False)
     return read.components, meaning
 
 

@@ -91,13 +91,13 @@ NO_POSE = (
 class Meaning(NamedTuple):
     """The meaning of a matrix: it maps points of `source` to `target`; in a tree `child` is below the other one.
 
-    said: the key states it; otherwise it is the meaning with `--direction parent-from-child`
+    is_stated: the key states it; otherwise it is the meaning with `--direction parent-from-child`
     """
 
     target: str
     source: str
     child: str
-    said: bool = True
+    is_stated: bool = True
 
 
 def meaning_of(key: str, known: Mapping[str, str], frames: Sequence[str] = ()) -> Meaning | Unclear | None:
@@ -111,11 +111,11 @@ def meaning_of(key: str, known: Mapping[str, str], frames: Sequence[str] = ()) -
         pattern, target, source = row
         if ways := _ways(pattern, last, frames):
             if len(ways) > 1:
-                said = " or ".join(f"{bare(a)},{bare(b)}" for a, b in ways)
-                return Unclear(f"{bare(key)} may name its two frames in several ways; give --frames {said}", key=True)
+                pairs = " or ".join(f"{bare(a)},{bare(b)}" for a, b in ways)
+                return Unclear(f"{bare(key)} may name its two frames in several ways; give --frames {pairs}", key=True)
             names = {"<a>": ways[0][0], "<b>": ways[0][1]} | {f"{{{name}}}": frame for name, frame in known.items()}
             child = names["{me}" if "{me}" in (target, source) else source]
-            return Meaning(names[target], names[source], child, said=row not in AMBIGUOUS)
+            return Meaning(names[target], names[source], child, is_stated=row not in AMBIGUOUS)
     return None
 
 
@@ -400,30 +400,30 @@ class Matrices:
         """Return the pose under one key, if it is one."""
         value, path = block.entries[key], (*block.path, key)
         meaning = meaning_of(key, known, self.frames)
-        says = isinstance(meaning, Meaning) and meaning.said
+        is_stated = isinstance(meaning, Meaning) and meaning.is_stated
         whole = grid
-        if grid is not None and (grid.holds(16) or (grid.holds(12) and says)):  # in a row
+        if grid is not None and (grid.holds(16) or (grid.holds(12) and is_stated)):  # in a row
             whole = grid._replace(rows=len(grid.texts) // 4, columns=4)
         if whole is not None and (whole.rows, whole.columns) not in ((4, 4), (3, 4)):
             whole = None
-        if says and whole is None and (grid is not None or type(value) is not str):
+        if is_stated and whole is None and (grid is not None or type(value) is not str):
             found = grid.size if grid else kind(value)
             raise Misfit(f"{bare(key)}: expected a 4 x 4 or 3 x 4 matrix, found {found}", path)
-        if whole is None or (not says and re.fullmatch(NO_POSE, key.rpartition(".")[2])):
+        if whole is None or (not is_stated and re.fullmatch(NO_POSE, key.rpartition(".")[2])):
             is_matrix = grid is not None and (grid.rows > 1 or type(value) is dict)
             if is_matrix or (type(value) is dict and value.get(TAG) in TAGS):
                 self.left.append(bare(dotted(path)))
             return None
         if isinstance(meaning, Unclear):
             raise meaning.below(*path)
-        if not says and (named_there := self._named(block, path)) is not None:
+        if not is_stated and (named_there := self._named(block, path)) is not None:
             meaning = named_there
         elif meaning is None:
             parent = self.base or ("imu" if block.name else "body")
             child = block.name or next(iter(self.frames[1 + self.asked :]), key.rpartition(".")[2])
             self.asked += 1
             meaning = directed(dotted(path), path, parent, child, self.answers)
-        elif not says:
+        elif not is_stated:
             meaning = directed(dotted(path), path, meaning.target, meaning.source, self.answers)
         if "" in (meaning.target, meaning.source):
             raise Misfit(f"{bare(key)}: there is no camera before {bare(block.name)}", path, key=True)
@@ -441,8 +441,8 @@ class Matrices:
             if target in block.entries and source in block.entries:
                 parent, child = (within(block.path, named, block.entries, key) for key in (target, source))
                 what = f"{target} and {source} beside {path[-1]}"
-                is_said = source != "source_frame"
-                return Meaning(parent, child, child) if is_said else directed(what, path, parent, child, self.answers)
+                is_stated = source != "source_frame"
+                return Meaning(parent, child, child) if is_stated else directed(what, path, parent, child, self.answers)
         for key, other in [*FRAME_KEYS, *(each[::-1] for each in FRAME_KEYS)]:
             if key in block.entries:
                 raise Misfit(f"{key} without {other}, so nothing says what the matrix is between", (*block.path, key))

@@ -133,15 +133,15 @@ def _below(root: str, children: Any, path: Path, reading: Reading) -> Iterator[E
         for child, entry in entries.items():
             here = reading.here = (*path, child)
             try:
-                said = {} if entry is None else entry
-                if type(said) is not dict:
+                fields = {} if entry is None else entry
+                if type(fields) is not dict:
                     if child in POSE_KEYS:
                         raise Misfit(f"{shown(child)} {NO_NAME}", key=True)
-                    as_mapping(said, f"the pose of frame {shown(child)}")  # raises
-                if names := NAMES.intersection(said):
+                    as_mapping(fields, f"the pose of frame {shown(child)}")  # raises
+                if names := NAMES.intersection(fields):
                     raise Misfit(f"{min(names)} is defined by the nesting; remove it", (min(names),), key=True)
-                pose = _pose(said, reading, NESTED)
-                yield from _edges(said, pose, _above(pose, parent, said), child, here, reading)
+                pose = _pose(fields, reading, NESTED)
+                yield from _edges(fields, pose, _above(pose, parent, fields), child, here, reading)
             except Misfit as misfit:
                 reading.refuse(misfit.below(*here))
             if type(entry) is dict and "children" in entry:
@@ -286,8 +286,8 @@ def _samples(
 def _sample(sample: Any, reading: Reading, *, uncertain: bool) -> tuple[Pose, int]:
     """Read one pose with its stamp.  uncertain: there is a covariance for all."""
     pose = _pose(as_mapping(sample, "a sample {stamp: .., xyz: [..], ..}"), reading, STAMP_KEYS)
-    if said := COVARIANCE_KEYS.intersection(sample):
-        raise Misfit(f"{min(said)} is common to all samples; write it next to samples", (min(said),), key=True)
+    if found := COVARIANCE_KEYS.intersection(sample):
+        raise Misfit(f"{min(found)} is common to all samples; write it next to samples", (min(found),), key=True)
     if uncertain and pose.parent is not None and "parent" not in sample:
         raise Misfit("axes turn from place to place; one covariance for all is in no axes; leave it out")
     if uncertain and sample.get("inverse") == "true":
