@@ -310,7 +310,7 @@ def rows_among(arguments: Sequence[str], request: Request, task: Task) -> Operan
 
 
 def combinations(arguments: Sequence[str], request: Request) -> list[tuple[Pose, ...]]:
-    """Return tuples of one pose per argument; one argument may hold several poses, each of which has a tuple."""
+    """Return tuples of one pose per argument; if one argument has several poses, there is a tuple for each of them."""
     found = [_read_argument(each, request) for each in arguments]
     several = _several(found)
     read = [each.only_poses(timed=True) for each in found]

@@ -1,6 +1,6 @@
 """Write results to standard output, whole lines at a time, or atomically to a file or a folder.
 
-On a terminal, text for people has styles, and a pager where it is longer than the screen.
+On a terminal, text for people has styles, and is paged if it is longer than the screen.
 Messages go to stderr, only by `say` and `tell`, which never fail; errors are sentences or JSON.
 """
 
@@ -241,7 +241,7 @@ def tell(text: str) -> None:
     if sys.stderr is None:
         return
     try:
-        print(text, file=sys.stderr, flush=True)  # noqa: T201 - this is where messages become text
+        print(text, file=sys.stderr, flush=True)  # noqa: T201 - the only print of messages
     except OSError:
         discard(sys.stderr)
 

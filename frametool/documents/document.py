@@ -94,7 +94,7 @@ def _offsets(text: str, paths: Sequence[Path], *, key: bool) -> list[int]:
     """Iterate over the events of a text, and return the offset of the value, or of the key, at each path.
 
     A path is (document, key or index, ...).  If the text does not have it, the offset is that of the nearest enclosing
-    value.  In a list the key is the value; the first of equal keys counts.
+    value.  In a list the key is the value; of equal keys the first is used.
     """
     wanted = {path[:length] for path in paths for length in range(1, len(path) + 1)}
     found: dict[Path, tuple[int, int]] = {}  # the offsets of the key and of the value

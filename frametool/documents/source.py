@@ -219,7 +219,7 @@ def decode(data: bytes, name: str) -> str:
 
 
 def not_text(data: bytes) -> str:
-    """Return what kind of data bytes are that are not UTF-8; "" if they may be text in another encoding."""
+    """Return the kind of data of bytes that are not UTF-8; "" if they may be text in another encoding."""
     head = data[:LOOKED_AT]
     for magic, what in MAGIC.items():
         if head.startswith(magic):

@@ -85,7 +85,7 @@ def _escape(match: re.Match[str]) -> str:
 
 
 def _one_line(value: Any, number: Callable[[float], str]) -> str | None:
-    """Write a scalar, an empty or leaf list, or a small map of numbers; None for what needs a block."""
+    """Write a scalar, an empty or leaf list, or a small map of numbers; None for values that need a block."""
     if isinstance(value, dict):
         if len(value) > _WIDEST_FLOW_MAP:
             return None

@@ -76,7 +76,7 @@ def split_run(text: str) -> tuple[str, list[Any]] | None:
 def split_brackets(text: str) -> tuple[str, list[Any]] | None:
     """Replace each plain value in brackets that ends a line by STANDIN; return the rest, and the values in order.
 
-    Returns None if there are none or the text is not plain.
+    Returns None without such values, or if the text is not plain.
     """
     if re.search(_NOT_PLAIN, text):
         return None
@@ -138,7 +138,7 @@ def translated(source: Source, error: Exception) -> FormatError:
 
 
 def _suspicion(source: Source, line: int) -> str:
-    """Return what is hard to see in the line of an error or the previous one: look-alikes, a missing blank, xacro."""
+    """Return a hint at mistakes near an error that are hard to see: look-alikes, a missing blank, xacro."""
     for text in (line_of(source.text, line), line_of(source.text, line - 1) if line > 1 else ""):
         if strange := odd_characters(text):
             return f"; the line has {strange}"

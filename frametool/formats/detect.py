@@ -82,7 +82,7 @@ class Beginning:
 
     @cached_property
     def json_paths(self) -> set[str]:
-        """Return the paths of the keys of JSON; lists on the path do not count."""
+        """Return the paths of the keys of JSON; lists on the path are skipped."""
         from frametool.documents.document import looks_like_json
 
         found: set[str] = set()
@@ -164,7 +164,7 @@ def _is_key(pattern: str, keys: Iterable[str]) -> bool:
     return any(map(re.compile(pattern).fullmatch, keys))
 
 
-# kind -> what is searched of a beginning, "" for all of it, and how a sign has to fit it; the strongest first
+# kind -> the property of Beginning that is searched, "" for all of it, and the function that matches; strongest first
 _STRONG: dict[str, tuple[str, Callable[..., Any]]] = {
     "magic": ("head", partial(re.match, flags=re.DOTALL)),
     "xml text": ("xml", re.search),
@@ -219,7 +219,7 @@ _NO_POSES = "no poses in it (frametool tree shows the frames); give what it was 
 
 
 def not_read(fmt: str, name: str) -> FormatError:
-    """Return the error for a file that is recognised but not supported: what it is, what to do."""
+    """Return the error for a file that is recognised but not supported: its description and what to do instead."""
     about = str(UNSUPPORTED[fmt]) if fmt in UNSUPPORTED else f"{FORMATS[fmt].summary}: {_NO_POSES}"
     return FormatError(about, source=name or "stdin")
 
@@ -277,7 +277,7 @@ def _no_text(what: str, name: str) -> FormatError:
 
 
 def instead_of_text(error: FormatError, path: str) -> FormatError:
-    """Return the error for a binary file where a pose is expected: what it is, not the position of a byte."""
+    """Return the error for a binary file instead of a pose: its kind, not the position of an invalid byte."""
     with open(path, "rb") as file:
         head = file.read(HEAD)
     what = not_text(head)

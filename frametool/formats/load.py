@@ -372,7 +372,7 @@ class EdgePlace(NamedTuple):
 
 
 def checked_answers(answers: dict[str, Any]) -> dict[str, Any]:
-    """Return answers about a format; raise ValueInvalid for words that are none of their choices."""
+    """Return answers about a format; raise ValueInvalid for words that are not among the choices."""
     for ask, choices in CHOICES.items():
         if (answer := answers.get(ask)) and answer not in choices:
             raise ValueInvalid(f"{ask} is {' or '.join(choices)}, not {shown(answer)}")

@@ -17,7 +17,7 @@ class Rows(NamedTuple):
     inverse: the file has the pose of the world in the body, not of the body in the world
     axes: of a camera, `optical` or `opengl`
     frames: default names of world and body
-    counted: what the numbers are that replace stamps; "" if rows have stamps
+    counted: the meaning of the numbers that replace stamps; "" if rows have stamps
     """
 
     delimiter: str | None = None
@@ -35,15 +35,15 @@ class Format(NamedTuple):
 
     summary: a description in one line
     suffixes: of files in this format; names: file names for which it is written
-    reads: what is read from it: `tree` by `read` of `reader`, `joints` (values by name) by its `read_joints`;
+    reads: kinds of content: `tree`, read by `read` of `reader`, `joints` (values by name) by its `read_joints`;
         `records` and `rows` by the streams, columns of numbers as `arrays` by its `open_columns`; `trajectory`: it
         holds one moving frame; a `drawing`: edges without poses, by `read`, for `tree` alone; `cameras`: it may hold
         intrinsics too
-    writes: what is written in it, by `write_poses` (also a `trajectory`: the poses of one frame over time),
+    writes: kinds of results, written by `write_poses` (also a `trajectory`: the poses of one frame over time),
         `write_points` (also for a `report`), `write_tree` of `writer`; as `arrays` by its `create`, with
         columns of `texts` if it has them; if all poses have one notation, a RowForm in `ROWS` of `writer` replaces
         `write_poses`; as messages of a `recording`, whose trees are written by `tree_pieces` of `writer`
-    magic: how it begins, as (kind, what); `frametool.formats.detect` defines the kinds
+    magic: signs of its beginning, as (kind, pattern); `frametool.formats.detect` defines the kinds
     conventions: the meaning of its numbers (frames, units, order)
     required_options: the options for what it does not specify
     not_stored: what a tree loses in this format, for a warning

@@ -49,7 +49,7 @@ OF = {"xyz": AXES[:3], "rpy": AXES[3:]}
 def find_columns(names: Sequence[str], size: int) -> tuple[tuple[int, ...], tuple[tuple[int, str], ...]]:
     """Return the indices of the columns of a covariance, and for sigmas the sources of each of the six axes.
 
-    size: 36 of a pose, 9 of a point.  None if there are none.  Raises NotARotation for an incomplete or duplicate one.
+    size: 36 of a pose, 9 of a point.  () without columns.  Raises NotARotation for an incomplete or duplicate one.
     """
     entries = columns(size)
     whole = tuple(names.index(name) for name in entries) if {*entries} <= {*names} else ()
@@ -97,7 +97,7 @@ def columns(size: int = 36) -> tuple[str, ...]:
 
 
 def read_covariance(mapping: dict[str, Any], reading: Reading) -> Components | None:
-    """Read the covariance of an entry, from either key; None if there is none: the pose is exact.
+    """Read the covariance of an entry, from either key; None without one: the pose is exact.
 
     Raises Misfit with the path, NotARotation if the numbers are not a covariance.
     """

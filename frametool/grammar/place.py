@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from frametool.grammar.pose import Pose
 
 AT = "at"
-# names of other tools; those after the first two count only together with these
+# names of other tools; those after the first two are only read together with these
 SAME = {"lat": "lat", "latitude": "lat", "lon": "lon", "longitude": "lon", "lng": "lon", "long": "lon"}
 SAME |= {"alt": "alt", "altitude": "alt", "height": "alt", "hae": "alt"}
 SEA_LEVEL = ("msl", "ele", "elevation", "orthometric")
@@ -64,7 +64,7 @@ def without_place(mapping: dict[str, Any]) -> dict[str, Any]:
 def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
     """Return the pose or point in `ecef` of a mapping with a position on the Earth and of the pose in its other keys.
 
-    Raises Misfit with the path of what is wrong in this mapping.
+    Raises Misfit with the path of the error in this mapping.
     """
     own = {key: value for key, value in mapping.items() if key in EARTH_KEYS}
     spots = _spots(own, reading)
@@ -157,7 +157,7 @@ def _by_field(own: dict[str, Any]) -> dict[str, str]:
 
 
 def heights(named: dict[str, str]) -> tuple[str, ...]:
-    """Return the fields that make a height above the ellipsoid, of fields with their names; () if there is none."""
+    """Return the fields that make a height above the ellipsoid, from field -> key; () without a height."""
     if "alt" in named or "msl" not in named:
         return ("alt",) * ("alt" in named)
     if "undulation" not in named:
@@ -397,7 +397,7 @@ def frame_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
 def seen_at(pose: Pose, place: Place | None) -> tuple[dict[str, Any], Pose]:
     """Return a frame of ecef in one notation, and the axes of the remaining pose.
 
-    A frame that is not on the Earth has none, and its pose is unchanged.
+    If the notation cannot express the position, the mapping is empty and the pose unchanged.
     """
     place = Place(LLA, POSITIONS[LLA].names, ENU) if place is None else place
     try:

@@ -134,7 +134,7 @@ class WrittenRotation(NamedTuple):
 def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] = ()) -> Pose:
     """Read one pose; `also` lists further keys, which the caller reads.
 
-    Raises Misfit with the path of what is wrong in this mapping.
+    Raises Misfit with the path of the error in this mapping.
     """
     if not POSE_KEYS.issuperset(mapping):
         if any(map(readers.may_be_on_earth, mapping)):
@@ -231,7 +231,7 @@ def read_angle_unit(value: Any) -> bool:
 
 
 def unknown_key(unknown: Sequence[str], hint: str) -> Misfit:
-    """Return the error for unknown keys of an entry, the first with a hint at what was meant."""
+    """Return the error for unknown keys of an entry, with a suggestion for the first."""
     others = shown(unknown[-1]) if len(unknown) == 2 else f"{len(unknown) - 1} more"
     named = f"unknown key {shown(unknown[0])}{hint.replace('; ', ', ')}{f'; and {others}' * (len(unknown) > 1)}"
     choices = ", ".join([*ROTATIONS][:MOST_CHOICES])

@@ -60,7 +60,7 @@ FLAT_KEYS = frozenset(names[0] for names in FLAT.values())  # which no other dat
 
 
 class Misfit(ValueInvalid):
-    """A value that does not fit, with the keys and indices that lead to it from where reading began."""
+    """A value that does not fit, with the keys and indices that lead to it from the value that was read."""
 
     def __init__(self, message: str, path: Path = (), *, key: bool = False, rule: str = "") -> None:
         """Store the path; `key` marks the last key itself as wrong, not its value."""
@@ -228,7 +228,7 @@ def places_in(value: list[Any]) -> Sequence[tuple[int, ...]]:
 def read_texts(value: Any, names: Sequence[str], *, partial: bool = False) -> list[Any]:
     """Return the values of a list of fixed length, or of a mapping with these names, in their order.
 
-    partial: missing names in a mapping count as 0.
+    partial: missing names in a mapping are 0.
     """
     if type(value) is list:
         texts: list[Any] = value

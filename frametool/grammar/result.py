@@ -138,7 +138,7 @@ def placed(position: Sequence[float], style: Style) -> dict[str, list[float]]:
 
 
 class NoResult(Result):
-    """A bad row that is kept: its frames and other keys, with null in place of its pose."""
+    """A bad row with --on-error null: its frames and other keys, with null in place of its pose."""
 
     __slots__ = ()
 

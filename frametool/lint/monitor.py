@@ -171,7 +171,7 @@ def monitor(
 ) -> list[dict[str, Any]]:
     """Describe every edge of files; or, for `ends` (target, source), the edges between the two and their chain.
 
-    clashing: receives the errors about frames on the topics of two robots, whose samples then count as one
+    clashing: receives the errors about frames on the topics of two robots, whose samples are then combined
     Raises FormatError for files without transforms, UnknownFrame, NotConnected.
     """
 

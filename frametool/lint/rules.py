@@ -221,7 +221,7 @@ def check(
     """Return all findings in files, combined into one tree, in the order of the files and lines.
 
     tree: receives the static edges
-    others: allow files of other kinds; a file without any frames only gets the finding that it has none
+    others: allow files of other kinds; a file without frames only gets a finding that says so
     """
     findings: list[Finding] = []
     findings += lint(_statements(files, findings, normalize=normalize, others=others), tree)

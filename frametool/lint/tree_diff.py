@@ -48,7 +48,7 @@ class Tolerance(NamedTuple):
     radians: float = NEAR
 
     def covers(self, apart: Apart | None) -> bool:
-        """Return True if two poses are within the tolerance; unknown parts do not count."""
+        """Return True if two poses are within the tolerance; unknown parts are ignored."""
         if apart is None:
             return True
         return apart.metres <= self.metres + apart.rounding and apart.radians <= self.radians + apart.turn_rounding
@@ -111,7 +111,7 @@ class Difference(NamedTuple):
     kind: one of KINDS, or `same` for an unchanged frame
     parent_a, parent_b: None for a root and for a missing frame
     own: displacement in its own parent; None if the parents differ, and for roots
-    seen_from: a frame relative to which it is compared in both; None if there is none
+    seen_from: the frame relative to which it is compared in both, if there is one
     seen: displacement relative to it
     note: further information
     """

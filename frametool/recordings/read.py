@@ -131,7 +131,7 @@ class McapFile:
                 yield Chunk.read(ReadDataStream(self.stream))
 
     def found(self, numbers: set[int]) -> Iterator[list[Recorded]]:
-        """Yield the messages of each chunk, and those outside of chunks, many together; register what else is there."""
+        """Yield the messages in and outside of chunks, many together; register schemas and channels."""
         from mcap import records
 
         found: list[Recorded] = []
@@ -150,7 +150,7 @@ class McapFile:
         yield found
 
     def _take(self, chunk: Any, numbers: set[int], found: list[Recorded]) -> None:
-        """Add the messages on some channels that are in a chunk; register what else is there.
+        """Add the messages on some channels that are in a chunk; register schemas and channels.
 
         Raises ValueError for a chunk that is too large, before it is unpacked.
         """

@@ -185,7 +185,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
 
 
 def _cut(piece: Piece, end: str, size: int) -> Iterator[Piece]:
-    """Split a piece, where documents or lines end, into chunks of a size, or of one longer document."""
+    """Split a piece at the ends of documents or lines into chunks of a size, or of one longer document."""
     text, line = piece
     at = 0
     while at < len(text):

@@ -101,7 +101,7 @@ def in_grammar(
 
 
 def _unless_grammar(source: Source, default: Notation | None, *, points: bool) -> list[Any] | None:
-    """Return the values of pasted numbers; of JSON only what the grammar would refuse."""
+    """Return the values of pasted numbers; for JSON only those that the grammar would refuse."""
     read = parse_json(source)
     lists = (each for each in read or () if type(each) is list and each and type(each[0]) is list)
     has_matrix = any((len(each), len(each[0])) in ((3, 3), (4, 4)) for each in lists)

@@ -48,7 +48,7 @@ def read_blocks(
     size, longest = sizes.BLOCK, longest or sizes.RECORD
     ready = readiness(stream)
     begun: list[bytes] = []  # the beginning of a record
-    pieces: list[bytes] = []  # what follows it
+    pieces: list[bytes] = []  # the text after it
     held, line = 0, 1
     while piece := _read_piece(stream, min(size, longest - held), ready):
         pieces.append(piece)
@@ -72,7 +72,7 @@ def read_blocks(
 
 
 def _read_piece(stream: ByteStream, size: int, ready: Callable[[int], bool]) -> bytes:
-    """Read what has arrived, and what arrives right after it if that is much."""
+    """Read the bytes that have arrived; if these are many, also those that arrive within a short wait."""
     piece = stream.read1(size)
     if not piece or len(piece) >= size:
         return piece

@@ -214,7 +214,7 @@ _MISTAKES = (
 def odd_characters(text: str) -> str:
     """Return a description of the first look-alike character: minus signs, wide digits, invisible blanks.
 
-    Returns "" if there is none.
+    Returns "" without such characters.
     """
     bad = next((c for c in text if ord(c) > 126 and (c in _ODD_MINUS or c.isdigit() or not c.isprintable())), None)
     if bad is None:

@@ -205,7 +205,7 @@ class RecordEnds:
     def __call__(self, text: bytes) -> int:
         """Return the number of bytes in complete records; negative: that many begin a record whose quote is open.
 
-        text: contains a line end; it follows what was returned last.
+        text: contains a line end; it follows the records returned last.
         """
         last, start = text.rfind(b"\n") + 1, 0
         if self.quoted:
@@ -267,7 +267,7 @@ def _inside_quotes(data: Bytes, end: int, delimiter: bytes) -> Flags | None:
 
 @cache
 def _cell_pattern(delimiter: bytes) -> re.Pattern[bytes]:
-    """Return a pattern for one cell and, as group 1, what ends it; an unclosed quote reaches to the end of the text."""
+    """Return a pattern for one cell and, as group 1, its end; an unclosed quote reaches to the end of the text."""
     mark = re.escape(delimiter)
     quoted = rb'"(?:[^"]++|"")*+(?:"[^' + mark + rb"\n]*+|\Z)"
     return re.compile(rb"(?:" + quoted + rb"|[^" + mark + rb"\n]*+)(" + mark + rb"|\n|\Z)")

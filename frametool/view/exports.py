@@ -55,7 +55,7 @@ CORNER = 46.0  # pixels from the corner to the origin of the legend's axes
 def still_picture(
     scene: FrameScene, eye: Eye = EYES["slanted"], title: str = "", other: FrameScene | None = None,
 ) -> Picture:  # fmt: skip
-    """Draw a scene from a direction, azimuth and elevation in radians; the picture's notes list what it does not show.
+    """Draw a scene from a direction, azimuth and elevation in radians; notes list what the picture does not show.
 
     other: another tree in the same frame; its frames with the same names are drawn faintly, with a line to them.
     """

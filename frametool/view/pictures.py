@@ -333,7 +333,7 @@ def require_matplotlib() -> None:
 def write_png(picture: Picture) -> bytes:
     """Return the picture as a PNG without a timestamp.
 
-    Raises FileProblem where matplotlib is missing.
+    Raises FileProblem if matplotlib is missing.
     """
     require_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -120,7 +120,7 @@ HEADINGS = {
     "parent": "parent <- child", "rate_hz": "rate Hz", "first_ns": "first", "last_ns": "last", "gap_s": "gap s",
     "delay_mean_s": "delay s", "delay_max_s": "max s", "backward": "back", "parent_changes": "parents",
 }  # fmt: skip
-HIDDEN = (  # keys that are no columns of the table of edges; sentences show some of them
+HIDDEN = (  # keys without a column in the table of edges; sentences show some of them
     "kind", "child", "gap_until_ns", "parents", "overlap", "length_m", "duration_s", "speed_mean", "speed_max", "gaps",
 )  # fmt: skip
 

@@ -45,7 +45,7 @@ PLACEHOLDERS: dict[str, Callable[[PointCloud], str]] = {
     "number": lambda cloud: f"{cloud.number:06d}",
     "topic": lambda cloud: cloud.topic.strip("/"),
     "frame": lambda cloud: cloud.frame,
-}  # {NAME} in -o -> what replaces it
+}  # {NAME} in -o -> its replacement
 _WRITTEN = f"formats: {', '.join(writers('arrays'))}"
 
 

@@ -171,7 +171,7 @@ def command_lines(stream: BinaryIO) -> Iterator[tuple[int, str, str]]:
         begin, text = 0, ""
 
 
-READABLE = (None, "json", "yaml")  # formats that kept results replace by JSON; others are for printing
+READABLE = (None, "json", "yaml")  # formats that JSON replaces for kept results; others are for printing
 KEPT_ARE = "a name keeps one pose, point, number or tree"
 
 

@@ -227,7 +227,7 @@ def follow(inputs: Inputs) -> None:
 def scene_of(inputs: Inputs, leader: MakeLeader) -> Scene:
     """Return the scene of a leader and followers; raises click.UsageError for invalid options."""
     chosen = {name: getattr(inputs, name) for name in SCENE_OPTIONS}
-    holonomic = chosen["turtlesim"] == "ros2" and inputs.holonomic  # in ROS 1 linear.y always counts
+    holonomic = chosen["turtlesim"] == "ros2" and inputs.holonomic  # ROS 1 always uses linear.y
     with misuse():
         law = drivers.FollowController(inputs.law, **{name: getattr(inputs, name) for name in LAW_OPTIONS})
         return tutorial(leader=leader, law=law, holonomic=holonomic, **chosen)

@@ -46,7 +46,7 @@ ORIENTATIONS = {  # and their defaults
 MAIN = "main"
 STRAIGHT = ("capsule", "cylinder", "box", "ellipsoid")  # sites that may be defined by two ends
 LEAST = 1e-14  # below this length MuJoCo treats a vector as zero
-SAME_LINE = 1e-10  # what MuJoCo takes for a zaxis along z
+SAME_LINE = 1e-10  # tolerance of MuJoCo for a zaxis along z
 
 
 class _Inside(NamedTuple):
@@ -71,7 +71,7 @@ class MjcfModel:
             nodes += node.children if node.tag in NESTING else ()
             if node.tag in ("include", "replicate", "attach"):
                 raise node.error(f"<{node.tag}> is not expanded here; {WHOLE}")
-        attributes: dict[str, Element] = {}  # of the compiler sections, anywhere in the file: the last value counts
+        attributes: dict[str, Element] = {}  # of the compiler sections, anywhere in the file: the last value is used
         for section in root.all("compiler"):
             attributes |= own_attributes(section)
         self.degrees = word(attributes, "angle", "degree", "radian") == "degree"
@@ -257,7 +257,7 @@ class MjcfModel:
 
 
 def own_attributes(node: Element) -> Attributes:
-    """Return the attributes of an element; empty ones count as missing."""
+    """Return the attributes of an element without empty ones."""
     return {name: node for name, text in node.attributes.items() if text.strip()}
 
 

@@ -341,7 +341,7 @@ class SdfTree:
             if name := xyz.attribute("expressed_in"):
                 outer = self.find(name, frame.scope, xyz, "expressed_in")
             elif self.version < (1, 5) or (self.version < (1, 7) and in_model):
-                outer = frame.scope  # before 1.5 an axis is relative to the model, until 1.6 if it says so
+                outer = frame.scope  # before 1.5 an axis is relative to the model, until 1.6 by use_parent_model_frame
             if outer is not frame:
                 x, y, z = quaternion.rotate(*self.relative(frame, outer)[3:], x, y, z)
             x, y, z = quaternion.unit_vector(x, y, z, floats)

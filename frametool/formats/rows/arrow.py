@@ -82,7 +82,7 @@ def stamps_of(column: Any, name: str, in_ns: int) -> tuple[Ints, Flags | None, d
     """Read times as nanoseconds: timestamps (UTC if they have no zone), integers, or float seconds.
 
     in_ns: as in `column_file.stamps_in`, of integers
-    Returns the times (0 for null), the null mask (None: none), and why numbers are not a time, by their rows.
+    Returns the times (0 for null), the null mask (None: none), and row -> the reason why a number is not a time.
     Raises ValueInvalid for another type.
     """
     pa = require_pyarrow("an Arrow column")
@@ -120,7 +120,7 @@ class ArrowBatch(column_file.Batch):
         return column.to_numpy(zero_copy_only=False).astype(np.float64), nulls_of(column)
 
     def stamps(self, place: int, *, in_ns: int) -> tuple[Ints, dict[int, str]]:
-        """Return a column as nanoseconds, and why rows have none: timestamps, integers by name, float seconds."""
+        """Return timestamps, integers by name, or float seconds as nanoseconds, and row -> reason if it has no time."""
         stamps, nulls, reasons = stamps_of(self.rows.column(place), self.rows.schema.names[place], in_ns)
         return stamps, reasons | dict.fromkeys([] if nulls is None else np.flatnonzero(nulls).tolist(), NO_TIME)
 

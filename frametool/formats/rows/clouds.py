@@ -1,4 +1,4 @@
-"""Point clouds with a header: what PCD and PLY share, and PLY, of polygons too.
+"""Read and write point clouds with a header: common parts of PCD and PLY, and PLY clouds and meshes.
 
 Records are binary, or lines of numbers between blanks.  Unchanged data are preserved byte for byte: in text, blanks,
 line ends and the digits of other columns too.  Of PLY, vertices and their normals are transformed:
@@ -156,7 +156,7 @@ def head_lines(file: InputFile, text: list[bytes], last: str) -> Iterator[list[s
 
 
 def count_in(word: str, what: str, file: InputFile, line: int) -> int:
-    """Read a count of items, which an error calls `what`; raises FormatError."""
+    """Read a count of items; raises FormatError, which names them by `what`."""
     if not (word.isascii() and word.isdecimal()) or len(word) > 19 or int(word) > _MOST_POINTS:
         raise file.error(f"{what} is not a count", line)
     return int(word)
@@ -447,7 +447,7 @@ class PlyFile(CloudFile):
 
 
 def _type_of(column: OutColumn) -> str:
-    """Return PLY's name for the type of a column; raises ValueInvalid for what PLY cannot hold."""
+    """Return PLY's name for the type of a column; raises ValueInvalid for types that PLY does not have."""
     return type_in("ply", NEW_NAMES if column.passed is None else NAMES, column)
 
 

@@ -100,7 +100,7 @@ class Batch(Protocol):
             return self.column(place).astype(np.float64), None
 
     def stamps(self, place: int, *, in_ns: int) -> tuple[Ints, dict[int, str]]:
-        """Return a column as nanoseconds, and why rows have none; in_ns: as in `stamps_in`."""
+        """Return a column as nanoseconds, and row -> reason for rows without a time; in_ns: as in `stamps_in`."""
         stamps, bad, reason = stamps_in(self.column(place), in_ns)
         return stamps, dict.fromkeys(np.flatnonzero(bad).tolist(), reason)
 
@@ -110,7 +110,7 @@ class Batch(Protocol):
 
 
 def stamps_in(numbers: NDArray[Any], in_ns: int) -> tuple[Ints, Flags, str]:
-    """Return numbers as nanoseconds, the mask of those that are no times, and why.
+    """Return numbers as nanoseconds, the mask of those that are not times, and the reason.
 
     in_ns: nanoseconds per unit, of integers alone; 0 for seconds, or what the size of the first integer implies.
     A float of seconds has the value of its shortest decimal text, as in a table of text.
@@ -137,7 +137,7 @@ class ColumnWriter(Protocol):
         """
 
     def end(self) -> Iterator[bytes]:
-        """Yield what follows the last batch."""
+        """Yield the bytes after the last batch."""
 
 
 class ColumnFile(Protocol):
@@ -336,7 +336,7 @@ def seekable(file: InputFile, owner: object) -> Any:
 
 
 class CountedWriter:
-    """Writes a header with the number of rows, the rows, and what follows them."""
+    """Writes a header with the number of rows, the rows, and the rest of the file."""
 
     def __init__(
         self, encode: Encode, head: Callable[[int], bytes], count: int | None,
@@ -344,7 +344,7 @@ class CountedWriter:
     ) -> None:  # fmt: skip
         """Store the functions that encode the rows of a batch, with their new data.
 
-        head: returns the header for a number of rows; behind: yields what follows the rows
+        head: returns the header for a number of rows; behind: yields the bytes after the rows
         count: the number of rows; None if it is known only at the end: rows are kept in a file until then.
         """
         self.encode, self.head, self.count, self.behind = encode, head, count, behind
@@ -364,7 +364,7 @@ class CountedWriter:
         return head + data if head else data
 
     def end(self) -> Iterator[bytes]:
-        """Yield what follows the last batch; all bytes, if the rows had to be counted first."""
+        """Yield the bytes after the last batch; all bytes, if the rows had to be counted first."""
         if not self.begun:
             yield self.head(self.written)
         if self.waiting is not None:
@@ -378,7 +378,7 @@ def encode_records(
 ) -> bytes | memoryview:
     """Return rows as records: new data are written into their fields, the others are copied.
 
-    kind: of the records, with a field for each column.  If none is new they are changed in place.
+    kind: of the records, with a field for each column.  Without new columns they are changed in place.
     """
     of_input = batch if batch is None or rows is None else StructuredBatch(batch.rows[rows])
     if of_input is not None and of_input.rows.dtype == kind:

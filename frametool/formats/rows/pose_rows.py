@@ -278,7 +278,7 @@ def text_lines(file: InputFile) -> Iterator[tuple[int, str]]:
 
 
 def whole_in(file: InputFile, line: int, word: str, what: str) -> int:
-    """Read a word as an integer, which errors call `what`; raises FormatError."""
+    """Read a word as an integer; raises FormatError, which names it by `what`."""
     if not re.fullmatch("[0-9]{1,18}", word):
         raise file.error(f"expected {what}, a whole number, found {shown(word)}", line)
     return int(word)

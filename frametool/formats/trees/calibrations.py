@@ -128,7 +128,7 @@ def _autoware(value: Any, reading: Reading) -> Iterator[Edge]:
 
 def _handeye(value: Any, reading: Reading) -> Iterator[Edge]:
     calibration = as_mapping(value, "parameters and transformation")
-    inner = "parameters" in calibration  # the first easy_handeye had none around them
+    inner = "parameters" in calibration  # missing in the first easy_handeye
     path: Path = ("parameters",) if inner else ()
     parameters = within(path, as_mapping, calibration["parameters"] if inner else calibration, "the parameters")
     mount = next((key for key in MOUNTS if key in parameters), None)

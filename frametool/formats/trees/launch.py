@@ -218,7 +218,7 @@ def _of_python(source: Source) -> list[Action]:
 
 
 def _literal(node: ast.expr) -> Any:
-    """Return the literal value of an argument; else a Misfit with what is not literal in it."""
+    """Return the literal value of an argument; else a Misfit that quotes the part that is not literal."""
     match node:
         case ast.List(elts=items) | ast.Tuple(elts=items):
             found = [_literal(each) for each in items]

@@ -275,7 +275,7 @@ def edges_of(statements: Iterable[Stated], reading: Reading) -> list[Edge]:
 
 
 def directed(what: str, path: Path, parent: str, child: str, answers: Answers) -> Meaning:
-    """Return the direction set for two frames; raises Unclear if none was."""
+    """Return the direction of --direction for two frames; raises Unclear if it is not set."""
     if not answers.direction:
         one, other = DIRECTIONS
         a, b = bare(parent), bare(child)
@@ -433,7 +433,7 @@ class Matrices:
         return Stated(*meaning[:3], (*(position or IDENTITY[:3]), *rotation), path, chained=key == "T_cn_cnm1")
 
     def _named(self, block: MatrixBlock, path: Path) -> Meaning | None:
-        """Return the meaning from the keys next to a matrix that name its two frames; None if there are none.
+        """Return the meaning from the keys next to a matrix that name its two frames; None without such keys.
 
         Raises Misfit if one of the two is missing, and Unclear if nothing states the direction.
         """
@@ -507,7 +507,7 @@ def stored(outer: Element, path: Path, elements: dict[Path, Element]) -> Any:
 def write_tree(tree: Frames, style: Style) -> str:
     """Return a camera chain; or OpenCV's YAML, one matrix per edge, named `parent_T_child`.
 
-    Raises ValueInvalid for what either cannot hold, as names that OpenCV does not accept.
+    Raises ValueInvalid for trees that do not fit, e.g. names that OpenCV does not accept.
     """
     if style.format == "camchain":
         return _chain(tree, style)

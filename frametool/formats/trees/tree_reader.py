@@ -318,7 +318,7 @@ def read_time(entry: dict[str, Any], key: str, example: str = "") -> int:
 
 
 def named(fields: dict[str, Any], key: str) -> str:
-    """Return the name under a key; raises Misfit if there is none."""
+    """Return the name under a key; raises Misfit if it is missing."""
     name = read_name(fields, key)
     if name is None:
         raise Misfit(f"missing {key}")
