@@ -32,9 +32,9 @@ def main(arguments: list[str] | None = None) -> None:
 
 def run(arguments: list[str]) -> int:
     """Run one command; every error becomes one line on stderr and an exit code."""
-    from frametool.cli.commands import TROUBLE, answer
-    from frametool.cli.signals import die_of
-    from frametool.cli.sink import TROUBLES, discard, say, say_error, say_warning, wants_json, words_of
+    from frametool.cli.commands import TROUBLE, call_command
+    from frametool.cli.signals import end_by_signal
+    from frametool.cli.sink import SYSTEM_ERRORS, discard, say, say_error, say_warning, system_message, wants_json
     from frametool.errors import FrametoolError, heard_by
     from frametool.sizes import DEEPEST
 
@@ -51,7 +51,7 @@ def run(arguments: list[str]) -> int:
     try:
         with heard_by(say_warning):
             try:
-                status = answer(arguments)
+                status = call_command(arguments)
             except KeyboardInterrupt:
                 status = INTERRUPTED
             except FrametoolError as error:
@@ -59,10 +59,10 @@ def run(arguments: list[str]) -> int:
                 status = own or error.exit_code
         sys.stdout.flush()
     except BrokenPipeError:
-        status = die_of("SIGPIPE")  # as `cat` does if its reader is gone
-    except TROUBLES as error:
+        status = end_by_signal("SIGPIPE")  # as `cat` does if its reader is gone
+    except SYSTEM_ERRORS as error:
         if status != in_out or not isinstance(error, OSError):  # else it is reported, and the buffer fails again
-            say(words_of(error))
+            say(system_message(error))
         if isinstance(error, OSError):
             discard(sys.stdout)
         status = in_out

@@ -370,7 +370,7 @@ class Command(WithHelp):
             options = {name for each in self.get_params(ctx) for name in each.opts}
             args = [f" {each}" if _is_negative(each) and each not in options else each for each in args]
         if "inv" in args:
-            args = _joined(args, ctx, always=self.name in OF_POSES)
+            args = _join_inverses(args, ctx, always=self.name in OF_POSES)
         if not OPTIONAL.keys().isdisjoint(args):
             for name, value in pairwise(args):
                 if value in OPTIONAL.get(name, ()) and not ctx.resilient_parsing:
@@ -419,7 +419,7 @@ class Command(WithHelp):
         formatter.write_text(self.epilog or EXIT_CODES)
 
 
-def _joined(args: list[str], ctx: click.Context, *, always: bool) -> list[str]:
+def _join_inverses(args: list[str], ctx: click.Context, *, always: bool) -> list[str]:
     """Rewrite the word `inv` and the pose behind it as inv(POSE); `always`: also if that may not be a pose."""
     joined: list[str] = []
     for each in reversed(args):

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from frametool.stream.request import Operation
 
 
-def _place(fmt: str, output: str | None) -> str:
+def _recording_path(fmt: str, output: str | None) -> str:
     """Return the path of a recording to write; raises UsageError if it does not fit the format."""
     if output is None or output == "-":
         raise UsageError(f"{fmt} is no text; give -o {'FOLDER' if fmt in table.FOLDERS else 'FILE'}")
@@ -50,7 +50,7 @@ def folder_of(place: str) -> str:
     return folder if os.path.isdir(folder) else ""
 
 
-def copied_as(fmt: str, path: str, output: str | None, named: str | None) -> tuple[str, str]:
+def copy_target(fmt: str, path: str, output: str | None, named: str | None) -> tuple[str, str]:
     """Return the format and the path of a copy of a recording; raise UsageError if they do not fit.
 
     named: the format of -f, None if the name of the output decides
@@ -60,7 +60,7 @@ def copied_as(fmt: str, path: str, output: str | None, named: str | None) -> tup
     if copy is None:
         unknown = f"-o {output} names no format; " if output else ""
         raise UsageError(f"{unknown}give {'-o NEW.bag' if fmt == 'bag1' else '-o NEW.mcap or -f bag2 -o FOLDER'}")
-    place = _place(copy, output)
+    place = _recording_path(copy, output)
     if "bag1" in (fmt, copy) and fmt != copy:
         what = f"{path} is copied as {'a ROS 1 bag' if fmt == 'bag1' else 'mcap or bag2'}, not as {copy}"
         raise UsageError(f"{what}; rosbags-convert --src {path} --dst {output} makes that of it")
@@ -120,14 +120,14 @@ class Output:
             screen=self.chosen in (None, "text") and self.path is None and sys.stdout.isatty(),
         ).changed(place=place)  # fmt: skip
         if table.holds(fmt, "recording"):
-            folder = folder_of(_place(fmt, self.path))
+            folder = folder_of(_recording_path(fmt, self.path))
             frames = inputs.recorded_frames or next(iter(inputs.named_frames), ())
             is_pair = len(frames) in (0, 2) and len({*frames}) == len(frames)
             refuse(not is_pair, "--frames takes WORLD,BODY, different names")
             recording = RecordingStyle(tuple(inputs.messages), inputs.topic_out or "", frames, folder)
             self.style = self.style._replace(recording=recording)
 
-    def take_axes(self, known: str, operation: Operation | None = None) -> None:
+    def set_camera_axes(self, known: str, operation: Operation | None = None) -> None:
         """Set the axes of the camera whose poses are written: those of --camera-axes, else of the input format."""
         stated = self._inputs.peek("camera_axes") or ""
         axes = (stated or known) if operation is None or operation.keeps_child else ""
@@ -136,10 +136,10 @@ class Output:
         if self.style.axes and row and row.rows.axes:
             self._inputs.use("camera_axes")
 
-    def take_axes_in(self, tree: Frames, source: str) -> None:
+    def set_camera_axes_of(self, tree: Frames, source: str) -> None:
         """Set the camera axes of a frame of a tree; if the tree has no cameras, --camera-axes applies to this frame."""
         if source in tree.camera_axes or not tree.camera_axes:
-            self.take_axes(tree.camera_axes.get(source, ""))
+            self.set_camera_axes(tree.camera_axes.get(source, ""))
 
     def values(self, values: Iterable[Value]) -> None:
         """Write results: poses as poses; points, vectors and messages, which are mappings, unchanged."""
@@ -246,7 +246,7 @@ class Output:
                     frames = first_of(children, 8, quote=shown) or "none"
                     instead = f"name two: lookup TREE TARGET SOURCE -f {self.style.format}"
                     raise ValueInvalid(f"{self.style.format} holds one frame, the tree has {frames}; {instead}")
-                self.take_axes_in(tree, children[0])
+                self.set_camera_axes_of(tree, children[0])
             self.values(sample_results(tree))
             return
         if self.style.format != "text":
@@ -266,9 +266,9 @@ class Output:
         if self.style.format != "text":
             self.text(self._module("").write_points(entries, self.style))
             return
-        from frametool.view.reports import trouble, write_report
+        from frametool.view.reports import problem_patterns, write_report
 
-        self.marks = trouble(entries)
+        self.marks = problem_patterns(entries)
         self.text(write_report(entries))
 
     @property

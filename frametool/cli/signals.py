@@ -38,7 +38,7 @@ class _Signals:
             frame = frame.f_back
         if frame and not self.cleans_up and not self.writing:
             # an exception raised during an import may be printed there, and lost
-            os._exit(130 if number == signal.SIGINT else die_of(name))
+            os._exit(130 if number == signal.SIGINT else end_by_signal(name))
         if number != signal.SIGINT:
             for each in ENDING:
                 signal.signal(each, signal.SIG_IGN)  # `timeout` sends it twice: do not interrupt the cleanup
@@ -60,13 +60,13 @@ def with_signals(run: Callable[[list[str]], int], arguments: list[str]) -> int:
             signal.signal(number, STATE.end)
         return run(arguments)
     except Terminated as error:
-        return die_of(str(error))
+        return end_by_signal(str(error))
     finally:
         for number in caught:
             signal.signal(number, signal.SIG_DFL)
 
 
-def die_of(name: str) -> int:
+def end_by_signal(name: str) -> int:
     """End the process by a signal, which the caller then sees; inside another program return its exit status."""
     number = getattr(signal, name, None)
     if number is None:  # SIGPIPE on Windows

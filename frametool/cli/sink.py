@@ -1,7 +1,7 @@
 """Write results to standard output, whole lines at a time, or atomically to a file or a folder.
 
 On a terminal, text for people has styles, and is paged if it is longer than the screen.
-Messages go to stderr, only by `say` and `tell`, which never fail; errors are sentences or JSON.
+Messages go to stderr, only by `say` and `write_lines`, which never fail; errors are sentences or JSON.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def writing(path: str | None, *, force: bool = False, folder: bool = False) -> I
             yield write
     else:
         number = _own_stream(path)
-        with problems_of(path):
+        with file_errors(path):
             special = open(path if number is None else os.dup(number), "wb", buffering=0)  # noqa: SIM115 - closed below
         with special:
             yield writer_into(special, path)
@@ -78,7 +78,7 @@ def _replacing(path: str, *, force: bool, folder: bool) -> Iterator[Write]:
             yield _folder_writer(part, path, opened) if folder else _file_writer(part, path, opened, mode)
             check()
         refuse()  # again, now that the part is complete
-        with problems_of(path):
+        with file_errors(path):
             if folder:
                 with suppress(FileNotFoundError):
                     os.rename(place, f"{part}.before")
@@ -176,7 +176,7 @@ def writer_into(stream: BinaryIO, name: str) -> Write:
         view = memoryview(encoded(piece) if isinstance(piece, str) else piece)
         STATE.writing = True  # Ctrl-C is deferred until the block of lines is written
         try:
-            with problems_of(name):
+            with file_errors(name):
                 while view:  # an unbuffered stream may write only a part
                     view = view[stream.write(view) :]
                 stream.flush()
@@ -190,7 +190,7 @@ def writer_into(stream: BinaryIO, name: str) -> Write:
 
 
 @contextmanager
-def problems_of(name: str) -> Iterator[None]:
+def file_errors(name: str) -> Iterator[None]:
     """Turn errors of the system into FileProblem with the name of the file; a closed pipe is not one."""
     try:
         yield
@@ -202,7 +202,7 @@ def problems_of(name: str) -> Iterator[None]:
 
 def _file_writer(part: str, path: str, opened: ExitStack, mode: int = 0o666) -> Write:
     """Create a temporary file and return a function that writes to it."""
-    with problems_of(path):
+    with file_errors(path):
         file = open(part, "xb", buffering=0, opener=lambda name, flags: os.open(name, flags, mode))  # noqa: SIM115
     return writer_into(opened.enter_context(file), path)
 
@@ -218,7 +218,7 @@ def _folder_writer(part: str, path: str, opened: ExitStack) -> Write:
         if write is not None and piece:  # the first piece has a name
             write(piece)
 
-    with problems_of(path):
+    with file_errors(path):
         os.mkdir(part)
     return fill
 
@@ -236,7 +236,7 @@ def _remove(part: str) -> None:
 LOCATIONS: list[dict[str, Any]] = []  # source and line of a batch; all messages begin with the last one
 
 
-def tell(text: str) -> None:
+def write_lines(text: str) -> None:
     """Write lines to stderr; if it is closed or its disk is full they are dropped, and the results are still valid."""
     if sys.stderr is None:
         return
@@ -250,7 +250,7 @@ def say(text: str) -> None:
     """Write a message to stderr after the program's name, wrapped on a terminal."""
     where = "{source}:{line}: ".format(**LOCATIONS[-1]) if LOCATIONS else ""
     text = printable(f"frametool: {where}{text}")
-    tell(folded(text) if sys.stderr is not None and sys.stderr.isatty() else text)
+    write_lines(folded(text) if sys.stderr is not None and sys.stderr.isatty() else text)
 
 
 def folded(line: str) -> str:
@@ -294,11 +294,11 @@ def say_error(error: FrametoolError, *, in_json: bool = False, fate: str = "") -
             own = {key: details.pop(key) for key in ("source", "line", "column") if key in details}
             message = f"{'{source}:{line}: '.format(**LOCATIONS[-1])}{message}"
             details = {**LOCATIONS[-1], **({"input": own} if own else {}), **details}
-        tell(dump_json({"error": error.kind, "message": f"{message}{fate}", **details}))
+        write_lines(dump_json({"error": error.kind, "message": f"{message}{fate}", **details}))
         return
     say(f"{error}{getattr(error, 'remedy', '')}{fate}")
     if snippet := getattr(error, "snippet", ""):
-        tell(snippet)
+        write_lines(snippet)
 
 
 def say_first(
@@ -318,16 +318,16 @@ def discard(stream: TextIO) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-TROUBLES = (MemoryError, ImportError, OSError)
+SYSTEM_ERRORS = (MemoryError, ImportError, OSError)
 
 
-def words_of(trouble: Exception) -> str:
+def system_message(error: Exception) -> str:
     """Return the message of an error of Python or the system."""
-    if isinstance(trouble, MemoryError):
+    if isinstance(error, MemoryError):
         return "out of memory"
-    if isinstance(trouble, ImportError):  # numpy's message has many lines, the cause is the last
-        return f"a library cannot be loaded: {str(trouble).strip().splitlines()[-1]}"
-    return (getattr(trouble, "strerror", None) or str(trouble)).lower()
+    if isinstance(error, ImportError):  # numpy's message has many lines, the cause is the last
+        return f"a library cannot be loaded: {str(error).strip().splitlines()[-1]}"
+    return (getattr(error, "strerror", None) or str(error)).lower()
 
 
 def wants_json(arguments: Sequence[str]) -> bool:

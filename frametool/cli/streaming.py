@@ -243,14 +243,14 @@ class Task:
         if output.chosen is None and (output.path or "").endswith(".bin") and not fmt.endswith("-bin"):
             raise click.UsageError(f"-o {output.path} does not name its format; give -f kitti-bin or nuscenes-bin")
         refuse(looks_up and fmt in RECORDS, f"frames are looked up for the rows of a table, not of {fmt}")
-        request = self._completed(request, fmt, alone=rows is None)
+        request = self._with_stream_options(request, fmt, alone=rows is None)
         if request.offset_ns and fmt in RECORDS:
             from frametool.stream.record_stream import at_other_times
 
             stream = at_other_times(stream, fmt, request.offset_ns)
         of_numbers = f"--time-offset is for text, {fmt} holds numbers; convert it to csv first"
         refuse(request.offset_ns and holds(fmt, "arrays"), of_numbers)
-        output.take_axes(FORMATS[fmt].rows.axes, request.operation)
+        output.set_camera_axes(FORMATS[fmt].rows.axes, request.operation)
         if is_trajectory(fmt) and not output.notations:
             request = request.with_results(notations=())  # rows are written in their own representation
         bad = self.policy(self.name, "row" if holds(fmt, "arrays") else "line")
@@ -363,7 +363,7 @@ class Task:
         tell = partial(say_error, in_json=self.inputs.peek("format_name") == "json")
         return BadRows(name, self.inputs.on_error, most=self.inputs.max_errors, tell=tell, counted=counted)
 
-    def _completed(self, request: Request, fmt: str, *, alone: bool) -> Request:
+    def _with_stream_options(self, request: Request, fmt: str, *, alone: bool) -> Request:
         """Add the options of the stream to the request; alone: the results are written, not collected."""
         inputs, output = self.inputs, self.output
         is_table = fmt not in RECORDS
@@ -414,7 +414,7 @@ class Task:
             precision=style.precision, keep_sign=style.keep_sign,
         )  # fmt: skip
         made = Request(rows=rows, results=results, **fields)
-        self.output.take_axes("", made.operation)
+        self.output.set_camera_axes("", made.operation)
         return made
 
     def only_arguments(self, arguments: Sequence[str | Source | None]) -> None:
@@ -423,19 +423,19 @@ class Task:
         if any(isinstance(each, str) and os.path.exists(each) for each in arguments):
             self.inputs.use("input_formats")
 
-    def streamed(self, arguments: Sequence[str], request: Request) -> Request | None:
+    def stream_request(self, arguments: Sequence[str], request: Request) -> Request | None:
         """Return the request for the stream if the only argument is `-`, a table, or their inverse; else None."""
         bare, is_inverse = without_inverse(arguments[0]) if arguments else ("-", False)
         if len(arguments) > 1 or (bare != "-" and (self.path or not self.has_table(bare))):
             return None
         return request.of_inverses() if is_inverse else request
 
-    def answer(self, argument: str | Source, request: Request, timed: dict[str, Any] | None = None) -> int:
+    def write_results(self, argument: str | Source, request: Request, timed: dict[str, Any] | None = None) -> int:
         """Write the results of the records of one argument: inline, a file, or the stream of the command.
 
         timed: replaces the stamp of a single result; {} removes it
         """
-        if isinstance(argument, str) and (streamed := self.streamed([argument], request)):
+        if isinstance(argument, str) and (streamed := self.stream_request([argument], request)):
             return self.run(streamed)
         self.only_arguments([argument])
         values = values_of([argument], request, self.output)
@@ -446,7 +446,7 @@ class Task:
         self.output.values(values)
         return 0
 
-    def written(self, argument: str | Source | None, *, warned: bool = False) -> WrittenPose:
+    def read_written(self, argument: str | Source | None, *, warned: bool = False) -> WrittenPose:
         """Read the single pose of an argument with its original notation, for a derivation.
 
         warned: its warnings were already written
@@ -454,7 +454,7 @@ class Task:
         if isinstance(argument, str):
             argument, is_inverse = without_inverse(argument)
             if is_inverse:
-                return self.written(argument, warned=warned).turned()
+                return self.read_written(argument, warned=warned).turned()
         from frametool.stream.written import written_poses
 
         request = self.request()

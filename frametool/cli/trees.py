@@ -81,7 +81,7 @@ def _load(
         tree = load_sources(files, rules, places if placed else None)
         if tree.moves:
             inputs.use("time_offset")
-        state(inputs, files)
+        report_files(inputs, files)
         return (tree, places), before - inputs.unused.keys()
 
     context = click.get_current_context(silent=True)
@@ -104,7 +104,7 @@ def lookups_in(inputs: Inputs, tree: Frames, *, carried: bool) -> Lookups:
     return Lookups(tree, carried=carried)
 
 
-def state(inputs: Inputs, files: Sequence[FrameFile]) -> None:
+def report_files(inputs: Inputs, files: Sequence[FrameFile]) -> None:
     """Report on stderr what was assumed of files that were read; with -v also their formats.
 
     --topic has an effect if one of them has topics.

@@ -162,7 +162,7 @@ def write_report(found: Sequence[Comparison], fmt: str, command: str) -> str:
                 pieces += pictures.svg_element(each, place=f' x="{number * each.width:g}" y="{top:g}"')
                 top += each.height
             bottom = max(bottom, top)
-        heading = pictures.words(LEFT, 20.0, title, weight="bold")
+        heading = pictures.svg_text(LEFT, 20.0, title, weight="bold")
         return pictures.write_svg(Picture(2.0 * wide, bottom, [heading], title), pieces)
     drawn = ""
     for column in (left, right):
@@ -234,7 +234,7 @@ def _path(curves: Sequence[Curve]) -> tuple[Picture, Callable[[Any], list[Point]
             begin = end
         below, text = TOP + area[3] + 25.0, f"error 0 .. {errors.max():.3g} m"
         legend += (pictures.box(LEFT + at * 7.0, below, 7.5, 9.0, shade) for at, shade in enumerate(SHADES))
-        legend.append(pictures.words(LEFT + LEVELS * 7.0 + 8.0, below + 4.5, text, "soft", size=11.0))
+        legend.append(pictures.svg_text(LEFT + LEVELS * 7.0 + 8.0, below + 4.5, text, "soft", size=11.0))
     else:
         lines += [ChartLine(each.name, each.colour, seen(each.found.moved.xyz[each.chosen])) for each in curves]
     shapes, place = chart(area, (names[0], names[1]), lines, ends)
@@ -280,7 +280,7 @@ def _distribution(curves: Sequence[Curve]) -> Picture:
         shapes += [
             pictures.line([(least, y), (most, y)], colour, 1.5, title=each.name),
             pictures.box(first, y - 7.0, third - first, 14.0, colour), pictures.dot(middle, y, 4.0, "paper"),
-            pictures.dot(last, y, 3.0, colour), pictures.words(LEFT + 4.0, y - 17.0, each.name[:60], size=11.0),
+            pictures.dot(last, y, 3.0, colour), pictures.svg_text(LEFT + 4.0, y - 17.0, each.name[:60], size=11.0),
         ]  # fmt: skip
     return _figure(ROW * len(curves), shapes)
 

@@ -30,8 +30,8 @@ from frametool.geometry.rigid import IDENTITY
 from frametool.sim.turtle import SIZE as WORLD
 from frametool.sim.turtle import single
 from frametool.view import pictures
-from frametool.view.pictures import PALETTE, ChartLine, Picture, box, dot, line, shade_of, stacked, words
-from frametool.view.scene import EYES, FrameScene, Projection, Size, can_be_drawn, nice, placed_names, text_width
+from frametool.view.pictures import PALETTE, ChartLine, Picture, box, dot, line, shade_of, stacked, svg_text
+from frametool.view.scene import EYES, FrameScene, Projection, Size, can_be_drawn, placed_names, rounded, text_width
 from frametool.view.terminal import BACKGROUND, ON_WHITE, colours_of
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def still_picture(
         if away > 1.1:  # with a leader line
             end = min(max(point.x, left), right), top if top > point.y else bottom
             shapes.append(line([point[:2], end], "soft", 0.7))
-        shapes.append(words(left + 2.0, (top + bottom) / 2.0, text))
+        shapes.append(svg_text(left + 2.0, (top + bottom) / 2.0, text))
     shapes += _legend(flat, step)
     near = len(flat.cluster())
     crowded = f"{near} of {len(scene.names)} frames lie in a small spot; --below FRAME shows a part"
@@ -102,12 +102,12 @@ def _legend(flat: Projection, step: float) -> Iterator[SvgElement]:
     for axis in sorted(range(3), key=lambda axis: toward[axis]):
         dx, dy = right[axis], -up[axis]
         yield line([(x, y), (x + 28.0 * dx, y + 28.0 * dy)], "xyz"[axis], 2.0)
-        yield words(x + 38.0 * dx, y + 38.0 * dy, "xyz"[axis], "xyz"[axis], "middle", weight="bold")
-    metres = nice(110.0 / flat.scale)
+        yield svg_text(x + 38.0 * dx, y + 38.0 * dy, "xyz"[axis], "xyz"[axis], "middle", weight="bold")
+    metres = rounded(110.0 / flat.scale)
     begin, end, base = WIDTH - 20.0 - metres * flat.scale, WIDTH - 20.0, HEIGHT - 20.0
     yield line([(begin, base - 6.0), (begin, base), (end, base), (end, base - 6.0)], "soft")
-    yield words((begin + end) / 2.0, base - 10.0, f"{metres:g} m", "soft", "middle", 11.0)
-    yield words(end, HEIGHT - 46.0, f"in {flat.scene.fixed[:40]}, grid {step:g} m", "soft", "end", 11.0)
+    yield svg_text((begin + end) / 2.0, base - 10.0, f"{metres:g} m", "soft", "middle", 11.0)
+    yield svg_text(end, HEIGHT - 46.0, f"in {flat.scene.fixed[:40]}, grid {step:g} m", "soft", "end", 11.0)
 
 
 WINDOW, METRE = 500.0, 45.0  # pixels, as turtlesim's
@@ -167,7 +167,7 @@ def run_picture(scene: Scene) -> tuple[Callable[[SimulationStep], None], Callabl
             for ahead, left, radius in BODY:
                 across, down = x + cosine * ahead - sine * left, y - sine * ahead - cosine * left
                 shapes += dot(across, down, radius + 1.0, "#333333"), dot(across, down, radius, colours[name])
-            shapes.append(words(x, y - 24.0, name, "#ffffff", "middle"))
+            shapes.append(svg_text(x, y - 24.0, name, "#ffffff", "middle"))
         followed = {name: rows for name, rows in curves.items() if rows}
         panels = {
             title: [ChartLine(name, ON_WHITE[colours[name]], [(row[0], row[at]) for row in rows])

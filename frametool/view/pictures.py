@@ -100,7 +100,7 @@ def box(x: float, y: float, width: float, height: float, colour: str) -> SvgElem
     return SvgElement("rect", colour, {"x": x, "y": y, "width": width, "height": height})
 
 
-def words(x: float, y: float, text: str, colour: str = "ink", anchor: str = "start", size: float = 12.0,
+def svg_text(x: float, y: float, text: str, colour: str = "ink", anchor: str = "start", size: float = 12.0,
           weight: str = "normal", halo: str = "") -> SvgElement:  # fmt: skip
     """Return one line of text, vertically centred at y; anchor: start, middle or end is at x; halo: outline colour."""
     look = {"x": x, "y": y, "text-anchor": anchor, "font-size": size, "font-weight": weight, "stroke": halo}
@@ -262,17 +262,17 @@ def chart(
         inside = min(max(up, y[0]), y[1])
         return left + width * (across - x[0]) / (x[1] - x[0]), top + height * (y[1] - inside) / (y[1] - y[0])
 
-    shapes = [words(left, above, names[1], "soft")]
+    shapes = [svg_text(left, above, names[1], "soft")]
     if names[0]:
-        shapes.append(words(right, bottom + 30.0, names[0], "soft", "end"))
+        shapes.append(svg_text(right, bottom + 30.0, names[0], "soft", "end"))
     for tick in (tick for tick in x_ticks if x[0] <= tick <= x[1]):
         across, _ = place(tick, 0.0)
         shapes.append(line([(across, top), (across, bottom)], "faint"))
-        shapes.append(words(across, bottom + 13.0, f"{tick:g}", "soft", "middle", 11.0))
+        shapes.append(svg_text(across, bottom + 13.0, f"{tick:g}", "soft", "middle", 11.0))
     for tick in (tick for tick in y_ticks if is_scaled and y[0] <= tick <= y[1]):
         _, down = place(0.0, tick)
         shapes.append(line([(left, down), (right, down)], "faint" if tick else "zero"))
-        shapes.append(words(left - 7.0, down, f"{tick:g}", "soft", "end", 11.0))
+        shapes.append(svg_text(left - 7.0, down, f"{tick:g}", "soft", "end", 11.0))
     for each in lines:
         points = [place(*point) for point in each.points]
         if points:
@@ -282,7 +282,7 @@ def chart(
     if sum(text_width(each.name) + 33.0 for each in named) > width - text_width(names[1]):
         named = [each for each in named if each.dashes]
     for each in reversed(named):
-        shapes.append(words(right, above, each.name, "ink", "end", 11.0))
+        shapes.append(svg_text(right, above, each.name, "ink", "end", 11.0))
         right -= text_width(each.name) + 21.0
         mark = [(right, above), (right + 16.0, above)]
         shapes.append(line(mark, each.colour, max(each.width, 2.0), dashes=each.dashes))
@@ -452,7 +452,7 @@ class Overlay:
             shapes.append(box(left + at * part, top, 1.05 * part, 0.015 * wide, colour))
         for share, unit in ((0.0, ""), (0.5, ""), (1.0, " m")):
             x, text = left + share * SHADES * part, f"{near + share * (far - near):.3g}{unit}"
-            shapes.append(words(x, top - 0.018 * wide, text, "#ffffff", "middle", 0.022 * wide, halo="#000000"))
+            shapes.append(svg_text(x, top - 0.018 * wide, text, "#ffffff", "middle", 0.022 * wide, halo="#000000"))
         return write_picture(Picture(wide, high, shapes, "overlay", CORNER, 3), self.suffix)
 
     def summary(self) -> str:

@@ -151,7 +151,7 @@ def write_report(entries: Sequence[dict[str, Any]]) -> str:
     return "".join([columns(rows, [key in ("parent", "topics") for key in shown]), *sentences])
 
 
-def trouble(entries: Sequence[dict[str, Any]]) -> tuple[str, ...]:
+def problem_patterns(entries: Sequence[dict[str, Any]]) -> tuple[str, ...]:
     """Return the patterns that highlight problems in a report; each group is named by its colour."""
     bad = (re.escape(_edge(entry)) for entry in entries if entry["jumps"] or entry["backward"])
     rows = (rf"(?m)^(?P<red>{edge} .*)$" for edge in bad)

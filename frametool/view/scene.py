@@ -340,7 +340,7 @@ class Projection:
     def ground(self) -> tuple[float, list[tuple[Point, Point, bool]]]:
         """Return the grid on z = 0: its spacing in metres, and its lines with True for those through the origin."""
         wide = max(self.high[0] - self.low[0], self.high[1] - self.low[1], 4.0 * self.axis)
-        step = nice(wide / 8.0)
+        step = rounded(wide / 8.0)
         first = [math.floor(low / step - 0.6) for low in self.low]
         last = [math.ceil(high / step + 0.6) for high in self.high]
         (left, near), (right, far) = ([number * step for number in ends[:2]] for ends in (first, last))
@@ -349,7 +349,7 @@ class Projection:
         return step, across + along
 
 
-def nice(length: float) -> float:
+def rounded(length: float) -> float:
     """Return a length rounded to 1, 2 or 5 times a power of ten."""
     power = 10.0 ** math.floor(math.log10(length))
     factor = length / power

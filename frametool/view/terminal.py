@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from frametool.errors import cells, printable
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.sim.turtle import SIZE, TurtleState
-from frametool.view.scene import EYES, Flat, FrameScene, Projection, Size, nice, placed_names, words_of
+from frametool.view.scene import EYES, Flat, FrameScene, Projection, Size, placed_names, rounded, words_of
 from frametool.view.text import coloured_console
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def terminal_lines(scene: FrameScene, columns: int, lines: int, eye: Eye = EYES[
         drawn = (each for letter in words for each in (letter, *[""] * (cells(letter) - 1)))  # wide letters take two
         letters |= {(row, column + at): (letter, style) for at, letter in enumerate(drawn)}
     # the scale, the direction of view, and the number of names without room
-    metres, stamp_ns, hidden = nice(24.0 / flat.scale), scene.at_ns, hidden + len(outside[12:])
+    metres, stamp_ns, hidden = rounded(24.0 / flat.scale), scene.at_ns, hidden + len(outside[12:])
     bar = "─" * max(round(metres * flat.scale / 2.0) - 2, 0)
     azimuth, elevation = (round(math.degrees(angle)) + 0 for angle in eye)
     more = f", {hidden} name{'s' * (hidden > 1)} hidden" if hidden else ""

@@ -19,7 +19,7 @@ from frametool.frames.lookups import FrameTree
 from frametool.geometry.transform import Transform
 from frametool.view.exports import HEIGHT, SIZE, WIDTH, still_picture
 from frametool.view.pictures import write_png, write_svg
-from frametool.view.scene import EYES, FrameScene, Projection, nice, placed_names
+from frametool.view.scene import EYES, FrameScene, Projection, placed_names, rounded
 from frametool.view.terminal import Canvas, terminal_lines, terminal_text
 
 if TYPE_CHECKING:
@@ -134,8 +134,8 @@ def test_placing_names_looks_at_twice_as_much_for_twice_as_many(monkeypatch: pyt
 
 
 @pytest.mark.parametrize(("length", "expected"), [(1.0, 1.0), (1.6, 2.0), (4.0, 5.0), (9.0, 10.0), (0.03, 0.02), (3e-7, 2e-7)])
-def test_a_nice_length_is_one_two_or_five(length: float, expected: float) -> None:
-    assert nice(length) == pytest.approx(expected)
+def test_a_round_length_is_one_two_or_five(length: float, expected: float) -> None:
+    assert rounded(length) == pytest.approx(expected)
 
 
 def test_shapes_of_a_frame_come_farthest_first() -> None:

@@ -147,7 +147,7 @@ group = Group("group", help=HELP, params=[
 ])  # fmt: skip
 
 
-def answer(
+def call_command(
     words: Sequence[str], parent: click.Context | None = None, prepare: Callable[[click.Context], None] | None = None
 ) -> int:
     """Call a command and return its exit status; raise FrametoolError for all errors of the user.
@@ -159,7 +159,7 @@ def answer(
     result, width = None, 100 if sys.stdout.isatty() else 80
     try:
         if instruction := os.environ.get(COMPLETION):
-            return _completed(instruction, " ".join(words))
+            return _print_completions(instruction, " ".join(words))
         name, *rest = ("frametool", *words) if parent is None else words
         command = group if parent is None else group.get_command(parent, name)
         with command.make_context(name, rest, parent, obj=(*words,), max_content_width=width) as ctx:
@@ -178,7 +178,7 @@ def answer(
 SCRIPTS = os.path.join(os.path.dirname(os.path.dirname(__file__)), "completions")  # of shells; the wheel installs them
 
 
-def _completed(wanted: str, line: str) -> int:
+def _print_completions(wanted: str, line: str) -> int:
     """Print what a shell needs for completion; return 0.
 
     wanted: `words`, the completions of the line, each with its type and meaning; or `bash_source` etc., a script

@@ -42,7 +42,7 @@ def compose_command(inputs: Inputs) -> int:
     """
     task = Task(inputs, "poses")
     if task.plan:
-        return task.derive("compose", *map(task.written, inputs.poses))
+        return task.derive("compose", *map(task.read_written, inputs.poses))
     from frametool.grammar.pose_algebra import product
 
     request = task.request(operation=Operation(similar=True, multiples=inputs.scale))
@@ -55,7 +55,7 @@ def compose_command(inputs: Inputs) -> int:
 
     behind = tuple(each.placed for each in rows.behind)
     operation = Operation(before and before.placed, behind, similar=True, multiples=inputs.scale)
-    return task.answer(rows.argument, request._replace(operation=operation, rename=rename), rows.timed)
+    return task.write_results(rows.argument, request._replace(operation=operation, rename=rename), rows.timed)
 
 
 @command_named("invert")
@@ -76,9 +76,10 @@ def invert_command(inputs: Inputs) -> int:
     """
     task = Task(inputs, "poses")
     if task.plan:
-        return task.derive("invert", task.written(inputs.pose))
+        return task.derive("invert", task.read_written(inputs.pose))
     operation = Operation(inverse=True, similar=True, multiples=inputs.scale)
-    return task.answer(inputs.pose, task.request(operation=operation, rename=lambda parent, name: (name, parent)))
+    request = task.request(operation=operation, rename=lambda parent, name: (name, parent))
+    return task.write_results(inputs.pose, request)
 
 
 @command_named("relative")
@@ -111,7 +112,7 @@ def relative_command(inputs: Inputs) -> int:
     """
     task, a, b = Task(inputs, "poses"), inputs.a, inputs.b
     if task.plan:
-        return task.derive("relative", *map(task.written, [one_argument(each) for each in (a, b)]))
+        return task.derive("relative", *map(task.read_written, [one_argument(each) for each in (a, b)]))
     if inputs.consecutive or inputs.first:
         velocity = inputs.consecutive and inputs.velocity
         refuse(b is not None, "rows are compared with one of themselves; leave A and B out")
@@ -119,13 +120,13 @@ def relative_command(inputs: Inputs) -> int:
         operation = Operation(of=VELOCITIES if velocity else PREVIOUS if inputs.consecutive else START)
         column = (inputs.time_column or "") if velocity or task.window else None
         request = task.request(operation=operation, extra_column=column, rename=lambda _parent, name: (name, name))
-        status = task.answer(a or "-", request)
+        status = task.write_results(a or "-", request)
         left_out = "the first pose has none before it, so no velocity: it is left out, results begin at the second"
         inputs.note(f"note: {left_out}" if velocity else None)
         return status
     if b is None:
         refuse(a not in (None, "-"), "name A and B; one of them may be - for standard input")
-        return task.answer("-", task.request(operation=Operation(of="pair"), poses=2))
+        return task.write_results("-", task.request(operation=Operation(of="pair"), poses=2))
     from frametool.grammar.pose_algebra import relative_names
 
     request = task.request()
@@ -137,7 +138,7 @@ def relative_command(inputs: Inputs) -> int:
         return relative_names(*((fixed, own) if rows.at else (own, fixed)))
 
     operation = Operation(of="first" if rows.at else "second", fixed=fixed.placed)
-    return task.answer(rows.argument, request._replace(operation=operation, rename=rename), rows.timed)
+    return task.write_results(rows.argument, request._replace(operation=operation, rename=rename), rows.timed)
 
 
 @command_named("interpolate", own=("notations",))
@@ -159,7 +160,7 @@ def interpolate_command(inputs: Inputs) -> int:
     task, fractions = Task(inputs, "poses"), [each for some in inputs.fractions for each in some]
     if task.plan:
         refuse(len(fractions) != 1, f"--explain derives one fraction, found {len(fractions)}")
-        return task.derive("interpolate", task.written(inputs.a), task.written(inputs.b), fractions[0])
+        return task.derive("interpolate", task.read_written(inputs.a), task.read_written(inputs.b), fractions[0])
     from frametool.grammar.pose_algebra import interpolated, shared_stamp
 
     pairs = poses.combinations((inputs.a, inputs.b), task.request())

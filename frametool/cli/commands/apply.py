@@ -49,7 +49,7 @@ PLACEHOLDERS: dict[str, Callable[[PointCloud], str]] = {
 _WRITTEN = f"formats: {', '.join(writers('arrays'))}"
 
 
-def bag_of_clouds(task: streaming.Task) -> Callable[[Way], int]:
+def bag_of_clouds(task: streaming.Task) -> Callable[[Mover], int]:
     """Return a function that moves the clouds of the bag of -i, writes each to its file and returns the exit status.
 
     Topics of --topic that are not clouds are left to the tree.
@@ -85,7 +85,7 @@ def bag_of_clouds(task: streaming.Task) -> Callable[[Way], int]:
         names[name] = cloud.number
         return len(cloud.rows)
 
-    def move_all(way: Way) -> int:
+    def move_all(mover: Mover) -> int:
         bad = task.policy(path, "message")
         inputs.refuse_unused()
         count = points = 0
@@ -97,7 +97,7 @@ def bag_of_clouds(task: streaming.Task) -> Callable[[Way], int]:
                     bad.take([Fault(cloud.line, "", cloud.message)])
                     continue
                 try:
-                    pose = way.from_frame(cloud.frame or None, cloud.stamp_ns)
+                    pose = mover.from_frame(cloud.frame or None, cloud.stamp_ns)
                 except FrametoolError as error:
                     bad.take([Fault(cloud.number, "", error)])
                 else:
@@ -107,13 +107,13 @@ def bag_of_clouds(task: streaming.Task) -> Callable[[Way], int]:
         if not count:
             raise FormatError(f"no messages on {', '.join(topics)}", source=path)
         files = f"{len(names)} file{'s' * (len(names) != 1)} ({', '.join(topics)})"
-        inputs.note(f"{path}: {points} points{way.into}, metres, in {files}")
+        inputs.note(f"{path}: {points} points{mover.into}, metres, in {files}")
         return bad.finish(count)
 
     return move_all
 
 
-def several_clouds(task: streaming.Task) -> Callable[[Way], int]:
+def several_clouds(task: streaming.Task) -> Callable[[Mover], int]:
     """Return a function that merges the clouds of several -i, each in a frame of its own or all in SOURCE, into one.
 
     --frames and the --in of clouds are then not available to the tree.
@@ -130,8 +130,8 @@ def several_clouds(task: streaming.Task) -> Callable[[Way], int]:
     formats, frames = options.for_each(named, count), [*chain.from_iterable(inputs.named_frames)]
     inputs.update(input_formats=[fmt for fmt in passed if fmt not in named], named_frames=())
 
-    def move_all(way: Way) -> int:
-        is_open, on_error = way.has_source == bool(frames) or len(frames) not in (0, count), inputs.on_error
+    def move_all(mover: Mover) -> int:
+        is_open, on_error = mover.has_source == bool(frames) or len(frames) not in (0, count), inputs.on_error
         refuse(is_open, f"name SOURCE, the frame of all clouds, or --frames A,B with one for each of the {count}")
         with ExitStack() as opened:
             planned = []
@@ -142,7 +142,7 @@ def several_clouds(task: streaming.Task) -> Callable[[Way], int]:
                 if "arrays" not in FORMATS[fmt].reads:
                     hint = f"make one of it: frametool convert -i {path} -o NEW.pcd"
                     raise FormatError(f"{FORMATS[fmt].summary}, no cloud; {hint}", source=path)
-                operation = Operation(left=way.from_frame(frame or None, None), moves=True)
+                operation = Operation(left=mover.from_frame(frame or None, None), moves=True)
                 planned.append((streaming.open_columns(file, fmt), Request(operation, on_error=on_error), path))
             merged, status = OtherColumns(planned, output.style), 0
             with writing(output.path, force=output.force) as write:
@@ -150,7 +150,7 @@ def several_clouds(task: streaming.Task) -> Callable[[Way], int]:
                     policy = task.policy(path, "row")
                     status = max(status, run(merged.outcomes(at), write, policy, lambda _rows, _size: None))
         froms = f", from {', '.join(frames)}" if frames else ""
-        inputs.note(f"{count} clouds{way.into} as one{froms}; metres")
+        inputs.note(f"{count} clouds{mover.into} as one{froms}; metres")
         return status
 
     return move_all
@@ -194,17 +194,17 @@ def apply_command(inputs: Inputs) -> int:
     """
     task = streaming.Task(inputs, "points", "trajectory")
     output, plan = task.output, task.plan
-    move_clouds: Callable[[Way], int] | None = None
+    move_clouds: Callable[[Mover], int] | None = None
     if len(task.paths) > 1:
         move_clouds = several_clouds(task)
     elif task.path and streaming.is_bag(task.path) and (holds(output.chosen, "arrays") or task.messages() is None):
         move_clouds = bag_of_clouds(task)  # their messages are not records
-    way = Way(task) if inputs.pose is not None else TreeWay(task, numbers=bool(task.place))
-    rest, is_stream = way.rest, way.is_stream
+    mover = Mover(task) if inputs.pose is not None else TreeMover(task, numbers=bool(task.place))
+    rest, is_stream = mover.rest, mover.is_stream
     if move_clouds is not None:
-        is_more = way.uncertain or not is_stream or plan is not None
+        is_more = mover.uncertain or not is_stream or plan is not None
         refuse(is_more, "clouds are moved whole, without records, --covariance or --explain")
-        return move_clouds(way)
+        return move_clouds(mover)
     kinds, count = inputs.kinds, len(inputs.peek("columns"))
     counts = f"--as appears {len(kinds)} times, --columns {count} times; each --columns has its own"
     refuse(len(kinds) not in (0, 1, count), counts)
@@ -212,8 +212,8 @@ def apply_command(inputs: Inputs) -> int:
     if plan is not None:
         records = list(sources_of(inputs, rest, kind))
         refuse(is_stream or len(records) != 1, f"a stream, or several records; {streaming.ONE_RECORD}")
-        return _derived(task, plan, way, records[0], kind)
-    request = way.request(kind=kind)
+        return _derived(task, plan, mover, records[0], kind)
+    request = mover.request(kind=kind)
     status = 0
     if is_stream:
         if count > 1:
@@ -224,32 +224,32 @@ def apply_command(inputs: Inputs) -> int:
         if task.place:
             inputs.use("from_rep")
         output.values(values_of(list(sources_of(inputs, rest, kind, task.place)), request, output))
-    if isinstance(way, TreeWay):  # report what was assumed
-        inputs.note(way.lookups.assumptions())
+    if isinstance(mover, TreeMover):  # report what was assumed
+        inputs.note(mover.lookups.assumptions())
     else:
-        warn_if_wide([way.pose.covariance or ()] * way.uncertain)
+        warn_if_wide([mover.pose.covariance or ()] * mover.uncertain)
     return status
 
 
-def _derived(task: streaming.Task, plan: Style, way: Way, record: str | Source, kind: str) -> int:
+def _derived(task: streaming.Task, plan: Style, mover: Mover, record: str | Source, kind: str) -> int:
     """Write the derivation of one record."""
     from frametool.stream.written import ByTree, derive_record
 
     request, timeless = task.request(operation=Operation(moves=True)), task.inputs.at is not None
-    if isinstance(way, TreeWay):
-        mover: ByTree | WrittenPose = ByTree(way.tree, way.target, way.source, options.at_ns(way.at))
+    if isinstance(mover, TreeMover):
+        derived_by: ByTree | WrittenPose = ByTree(mover.tree, mover.target, mover.source, options.at_ns(mover.at))
     else:
-        mover = task.written(way.read, warned=True)
+        derived_by = task.read_written(mover.read, warned=True)
     with inline_misuse():
         rows = RowOptions(
-            kind=kind, degrees=request.rows.degrees, normalize=task.normalize, frame_is_counter=way.counters
+            kind=kind, degrees=request.rows.degrees, normalize=task.normalize, frame_is_counter=mover.counters
         )
-        made = derive_record(plan, mover, pose_source(record, request), rows, timeless=timeless)
+        made = derive_record(plan, derived_by, pose_source(record, request), rows, timeless=timeless)
     task.output.text(made.render(task.inputs.explain))
     return 0
 
 
-class Way:
+class Mover:
     """Transforms records by one pose; if the pose names its frames, records must be expressed in its source.
 
     target: the frame of the results, if it has a name
@@ -301,7 +301,7 @@ class Way:
         )  # fmt: skip
 
 
-class TreeWay(Way):
+class TreeMover(Mover):
     """Transforms records by lookups in a tree."""
 
     def __init__(self, task: streaming.Task, *, numbers: bool) -> None:

@@ -23,8 +23,8 @@ import click
 
 from frametool import cli
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, say_if_typed
-from frametool.cli.commands import TROUBLE, answer, group
-from frametool.cli.sink import LOCATIONS, TROUBLES, say_error, wants_json, words_of
+from frametool.cli.commands import TROUBLE, call_command, group
+from frametool.cli.sink import LOCATIONS, SYSTEM_ERRORS, say_error, system_message, wants_json
 from frametool.documents.source import ReadCache, opened
 from frametool.errors import FileProblem, FrametoolError, Misused, ValueInvalid, alternatives
 from frametool.stream.faults import ROWS_SKIPPED, SKIP, STOP, RowsSkipped
@@ -256,8 +256,8 @@ class CommandBatch:
             raise
         except FrametoolError as error:
             problem = error
-        except TROUBLES as error:
-            problem = FileProblem(words_of(error))
+        except SYSTEM_ERRORS as error:
+            problem = FileProblem(system_message(error))
         if name:
             self.kept[name] = number
         self.in_json &= (in_json := wants_json(words))
@@ -270,10 +270,10 @@ class CommandBatch:
             raise Misused(REFUSED[words[0]])
         self.context.meta.clear()
         if not name:
-            return answer(words, None if words[0].startswith("-") else self.context)  # an option of frametool itself
+            return call_command(words, None if words[0].startswith("-") else self.context)  # or an option: no parent
         held = BytesIO()
         with streams(sys.stdin, writer(held)):
-            status = answer(words, self.context, partial(print_as_json, name))
+            status = call_command(words, self.context, partial(print_as_json, name))
         if status in FINISHED:
             text = held.getvalue().decode()
             if (lines := text.count("\n")) != 1:

@@ -18,7 +18,7 @@ from frametool.cli.command import Command, Inputs, Text, argument, command_named
 from frametool.cli.commands.help import topic
 from frametool.cli.options import COLUMN, OF_EARTH, pose_result_options, reading_options
 from frametool.cli.poses import source_of
-from frametool.cli.sink import say_error, show, tell
+from frametool.cli.sink import say_error, show, write_lines
 from frametool.cli.streaming import Task, stream_options
 from frametool.cli.trees import load_tree
 from frametool.documents.source import HEAD, InputFile, decode, opened
@@ -182,7 +182,7 @@ def _cells(term: Term, style: Style) -> Any:
     return dict(frame) | dict(zip(names, numbers, strict=True))
 
 
-def shown_of(values: Iterable[tuple[Line, Term]]) -> Iterator[Term]:
+def displayed(values: Iterable[tuple[Line, Term]]) -> Iterator[Term]:
     """Yield the values of lines; a value that is bound to a name is only shown if it is the last."""
     last = None
     for line, term in values:
@@ -215,14 +215,14 @@ def calculate_lines(stream: Task, scope: Scope) -> int:
                     raise
                 bad.take([Fault(number, str(error.details().get("column", "")), error)])
 
-    stream.output.pieces(value_texts(shown_of(values()), stream.output.style))
+    stream.output.pieces(value_texts(displayed(values()), stream.output.style))
     return bad.finish(count)
 
 
 LONGEST_HISTORY = 1000  # lines
 
 
-def talk(inputs: Inputs, scope: Scope, output: Output) -> int:
+def run_prompt(inputs: Inputs, scope: Scope, output: Output) -> int:
     """Evaluate lines until Ctrl-D; continue after errors; Ctrl-C discards the line."""
     refuse(output.path is not None, "-o FILE is for expressions on the command line or in a pipe, not for the prompt")
     prompt = "> " if sys.stdout.isatty() else ""
@@ -238,12 +238,12 @@ def talk(inputs: Inputs, scope: Scope, output: Output) -> int:
                     output.pieces(value_texts([evaluate_line(read_line(line), scope)], output.style))
             except EOFError:
                 if prompt:
-                    tell("")
+                    write_lines("")
                 return 0
             except KeyboardInterrupt:
-                tell("")
+                write_lines("")
             except click.UsageError as error:
-                tell(f"frametool: {error.format_message()}")
+                write_lines(f"frametool: {error.format_message()}")
             except FrametoolError as error:
                 say_error(error)
 
@@ -340,11 +340,11 @@ def calc_command(inputs: Inputs) -> int:
         inputs.use(*OF_EARTH)  # any line may use them
         refuse(task.path is not None, "-i FILE needs an expression over row")
         is_prompt = sys.stdin is not None and sys.stdin.isatty()
-        return talk(inputs, scope, output) if is_prompt else calculate_lines(task, scope)
+        return run_prompt(inputs, scope, output) if is_prompt else calculate_lines(task, scope)
     if task.path is not None or any(mentions_row(line.tree) for line in lines):
         return task.run(_over_rows(lines, len(texts), scope, task))
     values = ((line, evaluate_line(line, scope)) for line in lines)
-    output.pieces(value_texts(shown_of(values), output.style))
+    output.pieces(value_texts(displayed(values), output.style))
     return 0
 
 

@@ -11,7 +11,7 @@ from frametool.cli import options
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, refuse_two_readers
 from frametool.cli.output import Output
 from frametool.cli.sink import folded, in_colour, say, say_error, say_first, show, writing
-from frametool.cli.trees import FRAME, frame_name, load_sides, opened, state
+from frametool.cli.trees import FRAME, frame_name, load_sides, opened, report_files
 from frametool.errors import Finding, FormatError, listing, warn
 from frametool.formats.table import FORMATS, format_entry
 from frametool.lint.monitor import monitor
@@ -73,7 +73,7 @@ def check_command(inputs: Inputs) -> int:
                 findings.append(Finding("no-frames", error.message, error.source, error.line or 1, 1))
             else:
                 findings += check(recordings, normalize=normalize, others=True)
-                state(inputs, recordings)
+                report_files(inputs, recordings)
     else:
         count = len(files) + len(measured)
         rows: list[Measurement] = []
@@ -82,10 +82,10 @@ def check_command(inputs: Inputs) -> int:
 
             recordings = opened(inputs, measured, behind=len(files), of=count)
             rows = read_measurements(recordings, normalize=normalize)
-            state(inputs, recordings)
+            report_files(inputs, recordings)
         recordings = opened(inputs, files, of=count)
         findings = _with_loops(recordings, rows, inputs.tolerance, normalize=normalize)
-        state(inputs, recordings)
+        report_files(inputs, recordings)
     text = WRITERS[fmt](findings)
     with writing(None) as write:
         on_terminal = fmt == "text" and sys.stdout.isatty()
@@ -215,7 +215,7 @@ def monitor_command(inputs: Inputs) -> int:
     clashes: list[FormatError] = []
     report = monitor(files, *frames, normalize=inputs.normalize, clashing=clashes.append)
     inputs.use("time_offset")
-    state(inputs, files)
+    report_files(inputs, files)
     tell = partial(say_error, in_json=output.chosen == "json")
     say_first(clashes, MOST_REPORTED, "frames come by two topics", tell)
     if any(abs(each["delay_max_s"] or 0.0) > YEAR_S for each in report):

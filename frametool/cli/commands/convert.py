@@ -73,7 +73,7 @@ def convert_command(inputs: Inputs) -> int:
 
         values, is_numbers = (mapping_of(inputs, values, request.rows.given_place),), False
     is_alone = operation.turns and not values and (task.plan or not task.has_input())
-    streamed = None if is_numbers or is_alone else task.streamed(values, request)
+    streamed = None if is_numbers or is_alone else task.stream_request(values, request)
     if streamed or not (is_numbers or all(map(poses.is_inline, values))):
         request = (streamed or request).with_results(unwrap=inputs.unwrap)
     if streamed:
@@ -92,13 +92,13 @@ def convert_command(inputs: Inputs) -> int:
         results = list(poses.values_of(sources, request, output))
     found = [each.pose for each in results if isinstance(each, Result)]
     if inputs.find is not None:
-        output.style = _found(found, inputs.find, inputs.tolerance, output.style)
+        output.style = _matching_style(found, inputs.find, inputs.tolerance, output.style)
     if task.plan:
         refuse(len(found) != 1, f"--explain derives one pose, found {len(results)}")
         if not sources:
             sources = [_source_of(values, request.rows.given, pose if values else found[0])]
         change = _named_change(axes, world, operation) if values else None
-        return task.derive("convert", task.written(sources[0], warned=True), own=found[0], change=change)
+        return task.derive("convert", task.read_written(sources[0], warned=True), own=found[0], change=change)
     output.values(results)
     if len(found) == 1 and any(is_locked(found[0], each) for each in output.style.notations):
         say("note: gimbal lock: the angles are not unique; the third was set to 0")
@@ -124,7 +124,7 @@ def _are_numbers(values: Sequence[str], *, has_from: bool) -> bool:
     return False
 
 
-def _found(poses: Sequence[Pose], find: str, tolerance: float, style: Style) -> Style:
+def _matching_style(poses: Sequence[Pose], find: str, tolerance: float, style: Style) -> Style:
     """Return a style with the Euler conventions in which three angles are the rotation of a pose."""
     from frametool.geometry.conventions import find_euler
     from frametool.geometry.transform import Rotation

@@ -14,7 +14,7 @@ from frametool import __version__
 from frametool.cli import command as shared
 from frametool.cli.command import EXIT_CODES, FILE, Inputs, Text, argument, command_named, option, refuse
 from frametool.cli.commands import COMMANDS, group
-from frametool.cli.sink import problems_of, refuse_existing, show, writing
+from frametool.cli.sink import file_errors, refuse_existing, show, writing
 from frametool.errors import FileProblem, ValueInvalid, any_near, shown
 from frametool.formats.table import FORMATS, format_entry
 
@@ -282,7 +282,7 @@ def examples_command(inputs: Inputs) -> None:
     refuse(name is None and output == "-", "--output - prints one example; name it, or a folder for all")
     if name is None or os.path.isdir(output):
         targets = {each: os.path.join(output, each) for each in ([name] if name else names())}
-        with problems_of(output):
+        with file_errors(output):
             os.makedirs(output, exist_ok=True)
     else:
         targets = {name: output}

@@ -13,7 +13,7 @@ from frametool.cli.command import FILE, Inputs, argument, command_named, option,
 from frametool.cli.output import QUATERNION, Output
 from frametool.cli.sink import say_error
 from frametool.cli.streaming import EXPLAIN, Task, stream_options
-from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, opened, state
+from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, opened, report_files
 from frametool.errors import FrametoolError, NoDataAt, UnknownFrame, warn
 from frametool.formats.table import holds
 from frametool.geometry.rigid import EXACT, UNCERTAIN
@@ -119,7 +119,7 @@ def lookup_command(inputs: Inputs) -> int:
     source_at, fixed = options.at_ns(inputs.source_at), inputs.fixed and frame_name(inputs.fixed, tree)
     if task.plan:
         return task.derive("lookup", tree, target, source, at_ns=at, source_at_ns=source_at, fixed=fixed)
-    output.take_axes_in(tree, source)
+    output.set_camera_axes_of(tree, source)
     status, every = 0, output.holds_all or task.window is not None
     every = every and inputs.at is None and fixed is None and tree.latest(target, source) is not None
     if inputs.times is not None or every:
@@ -230,7 +230,7 @@ def echo_command(inputs: Inputs) -> int:
     refuse(out.style.place and out.style.format == "text", "tf2_echo's blocks have x, y, z; give -f yaml, json or csv")
     frames = load_tree(inputs, inputs.tree, inputs.more)
     target, source = frame_name(target, frames), frame_name(source, frames)
-    out.take_axes_in(frames, source)
+    out.set_camera_axes_of(frames, source)
     if frames.covariances:
         warn(LEFT_OUT.format("echo"))
     replayed = frames.replay(target, source, rate_hz=inputs.rate, start_ns=start, stop_ns=stop)
@@ -297,5 +297,5 @@ def fk_command(inputs: Inputs) -> int:
         names = names_in(begin, fmt, stream.name, wanted, header=header)
         rows.bind(names, stream.name, fixed=frozenset(file.answers.joints))
         file.tally.assumed = ""  # rows have the values of all joints of the chain
-        state(inputs, [file])
+        report_files(inputs, [file])
         return stream.run(stream.request(operation=Operation(moves=True, formula=rows), poses=0))

@@ -101,7 +101,8 @@ def project_command(inputs: Inputs) -> int:
     inputs.note(no_size if task.camera.size is None else None)
     take, ranged = None if overlay is None else overlay.take, bool(inputs.ranged)
     seen = PixelsOfPoints(task.camera, inputs.first_pixel, name=task.camera_name, ranged=ranged, take=take)
-    status = task.finish(task.adds(seen), () if task.is_stream else [*apply.sources_of(inputs, task.rest)], seen)
+    records = () if task.is_stream else [*apply.sources_of(inputs, task.rest)]
+    status = task.finish(task.adding_request(seen), records, seen)
     if overlay is not None:
         with writing(overlay.path, force=inputs.force) as write:
             write(overlay.drawn())
@@ -117,7 +118,7 @@ class CameraTask(Task):
         super().__init__(inputs, output=output)
         holds_clouds = self.messages() is None and self.path and is_bag(self.path)  # of a bag, --topic is for records
         refuse(holds_clouds, f"write the clouds of {self.path} as files first: apply -o '{{stamp_ns}}.pcd'")
-        self.way: apply.TreeWay | None = None
+        self.mover: apply.TreeMover | None = None
         self.rest: tuple[str, ...] = inputs.arguments
         _, colon, name = (inputs.camera or "").rpartition(":")
         self.camera_name = name if colon and not is_inline(inputs.camera) else ""
@@ -127,9 +128,9 @@ class CameraTask(Task):
             if len(self.rest) < len(names) or begins_number(self.rest[0]):
                 raise click.UsageError(f"name {', '.join(before)} and CAMERA, or give --camera FILE[:NAME]")
             self.camera_name = self.rest[len(before)]
-            self.way = apply.TreeWay(self, numbers=True)
-            self.rest = self.way.rest
-        self.is_stream, tree = self.rest in ((), ("-",)), None if self.way is None else self.way.tree
+            self.mover = apply.TreeMover(self, numbers=True)
+            self.rest = self.mover.rest
+        self.is_stream, tree = self.rest in ((), ("-",)), None if self.mover is None else self.mover.tree
         from frametool.formats.cameras import load_camera, resized
 
         if tree is not None and inputs.camera is None:
@@ -148,11 +149,11 @@ class CameraTask(Task):
         inputs = self.inputs
         return self.camera.rectified(from_first=bool(inputs.from_first)) if inputs.rectified else self.camera
 
-    def adds(self, formula: Formula, **fields: Any) -> Request:
+    def adding_request(self, formula: Formula, **fields: Any) -> Request:
         """Return the request for rows to which the results of a formula are added."""
         self.inputs.use("keep")
-        if self.way is not None:
-            return self.way.request(formula, **fields)
+        if self.mover is not None:
+            return self.mover.request(formula, **fields)
         return self.request(operation=Operation(moves=True, formula=formula), **fields)
 
     def finish(self, request: Request, records: Sequence[Source | str], seen: Seen) -> int:
@@ -221,20 +222,20 @@ def unproject_command(inputs: Inputs) -> int:
         far = ("range" if columns[2] == "range" else "depth"), None
     height = inputs.height if inputs.ground else None
     if into is None and inputs.ground:
-        if task.way is None:
+        if task.mover is None:
             raise click.UsageError("--ground needs TREE, TARGET and CAMERA: the tree says where the ground is")
-        task.way = GroundWay(task.way, inputs.ground, task.camera_name)
-    target = "" if task.way is None else task.way.target
+        task.mover = GroundMover(task.mover, inputs.ground, task.camera_name)
+    target = "" if task.mover is None else task.mover.target
     seen = PointsOfPixels(task.camera, inputs.first_pixel, columns, far=far, height=height, into=into, target=target)
-    return task.finish(task.adds(seen, poses=0), records, seen)
+    return task.finish(task.adding_request(seen, poses=0), records, seen)
 
 
-class GroundWay(apply.TreeWay):
+class GroundMover(apply.TreeMover):
     """Looks up two poses at one time: of the ground in TARGET, and of the camera in the ground's frame."""
 
-    def __init__(self, way: apply.TreeWay, ground: str, camera: str) -> None:
-        """Copy the tree and the times of a way."""
-        vars(self).update(vars(way))
+    def __init__(self, mover: apply.TreeMover, ground: str, camera: str) -> None:
+        """Copy the tree and the times of a mover."""
+        vars(self).update(vars(mover))
         ground = frame_name(ground, self.tree)
         self.pairs = ((self.target, ground), (ground, frame_name(camera, self.tree)))
         if self.timed is not None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.options import place_options, pose_options, reading_options, verbose_option
-from frametool.cli.output import copied_as, folder_of
+from frametool.cli.output import copy_target, folder_of
 from frametool.cli.sink import say_error, writing
 from frametool.cli.trees import FRAME, load_tree, tree_file, without_slash
 from frametool.errors import BadAnswer, FileProblem, FormatError, ValueInvalid, listing, printable, shown, warn
@@ -78,7 +78,7 @@ def record_command(inputs: Inputs) -> int:
     if not holds(source.format, "recording"):
         hint = "frametool tree, convert and lookup write one: -o NEW.mcap"
         raise FormatError(f"{FORMATS[source.format].summary}: no recording of messages; {hint}", source=path)
-    copy, place = copied_as(source.format, path, inputs.output, inputs.format_name)
+    copy, place = copy_target(source.format, path, inputs.output, inputs.format_name)
     new = Path(place).resolve()
     for each in filter(os.path.exists, (path, *map(tree_file, more))):
         read = Path(each).resolve()

@@ -12,8 +12,8 @@ from frametool.cli import options
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, refuse_two_readers
 from frametool.cli.commands.compare import trajectory
 from frametool.cli.output import Output
-from frametool.cli.sink import refuse_existing, say_error, tell
-from frametool.cli.trees import answers, load_tree, opened, state
+from frametool.cli.sink import refuse_existing, say_error, write_lines
+from frametool.cli.trees import answers, load_tree, opened, report_files
 from frametool.errors import ValueInvalid, alternatives, first_of, shown, warn
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.pose import Pose
@@ -40,7 +40,7 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
 
     recordings = opened(inputs, files)
     rows = read_measurements(recordings, normalize=inputs.normalize)
-    state(inputs, recordings)
+    report_files(inputs, recordings)
     inputs.refuse_unused("topics")
     for each in recordings:
         own = [row for row in rows if parted(row.place)[0] == each.name]
@@ -232,7 +232,7 @@ def solve_command(inputs: Inputs) -> None:
     solve = solved_hand_eye if hand_eye else solved_points if points else solved_tree
     found = solve(inputs, files, robust=not inputs.no_robust)
     if summary := (write_left_out if inputs.quiet else write_solution)(found):
-        tell(summary.rstrip("\n"))
+        write_lines(summary.rstrip("\n"))
     if report:  # one document, or a table of the rows
         into = Output(inputs.changed(output=report, format_name=None, notations=(), precision=None), "report")
         into.report(found.numbers["measurements"] if into.chosen == "csv" else [found.numbers])
