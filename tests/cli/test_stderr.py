@@ -34,7 +34,7 @@ LINES = '{"xyz": [1, 2, 3]}\n{"xyz": [1, "?", 3]}\n{"xyz": [4, 5, 6]}\n'
 
 
 def calls(path: Path) -> set[str]:
-    """Name the functions by which a file could talk to somebody past `tell`."""
+    """Name the functions by which a file could write to stderr without `write_lines`."""
     found = set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):

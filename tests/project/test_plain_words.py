@@ -8,11 +8,11 @@ import pytest
 from count_words import WORDS, rooms
 
 UNREVISED = {
-    "cli": dict(zip(WORDS, (0, 2, 14, 8, 0, 4, 3, 0), strict=True)),
+    "cli": dict(zip(WORDS, (0, 2, 14, 5, 0, 4, 3, 0), strict=True)),
     "stream": dict(zip(WORDS, (0, 7, 42, 2, 1, 20, 8, 1), strict=True)),
     "view": dict(zip(WORDS, (0, 2, 0, 1, 0, 6, 1, 1), strict=True)),
 }
-MOST = dict(zip(WORDS, (0, 10, 11, 34, 0, 8, 34, 22), strict=True))
+MOST = dict(zip(WORDS, (0, 9, 3, 24, 0, 7, 20, 22), strict=True))
 
 
 def test_no_unrevised_room_uses_such_words_more_often_than_before() -> None:
