@@ -1,4 +1,4 @@
-// What the command wrote into the page: a head, and doubles and 64-bit stamps, packed if many.
+// Read the data of the page: a head, and doubles and 64-bit stamps, compressed if many.
 
 const head = JSON.parse(document.getElementById("head-data").textContent);
 const blob = await unpack(JSON.parse(document.getElementById("blob").textContent), head.packed);

@@ -1,11 +1,11 @@
-// From metres in `fixed` to pixels: an orthographic or perspective view that turns about a point.
+// Map metres in `fixed` to pixels: an orthographic or perspective view that orbits a point.
 
 const SLANTED = [-0.9, 0.5];  // azimuth and elevation of the eye, radians
 const cam = {azimuth: SLANTED[0], elevation: SLANTED[1], scale: 60, at: [0, 0, 0], radius: 1};
 const canvas = document.getElementById("view"), pen = canvas.getContext("2d", {alpha: false});
 let view = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];  // rows: right, up, toward the eye
 let width = 1, height = 1, far = 1;  // pixels, pixels, metres from the eye
-const AT = new Float32Array(3 * COUNT);  // of every drawn frame: pixels x, y, metres of depth
+const AT = new Float32Array(3 * COUNT);  // for every drawn frame: pixels x, y, depth in metres
 
 function view_axes() {
   const ca = Math.cos(cam.azimuth), sa = Math.sin(cam.azimuth);
@@ -13,7 +13,7 @@ function view_axes() {
   return [[-sa, ca, 0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]];
 }
 
-// Return pixels x, y and the depth toward the eye; not a number behind a perspective eye.
+// Return pixels x, y and the depth toward the eye; NaN behind a perspective eye.
 function project([px, py, pz]) {
   const x = px - cam.at[0], y = py - cam.at[1], z = pz - cam.at[2], [right, up, toward] = view;
   const depth = toward[0] * x + toward[1] * y + toward[2] * z;
@@ -35,7 +35,7 @@ function begin_picture() {
   far = 3.2 * Math.max(cam.radius, height / cam.scale / 2);
 }
 
-// Leave out the few frames that lie far from most: a robot in a large map would be a spot.
+// Leave out a few frames that are far from the others: a robot in a large map would be a spot.
 function cluster(frames) {
   if (frames.length < 4) return frames;
   const median = (values) => values.sort((a, b) => a - b)[values.length >> 1];
@@ -46,7 +46,7 @@ function cluster(frames) {
   return some_far ? frames.filter((_, at) => away[at] <= reach) : frames;
 }
 
-// Show all that is drawn, or where most of it is.
+// Fit all drawn frames into the picture, or the cluster in which most are.
 function fit(most = false) {
   const all = shown(), frames = most ? cluster(all) : all, low = [Infinity, Infinity, Infinity], high = low.map((v) => -v);
   const take = (point) => point.forEach((value, k) => {
@@ -93,7 +93,7 @@ function look_from(azimuth, elevation) {
   redraw();
 }
 
-// Return a round length near another: 1, 2 or 5 times a power of ten.
+// Return a length rounded to 1, 2 or 5 times a power of ten.
 function nice(metres) {
   const power = 10 ** Math.floor(Math.log10(metres)), factor = metres / power;
   return (factor < 1.5 ? 1 : factor < 3.5 ? 2 : factor < 7.5 ? 5 : 10) * power;

@@ -1,10 +1,10 @@
 // The tree of frames over time, as frametool.frames has it.  Times are BigInts of nanoseconds: doubles hold 104 days.
-//  Frames are numbers: places in head.names; -1 is none.
+// Frames are numbers: indices of head.names; -1 is no frame.
 
 const NAMES = head.names, COUNT = NAMES.length;
-const PARENT = Int32Array.from(head.parents);  // of frames that stand still
+const PARENT = Int32Array.from(head.parents);  // of static frames
 const POSE = new Float64Array(blob, 0, 7 * COUNT);
-const TRACKS = new Map(head.tracks.map((track) => [track.frame, {  // of those that move
+const TRACKS = new Map(head.tracks.map((track) => [track.frame, {  // of moving frames
   parents: track.parents, last: track.count - 1,
   stamps: new BigInt64Array(blob, track.at, track.count),
   samples: new Float64Array(blob, track.at + 8 * track.count, 7 * track.count),
@@ -19,7 +19,7 @@ const first_parent = (frame) => {
   return track ? (varies(track) ? track.parents[0] : track.parents) : PARENT[frame];
 };
 
-// Return how many stamps are not after a time.
+// Return the number of stamps up to a time.
 function count_until(stamps, t) {
   let low = 0, high = stamps.length;
   while (low < high) {
@@ -29,7 +29,7 @@ function count_until(stamps, t) {
   return low;
 }
 
-// Return {parent, pose, moves} of a frame at a time; null for a root and where there is no data.
+// Return {parent, pose, moves} of a frame at a time; null for a root and without data.
 function edge(frame, t) {
   const track = TRACKS.get(frame);
   if (!track) return PARENT[frame] < 0 ? null : {parent: PARENT[frame], pose: part_of(POSE, 7, frame), moves: false};
@@ -41,7 +41,7 @@ function edge(frame, t) {
   return {parent, pose: along(here, next, Number(t - stamps[at]) / Number(stamps[at + 1] - stamps[at])), moves: true};
 }
 
-// List a frame and its ancestors with the edges between; `gap` is the moving frame whose data end it.
+// List a frame and its ancestors with the edges between; `gap`: the moving frame without data at its end, or -1.
 function to_root(frame, t) {
   const line = [frame], edges = [];
   for (let step = edge(frame, t); step && line.length <= COUNT; step = edge(step.parent, t)) {
@@ -52,7 +52,7 @@ function to_root(frame, t) {
   return {line, edges, gap: TRACKS.has(top) ? top : -1};
 }
 
-// Compose the edges of one branch, topmost first: neighbours that stand still before the others.
+// Compose the edges of one branch, topmost first: adjacent static ones before the others.
 function product(edges) {
   const folded = [];
   for (const {pose, moves} of edges) {
@@ -105,14 +105,14 @@ function parse_stamp(text) {
 
 const within = (t) => (t < FIRST ? FIRST : t > LAST ? LAST : t);
 
-// Return every stamp of some tracks once, in order.
+// Return the different stamps of some tracks, in order.
 function stamps_of(tracks) {
   if (tracks.length === 1) return tracks[0].stamps;
   const all = BigInt64Array.from(tracks.flatMap(({stamps}) => [...stamps])).sort();
   return all.filter((t, at) => !at || t !== all[at - 1]);
 }
 
-// Return every frame at a time, parents before children; only changing parents can upset their order.
+// Return every frame at a time, parents before children; only changing parents affect their order.
 const ALL = Array.from({length: COUNT}, (_, frame) => frame);
 const REPARENTED = head.tracks.some((track) => Array.isArray(track.parents));
 function ordered(t) {

@@ -1,6 +1,6 @@
 // Mouse, touch, keys and buttons.
 
-const TOUCH = 24, MOUSE = 13;  // pixels from a frame that still hit it
+const TOUCH = 24, MOUSE = 13;  // pixels from a frame within which it is hit
 const fingers = new Map();
 let dragged = 0;  // pixels since the first finger came down
 

@@ -16,7 +16,7 @@ function motion({kind, axis: [x, y, z], anchor, rest}, value) {
   return compose([ax, ay, az, 0, 0, 0, 1], compose(turned, [-ax, -ay, -az, 0, 0, 0, 1]));
 }
 
-// Put a joint, and those that follow it, at a value.
+// Set the value of a joint, and of those that follow it.
 function set_joint(at, value) {
   values[at] = value;
   const {frame, joints, origin, after, inverted} = LINK_OF.get(at);
@@ -69,7 +69,7 @@ extras.begin.push(() => {
   };
 });
 
-// The address keeps the joints that were moved, the command those that are not at rest.
+// The address has the joints that were moved, the command those that are not at rest.
 const differing = (differs) => JOINTS.map((joint, at) => [joint, values[at]])
   .filter(([joint, value]) => !joint.mimic && differs(joint, value)).map(([joint, value]) => `${joint.name}=${value}`);
 extras.fragment.push((fragment) => {

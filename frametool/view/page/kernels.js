@@ -25,7 +25,7 @@ function doubled_sincos(y) {
   return [Math.sqrt(1 - squared_sine) * 2 * sine, cosine];
 }
 
-function half_sincos(angle) {  // here |angle| <= pi: whole turns of a joint are taken off
+function half_sincos(angle) {  // |angle| <= pi here: full turns of a joint are removed
   return doubled_sincos(0.25 * angle);
 }
 
@@ -132,7 +132,7 @@ function to_rpy([x, y, z, w]) {
 function to_axis_angle(q) {
   const [x, y, z, w] = canonical(q), largest = Math.max(Math.abs(x), Math.abs(y), Math.abs(z));
   if (largest === 0) return {axis: [1, 0, 0], angle: 0};
-  const scale = largest < 1e-140 ? 2 ** 600 : 1;  // exact, and squares do not vanish
+  const scale = largest < 1e-140 ? 2 ** 600 : 1;  // exact, and squares do not underflow
   const scaled = [x * scale, y * scale, z * scale], norm = length(...scaled);
   return {axis: scaled.map((part) => part / norm), angle: 2 * incline(norm / scale, Math.abs(w))};
 }
@@ -142,7 +142,7 @@ function to_rotvec([x, y, z, w]) {
   return [x, y, z].map((part) => part / sine * angle);
 }
 
-function notations(pose) {  // every way to write a pose
+function notations(pose) {  // a pose in every representation
   const q = canonical(unit(rotation(pose))), {angles, locked} = to_rpy(q);
   return {
     q, locked, rpy: angles, rpy_deg: angles.map((angle) => angle * RADIAN),

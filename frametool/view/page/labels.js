@@ -1,11 +1,11 @@
-// Names next to frames, without overlaps: the chosen ones first, then those that move, then the nearest.
+// Place names next to frames, without overlaps: the chosen ones first, then moving ones, then the nearest.
 
 const MOST_NAMES = 160, MOST_FAILED = 60, MANY = 3000, CELL = 64, LINE = 16;
 const DISTANCES = [9, 20, 34, 52, 74];  // pixels from a frame to its name
 const SIDES = [[1, -0.6], [1, 0.6], [-1, -0.6], [-1, 0.6], [0, -1.3], [0, 1.3], [1, 0], [-1, 0]];
 const labels = {placed: [], outside: [], hidden: 0};
 
-// Rectangles in a grid of cells, so that only near ones are compared.
+// Rectangles in a grid of cells: only near ones are compared.
 class Rectangles {
   constructor() {
     this.cells = new Map();
@@ -44,7 +44,7 @@ function weight(frame) {
   return state.found && state.found.has(frame) ? 2 : TRACKS.has(frame) ? 1 : 0;
 }
 
-// Gather frames that lie on one point; they share one name.
+// Group frames on one point; they share one label.
 function groups_of(frames) {
   const spots = new Map();
   for (const frame of frames) {
@@ -86,7 +86,7 @@ function draw_names(inside) {
   labels.hidden = state.names ? left_out : 0;
 }
 
-// Find where a name fits: clear of other names, and if asked of its own axes.
+// Find a spot for a name: clear of other names, and optionally of its own axes.
 function free_spot(group, taken, avoid_axes) {
   const words = words_of(group), wide = pen.measureText(words).width, x = x_of(group[0]), y = y_of(group[0]);
   let second = null;
@@ -132,7 +132,7 @@ function place_name(group, {words, away, left, middle, box}, taken) {
   labels.placed.push({box, group, words});
 }
 
-// Point at the edge of the picture to the few frames outside of it, with their distance.
+// Point to the few frames outside of the picture, at its edge, with their distance.
 function draw_outside(frames) {
   labels.outside = [];
   const out = frames.filter((frame) => !Number.isNaN(x_of(frame)) && !is_inside(frame, 0));

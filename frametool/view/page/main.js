@@ -1,4 +1,4 @@
-// Begin: fill the page, and draw the first picture.
+// Fill the page, and draw the first picture.
 
 const theme = wanted.get("theme");
 const is_dark = theme ? theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
@@ -27,7 +27,7 @@ fit(!state.path_only);
 new ResizeObserver(redraw).observe(canvas);
 draw();
 
-// what tests ask for
+// for tests
 window.frameview = {
   state, cam, draw, labels, notations, stamp,
   lookup: (target, source, t = state.t) => lookup(INDEX.get(target), INDEX.get(source), BigInt(t)),

@@ -1,12 +1,12 @@
-// The panel: the numbers of a transform, the list of frames, and what is copied.
+// The panel: the numbers of a transform, the list of frames, and text to copy.
 
 const MOST_LISTED = 300;
 const $ = (id) => document.getElementById(id);
 const make = (tag, properties) => Object.assign(document.createElement(tag), properties);
 const bold = (text) => make("b", {textContent: text});
-let answer = {path: []};  // of `lookup` for target and source
+let answer = {path: []};  // the result of `lookup` for target and source
 
-// Write a number for reading, or with all its digits as the command does.
+// Return a number rounded for reading, or with all digits as the command writes it.
 function digits(value) {
   if (state.exact) return all_digits(value);
   return value.toFixed(6).replace(/^-(0\.0+)$/, "$1");
@@ -15,7 +15,7 @@ function digits(value) {
 function all_digits(value) {
   const size = Math.abs(value);
   if (value === 0) return "0.0";
-  if (size >= 1e16 || size < 1e-4) {  // Python's repr has two digits of exponent at least
+  if (size >= 1e16 || size < 1e-4) {  // Python's repr has at least two digits of exponent
     return value.toExponential().replace(/e([+-])(\d)$/, "e$10$2");
   }
   return Number.isInteger(value) ? value.toFixed(1) : String(value);
@@ -66,7 +66,7 @@ function add_row(body, label, cells, unit = "") {
   Object.assign(row.insertCell(), {className: "unit", textContent: unit});
 }
 
-// Return the answer as an entry of a tree.
+// Return the result as an entry of a tree.
 function yaml() {
   const [x, y, z] = position(answer.pose).map(all_digits), q = notations(answer.pose).q.map(all_digits);
   const rotation_text = `{x: ${q[0]}, y: ${q[1]}, z: ${q[2]}, w: ${q[3]}}`;
@@ -76,7 +76,7 @@ function yaml() {
 
 const quoted = (text) => (/^[\w./=-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
 
-// Return the command that answers the same.
+// Return the command with the same result.
 function command() {
   const at = TRACKS.size ? ` --at ${stamp(state.t)}` : "";
   const names = [head.file, NAMES[state.target], NAMES[state.source]], more = extras.shell.map((part) => part());
@@ -91,7 +91,7 @@ function matcher(text) {
     const pattern = new RegExp(text.slice(1, -1), "i");
     return (name) => pattern.test(name);
   } catch {
-    return plain;  // half typed
+    return plain;  // not complete yet
   }
 }
 
@@ -162,7 +162,7 @@ function swap() {
   choose(source, "target");
 }
 
-// Put a frame in the middle; one that hangs in another tree is then what all is seen in.
+// Put a frame in the middle; one of another tree becomes the fixed frame.
 function focus_on(frame) {
   if (SEEN[frame]) {
     cam.at = Array.from(origin(frame));
@@ -193,7 +193,7 @@ function set_time(t) {
   update();
 }
 
-// Keep the choices in the address, so that it links to this very view.
+// Store the choices in the address, so that it links to this view.
 function remember() {
   const fragment = new URLSearchParams({target: NAMES[state.target], source: NAMES[state.source]});
   if (state.fixed !== HOME) fragment.set("fixed", NAMES[state.fixed]);

@@ -1,11 +1,11 @@
-// The picture: ground, links, trails, the way, axes, what lies outside, a scale.
+// Draw the picture: ground, links, trails, the path, axes, frames outside, a scale.
 
-const MOST_ROUND = 600, MOST_LINES = 5000;  // frames drawn one by one, and with lines at all
-const AXIS_LENGTHS = [14, 46];  // pixels, least and most
-const EDGE = 60;  // pixels beyond the picture that still count
+const MOST_ROUND = 600, MOST_LINES = 5000;  // largest number of frames drawn one by one, and with lines
+const AXIS_LENGTHS = [14, 46];  // pixels, minimum and maximum
+const EDGE = 60;  // pixels beyond the picture within which frames are drawn
 const SMALL = "11px system-ui, sans-serif", NORMAL = "12px system-ui, 'DejaVu Sans', sans-serif";
 const tint = {};
-let drawing = false;  // whether the next picture is on its way
+let drawing = false;  // the next picture is scheduled
 
 function take_colours() {
   const style = getComputedStyle(document.documentElement);
@@ -115,7 +115,7 @@ function draw_trails() {
   }
 }
 
-// Draw how high the chosen frames are above the ground.
+// Draw the height of the chosen frames above the ground.
 function draw_plumb_lines() {
   for (const frame of state.grid ? new Set([state.source, state.target, state.hover]) : []) {
     if (frame < 0 || !SEEN[frame]) continue;
@@ -195,7 +195,7 @@ function draw_frame(frame, metres) {
   stroke(tint_of(frame, tint.ink), 1.5);
 }
 
-// Draw where the frames stand in the other tree, and how they got there.
+// Draw the frames of the other tree, with lines to where they are in this one.
 function draw_others(inside) {
   const metres = axis_metres();
   for (const frame of OTHER.size ? inside : []) {
@@ -219,7 +219,7 @@ function depth_of_axis(frame, axis) {
   return view[2][0] * WORLD[at] + view[2][1] * WORLD[at + 1] + view[2][2] * WORLD[at + 2];
 }
 
-// Draw very many frames as dots, straight into the picture's memory.
+// Draw very many frames as dots, directly into the picture's memory.
 function draw_dust(inside) {
   const ratio = window.devicePixelRatio || 1, picture = pen.getImageData(0, 0, canvas.width, canvas.height);
   const dots = new Uint32Array(picture.data.buffer), size = ratio >= 2 ? 3 : 2;
@@ -234,7 +234,7 @@ function draw_dust(inside) {
   draw_axes(inside.filter(is_strong));
 }
 
-// Draw which way the axes of `fixed` point, and how long a metre is.
+// Draw the directions of the axes of `fixed`, and the scale.
 function draw_corner() {
   const [x, y] = [44, height - 44];
   for (const axis of [0, 1, 2].sort((a, b) => view[2][a] - view[2][b])) {
