@@ -317,9 +317,12 @@ def may_be_on_earth(name: str) -> bool:
     return re.search(_EARTH, name.lower()) is not None or name in FLAT_KEYS
 
 
+_SIGMAS = ("sigma_x", "sigma_y", "sigma_z", "sigma_r", "sigma_p")
+
+
 def may_be_uncertain(name: str) -> bool:
-    """Return True if a column may be the first of a covariance, c11, or a sigma: `sigma_yaw_deg`, `sigma_z [mm]`."""
-    return name == "c11" or FIX in name or name.startswith(("sigma_x", "sigma_y", "sigma_z", "sigma_r", "sigma_p"))
+    """Return True if a column may be of a covariance, c11, or a sigma: `sigma_yaw_deg`, `sigma_z [mm]`."""
+    return name == "c11" or "covariance" in name or name.startswith(_SIGMAS)
 
 
 def without_mark(name: str) -> str:

@@ -141,6 +141,9 @@ def with_scale(record: Record, value: Any, around: Path, request: Request) -> Re
     return _with_numbers(record, SCALE, [(*around, SCALE)], [scale])
 
 
+OTHER_ENTRIES = r"(?:(?!.*twist).*[._/])?covariance[._\[]?\d*\]?"  # as other tools name them
+
+
 def covariance_columns(
     table: Table, request: Request, shapes: tuple[Shape, ...]
 ) -> tuple[tuple[int, ...], tuple[Shape, ...]]:
@@ -165,6 +168,9 @@ def covariance_columns(
         from frametool.stream.earth_columns import along
 
         places, shape = along(own, shape, table.names or (), places, table.source)
+    stay = [name for name in table.names or () if re.fullmatch(OTHER_ENTRIES, name)]
+    if stay and not places and request.operation.formula is None:
+        warn(f"{table.source}: not moved: {listing(stay, 3)}; the columns of a covariance are c11, c12 ..")
     if places and request.operation.formula is not None:
         warn(f"{table.source}: {LEFT_OUT.format('calc')}", rule="left-out")
     if not places or request.operation.formula is not None:

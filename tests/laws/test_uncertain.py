@@ -305,8 +305,9 @@ def test_points_that_are_inverted_have_the_covariance_of_their_position_in_every
     assert run("invert", "-o", "new.npy", stdin=text).status == 0
 
 
-@pytest.mark.parametrize("form", ["csv", "npy", "parquet"])
-@pytest.mark.parametrize("kind", ["pose", "point"])
+@pytest.mark.parametrize(
+    ("kind", "form"), [("pose", "csv"), *((kind, form) for kind in ("pose", "point") for form in ("npy", "parquet"))]
+)
 def test_a_covariance_in_rows_becomes_the_same_columns_as_one_in_a_list(run: Any, kind: str, form: str) -> None:
     size, key = (6, POSE) if kind == "pose" else (3, {"point": [1.0, 2.0, 3.5]})
     rows = np.reshape(WHOLE, (6, 6))[:size, :size]
@@ -316,3 +317,13 @@ def test_a_covariance_in_rows_becomes_the_same_columns_as_one_in_a_list(run: Any
     found = [run("apply", "--transform", EXACT, "-f", "json", "-i", f"{at}.{form}").out for at in range(2)]
     assert found[0] == found[1]
     assert len(json.loads(found[0])["covariance"]) == size**2
+
+
+@pytest.mark.parametrize("name", ["covariance", "field.pose.covariance7", "/odom/pose/pose/covariance[35]"])
+def test_columns_of_a_covariance_by_other_names_are_not_moved_and_a_warning_says_it(run: Run, name: str) -> None:
+    text = ",".join((*CELLS, name)) + "\n" + ",".join(map(str, CELLS.values())) + ",0.5\n"
+    for command in (("invert",), ("apply", "--transform", EXACT)):
+        done = run(*command, stdin=text)
+        assert done.out.endswith(",0.5\n")
+        assert done.err == f"frametool: warning: stdin: not moved: {name}; the columns of a covariance are c11, c12 ..\n"
+    assert run("convert", "--to", "rpy", stdin=text).err == ""
