@@ -1,4 +1,4 @@
-// Point at a place of a path or of a curve: both show the pair, with its time and errors.
+// Point at a path or a curve: both show the nearest pair, with its time and errors.
 
 const SVG = "http://www.w3.org/2000/svg";
 const pictures = {path: document.querySelector("#path svg"), errors: document.querySelector("#errors svg")};
@@ -16,7 +16,7 @@ const marks = {
   path: add(pictures.path, "circle", {class: "mark", r: 5}), errors: add(pictures.errors, "circle", {class: "mark", r: 4}),
 };
 
-// Return the sample nearest to a point: on a path by its distance, on a curve by its time, then by its error.
+// Return the sample nearest to a point: on a path by distance, on a curve by time, then by error.
 function nearest(where, x, y) {
   let found = null, least = Infinity;
   for (const each of curves) {

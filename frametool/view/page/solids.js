@@ -1,9 +1,9 @@
-// Solids of a robot in their frames: shaded faces under all else, the farthest first.
+// Draw the solids of a robot in their frames: shaded faces below everything else, the farthest first.
 
-const MOST_FACES = 2000, AROUND = 20, ARC = 5;  // faces that are drawn unasked; parts of a circle, of a quarter of one
-const BOX = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];  // seen from outside
+const MOST_FACES = 2000, AROUND = 20, ARC = 5;  // faces drawn by default, at most; segments of a circle, of a quarter
+const BOX = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];  // facing outwards
 
-// Return a quarter of a circle as [radius, height], from its end on the axis to the other, about a middle.
+// Return a quarter circle about a centre as [radius, height], from its end on the axis to the other.
 function quarter(radius, middle, way) {
   const points = [];
   for (let k = 0; k <= ARC; k++) {
@@ -13,7 +13,7 @@ function quarter(radius, middle, way) {
   return points;
 }
 
-// Return the faces of what turns about z, by its outline from below to above.
+// Return the faces of a solid of revolution about z, from its outline, bottom to top.
 function turned(outline) {
   const faces = [], at = ([radius, z], k) =>
     [radius * Math.cos(2 * Math.PI * k / AROUND), radius * Math.sin(2 * Math.PI * k / AROUND), z];
@@ -39,7 +39,7 @@ const placed = (pose, [x, y, z]) => position(compose(pose, [x, y, z, 0, 0, 0, 1]
 const FACES = head.solids.flatMap((solid) => faces_of(solid).map((face) =>
   ({frame: solid.frame, points: face.map((point) => placed(solid.pose, point))})));
 
-// Return where a point of a frame is in `fixed`.
+// Return a point of a frame, expressed in `fixed`.
 function in_fixed(frame, [x, y, z]) {
   const at = 12 * frame;
   return [0, 1, 2].map((k) => WORLD[at + k] + x * WORLD[at + 3 + k] + y * WORLD[at + 6 + k] + z * WORLD[at + 9 + k]);

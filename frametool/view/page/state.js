@@ -1,10 +1,10 @@
-// What is chosen and shown.  It begins with the command's options, and the page's fragment overrides those, so that a
+// The choices of the page.  They begin with the command's options, which the page's fragment overrides, so that a
 // view can be linked: #target=map&source=tool&t=1.5&fixed=odom&theme=dark
 
 const wanted = new URLSearchParams(location.hash.slice(1));
 const {depth: DEPTH, root: ROOT} = levels();
 
-// Return the root below which most frames hang.
+// Return the root with the most descendants.
 function biggest_root() {
   const count = new Map();
   for (const root of ROOT) count.set(root, (count.get(root) || 0) + 1);
@@ -26,13 +26,13 @@ const state = {
   names: true, axes: true, links: true, grid: true, trails: true, perspective: false, size: 1,
 };
 
-// Begin at a time that all edges have, if there is one.
+// Begin at a time at which all edges have data, if there is one.
 const common = [...TRACKS.values()].reduce((latest, {stamps: [t]}) => (t > latest ? t : latest), FIRST);
 state.t = within(parse_stamp(wanted.get("t") ?? head.show.t ?? "") ?? common);
 
-// Where every frame is in `fixed` at state.t: origin, then the axes x, y, z.
+// The pose of every frame in `fixed` at state.t: origin, then the axes x, y, z.
 const WORLD = new Float64Array(12 * COUNT), SEEN = new Uint8Array(COUNT), UP = new Int32Array(COUNT);
-let link_length = 0.5;  // the usual distance from a frame to its parent
+let link_length = 0.5;  // the median distance from a frame to its parent
 
 function place_frames() {
   const poses = new Array(COUNT), base = new Int32Array(COUNT).fill(-1);
@@ -71,7 +71,7 @@ function usual_link() {
 const origin = (frame) => WORLD.subarray(12 * frame, 12 * frame + 3);
 const distance = (a, b) => length(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 
-// Return the point of an axis of a frame, so many metres out.
+// Return the point of an axis of a frame at a distance in metres.
 function on_axis(frame, axis, metres) {
   const at = 12 * frame, along_axis = at + 3 + 3 * axis;
   return [0, 1, 2].map((k) => WORLD[at + k] + metres * WORLD[along_axis + k]);
@@ -85,7 +85,7 @@ function other_pose(frame) {
   return back && pose ? compose(inverse(back), pose) : null;
 }
 
-// Return in words how far a frame is from itself in the other tree; "" where it is not in both.
+// Return a text with the distance of a frame from itself in the other tree; "" if it is not in both.
 function difference(frame) {
   const here = lookup(state.fixed, frame, state.t).pose, there = other_pose(frame);
   if (!here || !there) return "";
@@ -101,7 +101,7 @@ function shown() {
     && (!path || path.has(frame)) && (!state.only_found || !state.found || state.found.has(frame)));
 }
 
-// ---- trails: where frames that move went in `fixed`, violet to green; null where it breaks
+// ---- trails: the paths of moving frames in `fixed`, violet to green; null at gaps
 const MOST_TRAIL = 4000, PARTS = 8;
 let trails = [];
 
@@ -110,7 +110,7 @@ function trace() {
   trails = [...frames].map((frame) => ({frame, points: trail(frame)})).filter((each) => each.points.length);
 }
 
-// Collect the moving frames on any way from a frame to its root.
+// Collect the moving frames on any path from a frame to its root.
 function movers_above(frame, into) {
   for (let each = frame; each >= 0;) {
     const track = TRACKS.get(each);

@@ -1,4 +1,4 @@
-// The numbers of a report as tiles and tables; they are those of `compare -f json`.
+// Show the numbers of a report, those of `compare -f json`, as tiles and tables.
 
 const numbers = JSON.parse(document.getElementById("numbers").textContent);
 const {unit, curves} = JSON.parse(document.getElementById("samples").textContent);
@@ -38,7 +38,7 @@ function make(tag, properties = {}, ...children) {
 
 const digits = (value, count) => (value ? `${Number(value.toPrecision(count))}` : "0");
 
-// Write a number as the terminal does: with an exponent where decimals say nothing or too much.
+// Return a number as the terminal shows it: with an exponent if too small or too large for its decimals.
 function fixed(value, decimals) {
   if (value == null) return "-";
   const size = Math.abs(value), is_plain = size < 1e-9 || (size >= 0.5 * 10 ** -decimals && size < 1e6);
