@@ -12,15 +12,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frametool.errors import FormatError, ValueInvalid, did_you_mean, first_of, shown
+from frametool.formats.table import FORMATS
 from frametool.geometry.transform import Transform
 from frametool.grammar.covariance import is_sigma
+from frametool.grammar.edges import Answers
 from frametool.grammar.pose import Pose
 from frametool.grammar.readers import EARTH_FRAMES, NAME_KEYS, PARENT_COLUMNS, stamp_column
-from frametool.grammar.result import Result, uncertain
+from frametool.grammar.result import Result, Style, uncertain
+from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows, Fault, Outcome, run
 from frametool.stream.record_results import BlockResults
+from frametool.stream.record_stream import run_records
 from frametool.stream.record_values import read_poses
-from frametool.stream.request import COMBINED, Request
+from frametool.stream.request import COMBINED, NO_STAMPS, Operation, Request, RowOptions
 from frametool.stream.row_layout import NOWHERE
 from frametool.stream.rows import RowPoses, block_of, codes_of, is_typed, kept, objects, plain_cells, read_each
 from frametool.text.numbers import parse_number
@@ -32,6 +36,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import Source
     from frametool.stream.as_poses import Step
+    from frametool.text.lines import ByteStream
     from frametool.text.spans import Floats, Ints
 
 POSITION = 3  # numbers
@@ -90,7 +95,7 @@ class Gathered:
         return np.concatenate([np.empty((0, 7)), *(each.numbers for each in self.blocks)])
 
     def rows(self, source: str) -> RowPoses:
-        """Return all rows as one block, with the columns that all have; raises FormatError if there are none."""
+        """Return all rows as one block, with the columns that any has; raises FormatError if there are none."""
         if not self.blocks:
             raise FormatError("no poses or points in it", source=source)
         stamps = [each.stamps_ns for each in self.blocks if each.stamps_ns is not None]
@@ -99,8 +104,11 @@ class Gathered:
         parents = [*chain.from_iterable(each.for_each(each.parents) for each in self.blocks)]
         names = [*chain.from_iterable(each.for_each(each.names) for each in self.blocks)]
         extras = {
-            key: objects(chain.from_iterable(plain_cells(each.extras[key]) for each in self.blocks))
-            for key in self.keys if all(key in each.extras for each in self.blocks)
+            key: objects(chain.from_iterable(
+                plain_cells(each.extras[key]) if key in each.extras else [None] * len(each.numbers)
+                for each in self.blocks
+            ))
+            for key in self.keys if any(key in each.extras for each in self.blocks)
         }  # fmt: skip
         lines = np.concatenate([each.lines for each in self.blocks])
         return RowPoses(self.numbers, np.concatenate(stamps) if stamps else None, lines, parents, names, extras)
@@ -114,6 +122,22 @@ def gathered(steps: Iterable[Step], bad: BadRows, keys: Sequence[str] = ()) -> R
     found = Gathered(keys)
     run(found.of(steps), lambda _: None, bad)
     return found.rows(bad.source)
+
+
+def samples_of(
+    stream: ByteStream, fmt: str, asked: RowOptions, bad: BadRows, keys: Sequence[str] = (),
+    answers: Answers = Answers(),  # noqa: B008 - it is frozen
+) -> RowPoses:  # fmt: skip
+    """Return the poses or points of a stream in any format of records, of rows, or of columns of numbers.
+
+    asked: how they are read; keys: of other columns, those that are kept; otherwise as `gathered`
+    """
+    request, style = Request(rows=asked, on_error=bad.on_error), Style("tum")  # which has a stamp for each
+    if "records" in FORMATS[fmt].reads:
+        outcomes = run_records(stream, fmt, request, source=bad.source, style=style)
+        return gathered(posed(outcomes, bad.source, timed=asked.stamps != NO_STAMPS), bad, keys)
+    request = request._replace(operation=Operation(moves=True), rename=lambda parent, name: (parent, name))
+    return gathered(FormatConverter(fmt, request, bad.source, style, answers).steps(stream), bad, keys)
 
 
 class MeanRows(Gathered):

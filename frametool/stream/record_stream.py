@@ -13,7 +13,7 @@ import re
 from contextlib import suppress
 from functools import cache, cached_property, partial
 from io import BufferedReader
-from itertools import chain, count
+from itertools import chain
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
@@ -260,7 +260,8 @@ class RecordBlocks:
                 if style is None:
                     items: list[tuple[int, Any]] = [(place, part.around(found.text, rendered(made, answers) or record))]
                 else:
-                    items = [*zip(count(part.start), values_of_text(made, answers, style), strict=False)]
+                    starts = (part.start + each for each in made.starts(answers))
+                    items = [*zip(starts, values_of_text(made, answers, style), strict=False)]
                 found.notes += made.notes_at(line, column_in(found.text, part.start), answers)
             except FrametoolError as error:
                 made = fault_at(made.source, error, line + made.line)

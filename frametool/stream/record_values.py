@@ -234,6 +234,14 @@ class RecordText:
             raise Outside("beyond --start or --stop")
         return found
 
+    def starts(self, answers: Sequence[Answer]) -> Iterator[int]:
+        """Yield how many bytes are before each record."""
+        at = size = 0
+        for each in answers:
+            start = self.root.at(each.entry.record.path).start
+            size, at = size + len(self.text[at:start].encode()), max(at, start)
+            yield size
+
     @property
     def lost(self) -> str:
         """Return a frame of a record whose result has no frames, else ""."""

@@ -8,7 +8,7 @@ id,x,y,z,weight                                                        points, i
 
 from __future__ import annotations
 
-import re
+from contextlib import closing
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -25,19 +25,15 @@ from frametool.frames.trajectory import BODY, WORLD, Trajectory
 from frametool.geometry.transform import Transform
 from frametool.grammar.pose import COVARIANCE_KEYS, Pose, inverted
 from frametool.grammar.readers import Misfit, Path, Reading, as_mapping, tell, within
-from frametool.grammar.result import Result
-from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows
-from frametool.stream.gathering import gathered
+from frametool.stream.gathering import samples_of
 from frametool.stream.header import listed
 from frametool.stream.record import find_records, pose_of
-from frametool.stream.record_search import value_at
-from frametool.stream.record_values import read_text
-from frametool.stream.request import Operation, Request, RowOptions
-from frametool.stream.row_layout import IDENTITY, POSE
-from frametool.stream.rows import RowPoses, block_of, plain_cells
+from frametool.stream.request import NO_STAMPS, Request, RowOptions
+from frametool.stream.row_layout import POSE
+from frametool.stream.rows import plain_cells
 from frametool.stream.table import open_table
-from frametool.stream.trajectories import TREE
+from frametool.stream.trajectories import holds_tree
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
@@ -134,8 +130,8 @@ def _of_table(file: InputFile, fmt: str, columns: Sequence[str], *, normalize: b
         raise FormatError(f"no columns {what}; columns: {listed(names)}", source=file.name, line=1)
     sides, placed, places = list[Transform](), False, list[str]()
     for each in columns:
-        request = Request(Operation(moves=True), RowOptions(columns=(each,), normalize=normalize))
-        poses = gathered(FormatConverter(fmt, request, file.name).steps(BytesIO(text)), BadRows(file.name))
+        asked = RowOptions(columns=(each,), normalize=normalize)
+        poses = samples_of(BytesIO(text), fmt, asked, BadRows(file.name))
         missing = np.isnan(poses.numbers)
         if missing[0, -1]:
             raise FormatError(f"no rotation among the columns {each}", source=file.name, line=1)
@@ -232,25 +228,18 @@ def read_points(argument: str, *, fmt: str, answers: Answers, policy: Callable[[
 
     Raises FormatError with the place.
     """
-    file = InputFile(argument)
-    try:
+    with closing(InputFile(argument)) as file:
         fmt = fmt or detect(file.head(), "rows", "arrays", "records", name=file.path)
-        reads = FORMATS[fmt].reads
-        if "records" in reads and not re.search(TREE, file.head()):
-            rows, places = _of_documents(file)
-        elif {"rows", "arrays"}.isdisjoint(reads):
+        if holds_tree(file, fmt):
             raise FormatError(f"no points in it: {FORMATS[fmt].summary}", source=file.name)
-        else:
-            converter = FormatConverter(fmt, Request(Operation(moves=True)), file.name, answers=answers)
-            rows = gathered(converter.steps(cast("ByteStream", file.stream)), policy(file.name), (*IDS, WEIGHT))
-            if np.isnan(rows.numbers[0, 0]):
-                raise FormatError("no positions in it: rotations alone are no points", source=file.name)
-            row = " row " if "arrays" in reads else ":"
-            places = [f"{file.name}{row}{line}" for line in rows.lines.tolist()]
-    finally:
-        file.close()
+        stream, asked = cast("ByteStream", file.stream), RowOptions(stamps=NO_STAMPS)
+        rows = samples_of(stream, fmt, asked, policy(file.name), (*IDS, WEIGHT), answers)
+    if np.isnan(rows.numbers[:, 0]).any():
+        raise FormatError("no positions in it: rotations alone are no points", source=file.name)
+    row = " row " if "arrays" in FORMATS[fmt].reads else ":"
+    places = [f"{file.name}{row}{line}" for line in rows.lines.tolist()]
     extras = {key: plain_cells(cells) for key, cells in rows.extras.items()}
-    if rows.names[0] is not None:
+    if len({*rows.names}) > 1:  # one that all have tells none from the others
         extras["name"] = [*rows.names]
     key = next((key for key in IDS if any(each is not None for each in extras.get(key, ()))), "")
     first: dict[str, str] = {}
@@ -270,28 +259,6 @@ def read_points(argument: str, *, fmt: str, answers: Answers, policy: Callable[[
             raise ValueInvalid(f"{place}: weight is negative: {text}")
     frame = rows.parents[0] if len({*rows.parents}) == 1 else None
     return Points(file.name, rows.numbers[:, :3], [*first] or None, weights or None, places, frame)
-
-
-def _of_documents(file: InputFile) -> tuple[RowPoses, list[str]]:
-    """Gather the points of YAML or JSON, with the members of the mappings around each, and where each is."""
-    source, request = file.source, Request()
-    known = read_text(source, request)
-    results = []
-    for record in known.records:
-        pose = pose_of(record, request)
-        if pose.position is None:
-            raise Misfit("expected a point {id: .., xyz: [x, y, z]}", record.path).placed(source)
-        said: dict[str, Any] = {}  # by the record and the mappings that hold it, up to the item of a list that it is
-        outermost = max((at for at, step in enumerate(record.path) if at and type(step) is int), default=0)
-        for depth in range(outermost, len(record.path)):
-            value = value_at(known.values, record.path[: depth + 1])
-            if type(value) is dict:
-                said |= {key: value[key] for key in (*IDS, WEIGHT) if type(value.get(key)) is str}
-        results.append(Result(Pose(pose.position, IDENTITY, parent=record.parent.text), said))
-    if not results:
-        raise FormatError("no points in it; each is {id: .., xyz: [x, y, z]}", source=source.name)
-    places = [f"{source.name}:{line}" for line, _ in locate_many(source.text, [each.path for each in known.records])]
-    return block_of(results), places
 
 
 class Matched(NamedTuple):

@@ -386,8 +386,9 @@ class TableRows(PlannedRows):
                 break
         if not first:
             raise FormatError("nothing in it", source=source)
-        known = request.rows.given or request.rows.given_place
-        table, rest = open_table(first, fmt, header=header, source=source, expected=known)
+        given = request.rows.given or request.rows.given_place
+        known = has_pose_column if request.rows.poses else lambda names: stamp_column(names) is not None
+        table, rest = open_table(first, fmt, header=header, source=source, expected=given, known=known)
         super().__init__(*as_trajectory(table, fmt, request))
         self.texts = chain((rest,) if rest else (), blocks)
         self.taken = len(first) - len(rest)

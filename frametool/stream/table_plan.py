@@ -284,8 +284,8 @@ def _stamp_columns(table: Table, request: Request, places: Sequence[int], frames
     if not (table.stamped and request.results.all_numbers):
         return []
     usual, below = stamp_places(table.names)
-    if not (table.names or request.rows.columns) and min(places, default=0) == 1:
-        usual = 0  # what is before the numbers that --from speaks of
+    if not (table.names or request.rows.columns) and min(places, default=1) == 1 and not frames:
+        usual = 0  # what is before the numbers that --from speaks of, or all there is
     return [] if usual in frames else [place for place in (usual, below) if place is not None]
 
 

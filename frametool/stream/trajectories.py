@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import os
 import re
-from contextlib import closing
-from itertools import chain
+from contextlib import closing, nullcontext
+from itertools import chain, repeat
 from operator import ge
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -25,21 +25,16 @@ from frametool.formats.table import BAG, FORMATS, by_suffix
 from frametool.frames.lookups import checked_rate
 from frametool.frames.stamps import BILLION, FURTHEST_NS, parse_time
 from frametool.frames.trajectory import BODY, WORLD, Trajectory
+from frametool.geometry.rigid import IDENTITY
 from frametool.geometry.transform import Rotation
 from frametool.grammar.edges import Answers, Diagnostics, Names
 from frametool.grammar.pose_algebra import sample_stamps
-from frametool.grammar.readers import in_nanoseconds, stamp_column, stamp_places
-from frametool.grammar.result import Style
+from frametool.grammar.readers import stamp_column
 from frametool.ros.messages import body_of
-from frametool.stream.as_poses import FormatConverter
-from frametool.stream.faults import BadRows
-from frametool.stream.gathering import POSITION, gathered, posed
-from frametool.stream.header import listed
-from frametool.stream.record_stream import run_records
-from frametool.stream.request import Operation, Request, RowOptions
-from frametool.stream.rows import read_stamps as read_columns
-from frametool.stream.table import open_table
-from frametool.text.spans import without_quotes
+from frametool.stream.faults import SKIP, BadRows, Fault
+from frametool.stream.gathering import POSITION, samples_of
+from frametool.stream.request import Operation, Request, ResultOptions, RowOptions
+from frametool.stream.table import TableRows
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -50,7 +45,6 @@ if TYPE_CHECKING:
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Array
     from frametool.grammar.edges import Report
-    from frametool.stream.rows import RowPoses
     from frametool.text.lines import ByteStream
 
     TrajectoryLike: TypeAlias = Trajectory | str | PathLike[str]
@@ -100,27 +94,28 @@ def read_trajectory(
     name, inside = split_name(text)
     if len(inside) == 1:
         topics, inside = inside, []
+    file, body = None, BODY
     if not inside and (fmt or by_suffix(name, RECORDINGS) or of_folder(name)) in RECORDINGS:
         from frametool.recordings.messages import open_trajectory
 
         if (found := open_trajectory(name, topics, Diagnostics())) is not None:
-            bad = policy(name)
-            asked = Request(rows=RowOptions(normalize=normalize), on_error=bad.on_error)
-            with closing(InputFile(name, found[0])) as file:
-                return _of_records(file, "json", bad, asked, body_of(found[1], answers))
-    if os.path.isdir(name) or inside or topics:
-        return _of_tree(name, fmt, topics, answers, inside, normalize=normalize)
-    file = InputFile(name)
-    try:
-        fmt = fmt or detect(file.head(), "rows", "arrays", "tree", "records", name=file.path)
-        is_record = "records" in FORMATS[fmt].reads and not re.search(TREE, file.head())
-        if not is_record and {"rows", "arrays"}.isdisjoint(FORMATS[fmt].reads):
+            file, fmt, body = InputFile(name, found[0]), "json", body_of(found[1], answers)
+    if file is None and not (os.path.isdir(name) or inside or topics):
+        file = InputFile(name)
+    with nullcontext() if file is None else closing(file):
+        if file is not None:
+            fmt = fmt or detect(file.head(), "rows", "arrays", "tree", "records", name=file.path)
+        if file is None or holds_tree(file, fmt):
             return _of_tree(name, fmt, topics, answers, inside, file, normalize=normalize)
-        bad = policy(file.name)
-        asked = Request(rows=RowOptions(normalize=normalize), on_error=bad.on_error)
-        return _of_records(file, fmt, bad, asked) if is_record else _of_rows(file, fmt, answers, bad, asked)
-    finally:
-        file.close()
+        return _of_samples(file, fmt, answers, policy(file.name), body, normalize=normalize)
+
+
+def holds_tree(file: InputFile, fmt: str) -> bool:
+    """Return True for a file of edges rather than of records, of rows, or of columns of numbers."""
+    reads = FORMATS[fmt].reads
+    if "records" in reads:
+        return re.search(TREE, file.head()) is not None
+    return {"rows", "arrays"}.isdisjoint(reads)
 
 
 def split_name(text: str) -> tuple[str, list[str]]:
@@ -147,44 +142,36 @@ def read_stamps(path: str, report: Report) -> list[int]:
     if path != "-" and not os.path.isfile(path) and (os.path.isdir(path) or ":" in path):
         name, topics = split_name(path)
         return _stamps_of(name, topics=topics)
-    file = InputFile(path)
-    try:
-        head = file.head()
+    with closing(InputFile(path)) as file:
+        head, fmt = file.head(), "columns"
         words = next((line.split() for line in head.splitlines() if line.strip() and line.lstrip()[:1] != b"#"), [])
         is_list = len(words) < 2 and not re.search(rb"[,;:{\[<\0]", b"".join(words)) and by_sign(head, "tree") is None
-        fmt = "tum" if is_list else detect(head, "rows", "arrays", "tree", "records", name=file.path)
-        known = FORMATS[fmt]
-        if not known.is_table or fmt == "kitti":
-            is_tree = not known.is_table and re.search(TREE, head) is not None
-            return _stamps_of(path, fmt, is_tree=is_tree or {"tree", "records"}.intersection(known.reads) == {"tree"})
-        text = file.stream.read()
-    finally:
-        file.close()
-    if not words:
-        raise FormatError(NO_TIMES, source=file.name)
-    titled = not is_list or stamp_column([words[0].decode("utf-8", "replace")]) is not None
-    known_by = lambda names: stamp_column(names) is not None  # noqa: E731
-    table, rest = open_table(text, fmt, header=titled, source=file.name, known=known_by)
-    named = table.names or (known.rows.columns or ("t",))[: table.width]
-    at, below = (0, None) if fmt == "euroc" else stamp_places(named)
-    if at is None:
-        columns = f"; columns: {listed(named)}" if table.names else ""
-        raise FormatError(f"no column of stamps (t, stamp, time, stamp_ns ..){columns}", source=file.name, line=1)
-    cells = table.split(rest)
-    lines = cells.rows + text.count(b"\n", 0, len(text) - len(rest)) + 1
-    in_ns = 1 if fmt == "euroc" else in_nanoseconds(named[at])
-    parts = tuple(without_quotes(cells.column(place)) for place in (at, below) if place is not None)
-    stamps, reasons = read_columns(parts, in_ns=in_ns)
-    found = []
-    for row, stamp in enumerate(stamps.tolist()):
-        reason = reasons.get(row, "")
-        if not reason and not -FURTHEST_NS < stamp < FURTHEST_NS:
-            reason = f"stamp {stamp} ns is beyond the year 2116"
-        if reason:
-            report(FormatError(reason, source=file.name, line=int(lines[row])))
-        else:
-            found.append(stamp)
-    if not len(stamps):
+        if is_list and not words:
+            raise FormatError(NO_TIMES, source=file.name)
+        if not is_list:
+            fmt = detect(head, "rows", "arrays", "tree", "records", name=file.path)
+            if not FORMATS[fmt].is_table or fmt == "kitti":
+                reads, is_tree = FORMATS[fmt].reads, holds_tree(file, fmt)
+                return _stamps_of(path, fmt, is_tree="tree" in reads and (is_tree or "records" not in reads))
+        titled = not is_list or stamp_column([words[0].decode("utf-8", "replace")]) is not None
+        named = ResultOptions(all_numbers=True, prefix=" ")  # as no column is
+        request = Request(Operation(left=IDENTITY), RowOptions(poses=0), named, on_error=SKIP)
+        rows = TableRows(cast("ByteStream", file.stream), fmt, request, file.name, header=titled)
+        if not rows.layout.times:
+            columns = f"; columns: {rows.columns}" if rows.table.names else ""
+            raise FormatError(f"no column of stamps (t, stamp, time, stamp_ns ..){columns}", source=file.name, line=1)
+        found, count, line = list[int](), 0, rows.lines + 1
+        for text in rows.texts:
+            run, outcome, _ = rows.of_text(text)
+            stamps = run.block.stamps[0][run.rows]
+            far = np.flatnonzero(abs(stamps) >= FURTHEST_NS)
+            places = map(run.block.line_of, run.rows[far].tolist())
+            beyond = (f"stamp {stamp} ns is beyond the year 2116" for stamp in stamps[far])
+            for fault in sorted([*outcome.faults, *map(Fault, places, repeat(""), beyond)]):
+                report(FormatError(str(fault.reason), source=file.name, line=line + fault.line))
+            found += np.delete(stamps, far).tolist()
+            line, count = line + outcome.lines, count + outcome.rows
+    if not count:
         raise FormatError(NO_TIMES, source=file.name)
     if any(map(ge, found, found[1:])):
         warn(f"{file.name}: stamps are out of order or doubled; used as they stand")
@@ -208,41 +195,31 @@ def _stamps_of(path: str, fmt: str = "", topics: Sequence[str] = (), *, is_tree:
     return found
 
 
-def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows, asked: Request) -> Trajectory:
-    """Gather the rows of a table, of columns of numbers, or of a file that lists poses."""
-    counts = bool(FORMATS[fmt].rows.counted)
-    own = answers if counts or fmt == "csv" else answers._replace(stamps="")
-    request = asked._replace(operation=Operation(moves=True), rename=lambda parent, name: (parent, name))
-    converter = FormatConverter(fmt, request, file.name, Style("tum"), own)
-    poses = gathered(converter.steps(cast("ByteStream", file.stream)), bad)
-    if counts and not own.stamps:
-        poses = poses._replace(stamps_ns=None)
-    found = _trajectory(poses, file.name, *own.names(WORLD, BODY))
-    return found if "arrays" in FORMATS[fmt].reads else found._replace(lines=poses.lines)
+def _of_samples(
+    file: InputFile, fmt: str, answers: Answers, bad: BadRows, body: str, *, normalize: bool
+) -> Trajectory:  # fmt: skip
+    """Gather records, rows or columns of numbers; body: the name of what moves, where records have none.
 
-
-def _of_records(file: InputFile, fmt: str, bad: BadRows, asked: Request, body: str = BODY) -> Trajectory:
-    """Gather records: poses, or points, with their stamps."""
-    outcomes = run_records(cast("ByteStream", file.stream), fmt, asked, source=file.name, style=Style("tum"))
-    made = _trajectory(gathered(posed(outcomes, file.name), bad), file.name, WORLD, body)
-    return made._replace(world=Names().bare(made.world))
-
-
-def _trajectory(poses: RowPoses, source: str, world: str, body: str) -> Trajectory:
-    """Return poses or points as a trajectory; world, body: the names where they have none.
-
-    Raises ValueInvalid for those of several frames.
+    Raises ValueInvalid for poses of several frames.
     """
+    known, source = FORMATS[fmt], file.name
+    are_records, counts = "records" in known.reads, bool(known.rows.counted)
+    answers = answers if counts or fmt == "csv" else answers._replace(stamps="")
+    poses = samples_of(cast("ByteStream", file.stream), fmt, RowOptions(normalize=normalize), bad, answers=answers)
     if np.isnan(poses.numbers[:, 0]).any():
         raise FormatError("rotations without positions are no trajectory", source=source)
+    world, body = (WORLD, body) if are_records else answers.names(WORLD, BODY)
     named = {(parent or world, name or body) for parent, name in zip(poses.parents, poses.names, strict=True)}
     if len(named) > 1:
         some = ", ".join(f"{parent}:{name}" for parent, name in sorted(named)[:3])
         raise ValueInvalid(f"{source}: poses of several frames ({some} ..); name one: {source}:TARGET:SOURCE")
-    ((parent, name),) = named or {(world, body)}
-    positions, turns = poses.numbers[:, :POSITION], poses.numbers[:, POSITION:]
-    has_turns = not np.isnan(turns).any()
-    return Trajectory(poses.stamps_ns, positions, turns if has_turns else None, parent, name)
+    ((parent, name),) = named
+    turns = poses.numbers[:, POSITION:]
+    return Trajectory(
+        None if counts and not answers.stamps else poses.stamps_ns, poses.numbers[:, :POSITION],
+        None if np.isnan(turns).any() else turns, Names().bare(parent), name,
+        None if are_records or "arrays" in known.reads else poses.lines,
+    )  # fmt: skip
 
 
 def _of_tree(
