@@ -22,10 +22,9 @@ from frametool.grammar.pose import COVARIANCE_KEYS
 from frametool.grammar.readers import Misfit, may_be_on_earth
 from frametool.grammar.readers import tell as tell_notes
 from frametool.ros.messages import LISTS
-from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows
-from frametool.stream.gathering import gathered
-from frametool.stream.request import Formula, Operation, Request, RowOptions, target_of
+from frametool.stream.gathering import samples_of
+from frametool.stream.request import Formula, Request, RowOptions, target_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -172,9 +171,8 @@ class RowExpressions(Formula):
 
 def poses_of_table(path: str, fmt: str, *, normalize: bool, degrees: bool) -> Term:
     """Return the poses or points of a table as a list; raises FormatError at the first bad row."""
-    request = Request(Operation(moves=True), RowOptions(normalize=normalize, degrees=degrees))
     with opened(path) as stream:
-        numbers = gathered(FormatConverter(fmt, request, path).steps(stream), BadRows(path)).numbers
+        numbers = samples_of(stream, fmt, RowOptions(normalize=normalize, degrees=degrees), BadRows(path)).numbers
     is_turned = not np.isnan(numbers[0, -1])
     type_ = Type(POSE if is_turned else POINT)
     rows = np.nan_to_num(numbers[:, : 7 if is_turned else len(AXES)]).tolist()

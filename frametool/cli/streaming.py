@@ -320,15 +320,13 @@ class Task:
     def _steps(self, stream: Any, fmt: str, request: Request) -> Iterator[Step]:
         """Return the results of each block as poses that are not written."""
         from frametool.cli.trees import answers
-        from frametool.stream.as_poses import AS_VALUES, FormatConverter
-        from frametool.stream.gathering import posed
-        from frametool.stream.record_stream import run_records
+        from frametool.stream.gathering import steps_of
 
         request = request.with_results(by_default=True, notations=())
         if fmt in RECORDS:
-            return posed(run_records(stream, fmt, request, source=self.name, style=AS_VALUES), self.name, timed=False)
-        converter = FormatConverter(fmt, request, self.name, AS_VALUES, answers(self.inputs))
-        return converter.steps(stream, header=not self.inputs.no_header)
+            return steps_of(stream, fmt, request, self.name)
+        header = not self.inputs.no_header
+        return steps_of(stream, fmt, request, self.name, answers=answers(self.inputs), header=header)
 
     def _records(self, stream: Any, fmt: str, request: Request, chosen: str) -> tuple[Generator[Outcome], str]:
         """Return the results of records, in place or in the chosen format, and that format."""

@@ -19,7 +19,7 @@ from frametool.grammar.edges import Answers
 from frametool.grammar.pose import Pose
 from frametool.grammar.readers import EARTH_FRAMES, NAME_KEYS, PARENT_COLUMNS, stamp_column
 from frametool.grammar.result import Result, Style, uncertain
-from frametool.stream.as_poses import FormatConverter
+from frametool.stream.as_poses import AS_VALUES, FormatConverter
 from frametool.stream.faults import BadRows, Fault, Outcome, run
 from frametool.stream.record_results import BlockResults
 from frametool.stream.record_stream import run_records
@@ -132,12 +132,22 @@ def samples_of(
 
     asked: how they are read; keys: of other columns, those that are kept; otherwise as `gathered`
     """
-    request, style = Request(rows=asked, on_error=bad.on_error), Style("tum")  # which has a stamp for each
+    request = Request(rows=asked, on_error=bad.on_error)
+    if "records" not in FORMATS[fmt].reads:
+        request = request._replace(operation=Operation(moves=True), rename=lambda parent, name: (parent, name))
+    has_stamps = asked.stamps != NO_STAMPS
+    return gathered(steps_of(stream, fmt, request, bad.source, Style("tum"), answers, timed=has_stamps), bad, keys)
+
+
+def steps_of(
+    stream: ByteStream, fmt: str, request: Request, source: str, style: Style = AS_VALUES,
+    answers: Answers = Answers(),  # noqa: B008 - it is frozen
+    *, header: bool = True, timed: bool = False,
+) -> Iterator[Step]:  # fmt: skip
+    """Return what becomes of each block of a stream in any such format; timed: as for `posed`."""
     if "records" in FORMATS[fmt].reads:
-        outcomes = run_records(stream, fmt, request, source=bad.source, style=style)
-        return gathered(posed(outcomes, bad.source, timed=asked.stamps != NO_STAMPS), bad, keys)
-    request = request._replace(operation=Operation(moves=True), rename=lambda parent, name: (parent, name))
-    return gathered(FormatConverter(fmt, request, bad.source, style, answers).steps(stream), bad, keys)
+        return posed(run_records(stream, fmt, request, source=source, style=style), source, timed=timed)
+    return FormatConverter(fmt, request, source, style, answers).steps(stream, header=header)
 
 
 class MeanRows(Gathered):
