@@ -386,9 +386,9 @@ class TableRows(PlannedRows):
                 break
         if not first:
             raise FormatError("nothing in it", source=source)
-        given = request.rows.given or request.rows.given_place
+        expected = request.rows.given or request.rows.given_place
         known = has_pose_column if request.rows.poses else lambda names: stamp_column(names) is not None
-        table, rest = open_table(first, fmt, header=header, source=source, expected=given, known=known)
+        table, rest = open_table(first, fmt, header=header, source=source, expected=expected, known=known)
         super().__init__(*as_trajectory(table, fmt, request))
         self.texts = chain((rest,) if rest else (), blocks)
         self.taken = len(first) - len(rest)
