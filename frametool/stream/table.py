@@ -390,8 +390,7 @@ class TableRows(PlannedRows):
         known = has_pose_column if request.rows.poses else lambda names: stamp_column(names) is not None
         table, rest = open_table(first, fmt, header=header, source=source, expected=expected, known=known)
         super().__init__(*as_trajectory(table, fmt, request))
-        self.texts = chain((rest,) if rest else (), blocks)
-        self.taken = len(first) - len(rest)
+        self.texts, self.taken = chain((rest,) if rest else (), blocks), len(first) - len(rest)
         self.lines = first.count(b"\n", 0, self.taken)
 
     def of_text(self, text: bytes) -> tuple[Run, Outcome, Cells]:
