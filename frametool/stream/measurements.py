@@ -192,10 +192,7 @@ def _of_table(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
     bare, line = file.tally.names.bare, 0
     for block, outcome in converter.steps(cast("ByteStream", file.stream)):
         rows, shape = converter.rows, converter.rows.shape
-        has_place = shape.whole or shape.unit is not None
         if not line and shape.notation is None:
-            if not has_place:
-                raise FormatError(f"no pose among the columns {rows.columns}; {LIKE}", source=file.name, line=1)
             warn(f"{file.name}:1: no rotation among the columns {rows.columns}: each is taken for 0")
         line = line or 1
         BadRows(file.name).take(fault._replace(line=line + fault.line) for fault in outcome.faults)

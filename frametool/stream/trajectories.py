@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import re
 from contextlib import closing, nullcontext
-from itertools import chain, repeat
+from itertools import repeat
 from operator import ge
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -241,11 +241,6 @@ def _of_tree(
             raise ValueInvalid(f"{recording.name}: {what}; name one: {name}:TARGET:SOURCE")
         frames = moving[0]
     target, source = frames
-    track = tree.track(source)
-    if track is not None and not track.is_static and track.parent == target and not track.varies:
-        times = np.fromiter((stamp_ns for stamp_ns, *_ in track.walk()), np.int64)
-        numbers = np.fromiter(chain.from_iterable(pose for *_, pose in track.walk()), np.float64).reshape(-1, 7)
-        return Trajectory(times, numbers[:, :POSITION].copy(), numbers[:, POSITION:].copy(), target, source)
     stamps = sample_stamps(tree, target, source)
     found = tree.lookup_many(target, source, stamps)
     return Trajectory(np.array(stamps, np.int64), found.xyz, np.stack(found.components[3:], -1), target, source)
