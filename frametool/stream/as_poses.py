@@ -319,7 +319,7 @@ class FormatConverter:
         for each in module.blocks(file, options._replace(report=report), named=False):
             lines = [row.line - 1 for row in each.rows]
             stamps = [each.stamps_ns + request.offset_ns]
-            block = Block(np.array(each.poses).T.copy(), (), np.arange(len(lines)), lines.__getitem__, stamps=stamps)
+            block = Block(np.array(each.poses).T.copy(), {}, np.arange(len(lines)), lines.__getitem__, stamps=stamps)
             done = Run(plan, block, state)
             written = [each.rows[row] for row in done.rows.tolist()]
             extras = {}

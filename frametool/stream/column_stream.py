@@ -108,7 +108,7 @@ class ColumnRows(PlannedRows):
         frames, names, strays = self.names_of(batch.size, lambda place: coded_texts(batch.texts(place)))
         stamps, late = self._stamps(batch)
         block = Block(
-            values, (), np.arange(batch.size), int, names=names, stamps=stamps, bad={**late, **strays, **bad},
+            values, {}, np.arange(batch.size), int, names=names, stamps=stamps, bad={**late, **strays, **bad},
             gone=gone, frames=[frames],
         )  # fmt: skip
         self.run = run = self.ran(block)
@@ -180,7 +180,7 @@ class ColumnRows(PlannedRows):
             new = target.piece if isinstance(target, New) else None
             if isinstance(new, Word):
                 codes = np.nan_to_num(numbers[:, new.number]).tolist()
-                made.append(Made([new.words[int(code)] for code in codes]))
+                made.append(Made([new.text(code).decode() for code in codes]))
             elif isinstance(new, Out):
                 with np.errstate(invalid="ignore"):
                     values = numbers[:, new.first].astype(column.kind or DOUBLE)

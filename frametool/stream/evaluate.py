@@ -427,29 +427,34 @@ class Run:
         """Return the rows that stay, and their numbers: nan in those that have none on purpose, or are null."""
         if len(self.rows) == self.count:
             return self.rows, self.results
-        gone = [] if self.block.gone is None else self.block.gone.tolist()
-        nulls = self.reasons if self.request.on_error == NULL else ()
-        rows = np.array(sorted({*self.rows.tolist(), *gone, *nulls}), np.int64)
-        return rows, np.where(np.isin(rows, self.rows)[:, None], self.results[rows], np.nan)
+        has_result, stays = np.zeros((2, self.count), np.bool_)
+        has_result[self.rows] = stays[self.rows] = True
+        stays[[*self.reasons] if self.request.on_error == NULL else []] = True
+        if self.block.gone is not None:
+            stays[self.block.gone] = True
+        rows = np.flatnonzero(stays)
+        results = self.results[rows]
+        results[~has_result[rows]] = np.nan
+        return rows, results
 
-    def groups(self, end: int | None) -> list[tuple[Ints, list[Spans]]]:
-        """Return what is written before place `end`: results, rows without one, and what passes."""
-        plan, parts, places, unchanged = self.plan, self.block.parts, self.block.places, [*self.block.unchanged]
+    def groups(self, parts: Mapping[Any, Spans], end: int | None) -> list[tuple[Ints, list[Spans]]]:
+        """Return what is written before place `end`: rows with their results, and what passes.
+
+        parts: spans (n,) that the pieces of results refer to
+        """
+        (rows, results), locked, plan = self.settled(), self.locked, self.plan
+        places, unchanged = self.block.places, [*self.block.unchanged]
         if end is not None:
-            self.rows = self.rows[places[self.rows] < end]
+            before = places[rows] < end
+            rows, results = rows[before], results[before]
             unchanged = [(place, text) for place, text in unchanged if place < end]
         groups = []
-        if len(self.rows):
-            results, locked, asked = self.results, self.locked, self.request.results
-            if len(self.rows) < self.count:  # else nothing is copied
-                results, locked = results[self.rows], locked[self.rows]
-                parts = [chosen(part, self.rows) for part in parts]
-            text = assemble(plan.pieces, parts, results, locked, asked.precision, yaml=plan.yaml, null=plan.null)
-            groups.append((places[self.rows], text))
-        if self.request.on_error == NULL and self.reasons:
-            rows = np.array(sorted(self.reasons), np.int64)
-            parts = [chosen(part, rows) for part in self.block.parts]
-            groups.append((places[rows], assemble(plan.pieces, parts, None, np.zeros_like(rows), null=plan.null)))
+        if len(rows):
+            if len(rows) < self.count:  # else nothing is copied
+                locked, parts = locked[rows], {key: chosen(part, rows) for key, part in parts.items()}
+            precision = self.request.results.precision
+            text = assemble(plan.pieces, parts, results, locked, precision, yaml=plan.yaml, null=plan.null)
+            groups.append((places[rows], text))
         return [*groups, texts_as_rows(unchanged)] if unchanged else groups
 
     def parts_of(self, row: int) -> list[tuple[float, ...]]:

@@ -15,7 +15,7 @@ from frametool.errors import FormatError, Misused, ValueInvalid, bare, did_you_m
 from frametool.formats.table import FORMATS
 from frametool.geometry import quaternion, rigid
 from frametool.stream.request import Formula, Shown
-from frametool.stream.row_layout import POINT, POSE, Word
+from frametool.stream.row_layout import POINT, POSE, Word, one_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -79,7 +79,7 @@ class PixelsOfPoints(Seen):
         self.names = ("u", "v", "depth", "in_image", *["range"] * ranged)
         self.take = take
         members: dict[str, Any] = {"camera": name} if name else {}
-        members |= {"pixel": (0, 1), "depth": (2,), "in_image": Word(3, TRUTHS)}
+        members |= {"pixel": (0, 1), "depth": (2,), "in_image": Word(3, one_of(TRUTHS))}
         self.shown = Shown({3: BITS}, members | dict.fromkeys(self.names[4:], (4,)))
 
     def extras(self, row: str) -> tuple[str, ...]:

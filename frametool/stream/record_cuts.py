@@ -450,7 +450,7 @@ def block_of(cut: Cut, called: Called, data: Bytes, text: bytes, request: Reques
     """Return the records of one template as rows; called: their frames, request: that of their plan."""
     template, rows = cut.template, len(cut.starts)
     starts, ends = cut.starts + MARGIN, cut.ends + MARGIN
-    parts = [Spans(data, starts[:, index], ends[:, index]) for index in range(starts.shape[1])]
+    parts = {index: Spans(data, starts[:, index], ends[:, index]) for index in range(starts.shape[1])}
 
     def line_of(row: int) -> int:
         return text.count(b"\n", 0, int(cut.starts[row, 0])) + template.line
@@ -472,7 +472,7 @@ def block_of(cut: Cut, called: Called, data: Bytes, text: bytes, request: Reques
     frames = [[named[code][at][0][0] for code in which] for at in range(len(template.entries))]
     for at, role, node in template.roles:  # the names of results
         texts = [quoted_name(node, each[at][1][role] or "", json=template.json).encode() for each in named]
-        parts.append(chosen(spans_of(texts), codes))
+        parts[len(parts)] = chosen(spans_of(texts), codes)
     # numbers that are no plain text are the same in all records
     numbers: Any = np.tile([value for record, *_ in template.entries for value in record.values], (rows, 1))
     if template.regular:

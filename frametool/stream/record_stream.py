@@ -216,7 +216,7 @@ class RecordBlocks:
         items = sorted((each for each in found.items if each[0] < end), key=itemgetter(0))
         written, results = b"", None
         if self.style is None:
-            written = text_in_order(items, [group for run in found.runs for group in run.groups(end)])
+            written = text_in_order(items, [group for run in found.runs for group in run.groups(run.block.parts, end)])
         else:
             alike = [each.take((each.places < end).nonzero()[0]) for each in found.alike] if stops else found.alike
             results = BlockResults([each for each in alike if len(each.places)], items, text)

@@ -5,14 +5,13 @@ Knows no text; works on floats and on arrays alike.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from frametool.errors import NamedTuple, ValueInvalid, overheard
 from frametool.geometry import euler, floats, quaternion, rigid
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from typing import Any
 
     from frametool.geometry.place import Place, Spot
     from frametool.geometry.representations import Notation, Whole
@@ -331,9 +330,9 @@ def doubt(shape: Shape, angle: float, remedy: str) -> str:
 
 
 class In(NamedTuple):
-    """A stretch of the input, by its index among the spans a format found."""
+    """A stretch of the input, by its key among the spans a format found."""
 
-    part: int
+    part: Any
 
 
 class Out(NamedTuple):
@@ -345,42 +344,21 @@ class Out(NamedTuple):
 
 
 class Word(NamedTuple):
-    """A number of the result as the word that it encodes, between quotes or not: the zone of UTM."""
+    """A number of the result in other words than digits; nan is a row without it."""
 
     number: int
-    words: tuple[str, ...]
-    quote: bytes = b""
-
-    def text(self, number: float) -> bytes:
-        """Return the word of a number."""
-        return self.quote + self.words[int(number)].encode() + self.quote
+    text: Callable[[float], bytes]
 
 
-class Item(Word):
-    """A number of a list with what is around it, or another text where it is not a number.
-
-    words: the text before it, the one behind it, the other one, and the format of the number
-    """
-
-    def text(self, number: float) -> bytes:
-        """Return the text of a number."""
-        before, behind, other, fmt = self.words
-        if number != number:  # noqa: PLR0124 - nan
-            return other.encode()
-        return f"{before}{number_text(number, fmt, self.quote.decode())}{behind}".encode()
+def one_of(words: Sequence[str], quote: bytes = b"", null: bytes = b"") -> Callable[[float], bytes]:
+    """Return what writes a number as the word that it encodes, between quotes or not: the zone of UTM."""
+    return lambda number: quote + words[int(number)].encode() + quote if number == number else null  # noqa: PLR0124 - nan
 
 
 def number_text(number: float, fmt: str, exponent: str) -> str:
     """Write a number in a format of Python's; exponent: what 1e-05 has for its e, in YAML `.0e`."""
     text = format(number, fmt)
     return text if "." in text else text.replace("e", exponent)
-
-
-class Instead(NamedTuple):
-    """A name of the result in place of a stretch of the input, which stays where there is no result."""
-
-    part: int
-    new: int
 
 
 class Renamed(NamedTuple):
@@ -402,4 +380,4 @@ class IfLocked(NamedTuple):
     text: bytes
 
 
-Piece: TypeAlias = In | Out | Const | IfLocked | Instead | Word | Renamed
+Piece: TypeAlias = In | Out | Const | IfLocked | Word | Renamed

@@ -23,7 +23,7 @@ from frametool.frames.stamps import BILLION, read_header_stamp, read_stamp
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.readers import in_nanoseconds
 from frametool.grammar.result import NoResult, Result, with_entries
-from frametool.stream.row_layout import AS_READ, NOWHERE, PARTS, POSE, Const, IfLocked, In, Instead, Out, Piece, Word
+from frametool.stream.row_layout import AS_READ, NOWHERE, PARTS, POSE, IfLocked, In, Out, Piece, Word
 from frametool.text.parse import FURTHEST, parse_stamps
 from frametool.text.spans import MARGIN, Floats, Ints, Spans, framed, join, without_quotes
 from frametool.text.write import float_spans, replaced, rounded_to_single
@@ -62,7 +62,7 @@ class Block(NamedTuple):
     """What a format found in a block of text.
 
     numbers: (n, c) the cells with our numbers, or the numbers themselves
-    parts: spans (n,) that pieces refer to
+    parts: spans (n,) that pieces refer to by their keys
     places: (n,) where each row is among all that the block holds
     line_of: the line of a row, from 0
     unchanged: place and text of what passes as it is
@@ -77,7 +77,7 @@ class Block(NamedTuple):
     """
 
     numbers: Spans | Floats
-    parts: Sequence[Spans]
+    parts: Mapping[Any, Spans]
     places: Ints
     line_of: Callable[[int], int]
     unchanged: Sequence[tuple[int, bytes]] = ()
@@ -189,23 +189,21 @@ def separators(pieces: Iterable[Piece]) -> bytes:
 
 
 def assemble(
-    pieces: Sequence[Piece], parts: Sequence[Spans], results: Floats | None, locked: Ints, precision: int | None = None,
-    *, yaml: bool = False, null: bytes = b"nan",
+    pieces: Sequence[Piece], parts: Mapping[Any, Spans] | Sequence[Spans], results: Floats, locked: Ints,
+    precision: int | None = None, *, yaml: bool = False, null: bytes = b"nan",
 ) -> list[Spans]:  # fmt: skip
     """Return the spans, in order, that make up the rows.
 
-    results: (n, k) the numbers, as `number_spans` writes them; without any, each is null and names stay as they are
+    results: (n, k) the numbers, as `number_spans` writes them
     locked: (n,) 1 where angles are not unique
     """
-    found, size = list[Spans](), len(locked)
-    after = b"" if results is None else separators(pieces)
-    values = None
-    if results is not None and after:
+    found, size, after = list[Spans](), len(locked), separators(pieces)
+    if after:
         values = number_spans(results[:, : len(after)], precision, after, yaml=yaml, null=null)
     for piece in pieces:
-        if isinstance(piece, (In, Instead)):
-            found.append(parts[piece.part if isinstance(piece, In) or results is None else piece.new])
-        elif isinstance(piece, Out) and values is not None:
+        if isinstance(piece, In):
+            found.append(parts[piece.part])
+        elif isinstance(piece, Out):
             own = slice(piece.first, piece.last)
             starts, ends = values.starts[:, own], values.ends[:, own].copy()
             if len(piece.between) == 1:
@@ -216,15 +214,11 @@ def assemble(
             found.append(each[0])
             for number in each[1:]:
                 found += [constant(piece.between, size), number]
-        elif isinstance(piece, Word) and results is not None:
+        elif isinstance(piece, Word):
             codes, of_row = np.unique(results[:, piece.number], return_inverse=True)
             found.append(chosen(spans_of([*map(piece.text, codes.tolist())]), of_row))
-        elif isinstance(piece, Out):
-            found.append(constant(piece.between.join([null] * (piece.last - piece.first)), size))
-        elif isinstance(piece, Word):
-            found.append(constant(null, size))
         else:
-            text = constant(piece.text if isinstance(piece, (Const, IfLocked)) else b"", size)
+            text = constant(piece.text, size)
             shown = text.starts + locked * (text.ends - text.starts) if isinstance(piece, IfLocked) else text.ends
             found.append(text._replace(ends=shown))
     return found

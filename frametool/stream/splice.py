@@ -7,7 +7,9 @@ separated.
 from __future__ import annotations
 
 from collections import defaultdict
+from functools import partial
 from itertools import chain
+from math import isnan
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -24,7 +26,7 @@ from frametool.stream.faults import Fault
 from frametool.stream.record import outermost
 from frametool.stream.record_search import POINT_KEYS, QUATERNION, STALE, XYZ
 from frametool.stream.record_values import Answer, Entry, Outside, RecordText, json_documents, written
-from frametool.stream.row_layout import POSE, SIX, Const, IfLocked, In, Out, Piece, Renamed, Word, number_text
+from frametool.stream.row_layout import POSE, SIX, Const, IfLocked, In, Out, Piece, Renamed, Word, number_text, one_of
 from frametool.text.lines import with_edits
 
 if TYPE_CHECKING:
@@ -233,12 +235,12 @@ class Splicer:
     def _listed(self, places: Sequence[int]) -> Iterator[Piece]:
         """Yield the pieces of a list of numbers, or of a single one; null instead of nan."""
         precision = self.request.results.precision
-        fmt, exponent = "" if precision is None else f"z.{precision}f", b"e" if self.json else b".0e"
+        fmt, exponent = "" if precision is None else f"z.{precision}f", "e" if self.json else ".0e"
         opens, closes = ("[", "]") if places[1:] else ("", "")
         for at in places:
             behind = closes if at == places[-1] else ", "
-            around = opens * (at == places[0]), behind, "null" * (at == places[0]), fmt
-            yield row_layout.Item(self.first + at, around, exponent)
+            around = opens * (at == places[0]), behind, "null" * (at == places[0]), fmt, exponent
+            yield Word(self.first + at, partial(_item, *around))
 
     def _names(self) -> None:
         """Rename frames where the record names them, or in new members."""
@@ -282,9 +284,14 @@ class Splicer:
         pieces: list[Piece] = []
         for at, part in enumerate(text.split(MARK), first):
             number = self.first + at
-            made = Word(number, words[at], b'"' * self.json) if at in words else Out(number, number + 1, b"")
+            made = Word(number, one_of(words[at], b'"' * self.json)) if at in words else Out(number, number + 1, b"")
             pieces += [Const(part.encode()), made] if part else [made]
         return tuple(pieces[:-1])
+
+
+def _item(before: str, behind: str, none: str, fmt: str, exponent: str, number: float) -> bytes:
+    """Write a number of a list with what is around it, or another text for nan."""
+    return none.encode() if isnan(number) else f"{before}{number_text(number, fmt, exponent)}{behind}".encode()
 
 
 def _joined(parts: Sequence[Pieces], gap: Const) -> Pieces:

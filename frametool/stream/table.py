@@ -27,7 +27,7 @@ from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import STOP, Fault, Outcome, RowNote
 from frametool.stream.header import has_pose_column, listed
 from frametool.stream.request import SOME
-from frametool.stream.row_layout import NORMAL, POSE, RATE, Out, Shape
+from frametool.stream.row_layout import NORMAL, POSE, RATE, In, Out, Shape
 from frametool.stream.rows import (
     Block,
     BlockNames,
@@ -223,14 +223,6 @@ def as_trajectory(table: Table, fmt: str, request: Request) -> tuple[Table, Requ
     return table._replace(names=names), request
 
 
-def _bounds(cells: Cells, at: int) -> Ints:
-    """Return where the rows are at a bound: 0 is the start of the line, 1 that of the first cell, 2 its end, .."""
-    place, is_end = divmod(at - 1, 2)
-    if 0 <= place < cells.starts.shape[1]:
-        return (cells.ends if is_end else cells.starts)[:, place]
-    return (cells.line_ends if at else cells.line_starts)[cells.rows]
-
-
 def run_table(
     stream: ByteStream, fmt: str, request: Request, *, source: str, header: bool = True
 ) -> Generator[Outcome]:
@@ -238,11 +230,11 @@ def run_table(
     rows = TableRows(stream, fmt, request, source, header=header)
     yield Outcome(rows.table.opening(rows.layout), lines=rows.lines, size=rows.taken)
     for text in rows.texts:
-        run, outcome, _ = rows.of_text(text)
+        run, outcome, cells = rows.of_text(text)
         end, broken = None, [place for place, _ in run.block.broken]
         if request.on_error == STOP and (run.reasons or broken):  # what is before the first bad row is written
             end = min([*run.block.places[[*run.reasons]].tolist(), *broken])
-        yield outcome._replace(text=written(run.groups(end)))
+        yield outcome._replace(text=written(run.groups(rows.parts_of(cells, run), end)))
 
 
 class PlannedRows:
@@ -318,19 +310,6 @@ class PlannedRows:
         known = [None if not text or text in counters else text for text in parents.texts]
         frames = [self.earth] if self.earth else [known[code] for code in parents.codes.tolist()]
         return frames, BlockNames(pairs, results, of_row, dict(sorted(lost.items())[:1])), bad
-
-    def _name_spans(self, cells: Cells, role: int, names: BlockNames) -> Spans:
-        """Write names as cells; one that does not change stays as it is written."""
-        place, of_row = self.layout.named[role] or 0, names.of_row
-        new = spans_of([self.table.cell(result[role]) for result in names.results])
-        starts, ends = new.starts[of_row], new.ends[of_row]
-        pairs = zip(names.pairs, names.results, strict=True)
-        same = np.array([old[role] == result[role] for old, result in pairs])[of_row]
-        if not same.any():
-            return Spans(new.data, starts, ends)
-        data, behind = np.concatenate([new.data, cells.data]), len(new.data)
-        starts = np.where(same, cells.starts[:, place] + behind, starts)
-        return Spans(data, starts, np.where(same, cells.ends[:, place] + behind, ends))
 
     def ran(self, block: Block) -> Run:
         """Return what becomes of a block, with its warnings in order."""
@@ -418,11 +397,6 @@ class TableRows(PlannedRows):
         if places and (cells.data == QUOTE).any():
             numbers = without_quotes(numbers)
         frames, names, bad = self.names_of(len(cells.rows), lambda place: coded(cells.column(place)))
-        parts = [
-            self._name_spans(cells, each.role, names) if isinstance(each, Named)
-            else Spans(cells.data, _bounds(cells, each[0]), _bounds(cells, each[1]))
-            for each in layout.stretches
-        ]
         times = [without_quotes(cells.column(place)) for place in layout.times]
         some_static = self.request.rows.stamps == SOME
         name = table.name(layout.times[0]) if times else ""
@@ -439,7 +413,27 @@ class TableRows(PlannedRows):
                     broken.append((line, Fault(int(before()[line]), "", reason, skipped=True)))
         line_of = lambda row: int(before()[cells.rows[row]])  # noqa: E731
         bad, stamped = late | bad, [stamps]
-        return Block(numbers, parts, cells.rows, line_of, unchanged, broken, names, stamped, bad, frames=[frames])
+        return Block(numbers, {}, cells.rows, line_of, unchanged, broken, names, stamped, bad, frames=[frames])
+
+    def parts_of(self, cells: Cells, run: Run) -> dict[Any, Spans]:
+        """Return the text around the results of a block, and the names in them."""
+        parts = [piece.part for piece in self.plan.pieces if isinstance(piece, In)] if run.count else []
+        return {
+            part: self._names(cells, part.place, part.role, run) if isinstance(part, Named)
+            else Spans(cells.data, *(_bounds(cells, bound) for bound in part))
+            for part in parts
+        }  # fmt: skip
+
+    def _names(self, cells: Cells, place: int, role: int, run: Run) -> Spans:
+        """Write names as cells; one that does not change, or of a row without a result, stays as it is written."""
+        names, of_row = run.block.names, run.block.names.of_row
+        new = spans_of([self.table.cell(result[role]) for result in names.results])
+        pairs = zip(names.pairs, names.results, strict=True)
+        same = np.array([old[role] == result[role] for old, result in pairs])[of_row]
+        same[[*run.reasons]] = True
+        data, behind = np.concatenate([new.data, cells.data]), len(new.data)
+        starts = np.where(same, cells.starts[:, place] + behind, new.starts[of_row])
+        return Spans(data, starts, np.where(same, cells.ends[:, place] + behind, new.ends[of_row]))
 
     def _at_other_times(self, text: bytes, cells: Cells, offset_ns: int) -> bytes:
         """Return rows with so much added to their stamps; what is no stamp stays and is reported when it is read."""
@@ -453,3 +447,11 @@ class TableRows(PlannedRows):
                 new = str(part) if len(columns) > 1 else stamp_text(column.text(row).decode(), stamp, in_ns=in_ns)
                 edits.append((int(column.starts[row]) - MARGIN, int(column.ends[row]) - MARGIN, new.encode()))
         return with_edits(text, edits)
+
+
+def _bounds(cells: Cells, at: int) -> Ints:
+    """Return where the rows are at a bound: 0 is the start of the line, 1 that of the first cell, 2 its end, .."""
+    place, is_end = divmod(at - 1, 2)
+    if 0 <= place < cells.starts.shape[1]:
+        return (cells.ends if is_end else cells.starts)[:, place]
+    return (cells.line_ends if at else cells.line_starts)[cells.rows]

@@ -14,7 +14,7 @@ from frametool.stream import header, row_layout
 from frametool.stream.evaluate import Plan
 from frametool.stream.header import XYZ, PoseColumns, has_pose_column, listed, named_pose, row_shape, wholes_of
 from frametool.stream.request import NO_STAMPS, PAIR, PLAIN, Request
-from frametool.stream.row_layout import POINT, POSE, SIX, Const, In, Out, Shape, Word, place_of, six_names
+from frametool.stream.row_layout import POINT, POSE, SIX, Const, In, Out, Shape, Word, one_of, place_of, six_names
 from frametool.text.numbers import number_or_none
 
 if TYPE_CHECKING:
@@ -44,25 +44,20 @@ class Named(NamedTuple):
 
 
 Column: TypeAlias = Kept | New | Named
-# a stretch is what is between two bounds of a row, or a name that is written; bound 0 is the start of the line, cells
-# begin at 1, 3, .. and end at 2, 4, .., and the last is the end of the line
-Stretch: TypeAlias = tuple[int, int] | Named
 
 
 class Layout(NamedTuple):
-    """The columns of the output, and from where in a row its pieces come.
+    """The columns of the output, and of the input what is read.
 
     places: the columns our numbers are read from
     times: that of the stamps, and of the nanoseconds of stamps whose seconds are whole
     frames: those that name the frame a row is expressed in, for look-ups the two frames
     named: those of the parent and of the name of a row's pose
-    stretches: the text that passes, and the names
     """
 
     columns: tuple[Column, ...]
     places: tuple[int, ...]
     frames: tuple[int, ...]
-    stretches: tuple[Stretch, ...]
     times: tuple[int, ...] = ()
     named: tuple[int | None, int | None] = (None, None)
 
@@ -122,8 +117,8 @@ def plan_table(table: Table, request: Request) -> tuple[Plan, Layout]:
     if table.header:
         refuse_repeated(written, names)
     times = _stamp_columns(table, request, places, frames)
-    pieces, stretches = ((), ()) if request.results.all_numbers else lay_out(written, table.width, table.delimiter)
-    layout = Layout(tuple(written), places, frames, stretches, tuple(times), (parent, name))
+    pieces = () if request.results.all_numbers else pieces_of(written, table.width, table.delimiter)
+    layout = Layout(tuple(written), places, frames, tuple(times), (parent, name))
     return Plan(
         shapes, targets, request, tuple(map(table.name, places)), pieces, b"" if table.delimiter else b"nan",
         request.pose_from_frame if moves_each else None, table.name(frames[0]) if len(frames) == 1 else "",
@@ -314,7 +309,7 @@ def _columns(
         several = len(targets) > 1 and (request.rows.poses > 1 or number > 0)
         is_same = pose.rotation is not None and [each for each, _ in target.notations] == [pose.rotation.notation]
         position, rotation, extras = _new_columns(
-            pose, target, request, shape, first, table.delimiter or b" ", several=several, same=is_same
+            pose, target, request, shape, first, table.delimiter, several=several, same=is_same
         )
         first += target.size
         # whether each number of the result stands where one of the input does
@@ -350,7 +345,7 @@ def _columns(
 
 
 def _new_columns(
-    pose: PoseColumns, target: Shape, request: Request, shape: Shape, first: int, between: bytes,
+    pose: PoseColumns, target: Shape, request: Request, shape: Shape, first: int, delimiter: bytes,
     *, several: bool, same: bool,
 ) -> list[list[Column]]:  # fmt: skip
     """Name the numbers of a result, from the one at `first`: position, rotation, what else there is.
@@ -370,10 +365,11 @@ def _new_columns(
         if target.place is None and not (target.kind in SIX or gone):
             moved += [f"{pose.position.prefix}z{pose.position.suffix}"] * (len(moved) < len(XYZ))
     words = (request.operation.shown or target.place or PLAIN).words
+    between, null = (delimiter, b"") if delimiter else (b" ", b"nan")
     names = [*(prefix + name for name in moved), *turned, *(prefix + name for name in target.extras)]
     new: list[Column] = []
     for at, name in enumerate(names, first):
-        new.append(New(name, Word(at, words[at]) if at in words else Out(at, at + 1, between)))
+        new.append(New(name, Word(at, one_of(words[at], null=null)) if at in words else Out(at, at + 1, between)))
     axes: list[Column] = []
     if target.place is not None and turned and not (target.place == shape.place and AXES_KEY in target.place.fields):
         axes = [New(prefix + AXES_KEY, Const(target.place.axes.encode()))]
@@ -385,37 +381,34 @@ def _new_columns(
 # --- the text of a row ---
 
 
-def lay_out(columns: Sequence[Column], width: int, delimiter: bytes) -> tuple[tuple[Piece, ...], tuple[Stretch, ...]]:
-    """Make the pieces of a row out of its columns, as few as can be: neighbours that pass are one stretch."""
+def pieces_of(columns: Sequence[Column], width: int, delimiter: bytes) -> tuple[Piece, ...]:
+    """Make the pieces of a row out of its columns, as few as can be: neighbours that pass are one stretch.
+
+    A stretch is what is between two bounds of a row: 0 is the start of the line, cells begin at 1, 3, .. and end at
+    2, 4, .., and the last is the end of the line; or it is a name that is written.
+    """
     pieces: list[Piece] = []
-    stretches: list[Stretch] = []
 
     def keep(begin: int, end: int) -> None:
-        if pieces and isinstance(pieces[-1], In) and stretches[-1][1] == begin:
-            begin = stretches.pop()[0]
-        else:
-            pieces.append(In(len(stretches)))
-        stretches.append((begin, end))
+        last = pieces[-1] if pieces else None
+        if isinstance(last, In) and type(last.part) is tuple and last.part[1] == begin:
+            begin = pieces.pop().part[0]  # type: ignore[union-attr]
+        pieces.append(In((begin, end)))
 
     for before, column in pairwise((None, *columns)):
+        last, new = pieces[-1] if pieces else None, column.piece if isinstance(column, New) else None
         if isinstance(column, Kept):  # with what parts it from the column before, if there is one
             keep(2 * column.place + (before is None and column.place > 0), 2 * column.place + 2)
-            continue
-        run, new = pieces[-1] if pieces else None, column.piece if isinstance(column, New) else None
-        if isinstance(run, Out) and isinstance(new, Out) and run.last == new.first:
-            pieces[-1] = run._replace(last=new.last)
-            continue
-        if isinstance(before, Kept) and before.place < width - 1:  # with what is behind it
-            keep(2 * before.place + 2, 2 * before.place + 3)
-        elif before:
-            pieces.append(Const(delimiter or b" "))
-        if isinstance(column, New):
-            pieces.append(column.piece)
-        elif column is not None:
-            pieces.append(row_layout.Instead(len(stretches), len(stretches) + 1))
-            stretches += [(2 * column.place + 1, 2 * column.place + 2), column]
+        elif isinstance(last, Out) and isinstance(new, Out) and last.last == new.first:
+            pieces[-1] = last._replace(last=new.last)
+        else:
+            if isinstance(before, Kept) and before.place < width - 1:  # with what is behind it
+                keep(2 * before.place + 2, 2 * before.place + 3)
+            elif before:
+                pieces.append(Const(delimiter or b" "))
+            pieces.append(new or In(column))
     keep(2 * width, 2 * width + 1)
-    return tuple(pieces), tuple(stretches)
+    return tuple(pieces)
 
 
 def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:
