@@ -105,11 +105,11 @@ class ColumnRows(PlannedRows):
         shapes = zip(absent, self.plan.shapes, strict=False)
         empty = [flags for flags, shape in shapes if shape.notation or every]
         gone = np.flatnonzero(np.logical_or.reduce(empty)) if np.any(empty) else None  # 0 is a point, but no rotation
-        frames, names, strays = self.names_of(batch.size, lambda place: coded_texts(batch.texts(place)))
+        names = self.names_of(batch.size, lambda place: coded_texts(batch.texts(place)))
         stamps, late = self._stamps(batch)
         block = Block(
-            values, {}, np.arange(batch.size), int, names=names, stamps=stamps, bad={**late, **strays, **bad},
-            gone=gone, frames=[frames],
+            values, {}, np.arange(batch.size), int, names=names, stamps=stamps, bad={**late, **names.bad, **bad},
+            gone=gone, frames=[names.frames],
         )  # fmt: skip
         self.run = run = self.ran(block)
         for number, kind in self.narrow.items():

@@ -13,7 +13,7 @@ import numpy as np
 
 from frametool.errors import FrametoolError, NamedTuple
 from frametool.frames.stamps import BILLION, format_stamp
-from frametool.geometry import arrays, floats, quaternion, uncertainty
+from frametool.geometry import arrays, quaternion, uncertainty
 from frametool.geometry.representations import UPPER_ROWS, BatchRule
 from frametool.geometry.rigid import EXACT, SCALED
 from frametool.geometry.validation import read_rotations
@@ -21,9 +21,9 @@ from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
 from frametool.grammar.pose import FEW_DIGITS
 from frametool.stream import row_layout
 from frametool.stream.faults import DEGREES, NULL, Fault, RowNote
-from frametool.stream.request import PAIR, START, Request, thing_pose
+from frametool.stream.request import PAIR, START, VELOCITIES, Request, thing_pose
 from frametool.stream.row_layout import LEAVES_PLANE, NOWHERE, POSE, TURN, Shape, checked_rotation, doubt, wrong_tail
-from frametool.stream.rows import Block, assemble, chosen, coded, numbered, read_each, texts_as_rows
+from frametool.stream.rows import Block, assemble, chosen, coded, read_each, texts_as_rows
 from frametool.text.numbers import parse_number, read_number_or_angle
 from frametool.text.parse import half_units, parse_floats
 from frametool.text.spans import Flags, Floats, Ints, Spans
@@ -70,8 +70,7 @@ class State:
     previous: Floats | None = None
     frame: str | None = None
     stamp_ns: int | None = None
-    angles: dict[int, float] = field(default_factory=dict)
-    turns: dict[int, float] = field(default_factory=dict)
+    angles: dict[int, tuple[float, float]] = field(default_factory=dict)
 
 
 class Run:
@@ -83,49 +82,49 @@ class Run:
     things: each shape of the rows, where its numbers begin among all, and these
     mended: rows whose rotation was off and normalised; off: by how much the worst was
     doubted: whether a row had an angle that looks like degrees; notes: warnings
-    outside: rows without numbers, and those before the first or after the last time that is wanted
-    lone: the very first row of velocities, which has none
+    absent: rows that have no result, and nothing is wrong with them: without numbers, before the first or after the
+        last time that is wanted, and the very first of velocities
     """
 
     def __init__(self, plan: Plan, block: Block, state: State) -> None:
         """Read, transform and check every row of the block."""
-        self.plan, self.block, self.state = plan, block, state
+        self.plan, self.block, self.state, self.count = plan, block, state, len(block.places)
         self.request, self.operation = plan.request, plan.request.operation
         self.reasons: dict[int, tuple[str, str | FrametoolError]] = dict(block.bad)
-        self.mended: list[int] = []
-        self.notes: list[RowNote] = []
+        self.absent = set[int]() if block.gone is None else {*block.gone.tolist()}
+        self.mended, self.notes = list[int](), list[RowNote]()
         self.doubted, self.off = False, 0.0
-        self.count = len(block.places)
         self.columns = [*np.ascontiguousarray(self._read().T)]
         firsts = accumulate([shape.size for shape in plan.shapes], initial=0)
         starts = zip(plan.shapes, firsts, strict=False)
         self.things = [(shape, first, (*self.columns[first : first + shape.size],)) for shape, first in starts]
         self._check_covariances()
-        self.outside = set[int]() if block.gone is None else {*block.gone.tolist()}
         if self.count and self.request.window:
             (first, last), times = self.request.window, block.stamps[0]
-            self.outside |= {*np.flatnonzero((times < first) | (times > last)).tolist()} - {*self.reasons}
-        self.lone = set[int]()
+            self.absent |= {*np.flatnonzero((times < first) | (times > last)).tolist()} - {*self.reasons}
         with np.errstate(all="ignore"):
             self.moved = self._compute()
             self.results, self.locked = self._results()
-        if self.outside:
-            self.reasons = {row: why for row, why in self.reasons.items() if row not in self.outside}
-            self.mended = [row for row in self.mended if row not in self.outside]
-        self.rows = np.arange(self.count)
-        if gone := {*self.reasons, *self.outside, *self.lone}:
-            self.rows = np.delete(self.rows, [*gone])
+        if self.absent:
+            self.reasons = {row: why for row, why in self.reasons.items() if row not in self.absent}
+            self.mended = [row for row in self.mended if row not in self.absent]
+        self.rows = self._good()
         self._note_block()
         for column, period in plan.targets[0].angle_columns() if self.request.results.unwrap and len(self.rows) else ():
             values = self.results[self.rows, column]  # full turns are added, so that no step is larger than half a turn
-            before = np.concatenate([[state.angles.get(column, values[0])], values[:-1]])
-            turns = state.turns.get(column, 0.0) - np.cumsum(np.rint((values - before) / period))
-            self.results[self.rows, column] = values + period * turns
-            state.angles[column], state.turns[column] = float(values[-1]), float(turns[-1])
+            last, turns = state.angles.get(column, (values[0], 0.0))
+            every = turns - np.cumsum(np.rint((values - np.concatenate([[last], values[:-1]])) / period))
+            self.results[self.rows, column] = values + period * every
+            state.angles[column] = float(values[-1]), float(every[-1])
 
-    def _blame(self, row: int, column: str, reason: str | FrametoolError) -> None:
-        """Keep the first reason why a row is bad."""
-        self.reasons.setdefault(row, (column, reason))
+    def _good(self) -> Ints:
+        """Return the rows that have a result as far as is known."""
+        return np.delete(np.arange(self.count), [*self.reasons, *self.absent])
+
+    def _blame(self, rows: Ints | int, column: str, reason: str | FrametoolError) -> None:
+        """Keep the first reason why rows are bad."""
+        for row in np.ravel(rows).tolist():
+            self.reasons.setdefault(row, (column, reason))
 
     def _note(self, row: int, number: int, about: str, sentence: str) -> None:
         """Warn of one of a row's numbers."""
@@ -204,40 +203,30 @@ class Run:
 
     def _mover(self, at: int) -> Rigid | None:
         """Return the pose that moves one of the points or poses of the rows: of its frame, at its time, or none."""
-        plan, formula, count, stamps = self.plan, self.operation.formula, self.count, self.block.stamps
-        if not count or (formula is not None and not self.operation.shown):
+        plan, operation, timed, count = self.plan, self.operation, self.request.timed, self.count
+        (frames, numbers), stamps = self.block.frames[at], self.block.stamps
+        times = stamps[at] if timed is not None and len(stamps) > at else None
+        if not count or (operation.formula is not None and not operation.shown):
             return None
-        frames = self.block.frames[at]
-        times = stamps[at] if self.request.timed is not None and len(stamps) > at else None
-        if times is None and (plan.edge_of is None or len(frames) != count):
+        if times is None and (plan.edge_of is None or numbers is None):
             return plan.edge_of and plan.edge_of(frames[0])
-        return self._movers(frames, times)
-
-    def _movers(self, frames: Sequence[str | None], times: Ints | None) -> Rigid:
-        """Return the pose of each row by its frame's name, or at its stamp; a row that has none is bad.
-
-        frames: one a row; where there are times it may be one for all
-        """
-        plan, timed, count, (known, codes) = self.plan, self.request.timed, self.count, numbered(frames)
+        codes = self.block.frames[at].of_rows(count)
         if timed is None or times is None:
-            edges = []
-            for name, code in known.items():
+            edges: list[Rigid] = []
+            for code, name in enumerate(frames):
                 try:
                     edges.append(plan.edge_of(name))  # type: ignore[misc]
                 except FrametoolError as error:
                     edges.append(NOWHERE)
-                    for row in np.flatnonzero(codes == code).tolist():
-                        self._blame(row, plan.frame_column, error)
-            columns = zip_longest(*edges, fillvalue=0.0)
-            return tuple(np.array(each)[codes] for each in columns)  # type: ignore[return-value]
+                    self._blame(np.flatnonzero(codes == code), plan.frame_column, error)
+            return tuple(np.array(each)[codes] for each in zip_longest(*edges, fillvalue=0.0))  # type: ignore[return-value]
         good, poses = np.delete(np.arange(count), [*self.reasons]), np.full((timed.width, count), np.nan)
-        for frame, code in known.items():
-            some = good if len(known) == 1 else good[codes[good] == code]
+        for code, frame in enumerate(frames):
+            some = good[codes[good] == code] if len(frames) > 1 else good
             try:
                 poses[:, some] = timed.many(frame, times[some])
             except FrametoolError as error:
-                for row in some.tolist():
-                    self._blame(row, plan.frame_column, error)
+                self._blame(some, plan.frame_column, error)
                 continue
             for row in some[np.isnan(poses[6, some])].tolist():  # asked singly, it says why
                 try:
@@ -263,7 +252,7 @@ class Run:
                 mover = self._mover(at)
             parts = operation.result(
                 shape, numbers, mover, arrays, rotation=partial(self._rotation, shape, first),
-                compared=self._with_before if operation.looks_back else lambda pose: [pose], seconds=self._seconds,
+                before=self._before if operation.looks_back else None,
                 times_ns=self.block.stamps[at] if needs_time else None,
             )  # fmt: skip
             if operation.formula is not None:  # what an expression makes of no row is that of each
@@ -271,58 +260,56 @@ class Run:
             found.append(parts)
         return found
 
-    def _good(self) -> Ints:
-        """Return the rows that have a result as far as is known."""
-        return np.array([row for row in range(self.count) if row not in self.reasons and row not in self.outside], int)
+    def _before(self, pose: Rigid) -> tuple[list[Any], Floats]:
+        """Return the good row before each row, or the first of all, and the row; and the time between the two.
 
-    def _with_before(self, pose: Rigid) -> list[Any]:
-        """Return the good row before each row, or the first of all, and the row; the very first row's is itself."""
-        good, state = self._good(), self.state
+        The very first row's is itself.
+        """
+        good, state, seconds = self._good(), self.state, np.ones(self.count)
         if not len(good):
-            return [pose, pose]
+            return [pose, pose], seconds
         full = np.stack([np.broadcast_to(np.asarray(part, np.float64), self.count) for part in pose])
         counts = self.request.counts if not self.plan.frame_column else lambda _: False  # a table has no counters left
-        frames, codes = numbered([None if each and counts(each) else each for each in self.block.frames[0]])
-        codes = np.resize(codes, self.count)
+        frames = [None if each and counts(each) else each for each in self.block.frames[0].texts]
+        codes = self.block.frames[0].of_rows(self.count)[good]
         if state.previous is None:
-            state.previous, state.frame = full[:, good[0]], [*frames][codes[good[0]]]
+            state.previous, state.frame = full[:, good[0]], frames[codes[0]]
         reason = f"given in another frame than {state.frame!r}, as the rows before are"
         reason = reason if state.frame else "given in a frame, as the rows before are not"
-        for row in good[codes[good] != frames.get(state.frame, -1)].tolist():
-            self._blame(row, self.plan.frame_column, reason)
-        if not len(good := self._good()):
-            return [pose, pose]
+        others = np.array([each != state.frame for each in frames])[codes]
+        self._blame(good[others], self.plan.frame_column, reason)
+        if not len(good := good[~others]):
+            return [pose, pose], seconds
         before = state.previous
         if len(before) == EXACT < len(full):  # exact, or of the scale 1
             before = np.append(before, np.full(len(full) - EXACT, float(len(full) == SCALED)))
         elif len(before) != len(full):
-            for row in good.tolist()[: None if self.operation.of == START else 1]:
-                self._blame(row, "", "what it is compared with has a covariance or a scale, which this one has not")
+            what = "what it is compared with has a covariance or a scale, which this one has not"
+            self._blame(good[: None if self.operation.of == START else 1], "", what)
             before = np.append(before[:EXACT], full[EXACT:, good[0]])
         earlier = np.repeat(before[:, None], self.count, axis=1)
         if self.operation.of != START:
             later = np.arange(good[0] + 1, self.count)
             earlier[:, later] = full[:, good[np.searchsorted(good, later) - 1]]
             state.previous = full[:, good[-1]]
-        return [tuple(earlier), tuple(full)]
+        if self.operation.of == VELOCITIES and len(good := self._good()):
+            seconds[good] = self._seconds(good, self.block.stamps[0][good])
+        return [tuple(earlier), tuple(full)], seconds
 
-    def _seconds(self) -> Floats:
+    def _seconds(self, good: Ints, stamps: Ints) -> Floats:
         """Return the time since the good row before each; the very first row has no velocity and no result."""
-        seconds, good, known = np.ones(self.count), self._good(), self.state.stamp_ns
-        if not len(good):
-            return seconds
-        at = self.block.stamps[0][good]
-        before = np.concatenate([[at[0] - BILLION if known is None else known], at[:-1]])
-        steps = at - before
+        known = self.state.stamp_ns
+        before = np.concatenate([[stamps[0] - BILLION if known is None else known], stamps[:-1]])
+        steps = stamps - before
         for index in np.flatnonzero(steps <= 0).tolist():
-            last, now = format_stamp(int(before[index])), format_stamp(int(at[index]))
+            last, now = format_stamp(int(before[index])), format_stamp(int(stamps[index]))
             what = "is that of the row before" if now == last else f"is before {last}, of the row before"
             reason = f"stamp {now} {what}: there is no velocity"
             self._blame(int(good[index]), self.request.rows.extra_column or "", reason)
-        seconds[good] = np.where(steps > 0, steps, BILLION) / BILLION
-        self.lone = {int(good[0])} if known is None else set()
-        self.state.stamp_ns = int(at[-1])
-        return seconds
+        if known is None:
+            self.absent.add(int(good[0]))
+        self.state.stamp_ns = int(stamps[-1])
+        return np.where(steps > 0, steps, BILLION) / BILLION
 
     def _rotation(self, shape: Shape, first: int, numbers: Components) -> Components:
         """Return the checked quaternions of a shape whose numbers begin at the column `first`."""
@@ -390,37 +377,33 @@ class Run:
         if not np.isfinite(results.sum()):
             wrong = np.isinf(results) if self.operation.shown else ~np.isfinite(results)  # nan may be a formula's
             for row in np.flatnonzero(wrong.any(axis=1)).tolist():
-                if row not in self.reasons and row not in self.outside:
+                if row not in self.reasons and row not in self.absent:
                     self._blame(row, *self._why_not_finite(row))
         return results, locked
 
     def _why_not_finite(self, row: int) -> tuple[str, str | FrametoolError]:
         """Return the column and the reason why a row has no finite result."""
-        operation, column = self.operation, ""
+        formula, column = self.operation.formula, ""
         try:
             for at, (shape, first, columns) in enumerate(self.things):
                 own = tuple(float(each[row]) for each in columns)
-                if operation.formula:  # for one row alone, it says so itself
-                    operation.result(
-                        shape, own, None, floats, compared=lambda pose: [pose], seconds=float,
-                        times_ns=int(self.block.stamps[at][row]) if operation.formula.needs_time else None,
-                        rotation=partial(_checked, shape),
-                    )  # fmt: skip
+                if formula is not None:  # for one row alone, it says so itself
+                    stamp_ns = int(self.block.stamps[at][row]) if formula.needs_time else None
+                    self.operation.of_one(shape, own, None, normalize=True, times_ns=stamp_ns)
                 elif shape.place is not None:
                     column = self.plan.names[first]
                     shape.place.check(own[: shape.place.size])
             column = ""
-            for target, parts in zip(self.plan.targets, self.moved, strict=True):
-                if target.place is not None and not operation.formula:
-                    target.place.check_result(*(float(np.broadcast_to(part, self.count)[row]) for part in parts[:3]))
+            for target, parts in zip(self.plan.targets, self.parts_of(row), strict=True):
+                if target.place is not None and formula is None:
+                    target.place.check_result(*parts[:3])
         except FrametoolError as error:
             return column, error
         return "", "the result is not finite: the numbers are too large"
 
     def refuse(self, wrong: Flags, reason: str) -> None:
         """Take results back: these rows are bad."""
-        for row in self.rows[wrong[self.rows]].tolist():
-            self._blame(row, "", reason)
+        self._blame(self.rows[wrong[self.rows]], "", reason)
         self.rows = self.rows[~wrong[self.rows]]
 
     def settled(self) -> tuple[Ints, Floats]:
@@ -466,8 +449,3 @@ class Run:
         """Return what is wrong, line by line."""
         found = [Fault(self.block.line_of(row), *why) for row, why in self.reasons.items()]
         return sorted([*map(itemgetter(1), self.block.broken), *found], key=lambda each: (each.line, each.column))
-
-
-def _checked(shape: Shape, own: Components) -> Components:
-    """Return the quaternion of one row's numbers, which was checked before."""
-    return checked_rotation(shape, own, normalize=True)[0]

@@ -25,7 +25,7 @@ from frametool.stream.record import KEYS_REMEDY
 from frametool.stream.record_search import POINT_KEYS
 from frametool.stream.record_values import MOST_ENTRIES
 from frametool.stream.row_layout import POSE, Const, In, Renamed
-from frametool.stream.rows import Block, chosen, numbered, one_text, spans_of, stamps_in
+from frametool.stream.rows import Block, Coded, chosen, numbered, one_text, spans_of, stamps_in
 from frametool.stream.splice import OURS, column_in, quoted_name, stretches_of
 from frametool.text.spans import MARGIN, Bytes, Ints, Spans, without_quotes
 
@@ -468,8 +468,10 @@ def block_of(cut: Cut, called: Called, data: Bytes, text: bytes, request: Reques
         stamps.append(found)
         bad = {**late, **bad}
     named, codes = called
-    which = codes.tolist() if len(named) > 1 else [0]
-    frames = [[named[code][at][0][0] for code in which] for at in range(len(template.entries))]
+    frames = []
+    for at in range(len(template.entries)):
+        known, own = numbered([each[at][0][0] for each in named])
+        frames.append(Coded([*known], None if len(named) == 1 else own[codes]))
     for at, role, node in template.roles:  # the names of results
         texts = [quoted_name(node, each[at][1][role] or "", json=template.json).encode() for each in named]
         parts[len(parts)] = chosen(spans_of(texts), codes)

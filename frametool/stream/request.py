@@ -8,11 +8,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from frametool.errors import NamedTuple, ValueInvalid
-from frametool.geometry import quaternion, rigid
+from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.floats import RADIAN
 from frametool.geometry.representations import HEADING, Notation, notation
 from frametool.geometry.rigid import EXACT, SCALED, UNCERTAIN
 from frametool.grammar.pose import SCALE, VELOCITY
+from frametool.stream import row_layout
 from frametool.stream.faults import STOP
 from frametool.stream.row_layout import MOVERS, POINT, POSE, RATE, SIX, TURNED, VECTOR, Shape, Unit, Word
 
@@ -236,15 +237,14 @@ class Operation(NamedTuple):
         xp: Namespace,
         *,
         rotation: Callable[[Components], Components],
-        compared: Callable[[Components], Sequence[Components]],
-        seconds: Callable[[], Number],
+        before: Callable[[Components], tuple[Sequence[Components], Number]] | None = None,
         times_ns: Number = None,
     ) -> Components:
         """Return what becomes of one thing of a shape, or of a column of them, and then what comes with it.
 
         rotation: makes the checked quaternion of a thing's own numbers
-        compared: adds to a pose what it is compared with
-        seconds: the time since the row before, of which velocities are made; times_ns: its own time
+        before: returns what a pose is compared with, it, and the time since that
+        times_ns: its own time
         """
         own, extra = numbers[: shape.own_size], tuple(numbers[shape.own_size :])
         if shape.sigma or (shape.covariance and shape.place is not None):
@@ -270,9 +270,10 @@ class Operation(NamedTuple):
                 from frametool.stream.extra_numbers import with_own
 
                 own, extra = with_own(shape, own, extra, edge or self.left, mirrors=self.mirrors)
-            found = self.pose(compared(own), edge, xp)
+            poses, took = ([own], None) if before is None else before(own)
+            found = self.pose(poses, edge, xp)
             if self.of == VELOCITIES:  # linear R_A' (p_B - p_A) / dt, angular the rotation vector of A^-1 B over dt
-                last, took = EXACT + len(RELATIVE_EXTRAS), seconds()
+                last = EXACT + len(RELATIVE_EXTRAS)
                 steps = (*found[:3], *quaternion.as_rotvec(found[3], found[4], found[5], found[6], xp))
                 found = (*found[:last], *(step / took for step in steps), *found[last:])
             found = (*found, *extra)
@@ -281,6 +282,13 @@ class Operation(NamedTuple):
         from frametool.geometry.place import Spot, Unmoved  # with what it was read as, where nothing moves it
 
         return Unmoved(found, Spot(shape.place, numbers[: shape.place.size]))
+
+    def of_one(
+        self, shape: Shape, numbers: Components, edge: Components | None, *, normalize: bool, times_ns: Number = None
+    ) -> Components:
+        """Return what becomes of one thing alone; raises ValueInvalid for what is no rotation."""
+        rotation = lambda own: row_layout.checked_rotation(shape, own, normalize=normalize)[0]  # noqa: E731
+        return self.result(shape, numbers, edge, floats, rotation=rotation, times_ns=times_ns)
 
     def pose(self, poses: Sequence[Components], edge: Components | None, xp: Namespace) -> Components:
         """Return the resulting pose, how far it goes if poses are compared, and its covariance or scale, if any."""

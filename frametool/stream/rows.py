@@ -40,17 +40,42 @@ if TYPE_CHECKING:
     Cells: TypeAlias = Spans | NDArray[Any]
 
 
+class Coded(NamedTuple):
+    """A column of texts as the distinct ones and the number of each row's; without numbers one for all rows."""
+
+    texts: Sequence[Any]
+    codes: Ints | None = None
+
+    def of_rows(self, size: int) -> Ints:
+        """Return the number of the text of each of so many rows."""
+        return np.zeros(size, np.int64) if self.codes is None else self.codes
+
+    def numbers(self, read: Callable[[str], float]) -> tuple[Floats, dict[int, str]]:
+        """Read the number that each encodes, nan if none, and why a row has none."""
+        known = np.full(len(self.texts), np.nan)
+        reasons = read_each(known, range(len(known)), lambda at: read(self.texts[at]))
+        codes = self.of_rows(1)
+        return known[codes], {row: reasons[at] for row, at in enumerate(codes.tolist()) if at in reasons}
+
+
+ALL_ALIKE = Coded((None,))  # rows that name no frame
+
+
 class BlockNames(NamedTuple):
     """The names of a block's rows.
 
+    frames: those that the rows are expressed in; for look-ups the two names, parted by NUL
     pairs, results: the parents and names that there are, and those of their results; of_row: (n,) those of a row
     lost: the first row whose result cannot name a frame: that frame
+    bad: rows whose names do not fit: column and reason
     """
 
+    frames: Coded
     pairs: Sequence[tuple[str, str]] = (("", ""),)
     results: Sequence[tuple[str, str]] = (("", ""),)
     of_row: Ints | None = None
     lost: Mapping[int, str] = MappingProxyType({})
+    bad: Mapping[int, tuple[str, FrametoolError | str]] = MappingProxyType({})
 
     def texts(self, role: int, rows: Ints) -> list[str | None]:
         """Return the parents (0) or names (1) of the results of rows, or one for all."""
@@ -70,8 +95,7 @@ class Block(NamedTuple):
     names: those of the rows, and of their results
     stamps: for each shape (or one for all) the nanoseconds, None where it has none
     bad: rows that are bad by what is no number: column and reason
-    frames: for each shape (or one for all) the name of the frame each row is expressed in, or one for all rows; for
-        look-ups the two names, parted by NUL
+    frames: for each shape (or one for all) the name of the frame each row is expressed in
     place_of: line, from 0, and column, from 1, of one of a row's numbers, where columns have no names
     gone: rows that have no numbers on purpose, and no result
     """
@@ -82,29 +106,12 @@ class Block(NamedTuple):
     line_of: Callable[[int], int]
     unchanged: Sequence[tuple[int, bytes]] = ()
     broken: Sequence[tuple[int, Fault]] = ()
-    names: BlockNames = BlockNames()
+    names: BlockNames = BlockNames(ALL_ALIKE)
     stamps: Sequence[Any] = ()
     bad: Mapping[int, tuple[str, FrametoolError | str]] = MappingProxyType({})
     place_of: Callable[[int, int], tuple[int, str]] | None = None
-    frames: Sequence[Sequence[str | None]] = ((None,),)
+    frames: Sequence[Coded] = (ALL_ALIKE,)
     gone: Ints | None = None
-
-
-class Coded(NamedTuple):
-    """A column of texts as the distinct ones and the number of each row's."""
-
-    texts: Sequence[str]
-    codes: Ints
-
-    def numbers(self, read: Callable[[str], float]) -> tuple[Floats, dict[int, str]]:
-        """Read the number that each encodes, nan if none, and why a row has none."""
-        known = np.full(len(self.texts), np.nan)
-        reasons = read_each(known, range(len(known)), lambda at: read(self.texts[at]))
-        return known[self.codes], {row: reasons[at] for row, at in enumerate(self.codes.tolist()) if at in reasons}
-
-    def each(self) -> list[str]:
-        """Return the text of each row."""
-        return [self.texts[code] for code in self.codes.tolist()]
 
 
 def read_each(values: NDArray[Any], places: Iterable[int], read: Callable[[int], float]) -> dict[int, str]:

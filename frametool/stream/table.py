@@ -61,8 +61,6 @@ if TYPE_CHECKING:
     from frametool.text.lines import ByteStream
     from frametool.text.spans import Floats
 
-    Bad = dict[int, tuple[str, str | FrametoolError]]
-
 COUNTER = "frame"  # such a column often counts pictures
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
@@ -276,27 +274,22 @@ class PlannedRows:
         """List the columns there are."""
         return listed(self.table.called)
 
-    def names_of(self, size: int, column: Callable[[int], Coded]) -> tuple[Sequence[str | None], BlockNames, Bad]:
-        """Read the names of so many rows: return their frames, the names of the results, and the rows that do not fit.
-
-        column: returns the texts of a column
-        """
-        if self.layout.named != (None, None) and size:
-            return self._renamed(size, column)
-        texts = [column(place).each() for place in self.layout.frames] if size else []
-        return [*map("\0".join, zip(*texts, strict=True))] or [self.earth], BlockNames(), {}
-
-    def _renamed(self, size: int, column: Callable[[int], Coded]) -> tuple[Sequence[str | None], BlockNames, Bad]:
-        """Read the names of rows that have columns of them, and rename them."""
-        none, rows = Coded([""], np.zeros(size, np.int64)), self.request.rows
-        called = next(self.table.name(place) for place in self.layout.named if place is not None)
-        parents, names = (none if place is None else column(place) for place in self.layout.named)
-        may_count, count = called == COUNTER and COUNTER not in rows.frames, len(names.texts)
-        counters = {text for text in parents.texts if may_count and self.request.counts(text)}
-        found, of_row = np.unique(parents.codes * count + names.codes, return_inverse=True)
-        pairs = [(parents.texts[code // count], names.texts[code % count]) for code in found.tolist()]
-        results, lost = list(pairs), dict[int, str]()
-        bad: Bad = {}
+    def names_of(self, size: int, column: Callable[[int], Coded]) -> BlockNames:
+        """Read the frames that so many rows name, and rename them; column: returns the texts of a column."""
+        named, frames, asked = self.layout.named, self.layout.frames, self.request
+        places = named if named != (None, None) else frames
+        if not (places and size):
+            return BlockNames(Coded((self.earth,)))
+        texts = [Coded([""]) if place is None else column(place) for place in places]
+        (parents, _), (names, _), codes = texts[0], texts[-1], texts[0].of_rows(size)
+        found, of_row = np.unique(codes * len(names) + texts[-1].of_rows(size), return_inverse=True)
+        pairs = [(parents[code // len(names)], names[code % len(names)]) for code in found.tolist()]
+        if places is frames:  # of a look-up
+            return BlockNames(texts[0] if len(places) == 1 else Coded([*map("\0".join, pairs)], of_row))
+        called = next(self.table.name(place) for place in places if place is not None)
+        may_count = called == COUNTER and COUNTER not in asked.rows.frames
+        counters = {text for text in parents if may_count and asked.counts(text)}
+        results, lost, bad = list(pairs), dict[int, str](), dict[int, tuple[str, str | FrametoolError]]()
         for at, pair in enumerate(pairs):
             try:
                 old = None if pair[0] in counters else pair[0] or None, pair[1] or None
@@ -304,19 +297,19 @@ class PlannedRows:
                 results[at] = pair[0] if pair[0] in counters else new[0] or "", new[1] or ""
             except FrametoolError as error:
                 bad |= dict.fromkeys(np.flatnonzero(of_row == at).tolist(), (called, error))
-            for place, name, result in zip(self.layout.named, pair, results[at], strict=True):
+            for place, name, result in zip(places, pair, results[at], strict=True):
                 if place is not None and name and not result:  # a cell named a frame, and the result does not
                     lost.setdefault(int((of_row == at).argmax()), name)
-        known = [None if not text or text in counters else text for text in parents.texts]
-        frames = [self.earth] if self.earth else [known[code] for code in parents.codes.tolist()]
-        return frames, BlockNames(pairs, results, of_row, dict(sorted(lost.items())[:1])), bad
+        known = [None if not text or text in counters else text for text in parents]
+        own = Coded((self.earth,)) if self.earth else Coded(known, codes)
+        return BlockNames(own, pairs, results, of_row, dict(sorted(lost.items())[:1]), bad)
 
     def ran(self, block: Block) -> Run:
         """Return what becomes of a block, with its warnings in order."""
         run = Run(self.plan, block, self.state)
         self.mended += len(run.mended)
         self.off = max(self.off, run.off)
-        for frame in {*block.frames[0]} if run.count else ():
+        for frame in block.frames[0].texts if run.count else ():
             with suppress(FrametoolError):  # rows of unknown frames say so themselves
                 if self.unasked is not None and self.unasked.moves(frame):
                     remedy = f"give --time-column {quote(self.unasked.name)}, or --at TIME"
@@ -396,7 +389,7 @@ class TableRows(PlannedRows):
         numbers = Spans(cells.data, cells.starts[:, own], cells.ends[:, own])
         if places and (cells.data == QUOTE).any():
             numbers = without_quotes(numbers)
-        frames, names, bad = self.names_of(len(cells.rows), lambda place: coded(cells.column(place)))
+        names = self.names_of(len(cells.rows), lambda place: coded(cells.column(place)))
         times = [without_quotes(cells.column(place)) for place in layout.times]
         some_static = self.request.rows.stamps == SOME
         name = table.name(layout.times[0]) if times else ""
@@ -412,8 +405,8 @@ class TableRows(PlannedRows):
                     reason = f"expected {table.width} cells{named}, found {int(cells.counts[line])}"
                     broken.append((line, Fault(int(before()[line]), "", reason, skipped=True)))
         line_of = lambda row: int(before()[cells.rows[row]])  # noqa: E731
-        bad, stamped = late | bad, [stamps]
-        return Block(numbers, {}, cells.rows, line_of, unchanged, broken, names, stamped, bad, frames=[frames])
+        bad, frames = {**late, **names.bad}, [names.frames]
+        return Block(numbers, {}, cells.rows, line_of, unchanged, broken, names, [stamps], bad, frames=frames)
 
     def parts_of(self, cells: Cells, run: Run) -> dict[Any, Spans]:
         """Return the text around the results of a block, and the names in them."""
