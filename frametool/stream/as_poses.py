@@ -315,7 +315,7 @@ class FormatConverter:
         bare = bare.with_rows(extra_column=None).with_results(unwrap=False)
         target = self.shape._replace(keep_sign=True)
         plan = Plan((self.shape,), (target,), bare, ("x", "y", "z", *QUATERNION.columns), edge_of=edge_of)
-        rename = request.renaming or (lambda parent, name: (parent, name))
+        rename = request.for_kind(POSE).rename or (lambda parent, name: (parent, name))
         for each in module.blocks(file, options._replace(report=report), named=False):
             lines = [row.line - 1 for row in each.rows]
             stamps = [each.stamps_ns + request.offset_ns]

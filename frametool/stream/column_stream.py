@@ -21,7 +21,7 @@ from frametool.formats.rows.csv import quoted
 from frametool.formats.table import FORMATS
 from frametool.grammar.readers import NORMALS, in_nanoseconds
 from frametool.stream.array_writer import DOUBLE, ColumnsWriter
-from frametool.stream.faults import SKIP, STOP, Outcome
+from frametool.stream.faults import SKIP, Outcome
 from frametool.stream.request import VELOCITIES, Operation, Request
 from frametool.stream.row_layout import Out, Word
 from frametool.stream.rows import Block, RowPoses, coded_texts, is_typed, objects, taken
@@ -120,11 +120,7 @@ class ColumnRows(PlannedRows):
             last = first + target.own_size if len(targets) > 1 else None
             run.results[flags, first:last] = np.nan
             first += target.own_size
-        rows, numbers = run.settled()
-        if self.request.on_error == STOP and run.reasons:
-            stay = rows < min(run.reasons)
-            rows, numbers = rows[stay], numbers[stay]
-        return rows, numbers
+        return run.settled(run.end)
 
     def outcome(self, batch: Batch, text: bytes | memoryview = b"") -> Outcome:
         """Return what is written of the last batch, and what is said of it."""

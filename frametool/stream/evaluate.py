@@ -20,11 +20,10 @@ from frametool.geometry.validation import read_rotations
 from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
 from frametool.grammar.pose import FEW_DIGITS
 from frametool.stream import row_layout
-from frametool.stream.faults import DEGREES, NULL, Fault, RowNote
+from frametool.stream.faults import DEGREES, NULL, STOP, Fault, RowNote
 from frametool.stream.request import PAIR, START, VELOCITIES, Request, thing_pose
 from frametool.stream.row_layout import LEAVES_PLANE, NOWHERE, POSE, TURN, Shape, checked_rotation, doubt, wrong_tail
 from frametool.stream.rows import Block, assemble, chosen, coded, read_each, texts_as_rows
-from frametool.text.numbers import parse_number, read_number_or_angle
 from frametool.text.parse import half_units, parse_floats
 from frametool.text.spans import Flags, Floats, Ints, Spans
 
@@ -138,20 +137,14 @@ class Run:
         if not isinstance(cells, Spans):
             return cells
         numbers, bad = parse_floats(cells)
-        width = max(len(plan.names), 1)
+        width, spots = max(len(plan.names), 1), [(shape, at) for shape in plan.shapes for at in range(shape.size)]
 
         def read(at: int) -> float:
             """Read an angle, or a length where metres are wanted, which may say its own unit; words are read below."""
             text, column = cells.text(*divmod(at, width)).decode("utf-8", "replace").strip(" \t"), at % width
-            if column in plan.words:
-                return 0.0
-            if column in plan.marked:
-                return plan.marked[column](text)
-            for shape in plan.shapes:
-                if column < shape.size:
-                    return read_number_or_angle(text, shape.in_degrees(column), metres=shape.in_metres(column))
-                column -= shape.size
-            return parse_number(text)
+            shape, place = spots[column]
+            reader = plan.marked.get(column) or partial(shape.read, place)
+            return 0.0 if column in plan.words else reader(text)
 
         for at, reason in read_each(numbers.reshape(-1), bad.tolist(), read).items():
             self._blame(at // width, plan.names[at % width], reason)
@@ -406,31 +399,38 @@ class Run:
         self._blame(self.rows[wrong[self.rows]], "", reason)
         self.rows = self.rows[~wrong[self.rows]]
 
-    def settled(self) -> tuple[Ints, Floats]:
-        """Return the rows that stay, and their numbers: nan in those that have none on purpose, or are null."""
-        if len(self.rows) == self.count:
+    def settled(self, before: int | None = None) -> tuple[Ints, Floats]:
+        """Return the rows that stay, and their numbers: nan in those that have none on purpose, or are null.
+
+        before: the place up to which rows stay
+        """
+        if before is None and len(self.rows) == self.count:
             return self.rows, self.results
         has_result, stays = np.zeros((2, self.count), np.bool_)
         has_result[self.rows] = stays[self.rows] = True
         stays[[*self.reasons] if self.request.on_error == NULL else []] = True
         if self.block.gone is not None:
             stays[self.block.gone] = True
-        rows = np.flatnonzero(stays)
+        rows = np.flatnonzero(stays if before is None else stays & (self.block.places < before))
         results = self.results[rows]
         results[~has_result[rows]] = np.nan
         return rows, results
 
-    def groups(self, parts: Mapping[Any, Spans], end: int | None) -> list[tuple[Ints, list[Spans]]]:
-        """Return what is written before place `end`: rows with their results, and what passes.
+    @property
+    def end(self) -> int | None:
+        """Return the place of the bad row that ends the stream, if there is one."""
+        if self.request.on_error != STOP or not (self.reasons or self.block.broken):
+            return None
+        return min([*self.block.places[[*self.reasons]].tolist(), *(place for place, _ in self.block.broken)])
+
+    def groups(self, parts: Mapping[Any, Spans], before: int | None = None) -> list[tuple[Ints, list[Spans]]]:
+        """Return what is written before a place, else all that stays: rows with their results, and what passes.
 
         parts: spans (n,) that the pieces of results refer to
         """
-        (rows, results), locked, plan = self.settled(), self.locked, self.plan
-        places, unchanged = self.block.places, [*self.block.unchanged]
-        if end is not None:
-            before = places[rows] < end
-            rows, results = rows[before], results[before]
-            unchanged = [(place, text) for place, text in unchanged if place < end]
+        before = self.end if before is None else before
+        (rows, results), locked, plan, places = self.settled(before), self.locked, self.plan, self.block.places
+        unchanged = [(place, text) for place, text in self.block.unchanged if before is None or place < before]
         groups = []
         if len(rows):
             if len(rows) < self.count:  # else nothing is copied

@@ -20,7 +20,7 @@ from frametool.errors import FrametoolError
 from frametool.grammar.pose import DESCRIPTIVE, LISTED_WORDS, POSE_KEYS, ROTATION_KEYS
 from frametool.grammar.readers import AXES_KEY, NAME_KEYS, PARENT_KEYS, Path, may_be_uncertain
 from frametool.stream.evaluate import Plan
-from frametool.stream.faults import NULL, SKIP, Fault
+from frametool.stream.faults import SKIP, Fault
 from frametool.stream.record import KEYS_REMEDY
 from frametool.stream.record_search import POINT_KEYS
 from frametool.stream.record_values import MOST_ENTRIES
@@ -487,17 +487,16 @@ def block_of(cut: Cut, called: Called, data: Bytes, text: bytes, request: Reques
 def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
     """Return the plan for the records of one template."""
     after, entries = len(template.stretches), template.entries
-    on_error = SKIP if request.on_error == NULL else request.on_error  # records without a result are written one by one
     stamp = next((entry.stamp for entry in entries if entry.stamp), ())
     key = str(stamp[0][-1]) if stamp else ""
     timed = request.timed
     if timed is not None and not timed.name and request.operation.formula is not None:
         timed = timed._replace(name=key if len(stamp) == 1 else "")  # the key that was found has the unit in its name
     extra = None if request.rows.extra_column is None else key
-    return Plan(
+    return Plan(  # bad records are taken one by one
         tuple(entry.record.shape for entry in entries),
         tuple(entry.target for entry in entries),
-        request._replace(on_error=on_error, timed=timed, offset_ns=0).with_rows(extra_column=extra),
+        request._replace(on_error=SKIP, timed=timed, offset_ns=0).with_rows(extra_column=extra),
         tuple(".".join(map(str, (path or ())[1:])) for entry in entries for path in entry.record.numbers),
         (In(after + 1), *template.pieces, In(after)),
         b"null",

@@ -331,6 +331,8 @@ def thing_pose(shape: Shape, own: Components, rotation: Callable[[Components], C
 class Timed(NamedTuple):
     """Where the stamps of rows are, and the poses that move from a frame (None: the one SOURCE) at such times.
 
+    An expression has no such poses: it knows by itself what the stamps are for.
+
     name: the column or key of the stamps; "" for the stamp in the header of each message
     many: columns of poses at an array of nanoseconds, nan where there is no data
     one: a pose at one time, or the reason raised
@@ -339,15 +341,10 @@ class Timed(NamedTuple):
     """
 
     name: str
-    many: Callable[[str | None, Any], Components]
-    one: Callable[[str | None, int], Components]
-    moves: Callable[[str | None], bool] = bool
+    many: Callable[[str | None, Any], Components] = lambda *_: ()
+    one: Callable[[str | None, int], Components] = lambda *_: ()
+    moves: Callable[[str | None], bool] = lambda _: True
     width: int = EXACT
-
-    @classmethod
-    def of_rows(cls, name: str) -> Timed:
-        """Return where the stamps of rows stand for an expression, which knows by itself what they are for."""
-        return cls(name, lambda *_: (), lambda *_: (), lambda _: True)
 
     @property
     def column(self) -> str:
@@ -448,18 +445,6 @@ class Request(NamedTuple):
         )
 
     @property
-    def renaming(self) -> Rename | None:
-        """Return what turns the (parent, name) of a row of a table into those of its result; None where they stay."""
-        operation = self.operation
-        if self.rename is not None:
-            return self.rename
-        if operation.moves:
-            return lambda _parent, name: (None, name)
-        if operation.looks_back:
-            return lambda _parent, name: (name, name)
-        return (lambda _parent, _name: (None, None)) if operation.of == PAIR else None
-
-    @property
     def in_order(self) -> bool:
         """Return True if a row's result depends on the rows before it."""
         takes_first = self.earth is not None and self.earth[0] is not None and self.earth[0].place is None
@@ -472,8 +457,8 @@ class Request(NamedTuple):
 
     def target(self, shape: Shape) -> Shape:
         """Choose how results of things of a shape are written: as they were read unless set."""
-        asked, kind, extras = self.results, self.operation.result_kind(shape.kind), self.operation.extras(shape)
-        in_place = () if shape.rewritten else shape.covariance
+        asked, operation, in_place = self.results, self.operation, () if shape.rewritten else shape.covariance
+        kind, extras = operation.result_kind(shape.kind), operation.extras(shape)
         target = Shape(kind, None, covariance=in_place, extras=extras, keep_sign=asked.keep_sign)
         if kind != shape.kind:
             shape = Shape(kind, shape.unit or 1.0)
@@ -483,9 +468,9 @@ class Request(NamedTuple):
             if asked.place is not None and kind != POINT:
                 raise ValueInvalid(f"a {kind} has no place on the Earth; leave --to {asked.place.name} out")
             return target._replace(unit=self._unit(shape))
-        operation, by_row = self.operation, bool(self.rows.frames) or self.timed is not None  # which moves each its way
-        moves = (operation.left, *operation.right, operation.fixed)
-        shifts = by_row or operation.formula is not None or any(pose is not None and any(pose[:3]) for pose in moves)
+        by_row = bool(self.rows.frames) or self.timed is not None  # which moves each its way
+        poses = filter(None, (operation.left, *operation.right, operation.fixed))
+        shifts = by_row or operation.formula is not None or any(any(pose[:3]) for pose in poses)
         there = shape.whole or shape.unit is not None
         placed = there or (shifts and kind == POSE)
         if asked.notations or shape.notation is None or shape.notation.representation is HEADING:
@@ -500,9 +485,10 @@ class Request(NamedTuple):
             if shape.inverse:  # which is written anew, with all its numbers in one unit
                 shape = shape._replace(absent=(), radians_at=())
             ahead = 3 * (placed and shape.unit is None and not shape.whole)  # a position comes in front
-            absent = tuple(at + ahead for at in shape.absent)
-            target = target._replace(notations=shape.notations, whole=shape.whole, absent=absent)
-            target = target._replace(radians_at=shape.radians_at)
+            target = target._replace(
+                notations=shape.notations, whole=shape.whole, radians_at=shape.radians_at,
+                absent=tuple(at + ahead for at in shape.absent),
+            )  # fmt: skip
         unit = (self._unit(shape) or 1.0) if placed and not target.whole else None
         is_matrix = len(target.notations) == 1 and target.notations[0][0].representation.whole is not None
         if is_matrix and operation.carried(shape) == (SCALE,):  # the scale of results is in the matrix

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from frametool.errors import NamedTuple, ValueInvalid, overheard
 from frametool.geometry import euler, floats, quaternion, rigid
+from frametool.text.numbers import read_number_or_angle
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -164,11 +165,11 @@ class Shape(NamedTuple):
         """Return which of the numbers are angles, each with the size of a full turn."""
         return [(at, 360.0 if degrees else TURN) for at, degrees in enumerate(self.angles) if degrees is not None]
 
-    def in_metres(self, place: int) -> bool:
-        """Return True if a row's number is a length in metres, of a point, a vector or a position."""
-        if self.place is not None or place >= self.position_size:
-            return False
-        return bool(_each(self.unit or 1.0)[self._there[place]] == 1.0)
+    def read(self, place: int, text: str) -> float:
+        """Read a row's number: an angle, or a length in metres, may have a unit of its own."""
+        is_length = self.place is None and place < self.position_size
+        metres = is_length and _each(self.unit or 1.0)[self._there[place]] == 1.0
+        return float(read_number_or_angle(text, self.in_degrees(place), metres=metres))
 
     def position(self, numbers: Sequence[Any]) -> Components:
         """Return x, y, z in metres; 0 where there is no position."""

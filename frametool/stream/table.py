@@ -24,7 +24,7 @@ from frametool.frames.stamps import BILLION, stamp_text
 from frametool.geometry.representations import notation
 from frametool.grammar.readers import EARTH_FRAMES, NORMALS, in_nanoseconds, stamp_column, stamp_places
 from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import STOP, Fault, Outcome, RowNote
+from frametool.stream.faults import Fault, Outcome, RowNote
 from frametool.stream.header import has_pose_column, listed
 from frametool.stream.request import SOME
 from frametool.stream.row_layout import NORMAL, POSE, RATE, In, Out, Shape
@@ -229,10 +229,7 @@ def run_table(
     yield Outcome(rows.table.opening(rows.layout), lines=rows.lines, size=rows.taken)
     for text in rows.texts:
         run, outcome, cells = rows.of_text(text)
-        end, broken = None, [place for place, _ in run.block.broken]
-        if request.on_error == STOP and (run.reasons or broken):  # what is before the first bad row is written
-            end = min([*run.block.places[[*run.reasons]].tolist(), *broken])
-        yield outcome._replace(text=written(run.groups(rows.parts_of(cells, run), end)))
+        yield outcome._replace(text=written(run.groups(rows.parts_of(cells, run))))
 
 
 class PlannedRows:
@@ -247,25 +244,25 @@ class PlannedRows:
 
     def __init__(self, table: Table, request: Request) -> None:
         """Plan the rows of a table; raises FormatError or Misused where they do not fit what is asked for."""
-        timed, extra, operation = request.timed, request.rows.extra_column, request.operation
+        timed, extra, operation, self.unasked = request.timed, request.rows.extra_column, request.operation, None
         usual = "" if (at := stamp_places(table.names)[0]) is None else table.name(at)
         is_cut = (request.window or request.offset_ns) and extra is None and not (timed and timed.name)
-        lacks_name, self.unasked = extra == "" or is_cut, None
-        of_formula = timed and not timed.name and operation.formula and not operation.shown
-        if not usual and (lacks_name or of_formula):
+        if lacks_name := extra == "" or is_cut:
+            request = request.with_rows(extra_column=usual)
+        if timed is not None and not timed.name:  # rows move at the latest time; an expression knows what theirs is for
+            self.unasked = timed._replace(name=usual) if usual else None
+            request = request._replace(timed=None)
+            if operation.formula and not operation.shown:
+                lacks_name, self.unasked = True, None
+                request = request._replace(timed=timed._replace(name=usual))
+        if lacks_name and not usual:
             what = f"no column looks like stamps; name it with --time-column; columns: {listing(table.called)}"
             raise Misused(what, source=table.source, line=1)
-        if lacks_name:
-            request = request.with_rows(extra_column=usual)
-        if timed is not None and not timed.name:
-            named = timed._replace(name=usual)
-            request = request._replace(timed=named if of_formula else None)
-            self.unasked = named if usual and not of_formula else None
         self.table, self.request = table, request
         self.plan, self.layout = plan_table(table, request)
         self.shape = self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
         self.earth = EARTH_FRAMES[0] if self.shape.place is not None else None
-        self.rename = request.for_kind(self.shape.kind).renaming
+        self.rename = request.for_kind(self.shape.kind).rename
         self.state = State()
         self.mended, self.off = 0, 0.0
 

@@ -299,7 +299,7 @@ def _columns(
         return columns
     at: dict[int, list[Column]] = {place: [] for pose in poses for place in pose.places}
     adds, ours = asked.keep or operation.only_adds or not at, tuple(at)
-    for role, renamed in enumerate(named if request.renaming is not None and not adds else ()):
+    for role, renamed in enumerate(named if request.rename is not None and not adds else ()):
         if renamed is not None:
             at.setdefault(renamed, [Named(renamed, role)])
     added, first = list[Column](), 0
@@ -415,12 +415,9 @@ def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:
     """Raise Misused if a new column would be called as one that stays, or as another new one."""
     new = [column.name for column in columns if isinstance(column, New)]
     kept = [names[column.place] for column in columns if not isinstance(column, New)]
-    if len({*new}) < len(new):
-        twice = sorted({name for name in new if new.count(name) > 1})
-        if {"x", "y", "z"} <= {*twice}:
-            hint = "a point with a weight: --columns x,y,z; a rotation: name it qx, qy, qz, qw"
-            raise Misused(f"columns x, y, z, w are a quaternion, its position would have their names; {hint}")
-        raise Misused(f"--to: columns {', '.join(twice)} would appear twice")
+    if twice := sorted({name for name in new if new.count(name) > 1}):
+        hint = "; a point with a weight: --columns x,y,z; a rotation: name it qx, qy, qz, qw" * ({*XYZ} <= {*twice})
+        raise Misused(f"--to: columns {', '.join(twice)} would appear twice{hint}")
     clash = sorted(set(new).intersection(kept))
     if clash:
         raise Misused(f"columns {', '.join(clash)} would appear twice; name the new ones with --prefix")

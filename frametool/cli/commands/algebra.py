@@ -126,7 +126,8 @@ def relative_command(inputs: Inputs) -> int:
         return status
     if b is None:
         refuse(a not in (None, "-"), "name A and B; one of them may be - for standard input")
-        return task.write_results("-", task.request(operation=Operation(of="pair"), poses=2))
+        request = task.request(operation=Operation(of="pair"), poses=2, rename=lambda *_: (None, None))
+        return task.write_results("-", request)
     from frametool.grammar.pose_algebra import relative_names
 
     request = task.request()

@@ -363,7 +363,7 @@ def _over_rows(lines: Sequence[Line], behind: int, scope: Scope, task: Task) -> 
     refuse(twice := next((name for name in names if name and names.count(name) > 1), ""), f"-e {twice}= appears twice")
     formula = RowExpressions(results, [line for line in lines if line not in results], scope, task.output.style)
     formula.check((inputs.kind,) if inputs.kind else ("pose", "point", "vector"))
-    timed = Timed.of_rows(inputs.time_column or "") if formula.needs_time else None
+    timed = Timed(inputs.time_column or "") if formula.needs_time else None
     counters = not any(any(map(str.isdecimal, tree.frames)) for _, tree in formula.scope.trees)
     return task.request(
         operation=Operation(moves=True, formula=formula), timed=timed, earth=formula.scope.earth,
