@@ -421,7 +421,8 @@ class Run:
         """Return the place of the bad row that ends the stream, if there is one."""
         if self.request.on_error != STOP or not (self.reasons or self.block.broken):
             return None
-        return min([*self.block.places[[*self.reasons]].tolist(), *(place for place, _ in self.block.broken)])
+        first: int = min([*self.block.places[[*self.reasons]].tolist(), *(place for place, _ in self.block.broken)])
+        return first
 
     def groups(self, parts: Mapping[Any, Spans], before: int | None = None) -> list[tuple[Ints, list[Spans]]]:
         """Return what is written before a place, else all that stays: rows with their results, and what passes.
