@@ -50,6 +50,10 @@ class Coded(NamedTuple):
         """Return the number of the text of each of so many rows."""
         return np.zeros(size, np.int64) if self.codes is None else self.codes
 
+    def each(self) -> list[str]:
+        """Return the text of each row."""
+        return [self.texts[code] for code in self.of_rows(1).tolist()]
+
     def numbers(self, read: Callable[[str], float]) -> tuple[Floats, dict[int, str]]:
         """Read the number that each encodes, nan if none, and why a row has none."""
         known = np.full(len(self.texts), np.nan)
