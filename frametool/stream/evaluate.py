@@ -13,7 +13,7 @@ import numpy as np
 
 from frametool.errors import FrametoolError, NamedTuple
 from frametool.frames.stamps import BILLION, format_stamp
-from frametool.geometry import arrays, quaternion, uncertainty
+from frametool.geometry import arrays, floats, quaternion, uncertainty
 from frametool.geometry.representations import UPPER_ROWS, BatchRule
 from frametool.geometry.rigid import EXACT, SCALED
 from frametool.geometry.validation import read_rotations
@@ -107,7 +107,7 @@ class Run:
         if self.absent:
             self.reasons = {row: why for row, why in self.reasons.items() if row not in self.absent}
             self.mended = [row for row in self.mended if row not in self.absent]
-        self.rows = self._good()
+        self.rows = np.delete(np.arange(self.count), [*self.reasons, *self.absent])
         self._note_block()
         for column, period in plan.targets[0].angle_columns() if self.request.results.unwrap and len(self.rows) else ():
             values = self.results[self.rows, column]  # full turns are added, so that no step is larger than half a turn
@@ -137,12 +137,12 @@ class Run:
         if not isinstance(cells, Spans):
             return cells
         numbers, bad = parse_floats(cells)
-        width, spots = max(len(plan.names), 1), [(shape, at) for shape in plan.shapes for at in range(shape.size)]
+        width = max(len(plan.names), 1)
 
         def read(at: int) -> float:
             """Read an angle, or a length where metres are wanted, which may say its own unit; words are read below."""
             text, column = cells.text(*divmod(at, width)).decode("utf-8", "replace").strip(" \t"), at % width
-            shape, place = spots[column]
+            shape, place = [(shape, at) for shape in plan.shapes for at in range(shape.size)][column]
             reader = plan.marked.get(column) or partial(shape.read, place)
             return 0.0 if column in plan.words else reader(text)
 
@@ -203,7 +203,11 @@ class Run:
             return None
         if times is None and (plan.edge_of is None or numbers is None):
             return plan.edge_of and plan.edge_of(frames[0])
-        codes = self.block.frames[at].of_rows(count)
+        return self._movers(self.block.frames[at].of_rows(count), frames, times)
+
+    def _movers(self, codes: Ints, frames: Sequence[Any], times: Ints | None) -> Rigid:
+        """Return the pose of each row by the number of its frame, or at its stamp; a row that has none is bad."""
+        plan, timed, count = self.plan, self.request.timed, self.count
         if timed is None or times is None:
             edges: list[Rigid] = []
             for code, name in enumerate(frames):
@@ -382,7 +386,8 @@ class Run:
                 own = tuple(float(each[row]) for each in columns)
                 if formula is not None:  # for one row alone, it says so itself
                     stamp_ns = int(self.block.stamps[at][row]) if formula.needs_time else None
-                    self.operation.of_one(shape, own, None, normalize=True, times_ns=stamp_ns)
+                    checked = lambda numbers, shape=shape: checked_rotation(shape, numbers, normalize=True)[0]  # noqa: E731
+                    self.operation.result(shape, own, None, floats, rotation=checked, times_ns=stamp_ns)
                 elif shape.place is not None:
                     column = self.plan.names[first]
                     shape.place.check(own[: shape.place.size])
@@ -431,7 +436,9 @@ class Run:
         """
         before = self.end if before is None else before
         (rows, results), locked, plan, places = self.settled(before), self.locked, self.plan, self.block.places
-        unchanged = [(place, text) for place, text in self.block.unchanged if before is None or place < before]
+        unchanged = self.block.unchanged
+        if before is not None:
+            unchanged = [(place, text) for place, text in unchanged if place < before]
         groups = []
         if len(rows):
             if len(rows) < self.count:  # else nothing is copied

@@ -37,7 +37,7 @@ from frametool.stream.faults import ZONES, RowNote
 from frametool.stream.record import Record, find_records, key_path, pose_of
 from frametool.stream.record_search import STALE, value_at
 from frametool.stream.request import NO_STAMPS, Request, RowOptions
-from frametool.stream.row_layout import FLAT, LEAVES_PLANE, PARTS, POSE, ROTATION, VECTOR
+from frametool.stream.row_layout import FLAT, LEAVES_PLANE, PARTS, POSE, ROTATION, VECTOR, checked_rotation
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -134,7 +134,10 @@ def answer(entry: Entry, values: Mapping[int, Any], request: Request) -> Answer:
             raise
     if request.window and at_ns is not None and not request.window[0] <= at_ns <= request.window[1]:
         raise Outside("beyond --start or --stop")
-    parts = operation.of_one(shape, entry.record.values, edge, normalize=request.rows.normalize, times_ns=at_ns)
+    parts = operation.result(
+        shape, entry.record.values, edge, floats, times_ns=at_ns,
+        rotation=lambda own: checked_rotation(shape, own, normalize=request.rows.normalize)[0],
+    )  # fmt: skip
     return Answer(entry, parts, has_gaps=operation.shown is not None)
 
 

@@ -8,12 +8,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from frametool.errors import NamedTuple, ValueInvalid
-from frametool.geometry import floats, quaternion, rigid
+from frametool.geometry import quaternion, rigid
 from frametool.geometry.floats import RADIAN
 from frametool.geometry.representations import HEADING, Notation, notation
 from frametool.geometry.rigid import EXACT, SCALED, UNCERTAIN
 from frametool.grammar.pose import SCALE, VELOCITY
-from frametool.stream import row_layout
 from frametool.stream.faults import STOP
 from frametool.stream.row_layout import MOVERS, POINT, POSE, RATE, SIX, TURNED, VECTOR, Shape, Unit, Word
 
@@ -282,13 +281,6 @@ class Operation(NamedTuple):
         from frametool.geometry.place import Spot, Unmoved  # with what it was read as, where nothing moves it
 
         return Unmoved(found, Spot(shape.place, numbers[: shape.place.size]))
-
-    def of_one(
-        self, shape: Shape, numbers: Components, edge: Components | None, *, normalize: bool, times_ns: Number = None
-    ) -> Components:
-        """Return what becomes of one thing alone; raises ValueInvalid for what is no rotation."""
-        rotation = lambda own: row_layout.checked_rotation(shape, own, normalize=normalize)[0]  # noqa: E731
-        return self.result(shape, numbers, edge, floats, rotation=rotation, times_ns=times_ns)
 
     def pose(self, poses: Sequence[Components], edge: Components | None, xp: Namespace) -> Components:
         """Return the resulting pose, how far it goes if poses are compared, and its covariance or scale, if any."""

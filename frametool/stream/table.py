@@ -273,15 +273,20 @@ class PlannedRows:
 
     def names_of(self, size: int, column: Callable[[int], Coded]) -> BlockNames:
         """Read the frames that so many rows name, and rename them; column: returns the texts of a column."""
-        named, frames, asked = self.layout.named, self.layout.frames, self.request
+        named, frames = self.layout.named, self.layout.frames
         places = named if named != (None, None) else frames
-        if not (places and size):
-            return BlockNames(Coded((self.earth,)))
+        return self._renamed(places, size, column) if places and size else BlockNames(Coded((self.earth,)))
+
+    def _renamed(
+        self, places: Sequence[int | None], size: int, column: Callable[[int], Coded]
+    ) -> BlockNames:
+        """Read the names in some columns, and rename them."""
+        asked = self.request
         texts = [Coded([""]) if place is None else column(place) for place in places]
         (parents, _), (names, _), codes = texts[0], texts[-1], texts[0].of_rows(size)
         found, of_row = np.unique(codes * len(names) + texts[-1].of_rows(size), return_inverse=True)
         pairs = [(parents[code // len(names)], names[code % len(names)]) for code in found.tolist()]
-        if places is frames:  # of a look-up
+        if not asked.rows.poses:  # of a look-up
             return BlockNames(texts[0] if len(places) == 1 else Coded([*map("\0".join, pairs)], of_row))
         called = next(self.table.name(place) for place in places if place is not None)
         may_count = called == COUNTER and COUNTER not in asked.rows.frames
@@ -407,11 +412,10 @@ class TableRows(PlannedRows):
 
     def parts_of(self, cells: Cells, run: Run) -> dict[Any, Spans]:
         """Return the text around the results of a block, and the names in them."""
-        parts = [piece.part for piece in self.plan.pieces if isinstance(piece, In)] if run.count else []
         return {
-            part: self._names(cells, part.place, part.role, run) if isinstance(part, Named)
-            else Spans(cells.data, *(_bounds(cells, bound) for bound in part))
-            for part in parts
+            (part := piece.part): self._names(cells, part.place, part.role, run) if isinstance(part, Named)
+            else Spans(cells.data, _bounds(cells, part[0]), _bounds(cells, part[1]))
+            for piece in (self.plan.pieces if run.count else ()) if isinstance(piece, In)
         }  # fmt: skip
 
     def _names(self, cells: Cells, place: int, role: int, run: Run) -> Spans:

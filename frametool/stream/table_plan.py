@@ -415,7 +415,8 @@ def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:
     """Raise Misused if a new column would be called as one that stays, or as another new one."""
     new = [column.name for column in columns if isinstance(column, New)]
     kept = [names[column.place] for column in columns if not isinstance(column, New)]
-    if twice := sorted({name for name in new if new.count(name) > 1}):
+    if len({*new}) < len(new):
+        twice = sorted({name for name in new if new.count(name) > 1})
         hint = "; a point with a weight: --columns x,y,z; a rotation: name it qx, qy, qz, qw" * ({*XYZ} <= {*twice})
         raise Misused(f"--to: columns {', '.join(twice)} would appear twice{hint}")
     clash = sorted(set(new).intersection(kept))
