@@ -9,7 +9,6 @@ Over (x, y, z, rotation about X, Y, Z), metres and radians, along the fixed axes
 from __future__ import annotations
 
 import re
-from math import radians
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid, did_you_mean, shown
@@ -26,8 +25,7 @@ if TYPE_CHECKING:
     from frametool.grammar.readers import Path
 
 COVARIANCE, SIGMA = "covariance", "sigma"
-LENGTHS = {"xyz": 1.0, "xyz_mm": 1000.0, "xyz_cm": 100.0}  # keys of sigma, and their units per metre
-ANGLES: dict[str, bool | None] = {"rpy": None, "rpy_deg": True, "rpy_rad": False}  # and whether they are in degrees
+KEYS = ("xyz", "xyz_mm", "xyz_cm", "rpy", "rpy_deg", "rpy_rad")  # of sigma
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 RADIANS = 3.141592653589793 / 180.0
 
@@ -104,7 +102,8 @@ def read_covariance(mapping: dict[str, Any], reading: Reading) -> Components | N
     if COVARIANCE in mapping and SIGMA in mapping:
         raise NotARotation("sigma and covariance in one entry; keep one", (SIGMA,), key=True)
     if SIGMA in mapping:
-        return within((SIGMA,), of_sigmas, within((SIGMA,), read_sigmas, mapping[SIGMA], reading))  # type: ignore[no-any-return]
+        said = within((SIGMA,), spelled, mapping[SIGMA])
+        return of_sigmas(within((SIGMA,), read_sigmas, said, degrees=reading.degrees))
     if COVARIANCE not in mapping:
         return None
     numbers = [number for _, number in within((COVARIANCE,), entries_of, mapping[COVARIANCE], (36,))]
@@ -126,30 +125,37 @@ def entries_of(value: Any, sizes: Sequence[int]) -> list[tuple[Path, float]]:
     return [(path, within(path, read_number, text)) for path, text in texts]
 
 
-def read_sigmas(value: Any, reading: Reading) -> list[float]:
-    """Read `sigma: {xyz: .., rpy_deg: ..}` as six numbers, metres and radians; each is one number or three."""
+def spelled(value: Any) -> list[tuple[str, Path, Any]]:
+    """Return `{xyz: .., rpy_deg: ..}` as columns: of each sigma its name, path and text; one number is all three."""
     if type(value) is not dict or not value:
         raise Misfit(f"sigma must be {{xyz: .., rpy_deg: ..}}, found {kind(value)}")
-    if unknown := [key for key in value if key not in LENGTHS and key not in ANGLES]:
-        known = (*LENGTHS, *ANGLES)
-        hint = did_you_mean(unknown[0], known) or f"; it has {', '.join(known)}"
-        raise Misfit(f"unknown key {shown(unknown[0])} in sigma{hint}", (unknown[0],), key=True)
+    found: list[tuple[str, Path, Any]] = []
+    for key, each in value.items():
+        if key not in KEYS:
+            hint = did_you_mean(key, KEYS) or f"; it has {', '.join(KEYS)}"
+            raise Misfit(f"unknown key {shown(key)} in sigma{hint}", (key,), key=True)
+        if type(each) in (dict, list):
+            axes = OF[key[:3]]
+            texts = within((key,), read_texts, each, axes, partial=True)
+            places = [(key, *step) for step in (places_in(each) if type(each) is list else zip(axes))]
+            found += zip((f"sigma_{axis}{key[3:]}" for axis in axes), places, texts, strict=True)
+        else:
+            found.append((f"sigma_{key}", (key,), each))
+    return found
+
+
+def read_sigmas(said: Sequence[tuple[str, Path, Any]], size: int = 36, *, degrees: bool) -> list[float]:
+    """Read sigmas as six numbers, metres and radians: of each the name of its column, its path and text.
+
+    size: as of `find_columns`; degrees: the unit of bare angles
+    """
     sigmas = [0.0] * 6
-    for first, keys in ((0, LENGTHS), (3, ANGLES)):
-        there = [key for key in keys if key in value]
-        if len(there) > 1:
-            raise Misfit(f"{there[0]} and {there[1]} in one sigma; keep one", (there[1],), key=True)
-        for key in there:
-            texts, places = [value[key]] * 3, [(key,)] * 3  # a single number applies to all three
-            if type(value[key]) in (dict, list):
-                axes = AXES[first : first + 3]
-                texts = within((key,), read_texts, value[key], axes, partial=True)
-                places = [(key, *step) for step in (places_in(value[key]) if type(value[key]) is list else zip(axes))]
-            degrees = (reading.degrees if ANGLES[key] is None else ANGLES[key]) if key in ANGLES else None
-            numbers = [within(path, _sigma, text, degrees) for path, text in zip(places, texts, strict=True)]
-            if key in LENGTHS:
-                numbers = [each / LENGTHS[key] for each in numbers]
-            sigmas[first : first + 3] = map(radians, numbers) if degrees else numbers
+    for axis, (at, own_unit) in enumerate(find_columns([name for name, _, _ in said], size)[1]):
+        if at >= 0:
+            _, path, text = said[at]
+            unit = own_unit or "deg" * (degrees and axis > 2)
+            number = within(path, _sigma, text, UNITS_OF_ANGLE.get(unit, False) if axis > 2 else None)
+            sigmas[axis] = in_unit(number, unit)
     return sigmas
 
 

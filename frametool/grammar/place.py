@@ -24,18 +24,12 @@ from frametool.grammar.readers import AXES_KEY, EARTH_FRAMES, FLAT, Misfit, Read
 from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from frametool.grammar.pose import Pose
 
 AT = "at"
-# names of other tools; those after the first two are only read together with these
-SAME = {"lat": "lat", "latitude": "lat", "lon": "lon", "longitude": "lon", "lng": "lon", "long": "lon"}
-SAME |= {"alt": "alt", "altitude": "alt", "height": "alt", "hae": "alt"}
-SEA_LEVEL = ("msl", "ele", "elevation", "orthometric")
-GEOID = {"undulation": "undulation", "geoid_separation": "undulation"}
-FIELDS = SAME | GEOID | dict.fromkeys(SEA_LEVEL, "msl") | {"utm_zone": ZONE}
-LLA_KEYS = frozenset((*SAME, "lat_rad", "lon_rad", *SEA_LEVEL, *GEOID))
+LLA_KEYS = frozenset(("lat_rad", "lon_rad", *readers.PLACE_FIELDS)) - {"utm_zone"}
 FLAT_NAMES = frozenset[str]().union(*FLAT.values())
 UTM_KEYS = frozenset((UTM, "easting", "northing", ZONE, "utm_zone"))
 HEADINGS = {"heading_deg": True, "heading_rad": False}
@@ -110,7 +104,8 @@ def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
     if UTM in own:
         found.append(within((UTM,), _utm, own[UTM], reading))
     elif "easting" in own:
-        found.append(_utm({key: own[key] for key in own if key in UTM_KEYS or SAME.get(key) == "alt"}, reading))
+        there = [key for key in own if key in UTM_KEYS or readers.PLACE_FIELDS.get(key) == "alt"]
+        found.append(_utm({key: own[key] for key in there}, reading))
     if any(key in own for key in ("lat", "latitude", "lat_rad")):
         named = _by_field(own)
         latitude, longitude = ([each for each in (name, f"{name}_rad") if each in named] for name in ("lat", "lon"))
@@ -150,7 +145,7 @@ def _by_field(own: dict[str, Any]) -> dict[str, str]:
     """Return the key of each field of a position; raise Misfit for two of one field."""
     named: dict[str, str] = {}
     for key in own:
-        if (field := FIELDS.get(key, key)) in named:
+        if (field := readers.PLACE_FIELDS.get(key, key)) in named:
             raise Misfit(f"{named[field]} and {key} are both {field}; keep one", (key,), key=True)
         named[field] = key
     return named
@@ -275,7 +270,7 @@ def _heading(own: dict[str, Any], axes: str) -> readers.Quaternion | None:
     return HEADING.forward((angle,), floats, degrees, NED if axes == NED else ENU)
 
 
-def refuse_not_read(own: dict[str, Any]) -> None:
+def refuse_not_read(own: Collection[str]) -> None:
     """Refuse keys that name another system than WGS84, and a bare `lla`."""
     if key := next((key for key in NOT_READ if key in own), None):
         raise Misfit(NOT_READ[key], (key,), key=True)

@@ -48,6 +48,11 @@ _UNIT = r"_([nmuµ]?s)$|[\[(]\s*+((?:\s*+[^\[\]()\s]++)*+)\s*+[\])]$"
 _WHOLE_SECONDS = r"(|.*[._])(?:secs?|seconds)"
 _UNITS = {"ns": 1, "us": 10**3, "µs": 10**3, "ms": 10**6} | dict.fromkeys(("s", "sec", "seconds", ""), 0)
 _EARTH = r"(?:^|[^a-z])(?:lat(?:itude)?(?![a-z])|lla$|ecef|utm|easting|north|mgrs|at$)"
+# of places on the Earth, by keys and columns; names of other tools after ours
+PLACE_FIELDS = {"lat": "lat", "latitude": "lat", "lon": "lon", "longitude": "lon", "lng": "lon", "long": "lon"}
+PLACE_FIELDS |= {"alt": "alt", "altitude": "alt", "height": "alt", "hae": "alt", "utm_zone": "zone"}
+PLACE_FIELDS |= dict.fromkeys(("msl", "ele", "elevation", "orthometric"), "msl")
+PLACE_FIELDS |= dict.fromkeys(("undulation", "geoid_separation"), "undulation")
 PLACE_KEYS = frozenset((
     "lat", "latitude", "lon", "longitude", "lng", "alt", "altitude", "ecef", "utm", "easting", "northing", "east",
     "north", "up", "down",
@@ -57,6 +62,10 @@ FIX = "position_covariance"  # of a NavSatFix, along local east, north, up
 # positions whose keys and columns are simply their names and numbers; the others have readers of their own
 FLAT = {key: row.names for key, row in representations.POSITIONS.items() if key not in ("lla", "ecef", "utm")}
 FLAT_KEYS = frozenset(names[0] for names in FLAT.values())  # which no other data have
+_OTHERS = ("easting", "northing", "zone", "heading", "axes", "parent", "datum", "epsg", "mgrs")
+PLACE_WORDS = PLACE_FIELDS | {"status.status": "status"} | {
+    word: word for words in (_OTHERS, representations.POSITIONS["ecef"].columns, *FLAT.values()) for word in words
+}  # fmt: skip
 
 
 class Misfit(ValueInvalid):

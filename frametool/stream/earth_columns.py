@@ -14,45 +14,31 @@ from __future__ import annotations
 
 import re
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import JSON_NUMBER
-from frametool.errors import FormatError, Misused, ValueInvalid, shown, warn
+from frametool.errors import Misused, ValueInvalid, shown, warn
 from frametool.geometry import uncertainty
 from frametool.geometry.earth import AXES as AXES_AT
 from frametool.geometry.earth import ZONES as ZONE_NAMES
 from frametool.geometry.earth import zone_number
-from frametool.geometry.place import AXES, ECEF, ENU, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Earth, Place, kernels
-from frametool.geometry.representations import HEADING, POSITIONS, Notation, notation
+from frametool.geometry.place import AXES, ECEF, ENU, LLA, LOCAL, UNSAID, UTM, ZONE, Earth, Place, kernels
+from frametool.geometry.representations import HEADING, POSITIONS, notation
+from frametool.grammar import place as grammar
 from frametool.grammar import readers
 from frametool.grammar.covariance import check, entries_of, of_position
-from frametool.grammar.place import (
-    AT,
-    EARTH_KEYS,
-    NO_ALT,
-    NOT_READ,
-    SAME,
-    band_s,
-    check_in_ecef,
-    check_parent,
-    coordinate,
-    heights,
-    placed_by,
-    refuse_not_read,
-    without_place,
-)
-from frametool.grammar.place import FIELDS as PLACE_FIELDS
 from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose
 from frametool.grammar.readers import AXES_KEY, EARTH_FRAMES, FIX, Misfit, Reading, may_be_uncertain, within
+from frametool.stream import header as finder
 from frametool.stream.faults import ZONES, RowNote
-from frametool.stream.header import Columns, Header, PoseColumns, find_positions, find_rotations, listed, places_named
 from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape, place_of
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Sequence
+    from collections.abc import Callable, Collection, Mapping, Sequence
     from typing import TypeAlias
 
+    from frametool.stream.header import Columns, Header, PoseColumns, Spot
     from frametool.stream.record import Record
     from frametool.stream.request import Request
     from frametool.stream.table import Table
@@ -60,161 +46,105 @@ if TYPE_CHECKING:
 
     Reader: TypeAlias = Callable[[str], float]
     Inner: TypeAlias = Callable[[dict[str, Any]], tuple[Pose, Sequence[str]]]
-    Groups: TypeAlias = dict[str, dict[str, "NamedColumn"]]
+    Groups: TypeAlias = dict[tuple[str, str], dict[str, Spot]]
 
-ECEF_COLUMNS = POSITIONS[ECEF].columns
 STATUS, PARENT = "status", "parent"
 STAYING = (STATUS, PARENT)  # read, and not rewritten
-OTHERS = ("easting", "northing", *ECEF_COLUMNS, ZONE, "heading", AXES, *STAYING, "datum", "epsg")
-FIELDS = PLACE_FIELDS | {name: name for names in (OTHERS, *readers.FLAT.values()) for name in names}
-PATTERN = re.compile(
-    rf"[#% ]*((?:.*[._/])??)({'|'.join(sorted(FIELDS, key=len, reverse=True))})"
-    r"(?:[_ ]?(deg|rad|e7|m|mm|cm|ft))?\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*",
-    re.IGNORECASE,
-)
 FIX_ENTRY = re.compile(rf"(?:.*[./_])?{FIX}\[?_?([0-8])\]?")
 FIX_TYPE = "position_covariance_type"
-WHOLE = ("lat", "latitude", "lat_rad", AT, "ecef", "utm", "easting", *readers.FLAT_KEYS)
-DEGREES = {"": False, "deg": False, "degrees": False, "°": False, "rad": True, "radians": True}
+WHOLE = ("lat", "latitude", "lat_rad", grammar.AT, "ecef", "utm", "easting", *readers.FLAT_KEYS)
+FIELDS = frozenset(readers.PLACE_WORDS.values())
+AT_PLACE = notation("heading:ned")
+METRES = finder.Units("of a length here; known is m", {"": None, "m": None})
 
 
-class NamedColumn(NamedTuple):
-    """A column: its place, its name, and the unit that this says."""
-
-    place: int
-    name: str
-    unit: str
-
-
-def _find(groups: Groups, earth: Earth, expected: str) -> PoseColumns | None:
-    """Find the one position on the Earth among columns, and a heading with it; None if absent.
-
-    expected: the representation that --from names.
-    Raises ValueInvalid for several, for heights that are not above the ellipsoid, and for units that are not known.
-    """
-    kinds = (expected,) if expected else POSITIONS
-    found = [(spots, _position(kind, spots, groups, earth)) for spots in groups.values() for kind in kinds]
-    found = [each for each in found if each[1] is not None]
-    plain = [each for each in found if each[0] is groups.get("")] or found
-    if len(plain) > 1:
-        several = "; ".join(columns.shown for _, columns in plain if columns)
-        raise ValueInvalid(f"several positions on the Earth: {several}; choose with --columns NAMES --from lla")
-    if not plain:
-        return None
-    spot = plain[0][0].get("heading")
-    if spot is None or spot.unit == "":
-        return PoseColumns(plain[0][1], None)
-    degrees = not _in_radians(spot)
-    heading = Notation(f"heading_{'deg' if degrees else 'rad'}", HEADING, NED, degrees=degrees)
-    return PoseColumns(plain[0][1], Columns((spot.place,), (spot.name,), notation=heading, said=(degrees,)))
-
-
-def _position(kind: str, spots: dict[str, NamedColumn], groups: Groups, earth: Earth) -> Columns | None:
-    """Return the columns of a position of one kind, if they are there."""
-    if kind in LOCAL and earth.origin is None:
-        return None  # east and north are other data
-    row = POSITIONS[kind]
-    words = [words for words in zip(row.names, row.columns, strict=True) if words[0] != "alt"]
-    fields = {field: spot for field, column in words if (spot := spots.get(column) or spots.get(field))}
-    missing = {field for field, _ in words} - fields.keys()
-    if kind == UTM and missing <= {ZONE}:
-        zone = fields.get(ZONE) or groups.get("utm_", {}).get(ZONE) or groups.get("", {}).get(ZONE)
-        if zone is None and earth.zone is None:
-            refuse_not_read(spots)
-            raise ValueInvalid("easting and northing do not say their zone; add a column utm_zone, or give --zone 32N")
-        fields, missing = ({} if zone is None else {ZONE: zone}) | fields, set()
-    if missing:
-        return None
-    if kind == LLA:
-        fields = {f"{name}_rad" if _in_radians(spot) else name: spot for name, spot in fields.items()}
-    above = heights({field: spot.name for field, spot in spots.items()}) if "alt" in row.names else ()
-    return _columns(kind, fields | {field: spots[field] for field in above}, spots, earth)
-
-
-def _columns(kind: str, fields: dict[str, NamedColumn], spots: dict[str, NamedColumn], earth: Earth) -> Columns:
-    """Put the columns together, with that of the axes, and those that are checked and stay."""
-    for field, spot in fields.items():
-        if field[:3] not in ("lat", "lon") and spot.unit not in ("", "m"):
-            what = f"column {shown(spot.name)}: unknown unit {shown(spot.unit)} of a length here; known is m"
-            raise ValueInvalid(what)
-    refuse_not_read(spots)
-    fields = fields | {name: spots[name] for name in (AXES, *STAYING) if name in spots}
-    axes, origin = (earth.axes or kind, earth.origin) if kind in LOCAL else (earth.axes, None)
-    place = Place(kind, (*fields,), axes, earth.zone if kind == UTM and ZONE not in fields else None, origin)
-    places, names, _ = zip(*fields.values(), strict=True)
-    return Columns(places, names, unit=place)
-
-
-def _in_radians(spot: NamedColumn) -> bool:
-    if spot.unit not in DEGREES:
-        unknown = f"column {shown(spot.name)}: unknown unit {shown(spot.unit)}"
-        raise ValueInvalid(f"{unknown}; lat and lon are degrees, or rad")
-    return DEGREES[spot.unit]
-
-
-def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumns | None:
+def find_pose(header: Header, request: Request, source: str) -> PoseColumns | None:
     """Find a position on the Earth and the rotation with it; None for rows that are expressed as x, y, z.
 
-    Raises FormatError for half of one, for heights above the sea, and for a rotation whose axes nobody says.
+    Raises ValueInvalid for half of one, for heights above the sea, and for several.
     """
-    groups: Groups = {}  # by what is before the names, and by field
-    for at, name in enumerate(names):
-        if name and (match := PATTERN.fullmatch(name)):
-            unit = (match[4] if match[4] is not None else match[3] or "").lower()
-            prefix, field = match[1].lower(), FIELDS[match[2].lower()]
-            if field == STATUS:  # of a NavSatFix: another may be anything
-                prefix = prefix.removesuffix("status.") if prefix.endswith("status.") else "another status"
-            groups.setdefault(prefix, {}).setdefault(field, NamedColumn(at, name, unit))
-    every = sorted((spot, field) for spots in groups.values() for field, spot in spots.items())
+    groups: Groups = {
+        key: {field: next(iter(found[field].values())) for field in found if field in FIELDS}
+        for key, found in header.found.items() if not key[1]
+    }  # fmt: skip
+    every = sorted((place, field) for spots in groups.values() for field, (place, _) in spots.items())
     earth, expected = request.earth or Earth(), request.rows.given_place
-    in_ecef = {spot.place for spot, field in every if field in ECEF_COLUMNS and not expected}
-    positions = find_positions(_header_of(names, in_ecef))
+    positions = [each for each in finder.find_positions(header) if not each.affixes[0].lower().endswith("ecef_")]
     if not expected and positions:
-        said = [spot.name for spot, field in every if readers.may_be_on_earth(spot.name) or field == "lon"]
+        names = [(header.names[place], field) for place, field in every]
+        said = [name for name, field in names if readers.may_be_on_earth(name) or field == "lon"]
         if not request.operation.keeps_frames and said:
             message = f"{', '.join(said[:2])} stay data: {positions[0].shown} are the position"
             warn(f"{source}: {message}; --columns lat,lon,alt --from lla turns it round")
         return None
-    try:
-        found = _find(groups, earth, expected)
-        if found is None and (place := Place.of_xyz(expected, earth)) and positions:
-            found = PoseColumns(positions[0]._replace(unit=place), None)
-        _check_found(found, names, {field for _, field in every}, request)
-    except ValueInvalid as error:
-        raise FormatError(str(error), source=source, line=1) from None
-    if found is None or found.position is None:
+    kinds = (expected,) if expected else POSITIONS
+    every_place = (_find(kind, header, groups, key, earth) for key in groups for kind in kinds)
+    found = [*filter(None, every_place)]
+    found = [each for each in found if each.affixes == finder.BARE] or found
+    if not found and positions and (place := Place.of_xyz(expected, earth)):
+        found = [positions[0]._replace(unit=place)]
+    _check_found(found, header.names, {field for _, field in every}, request)
+    if not found:
         return None
-    taken = {place for columns in found if columns for place in columns.places}
-    turned = find_rotations(_header_of(names, taken), request.rows.given)
-    turned += [found.rotation] if found.rotation else []
-    if len(turned) > 1:
-        several = " and ".join(each.shown for each in turned)
-        raise FormatError(f"expected one rotation, found {several}", source=source, line=1)
-    unsaid = [spot.name for spot, field in every if field == "heading" and not spot.unit]
-    if unsaid and not turned:
-        warn(f"{source}: {shown(unsaid[0])} has no unit and stays data; name it heading_deg")
-    return PoseColumns(found.position, next(iter(turned), None))
+    (position,) = found
+    turned = finder.find_rotations(header.without(position.places), request.rows.given)
+    headings = [each for each in header.match((HEADING.name,), angles=(0,)) if each.affixes == position.affixes]
+    turned += [finder.rotation_of(each, HEADING, AT_PLACE) for each in headings if each.said != (None,) or each.wrong]
+    if headings and not turned:
+        warn(f"{source}: {shown(headings[0].shown)} has no unit and stays data; name it heading_deg")
+    return finder.paired(header, found, turned)[0]
 
 
-def _header_of(names: Sequence[str], taken: Collection[int]) -> Header:
-    """Return a header without some of its columns, which keep their places."""
-    return Header(["" if at in taken else name for at, name in enumerate(names)])
+def _find(kind: str, header: Header, groups: Groups, key: tuple[str, str], earth: Earth) -> Columns | None:
+    """Return the columns of a position of one kind, if they are there.
+
+    Raises ValueInvalid for heights that are not above the ellipsoid, and for a zone that nobody says.
+    """
+    row, spots = POSITIONS[kind], groups[key]
+    if kind == UTM and (zone := spots.get(ZONE) or groups.get(finder.BARE, {}).get(ZONE)):
+        spots = spots | {ZONE: zone}
+    words = zip(row.names, row.columns if kind == ECEF else row.names, strict=True)
+    fields = {name: spots.get(word) for name, word in words if name != "alt" and (name != ZONE or ZONE in spots)}
+    if None in fields.values() or (kind in LOCAL and earth.origin is None):
+        return None  # without an origin east and north are other data
+    if kind == UTM and ZONE not in fields and earth.zone is None:
+        grammar.refuse_not_read(spots)
+        raise ValueInvalid("easting and northing do not say their zone; add a column utm_zone, or give --zone 32N")
+    named = {field: header.names[place] for field, (place, _) in spots.items()}
+    above = grammar.heights(named) if "alt" in row.names else ()
+    return _columns(kind, header, fields | {field: spots[field] for field in above}, spots, earth, key)
 
 
-def _check_found(found: PoseColumns | None, names: Sequence[str], fields: Collection[str], request: Request) -> None:
-    """Raise ValueInvalid for an incomplete position, for the one of --from that is not there, and for an idle zone."""
-    expected = request.rows.given_place
-    if found is not None:
-        place = place_of(found.position.unit) if found.position else None
-        says_zone = expected == UTM and place is not None and ZONE in place.fields
-        is_asked = request.results.place is not None and UTM in [each.name for each in request.results.place.all]
-        if says_zone and not is_asked and request.earth is not None and request.earth.zone is not None:
+def _columns(
+    kind: str, header: Header, fields: Mapping[str, Spot | None], spots: Mapping[str, Spot], earth: Earth,
+    key: tuple[str, str] = finder.BARE,
+) -> Columns:  # fmt: skip
+    """Put the columns of a position together, with that of the axes, and those that are checked and stay."""
+    grammar.refuse_not_read(spots)
+    fields = {**fields, **{name: spots[name] for name in (AXES, *STAYING) if name in spots}}
+    angles = [at for at, field in enumerate(fields) if field in ("lat", "lon")]
+    columns = header.columns([*fields.values()], METRES, angles, key)
+    names = [name + "_rad" * (said is False) for name, said in zip(fields, columns.said, strict=True)]
+    axes, origin = (earth.axes or kind, earth.origin) if kind in LOCAL else (earth.axes, None)
+    zone = earth.zone if kind == UTM and ZONE not in fields else None
+    return columns._replace(unit=Place(kind, tuple(names), axes, zone, origin))
+
+
+def _check_found(found: Sequence[Columns], names: Sequence[str], fields: Collection[str], request: Request) -> None:
+    """Raise ValueInvalid for several positions, for none or half of one, and for a zone that has no effect."""
+    expected, place = request.rows.given_place, place_of(found[0].unit) if found else None
+    if len(found) > 1:
+        several = "; ".join(each.shown for each in found)
+        raise ValueInvalid(f"several positions on the Earth: {several}; choose with --columns NAMES --from lla")
+    if place is not None:
+        written = [each.name for each in request.results.place.all] if request.results.place is not None else []
+        if expected == UTM and ZONE in place.fields and UTM not in written and request.earth and request.earth.zone:
             raise ValueInvalid("--zone has no effect: each row says its zone")
-    elif row := POSITIONS.get(expected):
-        what = f"no columns of {expected} ({' '.join(row.columns)}) among: {listed(names)}"
+    elif expected:
+        what = f"no columns of {expected} ({' '.join(POSITIONS[expected].columns)}) among: {finder.listed(names)}"
         raise ValueInvalid(f"{what}; name them with --columns")
-    elif any(name.lower().rpartition(".")[2] == "mgrs" for name in names):
-        raise ValueInvalid(NOT_READ["mgrs"])
+    elif "mgrs" in fields:
+        raise ValueInvalid(grammar.NOT_READ["mgrs"])
     elif ("lat" in fields) != ("lon" in fields):
         missing = "lon" if "lat" in fields else "lat"
         raise ValueInvalid(f"half a place on the Earth: no {missing}; add it, or choose with --columns")
@@ -222,43 +152,40 @@ def _check_found(found: PoseColumns | None, names: Sequence[str], fields: Collec
         raise ValueInvalid("east, north and up or down are of an origin; give --origin '{lat: .., lon: ..}'")
 
 
-def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Request) -> PoseColumns:
+def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Request, _: str) -> PoseColumns:
     """Take the columns that --columns names for a place, as --from says, and a rotation behind it.
 
     spec: "" for all columns of a table without names, behind a stamp or not
     Raises Misused for names that are not there, or a count that the place does not have.
     """
     kind, earth = request.rows.given_place, request.earth or Earth()
-    is_zoned = kind == UTM and earth.zone is not None
-    fields = POSITIONS[kind].names[is_zoned:]
-    most = len(fields)
-    called, places = places_named(spec or f"{1 + (width == most + 1)}-{width}", names, width)
-    own, behind = places[:most], places[most:]
-    if len(own) < (kernels(kind).least or most) - is_zoned:
-        raise Misused(f"--columns: {kind} has {most} numbers ({' '.join(fields)}); found {len(own)}")
-    spots = {field: NamedColumn(place, called[place], "") for field, place in zip(fields, own, strict=False)}
-    try:
-        position = _columns(kind, spots, {}, earth)
-    except ValueInvalid as error:
-        raise Misused(f"--columns: {error}") from None
-    turned = find_rotations(_header_of(called, {*range(width)}.difference(behind)), None)
-    if behind and len(turned) != 1:
-        raise Misused(f"--columns: {', '.join(called[at] for at in behind)} are no rotation behind {kind}")
-    return PoseColumns(position, turned[0] if turned else None)
+    fields = POSITIONS[kind].names[kind == UTM and earth.zone is not None :]
+    least = len(fields) - len(POSITIONS[kind].names) + (kernels(kind).least or len(POSITIONS[kind].names))
+    spec = spec or f"{1 + (width == len(fields) + 1)}-{width}"
+    header, places = finder.places_named(spec, names, width)
+    if len(places) < least:
+        raise Misused(f"--columns: {kind} has {len(fields)} numbers ({' '.join(fields)}); found {len(places)}")
+    for count in range(len(fields), least - 1, -1):
+        rotation = finder.named_rotation(header, places[count:], None) if len(places) > count else None
+        if rotation or len(places) == count:
+            spots = dict(zip(fields, header.spots(places[:count]), strict=False))
+            return finder.PoseColumns(_columns(kind, header, spots, {}, earth), rotation)
+    behind = ", ".join(header.names[at] for at in places[len(fields) :])
+    raise Misused(f"--columns: {behind} are no rotation behind {kind}")
 
 
 def along(
-    place: Place, shape: Shape, names: Sequence[str], places: tuple[int, ...], source: str
+    place: Place, shape: Shape, names: Sequence[str], places: tuple[int, ...]
 ) -> tuple[tuple[int, ...], Shape]:
     """Return what the covariance with a place is expressed in; that of a NavSatFix is, where nothing else is there.
 
-    Raises FormatError where nobody says so.
+    Raises ValueInvalid where nobody says so.
     """
     fix = {int(match[1]): at for at, name in enumerate(names) if (match := FIX_ENTRY.fullmatch(name))}
     if not places and shape.kind == POINT and len(fix) == 9:  # field.position_covariance0, or [0]
         return tuple(fix[at] for at in range(9)), shape._replace(unit=place._replace(axes=ENU))
     if places and not (place.axes or AXES in place.fields):
-        raise FormatError(UNSAID.replace("rotation", "covariance").replace("a pose", "a row"), source=source, line=1)
+        raise ValueInvalid(UNSAID.replace("rotation", "covariance").replace("a pose", "a row"))
     return places, shape
 
 
@@ -270,7 +197,7 @@ def readers_of(shape: Shape) -> tuple[dict[int, Reader], dict[int, Reader], int]
     fields = shape.place.fields if shape.place is not None else ()
     words = {at: WORDS[field] for at, field in enumerate(fields) if field in WORDS}
     marked: dict[int, Reader] = {
-        at: partial(coordinate, field=field) for at, field in enumerate(fields) if field in ("lat", "lon")
+        at: partial(grammar.coordinate, field=field) for at, field in enumerate(fields) if field in ("lat", "lon")
     }
     return words, marked, sum(field in STAYING for field in fields)
 
@@ -290,7 +217,7 @@ def _status(text: str) -> float:
 
 def _parent(text: str) -> float:
     """Check the frame that a row names."""
-    check_parent({PARENT: text or None}, {"lat": None})
+    grammar.check_parent({PARENT: text or None}, {"lat": None})
     return 0.0
 
 
@@ -314,7 +241,8 @@ def doubt_band(place: Place, columns: Sequence[Floats], line_of: Callable[[int],
     northing = fields["northing"]
     zone = fields[ZONE] if place.zone is None else northing * 0.0 + place.zone
     rows = ((zone < 0.0) & (northing >= 3.5e6) & (northing <= 4.5e6)).nonzero()[0][:1].tolist()
-    return [RowNote(line_of(row), "band-s", band_s(float(zone[row]), float(northing[row])), ZONE) for row in rows]
+    doubts = [(row, grammar.band_s(float(zone[row]), float(northing[row]))) for row in rows]
+    return [RowNote(line_of(row), "band-s", doubt, ZONE) for row, doubt in doubts]
 
 
 def settle(
@@ -322,7 +250,7 @@ def settle(
 ) -> tuple[Request, tuple[Shape, ...]]:
     """Check what rows on the Earth need: axes for rotations, a height; and that the frame of places is the Earth's.
 
-    Raises FormatError for a rotation whose axes nobody says, CalcError.
+    Raises ValueInvalid for a rotation whose axes nobody says.
     """
     operation, asked, names = request.operation, request.results, table.names or ()
     if on_earth and (place := shapes[0].place) is not None:
@@ -331,7 +259,7 @@ def settle(
         if shape.kind == VECTOR:
             raise Misused("a vector has no place on the Earth; leave --as vector out")
         if place.name in (LLA, UTM) and not {"alt", "msl"}.intersection(place.fields) and reads:
-            warn(f"{table.source}: {NO_ALT}")
+            warn(f"{table.source}: {grammar.NO_ALT}")
         if operation.keeps_frames and asked.place is None:
             bare = shape.notation is None and all(each.representation.name == "quaternion" for each in asked.notations)
             request = request.with_results(place=Place.written((ECEF,), Earth()), by_default=asked.by_default or bare)
@@ -340,12 +268,11 @@ def settle(
             if has_idle_axes and not (asked.all_numbers or any(map(may_be_uncertain, names))):
                 raise Misused("--local-axes has no effect: the rows have no rotation")
         elif shape.notation is None or not (place.axes or AXES in place.fields):
-            raise FormatError(UNSAID, source=table.source, line=1)
+            raise ValueInvalid(UNSAID)
         else:  # a heading is one in the axes there
             level = shape.notation.representation is HEADING
             if level and place.axes == ECEF:
-                what = "a heading is clockwise from north, which axes ecef do not have"
-                raise FormatError(what, source=table.source, line=1)
+                raise ValueInvalid("a heading is clockwise from north, which axes ecef do not have")
             shapes = (shape._replace(unit=place._replace(level=level)),)
     is_formula = operation.formula is not None
     stays = not (is_formula or operation.moves)
@@ -354,11 +281,8 @@ def settle(
         return request, shapes  # a look-up looks at each row, an expression at its own frames
     rename = (request.for_kind(shapes[0].kind) if shapes else request).rename
     frame = None if stays or rename is None else rename(ECEF if on_earth and is_formula else None, None)[0]
-    try:
-        if request.results.place is not None:
-            check_in_ecef(frame, request.results.place)
-    except ValueInvalid as error:
-        raise FormatError(str(error), source=table.source, line=1) from None
+    if request.results.place is not None:
+        grammar.check_in_ecef(frame, request.results.place)
     return request, shapes
 
 
@@ -367,7 +291,7 @@ def settle(
 
 def is_on_earth(value: dict[str, Any]) -> bool:
     """Return True if a mapping says a position on the Earth, whole or by half."""
-    return not {*WHOLE, "mgrs", LLA}.isdisjoint(value) and not EARTH_KEYS.isdisjoint(value)
+    return not {*WHOLE, "mgrs", LLA}.isdisjoint(value) and not grammar.EARTH_KEYS.isdisjoint(value)
 
 
 def placed_record(
@@ -379,9 +303,9 @@ def placed_record(
     The numbers of latitude, longitude and height stay members of the record; no other has a place of its own.
     Raises Misfit for half a place, for a pose whose axes nobody says, and for what is no place.
     """
-    own = [key for key in value if key in EARTH_KEYS]
+    own = [key for key in value if key in grammar.EARTH_KEYS]
     in_ecef = value.get("frame", value.get("parent")) in EARTH_FRAMES
-    if AT not in value and ((positions and not in_ecef) or {"x", "y", "z"} <= value.keys()):
+    if grammar.AT not in value and ((positions and not in_ecef) or {"x", "y", "z"} <= value.keys()):
         if request.rows.poses and not request.operation.keeps_frames:
             what = f"{', '.join(own)} stay data: x, y, z are the position"
             reading.note(f"{what}; to read the place, leave these out", own[0], rule="stays")
@@ -389,12 +313,12 @@ def placed_record(
     if request.rows.kind == VECTOR:
         raise Misfit("a vector has no place on the Earth; leave --as vector out")
     operation = request.operation
-    check_parent(value, value)
-    there, used = inner(without_place(value))
+    grammar.check_parent(value, value)
+    there, used = inner(grammar.without_place(value))
     mapping = {key: value[key] for key in (*own, AXES_KEY, "parent", "frame", "inverse") if key in value}
     is_fix = "header" in value and operation.formula is None
     covariance = _of_fix(value, mapping, reading, request) if is_fix else ()
-    pose = placed_by(mapping, there, reading)
+    pose = grammar.placed_by(mapping, there, reading)
     if pose.rotation is None and (operation.inverse or operation.similar):
         raise Misfit(UNSAID)  # as a factor it is a pose
     takes_points = operation.takes_points or operation.keeps_frames
@@ -415,7 +339,7 @@ def placed_record(
     keys += ["header", *[FIX, FIX_TYPE] * bool(covariance)] if "header" in value else []
     stays = False
     if pose.read and is_point and not extra:
-        place, named = pose.read.place, {SAME.get(key): key for key in keys}
+        place, named = pose.read.place, {readers.PLACE_FIELDS.get(key): key for key in keys}
         stays = len(keys) == len(named) and named.keys() == {"lat", "lon", "alt"}
         stays = stays and all(re.fullmatch(JSON_NUMBER, value[key]) for key in keys)  # without marks of degrees
         if stays or operation.keeps_frames:
@@ -443,5 +367,5 @@ def _of_fix(value: dict[str, Any], mapping: dict[str, Any], reading: Reading, re
     entries = [number for _, number in within((FIX,), entries_of, value[FIX], (9,))]
     within((FIX,), check, entries)
     level = Pose(rotation=(0.0, 0.0, 0.0, 1.0))
-    at = placed_by(mapping | {AXES_KEY: ENU}, level, Reading(reading.source))
+    at = grammar.placed_by(mapping | {AXES_KEY: ENU}, level, Reading(reading.source))
     return tuple(uncertainty.rotate_covariance(tuple(entries), *at.components[3:]))

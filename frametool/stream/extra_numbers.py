@@ -9,7 +9,7 @@ import re
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import FormatError, ValueInvalid, listing, warn
+from frametool.errors import ValueInvalid, listing, warn
 from frametool.geometry import rigid, uncertainty
 from frametool.geometry.quaternion import TOLERATED
 from frametool.geometry.rigid import EXACT, NOT_BOTH, SCALED, inverse_full, pose_of, scale_of
@@ -112,16 +112,12 @@ def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Readi
     degrees = read_angle_unit(own["angles"]) if "angles" in own else reading.degrees
     if not flat:
         entries = within(path, covariance.read_covariance, own, reading=Reading(reading.source, degrees=degrees))
-    else:  # keys as columns: c11 .. c66, or sigma_x ..
-        numbers = [within((*path, key), read_number, own[key]) for key in flat]
-        _, sigma = covariance.find_columns(flat, size)
-        negative = next((key for key, number in zip(flat, numbers, strict=True) if number < 0.0), "")
-        if sigma and negative:
-            raise NotARotation(f"sigma is negative: {own[negative]}", (*path, negative))
-        if not sigma:
-            within((*path, flat[0]), covariance.check, numbers)
-        sigma = _with_unit(sigma, degrees=degrees)
-        entries = _of_sources(numbers, sigma, size) if sigma else tuple(numbers)
+    elif covariance.find_columns(flat, size)[1]:  # keys as columns: sigma_x ..
+        said = [(key, (key,), own[key]) for key in flat]
+        entries = covariance.of_sigmas(within(path, covariance.read_sigmas, said, size, degrees=degrees))
+    else:  # c11 .. c66
+        entries = tuple(within((*path, key), read_number, own[key]) for key in flat)
+        within((*path, flat[0]), covariance.check, entries)
     if size < len(entries) and any(entries[18:]):
         raise Misfit("a point does not turn; its sigma has xyz alone", (*path, covariance.SIGMA))
     entries = entries if size == len(entries) else covariance.of_position(entries)
@@ -156,18 +152,15 @@ def covariance_columns(
             message = f"the covariance is along {own.axes or 'the axes there'}, the result along {place.axes}"
             remedy = "" if own.axes else f", or say --local-axes {place.axes}"
             if found:
-                raise FormatError(f"{message}; leave its columns out{remedy}", source=table.source, line=1)
+                raise ValueInvalid(f"{message}; leave its columns out{remedy}")
     if passes or not kinds or not {*PLACED}.issuperset(kinds):
         return (), shapes
-    try:
-        places, sigma = covariance.find_columns(table.names or (), 36 if POSE in kinds else 9)
-    except NotARotation as error:
-        raise FormatError(str(error), source=table.source, line=1) from None
+    places, sigma = covariance.find_columns(table.names or (), 36 if POSE in kinds else 9)
     shape = shapes[0]
     if own is not None:
         from frametool.stream.earth_columns import along
 
-        places, shape = along(own, shape, table.names or (), places, table.source)
+        places, shape = along(own, shape, table.names or (), places)
     stay = [name for name in table.names or () if re.fullmatch(OTHER_ENTRIES, name)]
     if stay and not places and request.operation.formula is None:
         warn(f"{table.source}: not moved: {listing(stay, 3)}; the columns of a covariance are c11, c12 ..")
@@ -176,8 +169,7 @@ def covariance_columns(
     if not places or request.operation.formula is not None:
         return (), shapes
     if len(shapes) != 1:
-        message = "a covariance beside several poses in a row: whose it is nobody can tell"
-        raise FormatError(message, source=table.source, line=1)
+        raise ValueInvalid("a covariance beside several poses in a row: whose it is nobody can tell")
     sigma = _with_unit(sigma, degrees=request.rows.degrees)
     return places, (shape._replace(covariance=(len(places),), sigma=sigma),)
 

@@ -263,7 +263,7 @@ def _mapping(members: Members, path: Path, reading: Reading, request: Request) -
         raise Misfit(f"inverse must be true or false, found {kind(flag)}", ("inverse",))
     shape = record.shape._replace(inverse=flag == "true")
     record = record._replace(shape=shape, keys=record.keys._replace(others=(*rotations[1:], *positions[1:])))
-    is_ecef = flat and flat.position and flat.position.prefix.lower().endswith("ecef_")
+    is_ecef = flat and flat.position and flat.position.affixes[0].lower().endswith("ecef_")
     place = request.rows.given_place or ("ecef" if is_ecef else "")
     return _given_on_earth(record, request.with_rows(given_place=place)) if place else record
 

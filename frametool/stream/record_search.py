@@ -108,7 +108,9 @@ class Members:
         try:
             found = plain_pose(tuple(names), affixed=is_flat)
         except ValueInvalid as error:
-            raise Misfit(str(error), key=True) from None
+            reason = str(error).partition(", or add --")[0].removesuffix("; choose with --columns")
+            reason = reason.replace("choose with --columns", "leave it out").replace("columns", "keys")
+            raise Misfit(reason, key=True) from None
         if wrong := (found.position and found.position.wrong) or (found.rotation and found.rotation.wrong):
             raise Misfit(wrong.replace("column ", "key ", 1), key=True)
         if found.rotation and rotations:

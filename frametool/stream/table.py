@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frametool.errors import FormatError, FrametoolError, Misused, NamedTuple, listing
+from frametool.errors import FormatError, FrametoolError, Misused, NamedTuple, ValueInvalid, listing
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION, stamp_text
 from frametool.geometry.representations import notation
@@ -259,7 +259,10 @@ class PlannedRows:
             what = f"no column looks like stamps; name it with --time-column; columns: {listing(table.called)}"
             raise Misused(what, source=table.source, line=1)
         self.table, self.request = table, request
-        self.plan, self.layout = plan_table(table, request)
+        try:
+            self.plan, self.layout = plan_table(table, request)
+        except ValueInvalid as error:
+            raise FormatError(str(error), source=table.source, line=1) from None
         self.shape = self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
         self.earth = EARTH_FRAMES[0] if self.shape.place is not None else None
         self.rename = request.for_kind(self.shape.kind).rename

@@ -12,13 +12,13 @@ from frametool.grammar import readers
 from frametool.grammar.readers import AXES_KEY, may_be_uncertain, nanoseconds_beside, stamp_places, without_mark
 from frametool.stream import header, row_layout
 from frametool.stream.evaluate import Plan
-from frametool.stream.header import XYZ, PoseColumns, has_pose_column, listed, named_pose, row_shape, wholes_of
+from frametool.stream.header import XYZ, PoseColumns, listed, row_shape
 from frametool.stream.request import NO_STAMPS, PAIR, PLAIN, Request
 from frametool.stream.row_layout import POINT, POSE, SIX, Const, In, Out, Shape, Word, one_of, place_of, six_names
 from frametool.text.numbers import number_or_none
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from frametool.stream.row_layout import Piece
     from frametool.stream.table import Table
@@ -63,13 +63,13 @@ class Layout(NamedTuple):
 
 
 def plan_table(table: Table, request: Request) -> tuple[Plan, Layout]:
-    """Choose the columns that are read and written; raises FormatError that names the columns there are.
+    """Choose the columns that are read and written; raises ValueInvalid that names the columns there are.
 
     Where all numbers are wanted no text is put together.
     """
     formula, poses, names = request.operation.formula, list[PoseColumns](), table.names or ()
     is_needed = formula is None or formula.reads_row or bool(request.rows.columns)
-    with suppress(*() if is_needed else (FormatError,)):
+    with suppress(*() if is_needed else (FormatError, ValueInvalid)):
         poses = _find(table, request)
     on_earth = bool(poses) and poses[0].position is not None and place_of(poses[0].position.unit) is not None
     is_point = request.operation.turns and poses and poses[0].rotation is None
@@ -80,7 +80,7 @@ def plan_table(table: Table, request: Request) -> tuple[Plan, Layout]:
     for pose, kind in zip(poses, request.rows.kinds or (request.rows.kind,) * len(poses), strict=True):
         for columns in filter(None, pose):
             if columns.wrong:
-                raise FormatError(columns.wrong, source=table.source, line=1)
+                raise ValueInvalid(columns.wrong)
         shapes, places = (*shapes, row_shape(pose, request, kind)), places + pose.places
     if formula is not None:  # the numbers that it asks for come last
         shapes = ((shapes[0] if shapes else Shape("", None))._replace(extras=formula.columns),)
@@ -140,51 +140,42 @@ def _find(table: Table, request: Request) -> list[PoseColumns]:
         raise Misused(f"--columns is given {len(specs)} times, for {asked.poses} poses in a row")
     if specs or not table.names:
         kinds = (asked.kinds if specs else ()) or (asked.kind,) * max(len(specs), 1)
-        specs = specs or (_by_width(table, request),)
-        if not asked.given_place:
-            chosen = zip(specs, kinds, strict=True)
-            return [named_pose(spec, table.names, width, request, kind) for spec, kind in chosen]
-        from frametool.stream.earth_columns import chosen_pose
-
-        return [chosen_pose(spec, table.names, width, request) for spec in specs]
-    hidden = {name for name in table.names if name == asked.extra_column or may_be_uncertain(name)}
-    names = ["" if at == apart or name in hidden else name for at, name in enumerate(table.names)]
-    six = header.find_six(known := header.Header(names), asked.kind if asked.kind in SIX else "")
+        choose: Callable[..., PoseColumns] = header.chosen_pose
+        if asked.given_place:
+            from frametool.stream.earth_columns import chosen_pose as choose
+        specs = specs or ("" if asked.given_place else _by_width(width, request),)
+        chosen = zip(specs, kinds, strict=True)
+        return [choose(spec, table.names, width, request, kind) for spec, kind in chosen]
+    hidden = {at for at, name in enumerate(table.names) if at == apart or name == asked.extra_column}
+    every = header.Header(table.names, hidden)
+    six = header.find_six(every, asked.kind if asked.kind in SIX else "")
     if asked.kind in SIX and six is None:
         wanted = " ".join(six_names(asked.kind))
-        found = f"no columns of a {asked.kind} ({wanted}) among: {listed(names)}; name them with --columns"
-        raise FormatError(found, source=table.source, line=1)
-    others = ["" if place in six.places else name for place, name in enumerate(names)] if six else names
-    if six is not None and (asked.kind in SIX or not has_pose_column(others)):
+        found = f"no columns of a {asked.kind} ({wanted}) among: {listed(every.names)}; name them with --columns"
+        raise ValueInvalid(found)
+    others = every.without(six.places if six else ())
+    if six is not None and (asked.kind in SIX or not others.has_pose):
         return [PoseColumns(six, None)]
     if not (request.operation.moves or request.operation.changes_nothing):
-        others = names  # what a pose has with it would no longer be true
-    if asked.poses == 1 and (asked.given_place or any(map(readers.may_be_on_earth, names))):
+        others = every  # what a pose has with it would no longer be true
+    if asked.poses == 1 and (asked.given_place or any(map(readers.may_be_on_earth, every.names))):
         from frametool.stream.earth_columns import find_pose
 
         if (pose := find_pose(others, request, table.source)) is not None:
             return [pose]
-    rest = known if others is names else header.Header(others)
-    return header.find_poses(rest, asked.given, asked.poses, table.source)
+    return header.find_poses(others, asked.given, asked.poses)
 
 
-def _by_width(table: Table, request: Request) -> str:
-    """Choose all columns of a table without names: a point, a whole pose, or what --from says, behind a stamp or not.
-
-    "" for those of a place.
-    """
-    asked, said, width = request.rows, request.rows.given, table.width
-    begin = int(width in (len(XYZ), *(each.counts[-1] for each in wholes_of(None))))
-    if said is not None:
-        begin = 1 if width in said.counts else 2 * (width - 1 in said.counts[1:])
-    if asked.kind in SIX and width == len(six_names(asked.kind)):
-        begin = 1
-    elif asked.poses > 1 or not (begin or asked.given_place):
-        reason = f"{width} columns without names do not say what they are; give --from REP, or --columns"
-        if asked.poses == 1 and said:
-            reason = f"{said.counted}; found {width} columns without names; or give --columns"
-        raise FormatError(reason, source=table.source, line=1)
-    return "" if asked.given_place else f"{begin}-{width}"
+def _by_width(width: int, request: Request) -> str:
+    """Choose all columns of a table without names: a point, a pose, or what --from says, behind a stamp or not."""
+    asked, said = request.rows, request.rows.given
+    begin = 1 if asked.kind in SIX or width in header.by_count(said) else 2
+    if asked.poses == 1 and (begin == 1 or (said is not None and width - 1 in {*said.counts[1:]})):
+        return f"{begin}-{width}"
+    reason = f"{width} columns without names do not say what they are; give --from REP, or --columns"
+    if asked.poses == 1 and said:
+        reason = f"{said.counted}; found {width} columns without names; or give --columns"
+    raise ValueInvalid(reason)
 
 
 def _turning_along(table: Table, poses: Sequence[PoseColumns], request: Request) -> list[tuple[PoseColumns, str]]:
@@ -215,7 +206,7 @@ def _without_position(pose: PoseColumns, request: Request, table: Table) -> Pose
     if pose.rotation is None:
         wanted = "; give --from REP or --columns" if request.rows.given is None else ""
         found = f"no columns of a rotation among: {listed(table.called)}{wanted}"
-        raise FormatError(found, source=table.source, line=1)
+        raise ValueInvalid(found)
     leaves_plane = pose.position and not pose.position.wrong and pose.position.absent and request.results.notations
     is_whole = len(request.results.notations) == 1 and request.results.notations[0].representation.whole is not None
     stays = not (is_whole or pose.rotation.whole or leaves_plane)
@@ -235,7 +226,7 @@ def _frame_columns(table: Table, request: Request, *, on_earth: bool) -> tuple[i
     found = _first_called(readers.PARENT_COLUMNS, table)
     if found is None and asked.frames:
         unsaid = "rows do not say their frame; name SOURCE, or give --frame-column; columns"
-        raise FormatError(f"{unsaid}: {', '.join(names)}", source=table.source, line=1)
+        raise ValueInvalid(f"{unsaid}: {', '.join(names)}")
     return () if found is None else (found,)
 
 
@@ -354,16 +345,16 @@ def _new_columns(
     same: its rotation is written in the notation it was read in
     """
     rotation, alone, prefix = pose.rotation, not request.results.prefix or several, request.results.prefix
-    before, behind = (rotation.prefix, rotation.suffix) if rotation and alone else (prefix, "")
+    affixes = rotation.affixes if rotation and alone else (prefix, "")
     moved, gone = target.position_columns, target.absent
-    turned = [before + name + behind for at, name in enumerate(target.names, len(moved)) if at not in gone]
+    turned = [name.join(affixes) for at, name in enumerate(target.names, len(moved)) if at not in gone]
     if rotation and alone and same and rotation.whole == target.whole:
         turned = [prefix + name for name in rotation.names]
     moved = [name for at, name in enumerate(moved) if at not in gone]
     if pose.position and (target.kind in SIX or (moved and alone and target.place == shape.place)):
         moved = list(pose.position.names)
         if target.place is None and not (target.kind in SIX or gone):
-            moved += [f"{pose.position.prefix}z{pose.position.suffix}"] * (len(moved) < len(XYZ))
+            moved += ["z".join(pose.position.affixes)] * (len(moved) < len(XYZ))
     words = (request.operation.shown or target.place or PLAIN).words
     between, null = (delimiter, b"") if delimiter else (b" ", b"nan")
     names = [*(prefix + name for name in moved), *turned, *(prefix + name for name in target.extras)]

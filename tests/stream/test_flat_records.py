@@ -129,7 +129,7 @@ def test_keys_mean_what_columns_of_the_same_names_mean(run: Callable[..., Any], 
 
 def test_several_positions_under_affixes_are_an_error_that_names_them(run: Callable[..., Any]) -> None:
     done = run("convert", stdin='{"a_x": 1, "a_y": 2, "a_z": 3, "b_x": 1, "b_y": 2, "b_z": 3}\n')
-    assert (done.status, done.err) == (1, "frametool: stdin:1:1: expected one position, found a_x a_y a_z and b_x b_y b_z\n")
+    assert (done.status, done.err) == (1, "frametool: stdin:1:1: keys of one pose are wanted, found a_x a_y a_z; b_x b_y b_z\n")
 
 
 def test_what_names_its_position_keeps_other_numbers_as_they_are(run: Callable[..., Any]) -> None:
