@@ -280,9 +280,7 @@ class PlannedRows:
         places = named if named != (None, None) else frames
         return self._renamed(places, size, column) if places and size else BlockNames(Coded((self.earth,)))
 
-    def _renamed(
-        self, places: Sequence[int | None], size: int, column: Callable[[int], Coded]
-    ) -> BlockNames:
+    def _renamed(self, places: Sequence[int | None], size: int, column: Callable[[int], Coded]) -> BlockNames:
         """Read the names in some columns, and rename them."""
         asked = self.request
         texts = [Coded([""]) if place is None else column(place) for place in places]
