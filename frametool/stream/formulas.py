@@ -257,7 +257,7 @@ class JointRows(Formula):
             if joint.lower is None or joint.upper is None or joint.lower > joint.upper or joint.name in self._beyond:
                 continue
             middle = 0.5 * (joint.lower + joint.upper)
-            if xp.furthest(value.plain - middle) > joint.upper - middle + SLACK:
+            if xp.some(abs(value.plain - middle) > joint.upper - middle + SLACK):
                 self._beyond.add(joint.name)
                 unit = "rad" if joint.kind in TURNING else "m"
                 warn(f"joint {shown(joint.name)} goes beyond its limits {joint.lower:g} .. {joint.upper:g} {unit}")

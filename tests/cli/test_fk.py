@@ -186,6 +186,11 @@ def test_limits_are_told_once(run: Run) -> None:
     assert (done.status, done.err.count("joint 'shoulder_pan' goes beyond its limits -3 .. 3 rad")) == (0, 1)
 
 
+def test_a_bad_row_hides_no_limit_of_the_others(run: Run) -> None:
+    done = run(*FK, "--on-error", "skip", stdin=table(rows=[ROWS[0], (3.5, 0.0, 0.0, 9.0), (float("nan"), 0.0, 0.0, 0.0)]))
+    assert (done.status, done.err.count("joint 'shoulder_pan' goes beyond its limits -3 .. 3 rad")) == (3, 1)
+
+
 def test_other_ways_through_the_robot(run: Run) -> None:
     assert run("fk", str(ARM), "tool", "wrist", stdin="a,b\n1,2\n").out.splitlines()[1].startswith("1,2,0.0,0.0,-0.115,")
     done = run("fk", str(ARM), "right_finger", "left_finger", stdin="gripper,b\n0.02,2\n")
