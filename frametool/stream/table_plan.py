@@ -409,7 +409,7 @@ def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:
     if len({*new}) < len(new):
         twice = sorted({name for name in new if new.count(name) > 1})
         hint = "; a point with a weight: --columns x,y,z; a rotation: name it qx, qy, qz, qw" * ({*XYZ} <= {*twice})
-        raise Misused(f"--to: columns {', '.join(twice)} would appear twice{hint}")
+        raise Misused(f"columns {', '.join(twice)} would appear twice{hint}")
     clash = sorted(set(new).intersection(kept))
     if clash:
         raise Misused(f"columns {', '.join(clash)} would appear twice; name the new ones with --prefix")
