@@ -99,8 +99,7 @@ def _load(
 
 def lookups_in(inputs: Inputs, tree: Frames, *, carried: bool) -> Lookups:
     """Return the lookups of a command; report covariances that are not used."""
-    unused = tree.covariances and not carried
-    inputs.note(f"sigmas of {bare(tree.name)} not used (--covariance)" if unused else None)
+    inputs.note(f"sigmas of {bare(tree.name)} not used (--covariance)" if tree.covariances and not carried else None)
     return Lookups(tree, carried=carried)
 
 

@@ -529,9 +529,8 @@ def all_pairs(along: Array, delta: float, tolerance: float) -> tuple[Indices, In
     after = np.searchsorted(along, wanted).clip(1, len(along) - 1)
     nearest = np.where(wanted - along[after - 1] <= along[after] - wanted, after - 1, after)
     end = np.searchsorted(along, along[nearest])
-    start = np.arange(len(along))
-    fits = (np.abs(along[end] - wanted) <= tolerance * delta) & (end > start)
-    return start[fits], end[fits]
+    fits = (np.abs(along[end] - wanted) <= tolerance * delta) & (end > np.arange(len(along)))
+    return np.flatnonzero(fits), end[fits]
 
 
 class SegmentErrors(NamedTuple):

@@ -12,7 +12,7 @@ from functools import partial
 from importlib import import_module
 from io import BytesIO
 from itertools import islice
-from operator import attrgetter, gt, lt
+from operator import attrgetter, gt, itemgetter, lt
 from os import PathLike
 from typing import Any, BinaryIO
 
@@ -445,9 +445,7 @@ def load_sources(
     tree.cameras = builder.cameras
     held, tree.robots = list[FrameFile](), []
     for file in files:
-        for frame, axes in file.tally.axes.items():
-            if axes:
-                tree.camera_axes[frame] = axes
+        tree.camera_axes.update(filter(itemgetter(1), file.tally.axes.items()))  # those that are known
         tree.drawn |= file.tally.drawn
         if file.tally.robot is not None:
             tree.robots.append(file.tally.robot)

@@ -144,7 +144,6 @@ _KITTI = (
 _UNNAMED = r"(?m)\A\ufeff?(?:[ \t]*(?:#(?!(?=.*\b(?:%s)\b)%s[ \t\r]*$).*)?\r?\n)*+[ \t]*"
 _LIKE_EUROC = _UNNAMED % ("q_?w|roll|yaw", r"(?:[^,\n]*+,){7}(?:(?:[^,\n]*+,){9})?[^,\n]*")
 _LIKE_KITTI = _UNNAMED % (r"r1[13][ \t]+r21|z[ \t]+r11|r33[ \t]+t?x", r"(?:[ \t]*+\S++){12}")
-_CELL = rf"\s*,\s*{NUMBER}"
 
 _KEY = r"""(?:\s|\{|#[^\n]*\n)*+["']?(?:%s)["']?:[ \t]*+"""
 _PARTS = "linear|angular|force|torque|position|translation"  # of a message
@@ -262,7 +261,7 @@ FORMATS = {
         "EuRoC ground truth", _TABLE,
         magic=(
             ("text", r"\A\ufeff?#\s*timestamp[^\n]*q_RS_w"),
-            ("text", rf"{_LIKE_EUROC}\d{{19}}(?:{_CELL}){{7}}(?:(?:{_CELL}){{9}})?\s*$"),
+            ("text", rf"{_LIKE_EUROC}\d{{19}}(?:\s*,\s*{NUMBER}){{7}}(?:(?:\s*,\s*{NUMBER}){{9}})?\s*$"),
         ),
         conventions="world<-body (R<-S), nanoseconds, metres, quaternion w x y z", required_options=("frames",),
         rows=Rows(",", _EUROC, (8, 17), "wxyz"),

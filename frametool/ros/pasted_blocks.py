@@ -58,8 +58,7 @@ _BEGIN = re.compile(
     | \x1b\[ | Out\[\d | Parameter\ containing: | (?:[A-Za-z_]\w*\s*)?<< | \(x,\s*y,\s*z,\s*w\)\s*=
     | (?:\w++:\s*+)?t\s*+= | (?:R|rot|rotation|rotation_matrix|t|p|T|trans|translation|tvec)\s*[:=][^\S\n]*+
       (?:[\[(] | \n\s*+(?:[-+]?[.\d\[(]|[A-Za-z_][\w.]*+\())       # no list of YAML, which has - and a blank
-    | [xyzw]:\s*{NUMBER}\s*,
-    | <(?:origin|joint|node|Matrix|Quaternion|Euler)\b | (?:args|x)\s*=
+    | [xyzw]:\s*{NUMBER}\s*, | <(?:origin|joint|node|Matrix|Quaternion|Euler)\b | (?:args|x)\s*=
     | (?:\[\w++\]\ .*+\n\s*+)*+(?:At\ (?:any\ )?time\b|-\ ++(?:Translation|Rotation):|Rotation:\ in\ |\S+\ seen\ from\ )
     | (?:Requesting\ state\ .*+\s++)?(?:Model:\ \[|(?:-\ )?Pose\ \[\ XYZ)
     | .*\b{CALL}\s | --(?:[xyz]|roll|pitch|yaw|q[xyzw]|(?:child-)?frame-id)[ =]

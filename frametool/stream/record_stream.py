@@ -260,7 +260,7 @@ class RecordBlocks:
                 if style is None:
                     items: list[tuple[int, Any]] = [(place, part.around(found.text, rendered(made, answers) or record))]
                 else:
-                    starts = (part.start + each for each in made.starts(answers))
+                    starts = made.starts(part.start, answers)
                     items = [*zip(starts, values_of_text(made, answers, style), strict=False)]
                 found.notes += made.notes_at(line, column_in(found.text, part.start), answers)
             except FrametoolError as error:

@@ -233,13 +233,13 @@ class RecordText:
             raise Outside("beyond --start or --stop")
         return found
 
-    def starts(self, answers: Sequence[Answer]) -> Iterator[int]:
-        """Yield how many bytes are before each record."""
-        at = size = 0
+    def starts(self, begin: int, answers: Sequence[Answer]) -> Iterator[int]:
+        """Yield the byte at which each record begins, if the text begins at `begin`."""
+        at = 0
         for each in answers:
             start = self.root.at(each.entry.record.path).start
-            size, at = size + len(self.text[at:start].encode()), max(at, start)
-            yield size
+            begin, at = begin + len(self.text[at:start].encode()), max(at, start)
+            yield begin
 
     @property
     def lost(self) -> str:

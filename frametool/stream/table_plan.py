@@ -408,8 +408,10 @@ def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:
     kept = [names[column.place] for column in columns if not isinstance(column, New)]
     if len({*new}) < len(new):
         twice = sorted({name for name in new if new.count(name) > 1})
-        hint = "; a point with a weight: --columns x,y,z; a rotation: name it qx, qy, qz, qw" * ({*XYZ} <= {*twice})
-        raise Misused(f"columns {', '.join(twice)} would appear twice{hint}")
+        if {*XYZ} <= {*twice}:
+            hint = "a point with a weight: --columns x,y,z; a rotation: name it qx, qy, qz, qw"
+            raise Misused(f"columns x, y, z, w are a quaternion, its position would have their names; {hint}")
+        raise Misused(f"--to: columns {', '.join(twice)} would appear twice")
     clash = sorted(set(new).intersection(kept))
     if clash:
         raise Misused(f"columns {', '.join(clash)} would appear twice; name the new ones with --prefix")

@@ -77,9 +77,8 @@ def invert_command(inputs: Inputs) -> int:
     task = Task(inputs, "poses")
     if task.plan:
         return task.derive("invert", task.read_written(inputs.pose))
-    operation = Operation(inverse=True, similar=True, multiples=inputs.scale)
-    request = task.request(operation=operation, rename=lambda parent, name: (name, parent))
-    return task.write_results(inputs.pose, request)
+    inverse = Operation(inverse=True, similar=True, multiples=inputs.scale)
+    return task.write_results(inputs.pose, task.request(operation=inverse, rename=lambda parent, name: (name, parent)))
 
 
 @command_named("relative")

@@ -165,10 +165,9 @@ def view_command(inputs: Inputs) -> None:
     names = ends | {"fixed": inputs.fixed, "below": inputs.below}
     named: Any = {key: name and frame_name(name, frames) for key, name in names.items()}
     scene = FrameScene(frames, at_ns=options.at_ns(inputs.at), only=inputs.only, path_only=inputs.path_only, **named)
-    absent = [name for name, track in scene.tracks.items() if not track.covers(scene.at_ns or 0)]
-    if absent and chosen != "html":  # a page shows their nearest time
-        at = format_stamp(scene.at_ns or 0)
-        say(f"note: no data of {listing(absent, 5)} at {at}: not drawn, nor what hangs there")
+    gone = [name for name, track in scene.tracks.items() if not track.covers(scene.at_ns or 0)]
+    if gone and chosen != "html":  # a page shows their nearest time
+        say(f"note: no data of {listing(gone, 5)} at {format_stamp(scene.at_ns or 0)}: not drawn, nor what hangs there")
     before = None
     if overlay:
         before = FrameScene(load_tree(inputs, str(target)), at_ns=scene.at_ns, fixed=scene.fixed, ground=scene.ground)

@@ -145,8 +145,7 @@ class MjcfModel:
             self.geoms.append((node, inside))
         elif node.tag in ("site", "camera"):
             attributes = self.attributes(node, inside.around)
-            pose_of = self.pose_of_site if node.tag == "site" else self.pose
-            name = self._place(node, inside, pose_of(attributes))
+            name = self._place(node, inside, (self.pose_of_site if node.tag == "site" else self.pose)(attributes))
             if node.tag == "camera":
                 self.options.tally.axes[name] = self.options.answers.camera_axes or "opengl"
             if "mode" in attributes and (mode := attributes["mode"].attribute("mode")) != "fixed":

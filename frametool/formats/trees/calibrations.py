@@ -491,8 +491,7 @@ def _kalibr_pose(text: str, head: re.Match[str], reading: Reading) -> Rigid:
     if len(words := turn[1].split()) != 4:
         raise Misfit(f"q: expected 4 numbers, found {len(words)}")
     x, y, z = read_numbers(shift[1].split(), XYZ)
-    rotation = read_spelled(notation("xyzw"), words, INDICES, reading).rotation
-    return x, y, z, *quaternion.conjugate(*rotation)
+    return x, y, z, *quaternion.conjugate(*read_spelled(notation("xyzw"), words, INDICES, reading).rotation)
 
 
 # --- writing ---
@@ -533,5 +532,4 @@ def write_mount(parent: str, child: str, pose: Rigid, style: Style, *, on_hand: 
 
 
 def _lines(keys: Iterable[str], numbers: Iterable[float], style: Style, indent: str) -> str:
-    pairs = zip(keys, numbers, strict=True)
-    return "".join(f"{indent}{key}: {flow(number, style.number)}\n" for key, number in pairs)
+    return "".join(f"{indent}{key}: {flow(number, style.number)}\n" for key, number in zip(keys, numbers, strict=True))

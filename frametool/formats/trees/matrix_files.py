@@ -247,8 +247,7 @@ def edges_of(statements: Iterable[Stated], reading: Reading) -> list[Edge]:
     first: dict[frozenset[str], Stated] = {}
     for each in sorted(statements, key=lambda each: (each.chained, each.child != each.source)):
         if each.target == each.source:
-            error = topology.own_parent(each.source)
-            raise Misfit(error.message, each.path, key=True)
+            raise Misfit(topology.own_parent(each.source).message, each.path, key=True)
         ends = frozenset((each.target, each.source))
         parent, child, components = each.target, each.child, each.components
         if child != each.source:
