@@ -138,12 +138,12 @@ class Run:
             return cells
         numbers, bad = parse_floats(cells)
         width = max(len(plan.names), 1)
+        readers = [partial(shape.read, at) for shape in plan.shapes for at in range(shape.size)] if len(bad) else []
 
         def read(at: int) -> float:
             """Read an angle, or a length where metres are wanted, which may say its own unit; words are read below."""
             text, column = cells.text(*divmod(at, width)).decode("utf-8", "replace").strip(" \t"), at % width
-            shape, place = [(shape, at) for shape in plan.shapes for at in range(shape.size)][column]
-            reader = plan.marked.get(column) or partial(shape.read, place)
+            reader = plan.marked.get(column) or readers[column]
             return 0.0 if column in plan.words else reader(text)
 
         for at, reason in read_each(numbers.reshape(-1), bad.tolist(), read).items():
