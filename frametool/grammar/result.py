@@ -167,7 +167,7 @@ def with_entries(extras: dict[str, Any]) -> dict[str, Any]:
 
 def in_columns(extras: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return the extras of poses or points as columns: a covariance as c11 .. c66, or c11 .. c33."""
-    entries = in_one_list(extras.get("covariance"))
+    entries = in_one_list(extras["covariance"]) if "covariance" in extras else None
     if entries is None:
         return extras
     from frametool.grammar.covariance import columns
