@@ -13,7 +13,7 @@ import re
 from contextlib import suppress
 from functools import cache, cached_property, partial
 from io import BufferedReader
-from itertools import chain
+from itertools import chain, count
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
@@ -260,7 +260,7 @@ class RecordBlocks:
                 if style is None:
                     items: list[tuple[int, Any]] = [(place, part.around(found.text, rendered(made, answers) or record))]
                 else:
-                    starts = made.starts(part.start, answers)
+                    starts = made.starts(part.start, answers) if b"\n" in record.strip() else count(part.start)
                     items = [*zip(starts, values_of_text(made, answers, style), strict=False)]
                 found.notes += made.notes_at(line, column_in(found.text, part.start), answers)
             except FrametoolError as error:
