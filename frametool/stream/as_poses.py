@@ -42,7 +42,7 @@ from frametool.stream.faults import NULL, STOP, BadRow, Fault, Outcome, written_
 from frametool.stream.record_results import BlockResults, ResultWriter, blocks_of
 from frametool.stream.request import NO_STAMPS, SOME, Request, RowOptions
 from frametool.stream.row_layout import POINT, POSE, Shape
-from frametool.stream.rows import NO_ROWS, NO_STAMP, Block, RowPoses, block_of, block_of_points, kept, spans_of
+from frametool.stream.rows import NO_ROWS, NO_STAMP, Block, RowPoses, block_of, kept, spans_of
 from frametool.stream.table import PlannedRows, TableRows
 from frametool.stream.writers import LEARNED, PoseWriter, RowsWriter, SingleWriter, TextWriter
 
@@ -85,55 +85,35 @@ class Blocks(ResultWriter):
 
     def of_block(self, block: RowPoses | BlockResults) -> bytes:
         """Return the text of a block of poses, or of results, many together."""
-        posed = block if isinstance(block, RowPoses) else block.posed()
-        if posed is None:
-            values = [*block.in_order()]  # type: ignore[union-attr]
-            return self._write(self._block(values)) if values else b""
-        if self.writer is not None and posed.placed > self.writer.placed:
-            posed = posed._replace(numbers=posed.numbers[:, 3:], placed=False)
-        return self._write(posed)
+        if isinstance(block, RowPoses):
+            return self._write(block)
+        if (posed := block.posed()) is not None:
+            return self._write(posed)
+        values, to_arrays = [*block.in_order()], holds(self.style.format, "arrays")
+        is_any = any(not isinstance(each, Result) or each.pose.position is not None for each in values)
+        placed = is_any or not to_arrays if self.writer is None else self.writer.placed
+        return self._write(block_of(values, placed=placed, timed=not to_arrays)) if values else b""
 
     def end(self) -> Iterator[bytes]:
         """Yield what comes behind the last."""
         if self.writer is None:
-            self._write(block_of([]))
+            self._write(NO_ROWS)
         yield from self.writer.end()  # type: ignore[union-attr]
 
     def _write(self, block: RowPoses) -> bytes:
         if self.writer is None:
             self.writer = writer_for(self.style, block)
-        elif block.kind != self.writer.kind:
-            kinds = f"{self.writer.kind} and {block.kind}"
-            raise ValueInvalid(f"{self.style.format} holds things of one kind, found {kinds}")
+        if block.kind != self.writer.kind:
+            raise ValueInvalid(f"one file holds things of one kind, found {self.writer.kind} and {block.kind}")
+        if block.placed > self.writer.placed:
+            block = block._replace(numbers=block.numbers[:, 3:], placed=False)
         return self.writer.of_block(block)
-
-    def _block(self, values: list[Value]) -> RowPoses:
-        """Return results as a block; what has no rotation is a point, but for the poses of a trajectory."""
-        fmt = self.style.format
-        found = values if is_trajectory(fmt) else [*map(_as_point, values)]
-        points = [each for each in found if not isinstance(each, Result)]
-        if is_trajectory(fmt) and (points or any(each.pose.rotation is None for each in found)):  # type: ignore[union-attr]
-            raise ValueInvalid("a trajectory holds poses; a point has no rotation")
-        if points:
-            if len(points) < len(found):
-                raise ValueInvalid(f"{fmt} holds things of one kind, found poses among others")
-            return block_of_points(points)
-        are_turns = holds(fmt, "arrays") and all(each.pose.position is None for each in found)  # type: ignore[union-attr]
-        return block_of(found, placed=not are_turns if self.writer is None else self.writer.placed)  # type: ignore[arg-type]
 
 
 def poses_text(values: Iterable[Value], style: Style) -> str:
     """Return single results as text of a format whose rows are poses."""
     writer = Blocks(style)
     return b"".join((*map(writer.of_block, blocks_of(values)), *writer.end())).decode()
-
-
-def _as_point(value: Value) -> Value:
-    """Take a result without a rotation for a point."""
-    if not isinstance(value, Result) or value.pose.rotation is not None or value.pose.position is None:
-        return value
-    named = {"name": value.pose.name, "frame": value.pose.parent, "point": list(value.pose.position)}
-    return {key: each for key, each in named.items() if each is not None} | value.extras
 
 
 class FormatConverter:

@@ -25,7 +25,7 @@ from frametool.stream.record_results import BlockResults
 from frametool.stream.record_stream import run_records
 from frametool.stream.record_values import read_poses
 from frametool.stream.request import COMBINED, NO_STAMPS, Operation, Request, RowOptions
-from frametool.stream.row_layout import NOWHERE
+from frametool.stream.row_layout import NOWHERE, POINT, POSE
 from frametool.stream.rows import RowPoses, block_of, codes_of, is_typed, kept, objects, plain_cells, read_each
 from frametool.text.numbers import parse_number
 from frametool.text.parse import parse_floats
@@ -43,24 +43,23 @@ POSITION = 3  # numbers
 
 
 def posed(outcomes: Iterable[Outcome], source: str, *, timed: bool = True) -> Iterator[Step]:
-    """Yield the results of records as poses with their lines, block by block; raises FormatError for what is none.
+    """Yield the results of records as poses or points with their lines, block by block.
 
-    timed: stamps count, of all or of none; else they are a column like others
+    timed: stamps count; either all have one, or none
+    Raises FormatError for anything else than poses and points.
     """
     for outcome in outcomes:
         results: BlockResults = outcome.results or BlockResults((), [])  # type: ignore[assignment]
         found = results.posed()
         if found is None:
             pairs = results.placed()
-            values = [value for _, value in pairs if isinstance(value, Result)]
-            if len(values) < len(pairs):
+            values = [value for _, value in pairs]
+            found = block_of(values, timed=timed, as_poses=True)
+            found = found._replace(lines=np.array([place for place, _ in pairs], np.int64))
+            if found.kind not in (POSE, POINT):
                 raise FormatError("expected poses, or points", source=source)
-            own = {} if timed else {"stamp_ns": "stamp"}  # no stamp of the block then
-            said = ({own.get(key, key): of for key, of in each.extras.items()} for each in values)
-            values = [each._replace(extras=extras) for each, extras in zip(values, said, strict=True)]
-            found = block_of(values)._replace(lines=np.array([place for place, _ in pairs], np.int64))
-            for row, (position, rotation, *_) in enumerate(each.pose for each in values):
-                found.numbers[row, [not position] * 3 + [not rotation] * 4] = np.nan
+            for row, pose in enumerate(each.pose for each in values if isinstance(each, Result)):
+                found.numbers[row, [not pose.position] * 3 + [not pose.rotation] * 4] = np.nan
         ends = np.flatnonzero(np.frombuffer(results.text, np.uint8) == ord("\n"))
         yield found._replace(lines=np.searchsorted(ends, found.lines)), outcome
 

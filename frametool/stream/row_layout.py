@@ -25,6 +25,8 @@ ATTITUDE = "attitude"  # a rotation of the frame itself, seen from a fixed world
 TURNED = (POSE, ROTATION, ATTITUDE)
 PARTS = {TWIST: ("linear", "angular"), WRENCH: ("force", "torque"), ACCEL: ("linear", "angular")}
 SIX = tuple(PARTS)  # two vectors, linear part first
+# the keys of the numbers in a mapping: these are lists, mappings, or single numbers
+MAPPINGS = ((POINT, ("point",)), (VECTOR, ("vector",)), (POINT, ("xyz",)), *PARTS.items(), (POINT, ("x", "y", "z")))
 THREE = (POINT, VECTOR, NORMAL, RATE)
 MOVERS: dict[str, Callable[..., Components]] = {  # by a pose, whose seven numbers come first
     "": lambda *_: (),

@@ -23,7 +23,7 @@ from frametool.frames.stamps import BILLION, read_header_stamp, read_stamp
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.readers import in_nanoseconds
 from frametool.grammar.result import NoResult, Result, with_entries
-from frametool.stream.row_layout import AS_READ, NOWHERE, PARTS, POSE, IfLocked, In, Out, Piece, Word
+from frametool.stream.row_layout import AS_READ, MAPPINGS, NOWHERE, PARTS, POINT, POSE, IfLocked, In, Out, Piece, Word
 from frametool.text.parse import FURTHEST, parse_stamps
 from frametool.text.spans import MARGIN, Floats, Ints, Spans, framed, join, without_quotes
 from frametool.text.write import float_spans, replaced, rounded_to_single
@@ -36,8 +36,10 @@ if TYPE_CHECKING:
     from frametool.geometry.place import Place, Spot
     from frametool.geometry.types import Components
     from frametool.stream.faults import Fault
+    from frametool.stream.record_values import Value
 
     Cells: TypeAlias = Spans | NDArray[Any]
+    Frames: TypeAlias = tuple[str | None, str | None]
 
 
 class Coded(NamedTuple):
@@ -406,61 +408,50 @@ def is_typed(cells: Any) -> bool:
     return isinstance(cells, np.ndarray) and cells.ndim == 1 and cells.dtype.kind in "fiubM"
 
 
-def block_of(results: Sequence[Result], *, placed: bool = True) -> RowPoses:
-    """Return results as a block of poses; what they lack is 0 and the identity.
+def block_of(values: Sequence[Value], *, placed: bool = True, timed: bool = True, as_poses: bool = False) -> RowPoses:
+    """Return results as one block of poses, points, vectors, twists or wrenches.
 
-    placed: they have positions
+    What a pose lacks is 0 or the identity; stamps that only some have are another column.
+    placed: poses have positions; timed: either all have a stamp, or none
+    as_poses: a position without a rotation is a pose too, not a point
+    Raises ValueInvalid for things of several kinds, for other mappings, and for stamps that are missing.
     """
-    stamped = ["stamp_ns" in result.extras for result in results]
-    if any(stamped) and not all(stamped):
+    if not values:
+        return NO_ROWS
+    rows = (_row_of(value, placed=placed, as_poses=as_poses) for value in values)
+    kinds, numbers, frames, others = zip(*rows, strict=True)
+    if len({*kinds}) > 1:
+        raise ValueInvalid(f"one file holds things of one kind, found {' and '.join(sorted({*kinds}))}")
+    parents, names = (each[:1] if len({*each}) == 1 else each for each in zip(*frames, strict=True))
+    keys = dict.fromkeys(key for other in others for key in other)
+    columns = {key: [other.get(key) for other in others] for key in keys}
+    stamps, read = columns.get("stamp_ns", [None]), columns.pop(AS_READ, [None])
+    if timed and None in stamps and "stamp_ns" in columns:
         raise ValueInvalid("some poses have a stamp and some have none; add it, or leave it out of all")
-    poses = [result.pose for result in results]
-    numbers = np.array([pose.components[0 if placed else 3 :] for pose in poses]) + 0.0  # none is -0.0
-    parents, names = [pose.parent for pose in poses], [pose.name for pose in poses]
-    scales: list[dict[str, Any]] = [{} if pose.scale == 1.0 else {SCALE: pose.scale} for pose in poses]
-    others = [scale | result.extras for scale, result in zip(scales, results, strict=True)]
-    return _block(numbers, parents, names, others)._replace(placed=placed)
-
-
-def block_of_points(records: Sequence[Mapping[str, Any]]) -> RowPoses:
-    """Return mappings of points, vectors, twists or wrenches as a block.
-
-    Raises ValueInvalid for no such column, or several of them.
-    """
-    choices = (("point",), ("vector",), ("xyz",), *PARTS.values())
-    kinds, found, rest = set[str](), list[list[Any]](), list[dict[str, Any]]()
-    for record in records:  # its numbers are in lists, mappings, or under x, y, z
-        keys = next((keys for keys in choices if set(keys) <= record.keys()), tuple("xyz"))
-        kind = next((kind for kind, parts in PARTS.items() if parts == keys), "vector" if "vector" in keys else "point")
-        numbers: list[Any] = []
-        for value in map(record.get, keys):
-            numbers += value.values() if isinstance(value, dict) else value if isinstance(value, list) else [value]
-        if len(numbers) != (6 if kind in PARTS else 3) or not all(isinstance(number, float) for number in numbers):
-            raise ValueInvalid(f"columns hold points or poses, found {', '.join(record)}")
-        kinds.add(kind)
-        found.append(numbers)
-        rest.append({key: value for key, value in record.items() if key not in (*keys, "frame")})
-    if len(kinds) > 1:
-        raise ValueInvalid(f"columns hold things of one kind, found {' and '.join(sorted(kinds))}")
-    frames = [record.get("frame") for record in records]
-    return _block(np.array(found, np.float64), frames, [None], rest)._replace(kind=min(kinds))
-
-
-def _block(
-    numbers: Floats, parents: list[str | None], names: list[str | None], others: Sequence[Mapping[str, Any]]
-) -> RowPoses:
-    """Return results as a block, with what else each of them says."""
-    stamps = [other.get("stamp_ns") for other in others]
-    is_stamped = bool(stamps) and all(type(stamp) is int for stamp in stamps)
-    read = [other[AS_READ] for other in others if AS_READ in other]
-    used = (AS_READ, "stamp_ns" if is_stamped else AS_READ)
-    keys = dict.fromkeys(key for other in others for key in other if key not in used)
-    parents, names = (each[:1] if len(set(each)) == 1 else each for each in (parents, names))
+    stamps_ns = np.array(columns.pop("stamp_ns"), np.int64) if all(type(stamp) is int for stamp in stamps) else None
     return RowPoses(
-        numbers, np.array(stamps, np.int64) if is_stamped else None, np.arange(len(numbers)), parents, names,
-        {key: objects([other.get(key) for other in others]) for key in keys},
-        read=np.array(read, np.float64) if read and len(read) == len(others) else None,
+        np.array(numbers, np.float64) + 0.0, stamps_ns, np.arange(len(numbers)), parents, names,  # none is -0.0
+        {key: objects(column) for key, column in columns.items()},
+        None if None in read else np.array(read, np.float64), kinds[0], placed,
     )  # fmt: skip
+
+
+def _row_of(value: Value, *, placed: bool, as_poses: bool) -> tuple[str, Sequence[Any], Frames, Mapping[str, Any]]:
+    """Return what a result is, its numbers, the names of its frames, and its other fields."""
+    if isinstance(value, Result):
+        pose, extras = value.pose, value.extras
+        if pose.rotation is None and pose.position is not None and not as_poses:
+            return POINT, pose.position, (pose.parent, None), ({"name": pose.name} if pose.name else {}) | extras
+        scale = {} if pose.scale == 1.0 else {SCALE: pose.scale}
+        return POSE, pose.components[0 if placed else 3 :], (pose.parent, pose.name), scale | extras
+    kind, keys = next((each for each in MAPPINGS if {*each[1]} <= value.keys()), MAPPINGS[0])
+    numbers: list[Any] = []
+    for part in map(value.get, keys):
+        numbers += part.values() if isinstance(part, dict) else part if isinstance(part, list) else [part]
+    if len(numbers) != (6 if kind in PARTS else 3) or not all(isinstance(number, float) for number in numbers):
+        raise ValueInvalid(f"columns hold points or poses, found {', '.join(value)}")
+    rest = {key: each for key, each in value.items() if key not in (*keys, "frame")}
+    return kind, numbers, (value.get("frame"), None), rest
 
 
 def objects(values: Iterable[Any]) -> NDArray[Any]:
