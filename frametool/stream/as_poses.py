@@ -30,29 +30,29 @@ import numpy as np
 
 from frametool.documents.source import InputFile, not_text
 from frametool.errors import FormatError, Misused, ValueInvalid, warn
-from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, describe, rows_of
+from frametool.formats.rows.pose_rows import StampFile, describe, rows_of
 from frametool.formats.table import FORMATS, Rows, holds, is_trajectory
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Answers, Diagnostics, EdgeColumns, Options, Topics, stop
+from frametool.grammar.edges import Answers, Diagnostics, EdgeColumns, Options, Topics
 from frametool.grammar.readers import EARTH_FRAMES
 from frametool.grammar.result import Result, Style
-from frametool.stream.evaluate import Plan, Run, State
-from frametool.stream.faults import NULL, STOP, BadRow, Fault, Outcome, written_by
+from frametool.stream.faults import NULL, SKIP, BadRow, Fault, Outcome, written_by
 from frametool.stream.record_results import BlockResults, ResultWriter, blocks_of
 from frametool.stream.request import NO_STAMPS, SOME, Request, RowOptions
-from frametool.stream.row_layout import POINT, POSE, Shape
-from frametool.stream.rows import NO_ROWS, NO_STAMP, Block, RowPoses, block_of, kept, spans_of
-from frametool.stream.table import PlannedRows, TableRows
+from frametool.stream.row_layout import POINT, POSE
+from frametool.stream.rows import NO_ROWS, NO_STAMP, RowPoses, block_of, kept
+from frametool.stream.table import TableRows
 from frametool.stream.writers import LEARNED, PoseWriter, RowsWriter, SingleWriter, TextWriter
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterable, Iterator, Sequence
 
+    from frametool.formats.rows.column_file import ColumnFile
     from frametool.geometry.types import Components
+    from frametool.stream.column_stream import ColumnRows
     from frametool.stream.record_values import Value
     from frametool.text.lines import ByteStream
-    from frametool.text.spans import Ints
 
     Step: TypeAlias = tuple[RowPoses, Outcome]  # what a block became, and what is reported about it
 
@@ -123,7 +123,7 @@ class FormatConverter:
     tally: what was assumed about a trajectory
     """
 
-    rows: PlannedRows
+    rows: TableRows | ColumnRows
 
     def __init__(
         self, fmt: str, request: Request, source: str, style: Style = AS_VALUES, answers: Answers = Answers()  # noqa: B008
@@ -140,8 +140,8 @@ class FormatConverter:
         self.request = request.with_results(all_numbers=True, notations=(QUATERNION,), keep_sign=True, place=None)
         # whose TARGET each row was checked for
         self.looks_up_places = request.results.place is not None and not request.rows.poses
-        self.to_arrays, self.has_points = ("arrays" in (writes := FORMATS[style.format].writes)), "points" in writes
-        if request.on_error == NULL and not (self.is_table and (self.to_arrays or style.format in LEARNED)):
+        has_nulls = style.format in LEARNED or holds(style.format, "arrays")
+        if request.on_error == NULL and not (self.is_table and has_nulls):
             raise Misused(f"--on-error null: {style.format} of {fmt} cannot hold a row without a result; give skip")
 
     def outcomes(self, stream: ByteStream, *, header: bool = True) -> Generator[Outcome]:
@@ -151,116 +151,99 @@ class FormatConverter:
             warn(f"{self.source}:{finding.line}: {finding.message}")
 
     def _to_write(self, stream: ByteStream, *, header: bool) -> Iterator[Outcome]:
-        """Yield the blocks that are written: up to the first bad row where that ends the stream."""
-        operation, place, is_any = self.request.operation, self.style.place, False
+        """Yield the blocks that are written."""
+        operation, place = self.request.operation, self.style.place
         for poses, outcome in self.steps(stream, header=header):
             has_more = poses.more and poses.kind != POSE and operation.formula is not None
-            if not is_any and (operation.only_adds or not poses.kind or has_more):
-                wanted = self.style.format
-                raise Misused(f"a stream of {self.fmt} with such results stays one; leave -f {wanted} out")
-            is_any, notes, left = True, [*outcome.notes], poses
-            if self.request.on_error == STOP and outcome.faults:
-                left = kept(poses, slice(0, int(np.searchsorted(poses.lines, outcome.faults[0].line))))
+            if operation.only_adds or not poses.kind or has_more:
+                remedy = f"leave -f {self.style.format} out" if self.is_table else "convert it to csv first"
+                raise Misused(f"such results are columns added to the rows of {self.fmt}; {remedy}")
+            notes = [*outcome.notes]
             if place is not None and place.words:
                 from frametool.stream.earth_columns import zone_notes
 
-                if len(there := np.flatnonzero(~np.isnan(left.numbers[:, 0]))):
-                    columns = place.numbers(*np.ascontiguousarray(left.numbers[there, :3].T))
-                    notes += zone_notes(place, columns, left.lines[there].tolist().__getitem__)
-            yield outcome._replace(results=left, notes=notes, kept=len(left.numbers))
-        if not is_any:
-            raise FormatError("nothing in it", source=self.source)
+                if len(there := np.flatnonzero(~np.isnan(poses.numbers[:, 0]))):
+                    columns = place.numbers(*np.ascontiguousarray(poses.numbers[there, :3].T))
+                    notes += zone_notes(place, columns, poses.lines[there].tolist().__getitem__)
+            yield outcome._replace(results=poses, notes=notes, kept=len(poses.numbers))
 
     def steps(self, stream: ByteStream, *, header: bool = True) -> Iterator[Step]:
-        """Yield the results of one block after the other; of rows first a block without any."""
-        if self.is_table:
-            steps = self._rows(stream, header=header)
-        else:
-            steps = self._columns(stream) if "arrays" in FORMATS[self.fmt].reads else self._listed(stream)
-        for poses, outcome in steps:
-            names, prefix = self.request.operation.extras(self.shape), self.request.results.prefix
-            own = self._of_position(poses, names) if self.shape.kind == POINT and len(poses.numbers) else poses
-            kind, more = self.request.operation.result_kind(self.shape.kind), tuple(prefix + name for name in names)
-            yield own._replace(kind=kind, placed=self.placed, more=more), outcome
+        """Yield the results of one block after the other, first a block without any.
 
-    def _of_position(self, poses: RowPoses, names: Sequence[str]) -> RowPoses:
-        """Return points with their own covariance, of rows that were read as poses without a rotation."""
-        every = self.request.operation.extras(self.rows.shape)
-        columns = [*range(3), *(3 + every.index(name) for name in names)]
-        return poses._replace(numbers=poses.numbers[:, columns]) if len(names) < len(every) else poses
-
-    def _begin(self, rows: PlannedRows, line: int = 0) -> None:
-        """Decide what rows become: without a rotation points, where nobody asked for one; raises FormatError."""
-        self.rows, shape, (target, *_) = rows, rows.shape, rows.plan.targets
-        self.placed = target.unit is not None
-        is_bare = shape.kind == POSE and shape.notation is None and bool(self.request.rows.poses)
-        has_none = is_bare and not target.notations
-        if (is_bare and self.request.keeps_position and not has_none) or (has_none and not self.has_points):
-            raise FormatError(NO_ROTATION.format(rows.columns), source=self.source, line=line)
-        self.shape = shape._replace(kind=POINT) if has_none else shape
-
-    # --- rows of tables, and of columns of numbers ---
-
-    def _rows(self, stream: ByteStream, *, header: bool) -> Iterator[Step]:
-        """Yield the rows of a table, with the stamps of a file, their own, or their numbers as seconds."""
-        fmt = FORMATS[self.fmt].rows
-        file = StampFile(self.answers.stamps) if self.answers.stamps else None
-        rows = TableRows(stream, self.fmt, self.request, self.source, header=header)
-        self._begin(rows, line=1)
-        yield NO_ROWS, Outcome(b"", lines=rows.lines, size=rows.taken)
-        count = 0
-        for text in rows.texts:
-            run, outcome, cells = rows.of_text(text)
-            chosen, numbers = run.settled()
-            lines = run.block.places[chosen]
-            if b'"' in text:  # a cell may hold line ends
-                lines = np.array([*map(run.block.line_of, chosen.tolist())], np.int64)
-            before, count = count, count + len(numbers)
-            poses = self._with_place(rows.poses_of(run, chosen, numbers, cells.column, lines))
-            if self.looks_up_places:
-                poses = poses._replace(parents=EARTH_FRAMES[:1])
-            if file:
-                poses = poses._replace(stamps_ns=np.array(file.between(before, count), np.int64))
-            elif fmt.counted and poses.stamps_ns is None and self.request.rows.stamps != NO_STAMPS:
-                poses = poses._replace(stamps_ns=np.arange(before, count) * BILLION)
-            yield poses._replace(stamps_ns=self._held(poses.stamps_ns, fmt)), outcome
-        if file:
-            file.finish(count, self.source)
-        if is_trajectory(self.fmt):
-            describe(Options(self.tally, Topics(), answers=self.answers), fmt, count, named=False)
-
-    def _held(self, stamps_ns: Ints | None, fmt: Rows) -> Ints | None:
-        """Return stamps, unless they only count and the other format has no place for them: they are not lost then."""
-        counts, other = bool(fmt.counted) and not self.answers.stamps, self.style.format
-        are_lost = self.request.rows.stamps == NO_STAMPS or holds(other, "recording") or FORMATS[other].rows.counted
-        return None if counts and are_lost else stamps_ns
-
-    def _columns(self, stream: ByteStream) -> Iterator[Step]:
-        """Yield the rows of columns of numbers; those that stand for no point have no place in a text."""
-        from frametool.stream.column_stream import ColumnRows, move_along
-
-        opened = import_module(FORMATS[self.fmt].reader).open_columns(self._opened(stream)[0])
-        rows = ColumnRows(opened, self.request, self.source)
-        move_along(opened, self.request)
+        Stamps are those of a file, those of the rows, or their numbers as seconds.
+        """
+        self.rows = rows = self._opened(stream, header=header)
         self._begin(rows)
-        yield rows.poses(opened.nothing()), Outcome(b"")
-        left_out = 0
-        for batch in opened.batches():
-            poses = self._with_place(rows.poses(batch))
-            if not self.to_arrays and self.request.on_error != NULL:
+        operation, fmt = self.request.operation, Rows() if self.answers.edges else FORMATS[self.fmt].rows
+        # stamps that only count are no loss where the other format has no place for them
+        counts, other = bool(fmt.counted) and not self.answers.stamps, self.style.format
+        lose_stamps = counts and bool(
+            self.request.rows.stamps == NO_STAMPS or holds(other, "recording") or FORMATS[other].rows.counted
+        )
+        names = operation.extras(self.shape)
+        kind, more = operation.result_kind(self.shape.kind), tuple(map(self.request.results.prefix.__add__, names))
+        file = StampFile(self.answers.stamps) if self.answers.stamps and self.is_table else None
+        count = left_out = 0
+        for found, outcome in rows.steps():
+            poses = self._of_shape(found, names) if len(found.numbers) else found
+            if not self.is_table:  # what stands for no point has no place in a text
                 there = np.flatnonzero(~np.isnan(poses.numbers[:, 0]))
                 left_out += len(poses.numbers) - len(there)
                 poses = kept(poses, there)
-            yield poses, rows.outcome(batch)
+            before, count = count, count + len(poses.numbers)
+            stamps = None if lose_stamps else poses.stamps_ns
+            if file is not None:
+                stamps = np.array(file.between(before, count), np.int64)
+            elif counts and stamps is None and not lose_stamps:
+                stamps = np.arange(before, count) * BILLION
+            yield poses._replace(stamps_ns=stamps, kind=kind, placed=self.placed, more=more), outcome
+        if file is not None:
+            file.finish(count, self.source)
+        if self.is_table and is_trajectory(self.fmt):
+            describe(Options(self.tally, Topics(), answers=self.answers), fmt, count, named=False)
         if left_out:
-            count = f"{left_out} {'row' if left_out == 1 else 'rows'}"
-            warn(f"{self.source}: {count} without numbers left out: {self.style.format} has no place for them")
+            what = f"{left_out} {'row' if left_out == 1 else 'rows'} without numbers left out"
+            warn(f"{self.source}: {what}: {self.style.format} has no place for them")
 
-    def _opened(self, stream: ByteStream) -> tuple[InputFile, Options]:
-        """Return the stream as a file, and how it is read."""
+    def _opened(self, stream: ByteStream, *, header: bool) -> TableRows | ColumnRows:
+        """Plan the rows of a stream: of a table, of columns of numbers, or of a list of poses."""
+        if self.is_table:
+            return TableRows(stream, self.fmt, self.request, self.source, header=header)
+        from frametool.stream.column_stream import ColumnRows, ListedPoses, move_along
+
         file = InputFile("-" if self.source == "stdin" else self.source, cast("BinaryIO", stream))
         file.format = self.fmt
-        return file, Options(self.tally, Topics(), normalize=self.request.rows.normalize, answers=self.answers)
+        if "arrays" in FORMATS[self.fmt].reads:
+            columns: ColumnFile = import_module(FORMATS[self.fmt].reader).open_columns(file)
+            move_along(columns, self.request)
+        else:
+            options = Options(self.tally, Topics(), normalize=self.request.rows.normalize, answers=self.answers)
+            is_same = self.fmt == self.style.format
+            columns = ListedPoses(file, options, self.request, numbered=is_same)  # type: ignore[abstract]
+        return ColumnRows(columns, self.request, self.source)
+
+    def _of_shape(self, poses: RowPoses, names: Sequence[str]) -> RowPoses:
+        """Return the results of rows as what they are: points with their own covariance, and as they were read.
+
+        names: of what comes with each
+        """
+        every, looked_up = self.request.operation.extras(self.rows.shape), self.looks_up_places
+        if self.shape.kind == POINT and len(names) < len(every):  # rows that were read as poses without a rotation
+            columns = [*range(3), *(3 + every.index(name) for name in names)]
+            poses = poses._replace(numbers=poses.numbers[:, columns])
+        poses = self._with_place(poses)
+        return poses._replace(parents=EARTH_FRAMES[:1]) if looked_up else poses
+
+    def _begin(self, rows: TableRows | ColumnRows) -> None:
+        """Decide what rows become: without a rotation points, where nobody asked for one; raises FormatError."""
+        shape, (target, *_) = rows.shape, rows.plan.targets
+        self.placed = target.unit is not None
+        is_bare = shape.kind == POSE and shape.notation is None and bool(self.request.rows.poses)
+        has_none = is_bare and not target.notations
+        no_points = "points" not in FORMATS[self.style.format].writes
+        if (is_bare and self.request.keeps_position and not has_none) or (has_none and no_points):
+            raise FormatError(NO_ROTATION.format(rows.columns), source=self.source, line=int(self.is_table))
+        self.shape = shape._replace(kind=POINT) if has_none else shape
 
     def _with_place(self, poses: RowPoses) -> RowPoses:
         """Add to points of the Earth their lat, lon and alt as they were read, where these are written again."""
@@ -271,52 +254,6 @@ class FormatConverter:
         inputs[:, np.isnan(poses.numbers[:, 0])] = np.nan
         fields = tuple(field for field in place.fields if field[:3] in ("lat", "lon", "alt", "msl", "und"))
         return poses._replace(read=np.column_stack(place._replace(fields=fields).lla([*inputs[: len(fields)]])))
-
-    # --- formats that list poses ---
-
-    def _listed(self, stream: ByteStream) -> Iterator[Step]:
-        """Yield the poses of a format whose lines are no table."""
-        module, request = import_module(FORMATS[self.fmt].reader), self.request
-        if request.rows.frames:
-            raise ValueInvalid("poses do not say their frame; name SOURCE")
-        if request.operation.columns:
-            raise FormatError(f"{self.fmt} lists poses and has no columns; convert it to csv first", source=self.source)
-        if request.rows.poses > 1:
-            raise FormatError(f"{self.fmt} lists one pose after the other; two a row are wanted", source=self.source)
-        faults: list[Fault] = []
-        report = stop
-        if request.on_error != STOP:
-            report = lambda error: faults.append(Fault(max(error.line, 1) - 1, "", error.message))  # noqa: E731
-        file, options = self._opened(stream)
-        fmt: Rows = module.form_of(file, options)
-        self.placed, self.shape, state, timed = True, Shape(POSE, 1.0, ((QUATERNION, False),)), State(), request.timed
-        edge_of = request.pose_from_frame if request.operation.moves and timed else None
-        bare = request._replace(timed=timed if timed and timed.name else None)
-        bare = bare.with_rows(extra_column=None).with_results(unwrap=False)
-        target = self.shape._replace(keep_sign=True)
-        plan = Plan((self.shape,), (target,), bare, ("x", "y", "z", *QUATERNION.columns), edge_of=edge_of)
-        rename = request.for_kind(POSE).rename or (lambda parent, name: (parent, name))
-        for each in module.blocks(file, options._replace(report=report), named=False):
-            lines = [row.line - 1 for row in each.rows]
-            stamps = [each.stamps_ns + request.offset_ns]
-            block = Block(np.array(each.poses).T.copy(), {}, np.arange(len(lines)), lines.__getitem__, stamps=stamps)
-            done = Run(plan, block, state)
-            written = [each.rows[row] for row in done.rows.tolist()]
-            extras = {}
-            if any(row.image for row in written):
-                extras[IMAGE] = spans_of([row.image.encode() for row in written])
-            if self.fmt == self.style.format:
-                extras[NUMBER] = spans_of([b"%d" % row.number for row in written])
-            own = any(row.names for row in written)
-            pairs = [rename(*(row.names or (None, None))) for row in (written if own else written[:1])]
-            parents, names = zip(*pairs, strict=True) if pairs else ((None,), (None,))
-            times = None if own else self._held(stamps[0][done.rows], fmt)
-            places = np.array(lines, np.int64)[done.rows]
-            poses = RowPoses(done.results[done.rows], times, places, parents, names, extras)
-            found, count = sorted(faults + done.faults()), len(lines) + len(faults)
-            yield poses, Outcome(b"", found, count, notes=sorted(done.notes))
-            faults.clear()
-
 
 # --- tables as frames ---
 
@@ -329,7 +266,7 @@ def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
     fmt = FORMATS[file.format].rows
     if what := not_text(file.head()):
         raise FormatError(what, source=file.name)
-    request = Request(rows=RowOptions(normalize=options.normalize, stamps=SOME))
+    request = Request(rows=RowOptions(normalize=options.normalize, stamps=SOME), on_error=SKIP)
     converter = FormatConverter(file.format, request, file.name, answers=options.answers)
     named, line, count = dict[int, str](), 0, 0
     for block, outcome in converter.steps(cast("ByteStream", file.stream)):

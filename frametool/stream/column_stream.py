@@ -15,34 +15,78 @@ import numpy as np
 
 from frametool.documents.source import InputFile
 from frametool.errors import FormatError, Misused, listing, warn
-from frametool.formats.rows import pcd
-from frametool.formats.rows.column_file import FLOATS, ColumnFile, Made, OutColumn, RecordFile, not_finite
+from frametool.formats.rows import column_file, pcd, pose_rows
+from frametool.formats.rows.column_file import FLOATS, STAMP_NS, ColumnFile, Made, OutColumn, not_finite
 from frametool.formats.rows.csv import quoted
+from frametool.formats.rows.pose_rows import IMAGE, NUMBER
 from frametool.formats.table import FORMATS
+from frametool.geometry.representations import ROTATIONS
+from frametool.geometry.rigid import EXACT
 from frametool.grammar.readers import NORMALS, in_nanoseconds
 from frametool.stream.array_writer import DOUBLE, ColumnsWriter
-from frametool.stream.faults import SKIP, Outcome
-from frametool.stream.request import VELOCITIES, Operation, Request
+from frametool.stream.faults import SKIP, STOP, Fault, Outcome
+from frametool.stream.request import NO_STAMPS, VELOCITIES, Operation, Request
 from frametool.stream.row_layout import Out, Word
 from frametool.stream.rows import Block, RowPoses, coded_texts, is_typed, objects, taken
 from frametool.stream.table import PlannedRows, Table
 from frametool.stream.table_plan import Kept, Named, New
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Sequence
+    from collections.abc import Generator, Iterator, Sequence
 
     from frametool.formats.rows.column_file import Batch, ColumnWriter, Kind
     from frametool.geometry.types import Rigid
+    from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
     from frametool.recordings.messages import PointCloud
     from frametool.stream.evaluate import Run
-    from frametool.text.spans import Flags, Floats, Ints
+    from frametool.text.spans import Flags, Floats
+
+
+PARENT, NAME, STAMP = "parent", "name", "stamp_ns"  # columns of listed poses
+
+
+class ListedPoses(ColumnFile):
+    """The poses of a file that lists them, as columns; an edge of a pose graph names its frames."""
+
+    gaps = False
+
+    def __init__(self, file: InputFile, options: Options, request: Request, *, numbered: bool) -> None:
+        """Read the first poses; numbered: their numbers are another column.
+
+        Raises FormatError if there are none.
+        """
+        self.errors = list[FormatError]()
+        options = options if request.on_error == STOP else options._replace(report=self.errors.append)
+        self.blocks = pose_rows.blocks(file, options, named=False)
+        if (first := next(self.blocks, None)) is None:
+            raise FormatError("nothing in it", source=file.name)
+        self.first, has_names = first, any(row.names for row in first.rows)
+        others = {PARENT: has_names, NAME: has_names, STAMP: not has_names and request.rows.stamps != NO_STAMPS}
+        others |= {IMAGE: any(row.image for row in first.rows), NUMBER: numbered}
+        self.others = [name for name, is_there in others.items() if is_there]
+        self.names = (*"xyz", *ROTATIONS["quaternion"].columns, *self.others)
+        self.kinds = [*[DOUBLE] * EXACT, *(STAMP_NS if name == STAMP else None for name in self.others)]
+        self.width = len(self.names)
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield the poses block by block."""
+        for block in chain([self.first], self.blocks):
+            every = {
+                PARENT: [row.names and row.names[0] for row in block.rows],
+                NAME: [row.names and row.names[1] for row in block.rows], STAMP: block.stamps_ns,
+                IMAGE: [row.image or None for row in block.rows], NUMBER: [row.number for row in block.rows],
+            }  # fmt: skip
+            kinds = zip(self.others, self.kinds[EXACT:], strict=True)
+            others = [np.array(every[name], kind or object) for name, kind in kinds]
+            batch = column_file.StructuredBatch(np.rec.fromarrays([*block.poses, *others]))
+            batch.lines = np.array([row.line - 1 for row in block.rows], np.int64)
+            batch.errors, self.errors[:] = [*self.errors], []
+            yield batch
 
 
 class ColumnRows(PlannedRows):
-    """Turn the rows of one batch after the other into results; run: what became of the last one."""
-
-    run: Run
+    """Turn the rows of one batch after the other into results."""
 
     def __init__(self, file: ColumnFile, request: Request, source: str) -> None:
         """Plan the rows; raises FormatError or Misused as for a table of the same columns."""
@@ -98,8 +142,14 @@ class ColumnRows(PlannedRows):
             raise Misused(f"{whole}; --keep puts it beside, -f csv writes text", source=self.table.source)
         return kind
 
-    def of_batch(self, batch: Batch) -> tuple[Ints, Floats]:
-        """Return the rows (n,) of a batch that are written, and their numbers (n, k), nan if absent."""
+    def steps(self) -> Iterator[tuple[RowPoses, Outcome]]:
+        """Yield the results of each batch for another format; first those of one without rows."""
+        for batch in chain([self.file.nothing()], self.file.batches()):
+            run, outcome = self.of_batch(batch)
+            yield self.poses_of(run, batch.column, batch.lines), outcome
+
+    def of_batch(self, batch: Batch) -> tuple[Run, Outcome]:
+        """Return what becomes of a batch, its numbers nan where they are absent, and its outcome."""
         values, absent, bad = self._read(batch)
         every = self.request.operation.formula is not None
         shapes = zip(absent, self.plan.shapes, strict=False)
@@ -108,10 +158,10 @@ class ColumnRows(PlannedRows):
         names = self.names_of(batch.size, lambda place: coded_texts(batch.texts(place)))
         stamps, late = self._stamps(batch)
         block = Block(
-            values, {}, np.arange(batch.size), int, names=names, stamps=stamps, bad={**late, **names.bad, **bad},
-            gone=gone, frames=[names.frames],
+            values, {}, np.arange(batch.size), batch.lines.tolist().__getitem__, names=names, stamps=stamps,
+            bad={**late, **names.bad, **bad}, gone=gone, frames=[names.frames],
         )  # fmt: skip
-        self.run = run = self.ran(block)
+        run = self.ran(block)
         for number, kind in self.narrow.items():
             with np.errstate(over="ignore"):  # bad rows, no infinities
                 run.refuse(~np.isfinite(run.results[:, number].astype(kind)), f"the result is too large for {kind}")
@@ -120,17 +170,10 @@ class ColumnRows(PlannedRows):
             last = first + target.own_size if len(targets) > 1 else None
             run.results[flags, first:last] = np.nan
             first += target.own_size
-        return run.settled(run.end)
-
-    def outcome(self, batch: Batch, text: bytes | memoryview = b"") -> Outcome:
-        """Return what is written of the last batch, and what is said of it."""
-        mended, self.mended = self.mended, 0
-        return Outcome(text, self.run.faults(), batch.size, batch.size, mended, self.run.notes, batch.bytes_read)
-
-    def poses(self, batch: Batch) -> RowPoses:
-        """Return the results of a batch for another format, with what else its rows hold."""
-        rows, numbers = self.of_batch(batch)
-        return self.poses_of(self.run, rows, numbers, batch.column, rows)
+        unread = [Fault(max(error.line, 1) - 1, "", error.message) for error in batch.errors]
+        faults, size = sorted(unread + run.faults()), batch.size + len(unread)
+        lines = 0 if isinstance(self.file, ListedPoses) else batch.size  # which has its own
+        return run, Outcome(b"", faults, size, lines, len(run.mended), run.notes, batch.bytes_read)
 
     def _read(self, batch: Batch) -> tuple[Floats, Flags, dict[int, tuple[str, str]]]:
         """Return our numbers (n, c); for each shape which rows have none, which count as 0; and rows that are bad."""
@@ -167,11 +210,11 @@ class ColumnRows(PlannedRows):
         for below in times[1:]:
             nanoseconds, more = batch.stamps(below, in_ns=1)
             stamps, reasons = stamps + nanoseconds, {**more, **reasons}
-        return [stamps], {row: (name, reason) for row, reason in reasons.items()}
+        return [stamps + self.request.offset_ns], {row: (name, reason) for row, reason in reasons.items()}
 
-    def made(self, columns: Sequence[OutColumn], rows: Ints, numbers: Floats) -> list[Made]:
+    def made(self, columns: Sequence[OutColumn], run: Run) -> list[Made]:
         """Return what is in the columns that are made, in their order."""
-        made = []
+        made, (rows, numbers) = list[Made](), run.settled()
         for column, target in zip(columns, self.layout.columns, strict=True):
             new = target.piece if isinstance(target, New) else None
             if isinstance(new, Word):
@@ -184,7 +227,7 @@ class ColumnRows(PlannedRows):
             elif new is not None:
                 made.append(Made([new.text.decode()] * len(numbers)))
             elif isinstance(target, Named):
-                texts = [text or "" for text in self.run.block.names.texts(target.role, rows)]
+                texts = [text or "" for text in run.block.names.texts(target.role, rows)]
                 made.append(Made(texts * (len(rows) if len(texts) == 1 else 1)))
         return made
 
@@ -198,9 +241,10 @@ def run_columns(file: ColumnFile, request: Request, style: Style, *, source: str
     drops = request.on_error == SKIP or request.operation.of == VELOCITIES
     writer: ColumnWriter = file.rewriter(columns, None if drops else file.count, style)
     for batch in file.batches():
-        chosen, numbers = rows.of_batch(batch)
+        run, outcome = rows.of_batch(batch)
+        chosen, _ = run.settled()
         some = None if len(chosen) == batch.size else chosen
-        yield rows.outcome(batch, writer.of_rows(batch, some, rows.made(columns, chosen, numbers)))
+        yield outcome._replace(text=writer.of_rows(batch, some, rows.made(columns, run)))
     yield from map(Outcome, writer.end())
 
 
@@ -237,8 +281,8 @@ class OtherColumns:
         file, rows = self.parts[at]
         columns = rows.out_columns(named=True)
         for batch in chain([file.nothing()], file.batches()):  # which names the columns even where there are no rows
-            chosen, numbers = rows.of_batch(batch)
-            new, found = iter(rows.made(columns, chosen, numbers)), dict[str, Made]()
+            run, outcome = rows.of_batch(batch)
+            (chosen, _), new, found = run.settled(), iter(rows.made(columns, run)), dict[str, Made]()
             for column in columns:
                 place, kind = column.passed, self.kinds.get(column.name)
                 if place is None:
@@ -252,7 +296,7 @@ class OtherColumns:
                 if kind is not None and is_typed(each.values):  # whole numbers with gaps are objects
                     each = each._replace(values=each.values.astype(kind, copy=False))
                 found |= {column.name: each} if column.name in self.kinds else {}
-            yield rows.outcome(batch, self.writer.of_columns(len(numbers), found))
+            yield outcome._replace(text=self.writer.of_columns(len(chosen), found))
         if rows is self.parts[-1][1]:
             yield from map(Outcome, self.writer.end())
 
@@ -280,6 +324,6 @@ def moved_cloud(cloud: PointCloud, pose: Rigid, style: Style, source: str) -> Ge
     into = SimpleNamespace(**{**vars(module), "create": create})
     request = Request(Operation(left=pose, moves=True))
     stored = InputFile(source, BytesIO(cloud.rows.tobytes()))
-    file = RecordFile(stored, cloud.names, cloud.rows.dtype, len(cloud.rows))  # type: ignore[abstract]
+    file = column_file.RecordFile(stored, cloud.names, cloud.rows.dtype, len(cloud.rows))  # type: ignore[abstract]
     file.vectors = NORMALS
     return OtherColumns([(file, request, source)], style, into).outcomes()

@@ -29,6 +29,7 @@ from frametool.stream.header import has_pose_column, listed
 from frametool.stream.request import SOME
 from frametool.stream.row_layout import NORMAL, POSE, RATE, In, Out, Shape
 from frametool.stream.rows import (
+    NO_ROWS,
     Block,
     BlockNames,
     Coded,
@@ -55,11 +56,10 @@ from frametool.text.spans import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Sequence
+    from collections.abc import Callable, Generator, Iterator, Sequence
 
     from frametool.stream.request import Request
     from frametool.text.lines import ByteStream
-    from frametool.text.spans import Floats
 
 COUNTER = "frame"  # such a column often counts pictures
 
@@ -322,9 +322,13 @@ class PlannedRows:
         run.notes.sort()
         return run
 
-    def poses_of(self, run: Run, rows: Ints, numbers: Floats, column: Callable[[int], Any], lines: Ints) -> RowPoses:
-        """Return the results of some rows of a block as poses; column: returns the cells of one for all rows."""
+    def poses_of(self, run: Run, column: Callable[[int], Any], lines: Ints) -> RowPoses:
+        """Return the results of a block for another format.
+
+        column: returns the cells of a column; lines: of the block's rows, from 0
+        """
         layout, block, plan = self.layout, run.block, self.plan
+        rows, numbers = run.settled()
         self.inputs = np.reshape(run.columns, (len(run.columns), run.count))[:, rows]
         used = {*layout.times, *layout.places, *layout.named}
         others = [place for place in range(self.table.width) if place not in used]
@@ -342,7 +346,7 @@ class PlannedRows:
             [name] if place is None else block.names.texts(role, rows)
             for role, (place, name) in enumerate(zip(layout.named, unnamed, strict=True))
         )
-        return RowPoses(numbers[:, :own], stamps, lines, parents, names, extras)
+        return RowPoses(numbers[:, :own], stamps, lines[rows], parents, names, extras)
 
 
 class TableRows(PlannedRows):
@@ -367,6 +371,13 @@ class TableRows(PlannedRows):
         super().__init__(*as_trajectory(table, fmt, request))
         self.texts, self.taken = chain((rest,) if rest else (), blocks), len(first) - len(rest)
         self.lines = first.count(b"\n", 0, self.taken)
+
+    def steps(self) -> Iterator[tuple[RowPoses, Outcome]]:
+        """Yield the results of each block for another format."""
+        yield NO_ROWS, Outcome(b"", lines=self.lines, size=self.taken)
+        for text in self.texts:
+            run, outcome, cells = self.of_text(text)
+            yield self.poses_of(run, cells.column, cells.lines_before()[cells.rows]), outcome
 
     def of_text(self, text: bytes) -> tuple[Run, Outcome, Cells]:
         """Return what becomes of a block, and its outcome; behind a quote that is not closed nothing is read."""

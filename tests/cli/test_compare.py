@@ -460,7 +460,7 @@ def test_what_cannot_be_written_is_refused_in_one_line(run: Run) -> None:
     done = run("compare", *DRONE, "--rows", "-f", "markdown", files=FILES)
     assert (done.status, "--rows are written as csv, json or yaml, not as markdown" in done.err) == (2, True)
     listed = run("calc", "row.x", "-i", "images.txt", files={"images.txt": "1 1 0 0 0 1 2 3 1 a.png\n\n"})
-    assert (listed.status, "colmap lists poses and has no columns; convert it to csv first" in listed.err) == (1, True)
+    assert (listed.status, "columns added to the rows of colmap; convert it to csv first" in listed.err) == (2, True)
 
 
 @pytest.mark.parametrize("form", ["csv", "json", "yaml"])

@@ -21,7 +21,7 @@ import os
 import stat
 from contextlib import contextmanager
 from decimal import Decimal
-from functools import partial
+from functools import cached_property, partial
 from shutil import copyfileobj
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, Protocol, TypeAlias
@@ -86,10 +86,17 @@ class Batch(Protocol):
     """Rows of a file, addressed by the indices of its columns.
 
     size: the number of rows; bytes_read: their size in the file
+    errors: why rows between them could not be read
     """
 
     size: int
     bytes_read: int
+    errors: Sequence[FormatError] = ()
+
+    @cached_property
+    def lines(self) -> Ints:
+        """Return the line of each row, or its number, from 0."""
+        return np.arange(self.size)
 
     def column(self, place: int) -> Any:
         """Return a column unchanged: an array of the file's type, or texts."""
