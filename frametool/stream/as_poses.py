@@ -172,43 +172,34 @@ class FormatConverter:
 
         Stamps are those of a file, those of the rows, or their numbers as seconds.
         """
-        self.rows = rows = self._opened(stream, header=header)
+        is_table, other = self.is_table, self.style.format
+        rows = TableRows(stream, self.fmt, self.request, self.source, header=header) if is_table else self._rows(stream)
         self._begin(rows)
         operation, fmt = self.request.operation, Rows() if self.answers.edges else FORMATS[self.fmt].rows
         # stamps that only count are no loss where the other format has no place for them
-        counts, other = bool(fmt.counted) and not self.answers.stamps, self.style.format
-        lose_stamps = counts and bool(
-            self.request.rows.stamps == NO_STAMPS or holds(other, "recording") or FORMATS[other].rows.counted
-        )
-        names = operation.extras(self.shape)
-        kind, more = operation.result_kind(self.shape.kind), tuple(map(self.request.results.prefix.__add__, names))
-        file = StampFile(self.answers.stamps) if self.answers.stamps and self.is_table else None
-        count = left_out = 0
-        for found, outcome in rows.steps():
-            poses = self._of_shape(found, names) if len(found.numbers) else found
-            if not self.is_table:  # what stands for no point has no place in a text
-                there = np.flatnonzero(~np.isnan(poses.numbers[:, 0]))
-                left_out += len(poses.numbers) - len(there)
-                poses = kept(poses, there)
+        counts = bool(fmt.counted) and not self.answers.stamps
+        has_no_place = holds(other, "recording") or FORMATS[other].rows.counted
+        are_lost = counts and (self.request.rows.stamps == NO_STAMPS or has_no_place)
+        kind, names = operation.result_kind(self.shape.kind), operation.extras(self.shape)
+        more = tuple(map(self.request.results.prefix.__add__, names))
+        file = StampFile(self.answers.stamps) if self.answers.stamps and is_table else None
+        is_placed, count = self.looks_up_places or self.shape.kind == POINT or self.shape.place is not None, 0
+        for found, outcome in rows.steps() if is_table else self._without_gaps(rows):
+            poses = self._placed(found, names) if is_placed and len(found.numbers) else found
             before, count = count, count + len(poses.numbers)
-            stamps = None if lose_stamps else poses.stamps_ns
+            stamps = None if are_lost else poses.stamps_ns
             if file is not None:
                 stamps = np.array(file.between(before, count), np.int64)
-            elif counts and stamps is None and not lose_stamps:
+            elif counts and stamps is None and not are_lost:
                 stamps = np.arange(before, count) * BILLION
             yield poses._replace(stamps_ns=stamps, kind=kind, placed=self.placed, more=more), outcome
         if file is not None:
             file.finish(count, self.source)
-        if self.is_table and is_trajectory(self.fmt):
+        if is_table and is_trajectory(self.fmt):
             describe(Options(self.tally, Topics(), answers=self.answers), fmt, count, named=False)
-        if left_out:
-            what = f"{left_out} {'row' if left_out == 1 else 'rows'} without numbers left out"
-            warn(f"{self.source}: {what}: {self.style.format} has no place for them")
 
-    def _opened(self, stream: ByteStream, *, header: bool) -> TableRows | ColumnRows:
-        """Plan the rows of a stream: of a table, of columns of numbers, or of a list of poses."""
-        if self.is_table:
-            return TableRows(stream, self.fmt, self.request, self.source, header=header)
+    def _rows(self, stream: ByteStream) -> ColumnRows:
+        """Plan the rows of a stream of columns of numbers, or of listed poses."""
         from frametool.stream.column_stream import ColumnRows, ListedPoses, move_along
 
         file = InputFile("-" if self.source == "stdin" else self.source, cast("BinaryIO", stream))
@@ -222,21 +213,21 @@ class FormatConverter:
             columns = ListedPoses(file, options, self.request, numbered=is_same)  # type: ignore[abstract]
         return ColumnRows(columns, self.request, self.source)
 
-    def _of_shape(self, poses: RowPoses, names: Sequence[str]) -> RowPoses:
-        """Return the results of rows as what they are: points with their own covariance, and as they were read.
-
-        names: of what comes with each
-        """
-        every, looked_up = self.request.operation.extras(self.rows.shape), self.looks_up_places
-        if self.shape.kind == POINT and len(names) < len(every):  # rows that were read as poses without a rotation
-            columns = [*range(3), *(3 + every.index(name) for name in names)]
-            poses = poses._replace(numbers=poses.numbers[:, columns])
-        poses = self._with_place(poses)
-        return poses._replace(parents=EARTH_FRAMES[:1]) if looked_up else poses
+    def _without_gaps(self, rows: TableRows | ColumnRows) -> Iterator[Step]:
+        """Yield the results of columns but for rows without numbers, which have no place in a text."""
+        left_out = 0
+        for poses, outcome in rows.steps():
+            there = np.flatnonzero(~np.isnan(poses.numbers[:, 0]))
+            left_out += len(poses.numbers) - len(there)
+            rows.inputs = rows.inputs[:, there]
+            yield kept(poses, there), outcome
+        if left_out:
+            what = f"{left_out} {'row' if left_out == 1 else 'rows'} without numbers left out"
+            warn(f"{self.source}: {what}: {self.style.format} has no place for them")
 
     def _begin(self, rows: TableRows | ColumnRows) -> None:
         """Decide what rows become: without a rotation points, where nobody asked for one; raises FormatError."""
-        shape, (target, *_) = rows.shape, rows.plan.targets
+        self.rows, shape, (target, *_) = rows, rows.shape, rows.plan.targets
         self.placed = target.unit is not None
         is_bare = shape.kind == POSE and shape.notation is None and bool(self.request.rows.poses)
         has_none = is_bare and not target.notations
@@ -245,15 +236,26 @@ class FormatConverter:
             raise FormatError(NO_ROTATION.format(rows.columns), source=self.source, line=int(self.is_table))
         self.shape = shape._replace(kind=POINT) if has_none else shape
 
-    def _with_place(self, poses: RowPoses) -> RowPoses:
-        """Add to points of the Earth their lat, lon and alt as they were read, where these are written again."""
-        place, inputs = self.shape.place, self.rows.inputs
+    def _placed(self, poses: RowPoses, names: Sequence[str]) -> RowPoses:
+        """Return points with their own covariance, and places with lat, lon, alt as read where these are written again.
+
+        names: of what comes with each
+        """
+        place, operation = self.shape.place, self.request.operation
+        if self.looks_up_places:
+            poses = poses._replace(parents=EARTH_FRAMES[:1])
+        every = operation.extras(self.rows.shape)
+        if self.shape.kind == POINT and len(names) < len(every):  # of rows that were read as poses
+            columns = [*range(3), *(3 + every.index(name) for name in names)]
+            poses = poses._replace(numbers=poses.numbers[:, columns])
         is_written = holds(self.style.format, "recording") or self.style.place
-        if not is_written or place is None or place.name != "lla" or not self.request.operation.keeps_frames:
+        if not is_written or place is None or place.name != "lla" or not operation.keeps_frames:
             return poses
+        inputs = self.rows.inputs
         inputs[:, np.isnan(poses.numbers[:, 0])] = np.nan
         fields = tuple(field for field in place.fields if field[:3] in ("lat", "lon", "alt", "msl", "und"))
         return poses._replace(read=np.column_stack(place._replace(fields=fields).lla([*inputs[: len(fields)]])))
+
 
 # --- tables as frames ---
 

@@ -214,7 +214,7 @@ class ColumnRows(PlannedRows):
 
     def made(self, columns: Sequence[OutColumn], run: Run) -> list[Made]:
         """Return what is in the columns that are made, in their order."""
-        made, (rows, numbers) = list[Made](), run.settled()
+        made, (rows, numbers) = list[Made](), run.settled(run.end)
         for column, target in zip(columns, self.layout.columns, strict=True):
             new = target.piece if isinstance(target, New) else None
             if isinstance(new, Word):
@@ -242,7 +242,7 @@ def run_columns(file: ColumnFile, request: Request, style: Style, *, source: str
     writer: ColumnWriter = file.rewriter(columns, None if drops else file.count, style)
     for batch in file.batches():
         run, outcome = rows.of_batch(batch)
-        chosen, _ = run.settled()
+        chosen, _ = run.settled(run.end)
         some = None if len(chosen) == batch.size else chosen
         yield outcome._replace(text=writer.of_rows(batch, some, rows.made(columns, run)))
     yield from map(Outcome, writer.end())
@@ -282,7 +282,7 @@ class OtherColumns:
         columns = rows.out_columns(named=True)
         for batch in chain([file.nothing()], file.batches()):  # which names the columns even where there are no rows
             run, outcome = rows.of_batch(batch)
-            (chosen, _), new, found = run.settled(), iter(rows.made(columns, run)), dict[str, Made]()
+            (chosen, _), new, found = run.settled(run.end), iter(rows.made(columns, run)), dict[str, Made]()
             for column in columns:
                 place, kind = column.passed, self.kinds.get(column.name)
                 if place is None:

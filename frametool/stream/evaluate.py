@@ -407,9 +407,8 @@ class Run:
     def settled(self, before: int | None = None) -> tuple[Ints, Floats]:
         """Return the rows that stay, and their numbers: nan in those that have none on purpose, or are null.
 
-        before: the place up to which rows stay  [default: that of the bad row that ends the stream]
+        before: the place up to which rows stay
         """
-        before = self.end if before is None else before
         if before is None and len(self.rows) == self.count:
             return self.rows, self.results
         has_result, stays = np.zeros((2, self.count), np.bool_)

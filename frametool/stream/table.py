@@ -328,7 +328,7 @@ class PlannedRows:
         column: returns the cells of a column; lines: of the block's rows, from 0
         """
         layout, block, plan = self.layout, run.block, self.plan
-        rows, numbers = run.settled()
+        rows, numbers = run.settled(run.end)
         self.inputs = np.reshape(run.columns, (len(run.columns), run.count))[:, rows]
         used = {*layout.times, *layout.places, *layout.named}
         others = [place for place in range(self.table.width) if place not in used]
