@@ -20,7 +20,7 @@ from frametool.formats.rows.column_file import STAMP_NS, WHOLE, Made, OutColumn,
 from frametool.formats.table import FORMATS
 from frametool.geometry import arrays
 from frametool.grammar.result import in_one_list
-from frametool.stream.row_layout import POSE, SIX, TWIST, WRENCH, six_names
+from frametool.stream.row_layout import POSE, SIX, six_names
 from frametool.stream.rows import NO_STAMP, is_typed, objects, plain_cells, text_of, texts_of
 from frametool.stream.writers import PoseWriter
 from frametool.text.parse import parse_floats
@@ -118,7 +118,7 @@ class ColumnsWriter:
                 self.columns.append(column)
         if not self.columns:
             raise ValueInvalid(f"{self.style.format} has no place for any column of these: {listing(self.left_out)}")
-        texts = {name for made in blocks for name in made if isinstance(made[name].values, Spans)}
+        texts = {name for size, made in self.waiting for name in made if size and isinstance(made[name].values, Spans)}
         if (named := [column for column in self.columns if column.name in texts]) and self.has_nulls:
             types = ", ".join(f"{each.name} {TYPE_NAMES.get(each.kind, each.kind)}" for each in named)
             warn(f"types of other columns, by their cells: {types}")
@@ -209,9 +209,6 @@ class ArrayWriter(PoseWriter):
     def of_block(self, block: RowPoses) -> bytes:
         """Return what is written of a block; numbers are metres and x y z w, nan in rows without a result."""
         self.settle(block)
-        if not len(block.numbers):
-            own = {POSE: 7 if self.placed else 4, TWIST: 6, WRENCH: 6}.get(self.kind, 3)
-            block = block._replace(numbers=np.empty((0, own + len(self.extras))))
         return self.file.of_columns(len(block.numbers), self._made(block))
 
     def end(self) -> Iterator[bytes]:

@@ -49,7 +49,6 @@ if TYPE_CHECKING:
     from collections.abc import Generator, Iterable, Iterator, Sequence
 
     from frametool.formats.rows.column_file import ColumnFile
-    from frametool.geometry.types import Components
     from frametool.stream.column_stream import ColumnRows
     from frametool.stream.record_values import Value
     from frametool.text.lines import ByteStream
@@ -90,9 +89,9 @@ class Blocks(ResultWriter):
         if (posed := block.posed()) is not None:
             return self._write(posed)
         values, to_arrays = [*block.in_order()], holds(self.style.format, "arrays")
-        is_any = any(not isinstance(each, Result) or each.pose.position is not None for each in values)
-        placed = is_any or not to_arrays if self.writer is None else self.writer.placed
-        return self._write(block_of(values, placed=placed, timed=not to_arrays)) if values else b""
+        has_any = any(not isinstance(each, Result) or each.pose.position is not None for each in values)
+        block = block_of(values, timed=not to_arrays)._replace(placed=has_any or not to_arrays)
+        return self._write(block) if values else b""
 
     def end(self) -> Iterator[bytes]:
         """Yield what comes behind the last."""
@@ -105,9 +104,7 @@ class Blocks(ResultWriter):
             self.writer = writer_for(self.style, block)
         if block.kind != self.writer.kind:
             raise ValueInvalid(f"one file holds things of one kind, found {self.writer.kind} and {block.kind}")
-        if block.placed > self.writer.placed:
-            block = block._replace(numbers=block.numbers[:, 3:], placed=False)
-        return self.writer.of_block(block)
+        return self.writer.of_block(block._replace(placed=self.writer.placed))
 
 
 def poses_text(values: Iterable[Value], style: Style) -> str:
@@ -313,10 +310,7 @@ def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
 
 def _edges(block: RowPoses, line: int, fmt: Rows, options: Options) -> EdgeColumns:
     """Return the poses of a block, of frames that move where they have stamps."""
-    columns: Components = tuple(block.numbers.T)
-    if len(columns) == len("xyzw"):
-        columns = (*[columns[0] * 0.0] * 3, *columns)
-    poses = [*zip(*(column.tolist() for column in columns), strict=True)]
+    poses = [*map(tuple, block.numbers.tolist())]
     stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
     bare, usual = options.tally.names.bare, options.answers.names(*fmt.frames)
     parents, names = (

@@ -80,9 +80,9 @@ class Gathered:
         line = 1
         for rows, outcome in steps:
             if len(rows.numbers):
-                numbers = rows.numbers[:, : 7 if rows.placed else 4]
-                missing = (7 - numbers.shape[1], 0) if not rows.placed else (0, 7 - numbers.shape[1])
-                numbers = np.pad(numbers, ((0, 0), missing), constant_values=np.nan)
+                numbers = rows.numbers[:, :7]
+                numbers = np.pad(numbers, ((0, 0), (0, 7 - numbers.shape[1])), constant_values=np.nan)
+                numbers[:, : 0 if rows.placed else POSITION] = np.nan
                 extras = {key: rows.extras[key] for key in self.keys if key in rows.extras}
                 self.blocks.append(rows._replace(numbers=numbers, lines=rows.lines + line, extras=extras))
             line += outcome.lines

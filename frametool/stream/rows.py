@@ -336,7 +336,7 @@ class RowPoses(NamedTuple):
     parents, names: one a row, one for all, or none
     extras: columns that are not ours, by name: cells of text, numbers as they are, or objects (see `objects`)
     read: (n, 3) lat lon alt of positions on the Earth that nothing has moved, as they were read
-    kind: what a row is: a pose, a point, ..; placed: whether poses have positions, which else are left out
+    kind: what a row is: a pose, a point, ..; placed: poses have positions, which else are 0
     more: the names of the numbers that come behind those of the thing itself
     """
 
@@ -408,17 +408,16 @@ def is_typed(cells: Any) -> bool:
     return isinstance(cells, np.ndarray) and cells.ndim == 1 and cells.dtype.kind in "fiubM"
 
 
-def block_of(values: Sequence[Value], *, placed: bool = True, timed: bool = True, as_poses: bool = False) -> RowPoses:
+def block_of(values: Sequence[Value], *, timed: bool = True, as_poses: bool = False) -> RowPoses:
     """Return results as one block of poses, points, vectors, twists or wrenches.
 
     What a pose lacks is 0 or the identity; stamps that only some have are another column.
-    placed: poses have positions; timed: either all have a stamp, or none
-    as_poses: a position without a rotation is a pose too, not a point
+    timed: either all have a stamp, or none; as_poses: a position without a rotation is a pose too, not a point
     Raises ValueInvalid for things of several kinds, for other mappings, and for stamps that are missing.
     """
     if not values:
         return NO_ROWS
-    rows = (_row_of(value, placed=placed, as_poses=as_poses) for value in values)
+    rows = (_row_of(value, as_poses=as_poses) for value in values)
     kinds, numbers, frames, others = zip(*rows, strict=True)
     if len({*kinds}) > 1:
         raise ValueInvalid(f"one file holds things of one kind, found {' and '.join(sorted({*kinds}))}")
@@ -432,18 +431,18 @@ def block_of(values: Sequence[Value], *, placed: bool = True, timed: bool = True
     return RowPoses(
         np.array(numbers, np.float64) + 0.0, stamps_ns, np.arange(len(numbers)), parents, names,  # none is -0.0
         {key: objects(column) for key, column in columns.items()},
-        None if None in read else np.array(read, np.float64), kinds[0], placed,
+        None if None in read else np.array(read, np.float64), kinds[0],
     )  # fmt: skip
 
 
-def _row_of(value: Value, *, placed: bool, as_poses: bool) -> tuple[str, Sequence[Any], Frames, Mapping[str, Any]]:
+def _row_of(value: Value, *, as_poses: bool) -> tuple[str, Sequence[Any], Frames, Mapping[str, Any]]:
     """Return what a result is, its numbers, the names of its frames, and its other fields."""
     if isinstance(value, Result):
         pose, extras = value.pose, value.extras
         if pose.rotation is None and pose.position is not None and not as_poses:
             return POINT, pose.position, (pose.parent, None), ({"name": pose.name} if pose.name else {}) | extras
         scale = {} if pose.scale == 1.0 else {SCALE: pose.scale}
-        return POSE, pose.components[0 if placed else 3 :], (pose.parent, pose.name), scale | extras
+        return POSE, pose.components, (pose.parent, pose.name), scale | extras
     kind, keys = next((each for each in MAPPINGS if {*each[1]} <= value.keys()), MAPPINGS[0])
     numbers: list[Any] = []
     for part in map(value.get, keys):
@@ -467,7 +466,7 @@ def values_of(block: RowPoses, place: Place | None = None) -> list[Any]:
 
     place: how positions on the Earth are written
     """
-    kind, extras, placed = block.kind, block.more, block.placed
+    kind, extras = block.kind, block.more
     names, parents = map(block.for_each, (block.names, block.parents))
     others = {name: plain_cells(cells) for name, cells in block.extras.items()}
     stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
@@ -481,9 +480,8 @@ def values_of(block: RowPoses, place: Place | None = None) -> list[Any]:
         said |= {name: cells[at] for name, cells in others.items()}
         named: dict[str, Any] = {"name": names[at]} if names[at] else {}
         if kind == POSE:
-            components = NOWHERE if own is None else own if placed else (0.0, 0.0, 0.0, *own)
-            pose = Pose.of(components, names[at], parents[at])._replace(read=block.spot(at))
-            pose = pose if placed else pose._replace(position=None)
+            pose = Pose.of(own or NOWHERE, names[at], parents[at])._replace(read=block.spot(at))
+            pose = pose if block.placed else pose._replace(position=None)
             made.append(NoResult(pose, said) if own is None else Result(pose, said))
         elif place is not None and own is not None:
             from frametool.grammar.place import point_entry

@@ -29,7 +29,6 @@ from frametool.stream.header import has_pose_column, listed
 from frametool.stream.request import SOME
 from frametool.stream.row_layout import NORMAL, POSE, RATE, In, Out, Shape
 from frametool.stream.rows import (
-    NO_ROWS,
     Block,
     BlockNames,
     Coded,
@@ -346,7 +345,10 @@ class PlannedRows:
             [name] if place is None else block.names.texts(role, rows)
             for role, (place, name) in enumerate(zip(layout.named, unnamed, strict=True))
         )
-        return RowPoses(numbers[:, :own], stamps, lines[rows], parents, names, extras)
+        numbers = numbers[:, :own]
+        if plan.targets[0].kind == POSE and plan.targets[0].unit is None:
+            numbers = np.hstack([numbers[:, :1] * np.zeros(3), numbers])
+        return RowPoses(numbers, stamps, lines[rows], parents, names, extras)
 
 
 class TableRows(PlannedRows):
@@ -374,9 +376,9 @@ class TableRows(PlannedRows):
 
     def steps(self) -> Iterator[tuple[RowPoses, Outcome]]:
         """Yield the results of each block for another format."""
-        yield NO_ROWS, Outcome(b"", lines=self.lines, size=self.taken)
-        for text in self.texts:
+        for text in chain((b"",), self.texts):  # the head has no rows, but columns
             run, outcome, cells = self.of_text(text)
+            outcome = outcome if text else Outcome(b"", lines=self.lines, size=self.taken)
             yield self.poses_of(run, cells.column, cells.lines_before()[cells.rows]), outcome
 
     def of_text(self, text: bytes) -> tuple[Run, Outcome, Cells]:

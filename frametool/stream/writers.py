@@ -71,9 +71,8 @@ class PoseWriter(ResultWriter):
         self.target = target_of(style, first.kind, placed=self.placed)
 
     def columns(self, block: RowPoses) -> Components:
-        """Return the numbers of a block as columns; poses that are not placed are at 0."""
-        columns = tuple(map(np.ascontiguousarray, block.numbers.T))
-        return columns if self.placed else (*[columns[0] * 0.0] * 3, *columns)
+        """Return the numbers of a block as columns."""
+        return tuple(map(np.ascontiguousarray, block.numbers.T))
 
     def settle(self, block: RowPoses) -> None:
         """Refuse positions of another frame than the Earth's, if these are wanted; the first may be the origin."""
@@ -261,7 +260,7 @@ class RowsWriter(PoseWriter):
         columns = {repr(number): at for at, number in enumerate(numbers) if type(number) is float}
         parent = PARENT if place is None or self.kind == POSE else EARTH_FRAMES[0]
         one = block._replace(
-            numbers=np.array([[*own[0 if self.placed else 3 :], *more]]), read=None,
+            numbers=np.array([[*own, *more]]), read=None, placed=self.placed,
             stamps_ns=None if block.stamps_ns is None else np.array([STAMP_NS]),
             parents=block.parents if len(block.parents) == 1 else [parent],
             names=block.names if len(block.names) == 1 else [NAME],
