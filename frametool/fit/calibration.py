@@ -78,7 +78,7 @@ def solve_mean(
 
     tried = range(len(own)) if len(own) <= MOST_TRIED else next(lsq.draws(1, MOST_TRIED, len(own)))
     start = own[min(tried, key=apart)] if robust else own[0]
-    found = lsq.settled(
+    found = lsq.robust_fit(
         start, lambda middle: roots[counts] * lsq.errors(own, middle),
         lambda _, weights: own.mean(weights * weight), mean_of, unknown=3, robust=robust,
     )  # fmt: skip
@@ -166,7 +166,7 @@ def solve_points(
         chosen.require_plane()
         return umeyama(*chosen, with_scale=scale)
 
-    found = lsq.settled(start, pairs.weighted_residuals, rough, fit, unknown=6 + scale, robust=robust)
+    found = lsq.robust_fit(start, pairs.weighted_residuals, rough, fit, unknown=6 + scale, robust=robust)
     best, sigma, kept = found.model, float(found.sigmas[0]), found.kept
     covariance, scale_sigma = pairs.at(kept).covariance(best, sigma, with_scale=scale)
     used = mass > 0.0
@@ -345,7 +345,7 @@ def solve_hand_eye(
     def rough(model: _Model, weights: Array) -> _Model:
         return samples.fitted(model._replace(cut="target"), weights, ROUGH_STEPS)
 
-    found = lsq.settled(start, samples.residuals, rough, likeliest, unknown=6, robust=robust)
+    found = lsq.robust_fit(start, samples.residuals, rough, likeliest, unknown=6, robust=robust)
     model = found.model
     s_t, s_r = found.sigmas.tolist()
     rms = np.sqrt((lsq.lengths(found.residuals[found.kept]) ** 2).mean(0))

@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from frametool.fit.measured_tree import Fitted
+    from frametool.fit.tree_problem import Fitted
     from frametool.geometry.types import Array
 
     Mask: TypeAlias = NDArray[np.bool_]
     Rows: TypeAlias = slice | list[int] | Mask
 
 
-class NotSettled(ValueInvalid):
+class Undetermined(ValueInvalid):
     """Equations that have no solution."""
 
     def __init__(self) -> None:
@@ -42,26 +42,26 @@ class NotSettled(ValueInvalid):
 def solve_normal(matrix: Array, right: Array) -> Array:
     """Return inv(matrix) right, (n, k), of a symmetric positive definite matrix; its rows may differ in units.
 
-    Raises NotSettled if there is no solution.
+    Raises Undetermined if there is no solution.
     """
     diagonal = np.diagonal(matrix)[:, None]
     if not (diagonal > 0.0).all():
-        raise NotSettled
+        raise Undetermined
     units = np.sqrt(diagonal)
     try:
         found: Array = np.linalg.solve(matrix / units / units.T, right / units) / units
     except np.linalg.LinAlgError:
-        raise NotSettled from None
+        raise Undetermined from None
     if not np.isfinite(found).all():
-        raise NotSettled
+        raise Undetermined
     return found
 
 
 def inverse(matrix: Array) -> Array:
-    """Return the inverse of a symmetric positive definite matrix, symmetric; raises NotSettled if there is none."""
+    """Return the inverse of a symmetric positive definite matrix, symmetric; raises Undetermined if there is none."""
     found = solve_normal(matrix, np.eye(len(matrix)))
     if not (np.diagonal(found) > 0.0).all():
-        raise NotSettled
+        raise Undetermined
     return (found + found.T) / 2.0
 
 
@@ -159,7 +159,7 @@ def stacked(transforms: Iterable[Transform]) -> Transform:
 
 
 Model = TypeVar("Model")
-Found = TypeVar("Found", bound="Settled[Any] | Fitted")
+Found = TypeVar("Found", bound="RobustFit[Any] | Fitted")
 
 KEPT = 3.0  # sigmas: a larger residual is an outlier
 CERTAIN = 2.5  # sigmas: up to here a first weight is 1
@@ -191,7 +191,7 @@ def draws(count: int, size: int, among: int) -> Iterator[list[int]]:
         yield sorted(chosen)
 
 
-class Settled(NamedTuple, Generic[Model]):
+class RobustFit(NamedTuple, Generic[Model]):
     """A fit of the inliers: residuals of all (n, 3 or 6), a sigma for each three of them, and u of each row."""
 
     model: Model
@@ -201,10 +201,10 @@ class Settled(NamedTuple, Generic[Model]):
     u: Array = np.ones(0)
 
 
-def settled(
+def robust_fit(
     model: Model, residuals: Callable[[Model], Array], rough: Callable[[Model, Array], Model],
     fit: Callable[[Model, Array], Model], *, unknown: int, robust: bool,
-) -> Settled[Model]:  # fmt: skip
+) -> RobustFit[Model]:  # fmt: skip
     """Fit, reject rows beyond 3 sigmas, and fit the rest again until the inliers do not change.
 
     residuals: (n, 3) or (n, 6) of a model; unknown: the number of unknowns that each three of them share
@@ -217,15 +217,15 @@ def settled(
         off = residuals(model)
         return deviations(off, np.array([median_sigma(part, share) for part in lengths(off).T]))
 
-    def fitted(found: Settled[Model], kept: Mask) -> Settled[Model]:
+    def fitted(found: RobustFit[Model], kept: Mask) -> RobustFit[Model]:
         model = fit(found.model, kept.astype(float))
         off = residuals(model)
         sigmas = fitted_sigmas(off, kept, unknown)
-        return Settled(model, kept, off, sigmas, deviations(off, sigmas))
+        return RobustFit(model, kept, off, sigmas, deviations(off, sigmas))
 
     if robust:
         model, kept = first_inliers(model, by_medians, rough)
-    return reselected(Settled(model, kept), fitted, robust=robust)
+    return refit_inliers(RobustFit(model, kept), fitted, robust=robust)
 
 
 def first_inliers(
@@ -242,7 +242,7 @@ def first_inliers(
     return model, u <= KEPT
 
 
-def reselected(found: Found, fit: Callable[[Found, Mask], Found], *, robust: bool) -> Found:
+def refit_inliers(found: Found, fit: Callable[[Found, Mask], Found], *, robust: bool) -> Found:
     """Fit the rows that are kept, and those within 3 sigmas of that fit again, until they do not change.
 
     fit: returns a better fit of some rows, with the rows that it used as `kept`, and `u` of all
@@ -278,5 +278,3 @@ def fitted_sigmas(residuals: Array, weights: Array | Mask, unknown: int) -> Arra
 def median_sigma(lengths: Array, share: float = 1.0) -> float:
     """Return the sigma of three numbers each from their median length; share q: the noise left by a fit."""
     return max(float(np.median(lengths)) / (MEDIAN_OF_THREE * share), LEAST)
-
-

@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import Verbatim
 from frametool.errors import FormatError, ValueInvalid, alternatives, did_you_mean, first_of, shown, warn
-from frametool.fit.measured_tree import Measurement, solve_tree
+from frametool.fit.blunders import Measurement
+from frametool.fit.measured_tree import solve_tree
 from frametool.formats.load import EdgePlace, FrameFile, lines_of, load
 from frametool.formats.trees.tree_reader import MOST_KEYS, read_edges
 from frametool.frames.lookups import FrameTree, taken

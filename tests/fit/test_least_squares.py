@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import samples
 
-from frametool.fit.least_squares import NotSettled, align_vectors, inverse, solve_normal
+from frametool.fit.least_squares import Undetermined, align_vectors, inverse, solve_normal
 from frametool.geometry.transform import Rotation
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def test_what_is_solved_for_is_a_solution(size: int) -> None:
 
 @pytest.mark.parametrize("matrix", [[[0.0]], [[1.0, 2.0], [2.0, 1.0]], [[1.0, 1.0], [1.0, 1.0]], [[np.nan]]])
 def test_what_has_no_inverse_is_an_error(matrix: list[list[float]]) -> None:
-    with pytest.raises(NotSettled):
+    with pytest.raises(Undetermined):
         inverse(np.array(matrix))
 
 

@@ -14,7 +14,8 @@ import pytest
 from worlds import COVARIANCE, SIGMA_M, SIGMA_RAD, World, inverted, world
 
 from frametool.errors import ValueInvalid
-from frametool.fit.measured_tree import BLUNDERS, Measurement, TreeSolution, solve_tree
+from frametool.fit.blunders import BLUNDERS, Measurement
+from frametool.fit.measured_tree import TreeSolution, solve_tree
 from frametool.frames.lookups import FrameTree
 from frametool.geometry.conventions import axes_change
 from frametool.geometry.transform import Rotation, Transform

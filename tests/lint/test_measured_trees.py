@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from frametool.fit.measured_tree import BLUNDERS, Measurement
+from frametool.fit.blunders import BLUNDERS, Measurement
 from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
@@ -59,8 +59,8 @@ def test_each_blunder_is_named(run: Run, words: str) -> None:
         "translation of the inverse": row(Transform(true.rotation, true.inverse().components[:3])),
         "wxyz taken for xyzw": row(Transform.of(*true.components[:3], true.components[6], *true.components[3:6])),
         "xyzw taken for wxyz": row(Transform.of(*true.components[:3], *true.components[4:], true.components[3])),
-        "millimetres": row(Measurement("", "", true.components).shifted(1000.0)),
-        "metres taken for millimetres": row(Measurement("", "", true.components).shifted(0.001)),
+        "millimetres": row(Measurement("", "", true.components).rescaled(1000.0)),
+        "metres taken for millimetres": row(Measurement("", "", true.components).rescaled(0.001)),
         "degrees taken for radians": GOOD.replace("[0.4, -0.3, 1.1]", "[22.918, -17.189, 63.025]"),
         "radians taken for degrees": GOOD.replace("rpy", "rpy_deg"),
         "yaw, pitch, roll taken for roll, pitch, yaw": GOOD.replace("[0.4, -0.3, 1.1]", "[1.1, -0.3, 0.4]"),

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from frametool.fit.measured_tree import Measurement
+    from frametool.fit.blunders import Measurement
 
     Read = Callable[..., list[Measurement]]
 

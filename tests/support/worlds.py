@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.fit.measured_tree import Measurement, bridges, spanning_tree
+from frametool.fit.blunders import Measurement
+from frametool.fit.bodies import bridges, spanning_tree
 from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ class World(NamedTuple):
         rows = [row for row in range(len(self.measurements)) if row not in leave_out]
         tree, poses = spanning_tree(len(self.poses), self.pairs, rows), {"f0": Transform.identity()}
         for body in tree.order[1:]:
-            row, above = self.measurements[tree.row[body]], poses[f"f{tree.above[body]}"]
+            row, above = self.measurements[tree.row[body]], poses[f"f{tree.parent[body]}"]
             poses[f"f{body}"] = above @ (row.transform if row.child == f"f{body}" else row.transform.inverse())
         return poses
 
@@ -64,7 +65,7 @@ class World(NamedTuple):
         if len(tree.order) < len(self.poses):
             return False
         alone = bridges(tree, self.pairs, rest)
-        return not any(alone.intersection(tree.way(*self.pairs[row])) for row in wrong)
+        return not any(alone.intersection(tree.rows_between(*self.pairs[row])) for row in wrong)
 
 
 def world(

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     import click
 
-    from frametool.fit.measured_tree import Measurement
+    from frametool.fit.blunders import Measurement
     from frametool.formats.load import FrameFile
 
 FAILED = 1
@@ -103,16 +103,16 @@ def _with_loops(
     """Return the findings on files, then the measurements that do not agree; report those that were not compared."""
     if not rows:
         return check(files, normalize=normalize)
-    from frametool.fit.measured_tree import loops
+    from frametool.fit.blunders import disagreements
     from frametool.frames.lookups import FrameTree
 
     tree = FrameTree()
     findings = check(files, normalize=normalize, tree=tree)
-    found, lacking, apart = loops(tree, rows, tolerance)
-    if lacking:
-        warn(f"frames that the tree does not have, or that move; not compared: {listing(lacking)}")
-    if apart:
-        warn(f"{apart} of {len(rows)} measurements not compared: their frames are not connected by static frames")
+    found, missing, unconnected = disagreements(tree, rows, tolerance)
+    if missing:
+        warn(f"frames that the tree does not have, or that move; not compared: {listing(missing)}")
+    if unconnected:
+        warn(f"{unconnected} of {len(rows)} measurements not compared: their frames are not connected by static frames")
     return [*findings, *found]
 
 

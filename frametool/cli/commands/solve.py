@@ -35,7 +35,8 @@ UNSURE = 1.2  # input sigmas that are too small by this factor are reported
 
 def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
     """Estimate the tree of the measurements in files, with the edges of --fix."""
-    from frametool.fit.measured_tree import parted, solve_tree
+    from frametool.fit.blunders import split_place
+    from frametool.fit.measured_tree import solve_tree
     from frametool.stream.measurements import read_measurements, without
 
     recordings = opened(inputs, files)
@@ -43,7 +44,7 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
     report_files(inputs, recordings)
     inputs.refuse_unused("topics")
     for each in recordings:
-        own = [row for row in rows if parted(row.place)[0] == each.name]
+        own = [row for row in rows if split_place(row.place)[0] == each.name]
         first = f": {own[0].parent}<-{own[0].child} .." if own else ""
         count = f"{len(own)} row{'s' * (len(own) != 1)}"
         inputs.note(f"{each.name}: {count}, each the pose of child in parent{first}")

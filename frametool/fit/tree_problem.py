@@ -1,0 +1,301 @@
+"""Measurements between bodies as a least-squares problem: initial poses, Gauss-Newton steps, noise and inliers."""
+
+from __future__ import annotations
+
+import math
+import random
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from frametool.errors import ValueInvalid, printable
+from frametool.fit import least_squares as lsq
+from frametool.fit.bodies import SpanningTree, bridges, spanning_tree
+from frametool.geometry.rigid import IDENTITY, compose
+from frametool.geometry.transform import Transform
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from frametool.fit.blunders import Measurement
+    from frametool.fit.bodies import Bodies
+    from frametool.geometry.types import Array
+
+
+TREES = 200
+SINGULAR = 1e-12  # of the correlations: the least eigenvalue of a valid covariance
+STEPS = 100
+MOST_DAMPED = 1e12
+REST = 1e-12  # of the extent, radians, and of a sigma: convergence of steps
+BORROWED = 0.3  # degrees of freedom of metres that radians add, and vice versa, if loops are few
+LEAST_SHARE = 0.04  # of the rows in loops, relative to the unknowns
+
+
+class Noise(NamedTuple):
+    """The sigmas of measurements without their own, and the factor by which stated ones are too small."""
+
+    translation: float = 0.01
+    rotation: float = math.radians(1.0)
+    factor: float = 1.0
+
+    def at_least(self, other: Noise) -> Noise:
+        """Return sigmas that are at least those of another."""
+        return Noise(*map(max, self, other._replace(factor=self.factor)))
+
+
+LOWEST = Noise(0.001, math.radians(0.1))  # medians if loops are few: most rows of a tree have no residual
+
+
+class Fitted(NamedTuple):
+    """Bodies that fit the inliers best.
+
+    estimated: whether these rows determine their own noise
+    few_loops: whether rotations can close all loops, so that metres alone do not determine their sigma
+    u: the residual of each row in sigmas
+    """
+
+    bodies: Transform
+    kept: Any
+    noise: Noise
+    estimated: bool = False
+    few_loops: bool = False
+    u: Array = np.ones(0)
+
+
+def jacobians(parent: Transform, child: Transform, turned: Array) -> tuple[Array, Array]:
+    """Return dr/da, dr/db, (n, 6, 6), of rows between frames at a and b; turned: the errors of the rotations."""
+    back = parent.rotation.inverse().as_matrix()
+    turn = lsq.inverse_left_jacobian(turned) @ back
+    by_parent, by_child = np.zeros((2, *turned.shape[:-1], 6, 6))
+    by_child[..., :3, :3], by_child[..., 3:, 3:] = back, turn
+    by_parent[..., :3, :3], by_parent[..., 3:, 3:] = -back, -turn
+    by_parent[..., :3, 3:] = back @ lsq.skew(child.xyz - parent.xyz)
+    return by_parent, by_child
+
+
+def by_body_step(jacobian: Array, body: Transform, frame: Transform) -> Array:
+    """Return the Jacobian by the step of a body from that by the step of a frame in it, by its lever arm."""
+    moved = jacobian.copy()
+    moved[..., 3:] -= jacobian[..., :3] @ lsq.skew(frame.xyz - body.xyz)
+    return moved
+
+
+class TreeProblem:
+    """Rows between bodies, and the poses that fit them."""
+
+    def __init__(self, measurements: Sequence[Measurement], bodies: Bodies) -> None:
+        """Store measurements as arrays: of bodies, of the poses of the measured frames in them, of covariances."""
+        self.measurements, self.size, self.unknown = measurements, len(measurements), max(bodies.number.values())
+        self.count = self.unknown + 1
+        sides = [[each.parent for each in measurements], [each.child for each in measurements]]
+        self.parent, self.child = (np.array([bodies.number[name] for name in side]) for side in sides)
+        self.in_parent, self.in_child = (lsq.stacked(bodies.pose[name] for name in side) for side in sides)
+        self.measured = lsq.stacked(each.transform for each in measurements)
+        self.stated = np.array([each.covariance is not None for each in measurements])
+        self._stated = np.zeros((self.size, 6, 6))  # the inverses of their covariances
+        for row in np.flatnonzero(self.stated).tolist():
+            covariance = np.array(measurements[row].covariance, float).reshape(6, 6)
+            sigmas = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+            if not sigmas.all() or np.linalg.eigvalsh(covariance / np.outer(sigmas, sigmas))[0] < SINGULAR:
+                raise ValueInvalid(f"{self.place(row)}: the covariance is exact in some direction; exact: --fix")
+            self._stated[row] = lsq.inverse(covariance)
+        self.pairs = list(zip(self.parent.tolist(), self.child.tolist(), strict=True))
+        self.arm = max(float(np.median(lsq.length(self.measured.xyz))), lsq.LEAST)
+        across = self.in_parent @ self.measured @ self.in_child.inverse()  # parent_from_child, of bodies
+        both = across.inverse(), across
+        self._across = [[*zip(*(part.tolist() for part in each.components), strict=True)] for each in both]
+        self._moves = (self.parent != self.child)[:, None, None]  # a row within a body has no effect
+
+    def place(self, row: int) -> str:
+        """Return the place of a measurement, else its number."""
+        return printable(self.measurements[row].place) or f"measurement {row + 1}"
+
+    def ends(self, bodies: Transform) -> tuple[Transform, Transform]:
+        """Return the poses of the frames of each row."""
+        return bodies[self.parent] @ self.in_parent, bodies[self.child] @ self.in_child
+
+    def errors(self, bodies: Transform) -> Array:
+        """Return the residuals, (n, 6)."""
+        parent, child = self.ends(bodies)
+        return lsq.errors(parent.inverse() @ child, self.measured)
+
+    def information(self, noise: Noise, factor: float = 1.0) -> Array:
+        """Return the inverse covariances, (n, 6, 6); factor: of stated sigmas."""
+        diagonal = [noise.translation**-2] * 3 + [noise.rotation**-2] * 3
+        return np.where(self.stated[:, None, None], self._stated / factor**2, np.diag(diagonal))
+
+    def u(self, errors: Array, noise: Noise) -> Array:
+        """Return the residual of each row in sigmas: the root mean square of its six numbers."""
+        return lsq.sigmas(errors, self.information(noise, noise.factor))
+
+    def tree(self, rows: Iterable[int]) -> SpanningTree:
+        """Return the spanning tree of the first rows that close no loop."""
+        return spanning_tree(self.count, self.pairs, rows)
+
+    # initial values
+
+    def initial_bodies(self, trees: int) -> Transform:
+        """Place the bodies by the spanning tree with which most other rows, including outliers, agree.
+
+        The rows are tried in their order, shuffled, and last sorted by how well each ever closed a loop: outliers never
+        do.
+        """
+        shuffled = random.Random(0)  # noqa: S311 - random() gives the same numbers in every Python
+        rows = range(self.size)
+        best = lsq.stacked([Transform.identity()] * self.count)
+        least, closest = math.inf, np.full(self.size, math.inf)
+
+        for at in range(trees + (trees > 1)):
+            order: Sequence[int] = rows
+            if at:
+                by = closest.tolist() if at == trees else [shuffled.random() for _ in rows]
+                order = sorted(rows, key=by.__getitem__)
+            tree = self.tree(order)
+            placed = self.poses_along(tree)
+            off = np.log1p(self.u(self.errors(placed), Noise()) ** 2)
+            if (sum_off := float(off.sum())) < least:
+                best, least = placed, sum_off
+            off[tree.row[1:]] = math.inf  # a tree agrees with its own rows
+            closest = np.minimum(closest, off)
+        return best
+
+    def poses_along(self, tree: SpanningTree) -> Transform:
+        """Return the poses of the bodies in a tree of rows."""
+        poses = [IDENTITY] * self.count
+        for body in tree.order[1:]:
+            row = tree.row[body]
+            poses[body] = compose(*poses[tree.parent[body]], *self._across[self.pairs[row][1] == body][row])
+        return Transform.of(*map(np.array, zip(*poses, strict=True)))
+
+    # Gauss-Newton
+
+    def normal_equations(self, bodies: Transform, information: Array) -> tuple[Array, Array, float]:
+        """Return J'LJ and J'Lr, six rows for each unknown body, and r'Lr."""
+        (parent, child), count = self.ends(bodies), self.count
+        off = lsq.errors(parent.inverse() @ child, self.measured)
+        by_parent, by_child = (self._moves * by for by in jacobians(parent, child, off[:, 3:]))
+        sides = [
+            (self.parent, by_body_step(by_parent, bodies[self.parent], parent)),
+            (self.child, by_body_step(by_child, bodies[self.child], child)),
+        ]
+        weighed = lsq.applied(information, off)
+        normal, gradient = np.zeros((count, count, 6, 6)), np.zeros((count, 6))
+        for body, by in sides:
+            np.add.at(gradient, body, lsq.applied(by.swapaxes(1, 2), weighed))
+            for other, by_other in sides:
+                np.add.at(normal, (body, other), by.swapaxes(1, 2) @ information @ by_other)
+        size = 6 * self.unknown
+        matrix = normal[1:, 1:].swapaxes(1, 2).reshape(size, size)
+        return matrix, gradient[1:].reshape(size), float((off * weighed).sum())
+
+    def damped_step(self, bodies: Transform, information: Array, damping: float) -> tuple[Transform, float, float]:
+        """Take one step, damped until it helps; return the bodies, the size of the step and the damping."""
+        normal, gradient, before = self.normal_equations(bodies, information)
+        diagonal = np.diagonal(normal).copy()
+        extent = max(float(np.abs(bodies.xyz).max()), lsq.LEAST)
+        while damping < MOST_DAMPED:
+            np.fill_diagonal(normal, diagonal * (1.0 + damping))
+            step = np.zeros((self.count, 6))
+            step[1:] = -lsq.solve_normal(normal, gradient[:, None]).reshape(-1, 6)
+            moved, size = lsq.stepped(bodies, step), float(np.abs(step / ([extent] * 3 + [1.0] * 3)).max())
+            off = self.errors(moved)
+            after = float((off * lsq.applied(information, off)).sum())
+            if size <= REST or after <= before * (1 + 1e-12):
+                return moved, size, damping / 10 if damping > 1e-9 else 0.0
+            damping = max(damping * 10, 1e-6)
+        return bodies, 0.0, 0.0
+
+    # noise, and selection of rows
+
+    def estimated_noise(self, bodies: Transform, kept: Any, noise: Noise, *, estimate: bool, few_loops: bool) -> Noise:
+        """Return the noise of the used rows: sums of squares over their degrees of freedom."""
+        dof = 3.0 * (kept.sum() - self.unknown)
+        if dof <= 0:
+            return Noise()
+        errors = self.errors(bodies)
+        free, stated = kept & ~self.stated, kept & self.stated
+        factor = 1.0
+        if stated.any():
+            chi2 = 6 * float((self.u(errors, Noise())[stated] ** 2).sum())
+            factor = max(1.0, math.sqrt(chi2 / (2 * dof * stated.sum() / kept.sum())))
+        if not estimate:
+            return Noise(factor=factor)
+        squares = [float((part[free] ** 2).sum()) for part in np.hsplit(errors, 2)]
+        dofs = [dof * free.sum() / kept.sum()] * 2
+        if few_loops:
+            # with the degrees of freedom of metres and of radians the sigmas converge to the maximum of the restricted
+            # likelihood (REML); source: Foerstner 1979
+            information = self.information(noise) * kept[:, None, None]
+            covariance = lsq.inverse(self.normal_equations(bodies, information)[0])
+            information *= ~self.stated[:, None, None]
+            for at, half in enumerate(np.kron(np.eye(2), np.ones(3))):
+                own = self.normal_equations(bodies, information * np.outer(half, half))[0]
+                dofs[at] = BORROWED + (3.0 * free.sum() - float((covariance * own).sum()))
+            squares[0] += BORROWED * (noise.rotation * self.arm) ** 2
+            squares[1] += BORROWED * (noise.translation / self.arm) ** 2
+        s_t, s_r = (max(float(np.sqrt(each / own)), lsq.LEAST) for each, own in zip(squares, dofs, strict=True))
+        return Noise(s_t, s_r, factor)
+
+    def median_noise(self, errors: Array, looped: Any) -> Noise:
+        """Return the noise from the medians of the rows in loops."""
+        unknown = self.unknown - (self.size - looped.sum())  # every row in no loop determines one
+        share = math.sqrt(max(1 - unknown / looped.sum(), LEAST_SHARE))
+        free, stated = looped & ~self.stated, looped & self.stated
+        noise = Noise()
+        if stated.any():
+            factor = float(np.median(_odd_count(self.u(errors, noise)[stated]))) / (lsq.MEDIAN_OF_SIX * share)
+            noise = noise._replace(factor=max(1.0, factor))
+        if free.any():
+            s_t, s_r = (lsq.median_sigma(_odd_count(each), share) for each in lsq.lengths(errors[free]).T)
+            noise = Noise(s_t, s_r, noise.factor)
+        return noise.at_least(LOWEST) if looped.sum() <= 2 * unknown else noise
+
+    def fitted(self, *, robust: bool) -> Fitted:
+        """Select the rows that agree, or all, and fit them by plain least squares."""
+        every = range(self.size)
+        bodies, noise = self.initial_bodies(TREES if robust and self.size > self.unknown else 1), Noise()
+        kept = np.ones(self.size, bool)
+        looped = kept.copy()
+        looped[list(bridges(self.tree(every), self.pairs, every))] = False
+
+        def by_medians(bodies: Transform) -> Array:
+            errors = self.errors(bodies)
+            return self.u(errors, self.median_noise(errors, looped))
+
+        def rough(bodies: Transform, weights: Array) -> Transform:
+            information = self.information(self.median_noise(self.errors(bodies), looped))
+            return self.damped_step(bodies, information * weights[:, None, None], 0.0)[0]
+
+        if robust and looped.any():
+            bodies, kept = lsq.first_inliers(bodies, by_medians, rough)
+            noise = self.median_noise(self.errors(bodies), looped)
+        return lsq.refit_inliers(Fitted(bodies, kept, noise), self.refitted, robust=robust)
+
+    def refitted(self, found: Fitted, kept: Any) -> Fitted:
+        """Fit the used rows, and the nearest of the others if frames would be disconnected.
+
+        Bodies and noise are those of the least-squares solution, both converged.
+        """
+        bodies, noise = found.bodies, found.noise
+        u = self.u(self.errors(bodies), noise)
+        tree = self.tree(np.lexsort((u, ~kept)).tolist() if not kept.all() else range(self.size))
+        reached = np.isin(np.arange(self.size), tree.row)
+        if (reached & ~kept).any():
+            kept, bodies = kept | reached, self.poses_along(tree)
+        alone = np.isin(np.arange(self.size), list(bridges(tree, self.pairs, np.flatnonzero(kept).tolist())))
+        estimate = bool((kept & ~alone & ~self.stated).any()) and kept.sum() > self.unknown
+        few_loops = bool((kept & ~alone).sum() <= 2 * (self.unknown - alone.sum()))
+        damping = 0.0
+        for _ in range(STEPS):
+            information = self.information(noise) * kept[:, None, None]
+            bodies, size, damping = self.damped_step(bodies, information, damping)
+            before, noise = noise, self.estimated_noise(bodies, kept, noise, estimate=estimate, few_loops=few_loops)
+            changes = (abs(new / old - 1) for new, old in zip(noise, before, strict=True))
+            if size <= REST and max(changes) <= REST:
+                break
+        return Fitted(bodies, kept, noise, estimate, few_loops, self.u(self.errors(bodies), noise))
+
+
+def _odd_count(values: Array) -> Array:
+    """Return an odd number of values, without the largest if necessary: of two rows that disagree one is wrong."""
+    return values if len(values) % 2 else np.sort(values)[:-1]
