@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from frametool.cli.commands.batch import Ran as Ran
     from frametool.cli.commands.batch import run as run
     from frametool.errors import FrametoolError as FrametoolError
-    from frametool.fit.calibration import solve_hand_eye as solve_hand_eye
-    from frametool.fit.calibration import solve_mean as solve_mean
-    from frametool.fit.calibration import solve_points as solve_points
+    from frametool.fit.hand_eye import solve_hand_eye as solve_hand_eye
+    from frametool.fit.matched_points import solve_points as solve_points
+    from frametool.fit.robust_mean import solve_mean as solve_mean
     from frametool.formats.cameras import load_camera as load_camera
     from frametool.formats.load import load as load
     from frametool.formats.robots.urdf import load_robot as load_robot
@@ -62,7 +62,9 @@ _HOMES = {
         "frametool.cli.commands.batch": "Ran run",
         "frametool.covariance": "covariance",
         "frametool.errors": "FrametoolError",
-        "frametool.fit.calibration": "solve_hand_eye solve_mean solve_points",
+        "frametool.fit.hand_eye": "solve_hand_eye",
+        "frametool.fit.matched_points": "solve_points",
+        "frametool.fit.robust_mean": "solve_mean",
         "frametool.formats.cameras": "load_camera",
         "frametool.formats.load": "load",
         "frametool.formats.robots.urdf": "load_robot",

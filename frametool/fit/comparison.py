@@ -1,33 +1,31 @@
-"""Compare a trajectory with a reference: settings, hints, numbers as a mapping and as rows, and limits on them.
-
-Limits are for continuous integration: `ate>5cm,rpe:10m>1%,paired<90%`.
-"""
+"""Compare a trajectory with a reference: settings, hints, and the numbers found, as a mapping and as rows."""
 
 from __future__ import annotations
 
-import operator
-import re
 from math import degrees, radians, sqrt
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import ValueInvalid, alternatives, shown
-from frametool.fit import alignment
-from frametool.fit.alignment import ALIGNMENTS, SCALED, Fit, Pairs, Unaligned, fitted, statistics
+from frametool.errors import ValueInvalid
+from frametool.fit import trajectory_errors
+from frametool.fit.alignment import ALIGNMENTS, SCALED, Fit, Unaligned, fitted, lever_arm, principal_axes
+from frametool.fit.clock_offset import LIMIT_S, clock_offset
 from frametool.fit.least_squares import require_near
+from frametool.fit.pairing import Pairs, interval, paired
+from frametool.fit.trajectory_errors import Delta, statistics
 from frametool.frames.stamps import format_stamp
 from frametool.frames.trajectory import Trajectory, way
 from frametool.geometry import arrays, earth
 from frametool.geometry.floats import half_sincos
 from frametool.geometry.place import ENU, Origin
 from frametool.geometry.representations import EARTH_FRAMES
-from frametool.geometry.transform import Rotation, Transform
+from frametool.geometry.transform import Rotation, Transform, in_notebook
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator
 
-    from frametool.fit.alignment import AbsoluteErrors, RelativeErrors, SegmentErrors
+    from frametool.fit.trajectory_errors import AbsoluteErrors, RelativeErrors, SegmentErrors
     from frametool.geometry.types import Array
 
 AUTO = "auto"
@@ -39,38 +37,6 @@ APART = radians(2.0)  # a rotation between bodies that is reported, if it is als
 STEADY = 5.0  # this many times as large as its spread
 NEAR_A_LINE = 3.0  # residuals that the second axis of positions must exceed
 SLENDER = 0.1  # of the first axis: what is wider is not a line
-
-
-class Delta(NamedTuple):
-    """The distance between two poses: metres, seconds, degrees of rotation, or frames."""
-
-    amount: float
-    unit: str
-
-    def __str__(self) -> str:
-        """Format it as it is parsed."""
-        return f"{self.amount:g}{self.unit}"
-
-    def along(self, each: Trajectory) -> Array | None:
-        """Return the cumulative distance at each pose of a trajectory, in the unit; None if it is not known."""
-        if self.unit == "frames":
-            return np.arange(each.size, dtype=float)
-        if self.unit == "m":
-            return way(each.xyz)
-        if self.unit == "s":
-            return None if each.stamps_ns is None else (each.stamps_ns - each.stamps_ns[0]) / 1e9
-        rotation = each.rotation
-        return None if rotation is None else np.degrees(np.append(0.0, np.cumsum(rotation[:-1].distance(rotation[1:]))))
-
-
-def parse_delta(text: str, units: Sequence[str] = ("m", "s", "deg", "frames")) -> Delta:
-    """Read `1m`, `10frames`, `1s`, `5deg`; raises ValueInvalid."""
-    found = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+)\s*([a-z]+)", text.strip())
-    if not found or found[2] not in units or not float(found[1]) > 0:
-        raise ValueInvalid(f"{shown(text)} is not a distance between poses; write a number with {', '.join(units)}")
-    if found[2] == "frames" and not float(found[1]).is_integer():
-        raise ValueInvalid(f"{shown(text)}: frames are counted whole")
-    return Delta(float(found[1]), found[2])
 
 
 class Pairing(NamedTuple):
@@ -86,7 +52,7 @@ class Pairing(NamedTuple):
     max_diff_ns: float = 10_000_000
     min_match: float = 0.1
     offset: int | str | None = None
-    offset_limit_s: float = alignment.LIMIT_S
+    offset_limit_s: float = LIMIT_S
     start: tuple[bool, int] | None = None
     stop: tuple[bool, int] | None = None
 
@@ -170,9 +136,7 @@ class Comparison(NamedTuple):
 
     def _repr_html_(self) -> str | None:
         """Show it in a notebook as a terminal does."""
-        import frametool
-
-        return frametool.html_of(self)
+        return in_notebook(self)
 
     def whole_estimate(self) -> Trajectory:
         """Return the whole estimate as it was compared: on the reference's clock, mounted and aligned."""
@@ -242,7 +206,7 @@ def compared(
         first = pairs.at(slice(int(np.count_nonzero(is_first))))
     fit = fitted(fitting.align, first.ref, first.est, up, names, tied=fitting.tie_first)
     moved = fit.moved(pairs.est)
-    ate = alignment.absolute_errors(pairs.ref, moved, up)
+    ate = trajectory_errors.absolute_errors(pairs.ref, moved, up)
     if fitting.mount is None and not reporting.evo:
         _warn_of_bodies(pairs.ref, moved, fitting, hints)
     by_alignment: dict[str, float | None] = {}
@@ -254,14 +218,14 @@ def compared(
             by_alignment[kind] = None
     noise = by_alignment["sim3"]  # what is not significant is not, even for a fit with a scale
     if fitting.align in ("se3", "sim3") and noise is not None:
-        long, second, _ = alignment.principal_axes(first.ref.xyz)
+        long, second, _ = principal_axes(first.ref.xyz)
         if second < min(NEAR_A_LINE * noise, SLENDER * long):
             hints.append("positions lie nearly on a line: the turn about it rests on noise")
     walked = pairs.ref if reporting.pairs_from == "reference" else moved
     return Comparison(
         names, settings, ref, est, pairs, moved, fit, by_alignment, ate,
         list(_relative(pairs.ref, moved, walked, reporting, hints)),
-        alignment.segment_errors(pairs.ref, moved, reporting.segments, reporting.segment_step), hints,
+        trajectory_errors.segment_errors(pairs.ref, moved, reporting.segments, reporting.segment_step), hints,
     )  # fmt: skip
 
 
@@ -297,12 +261,12 @@ def _paired(ref: Trajectory, est: Trajectory, settings: Settings, names: tuple[s
             raise ValueInvalid(f"{names[ref.stamps_ns is not None]} has no stamps; give them with --stamps FILE")
         if pairing.offset:
             raise ValueInvalid("poses that are counted have no clock; leave the offset out")
-        return alignment.paired(ref, est)
+        return paired(ref, est)
     offset_ns, score = 0, None
     if pairing.offset == AUTO:
         kind = "sim3" if settings.fitting.align in SCALED else "se3"
         by_turning = settings.fitting.mount == AUTO
-        found = alignment.clock_offset(ref, est, limit_s=pairing.offset_limit_s, kind=kind, by_turning=by_turning)
+        found = clock_offset(ref, est, limit_s=pairing.offset_limit_s, kind=kind, by_turning=by_turning)
         if found.score < CLEAR:
             raise ValueInvalid(f"no clear clock offset (score {found.score:.2f}); give one: --offset T")
         offset_ns, score = round(found.seconds * 1e9), found.score
@@ -312,7 +276,7 @@ def _paired(ref: Trajectory, est: Trajectory, settings: Settings, names: tuple[s
     elif pairing.offset is not None:
         offset_ns = int(pairing.offset)
     shifted = est._replace(stamps_ns=est.stamps_ns + offset_ns)
-    pairs = alignment.paired(ref, shifted, pairing.max_gap_ns, pairing.max_diff_ns if is_nearest else None)
+    pairs = paired(ref, shifted, pairing.max_gap_ns, pairing.max_diff_ns if is_nearest else None)
     share = pairs.ref.size / max(pairs.possible, 1)
     counted = f"{pairs.ref.size} of {pairs.possible} poses have a partner in {names[0]}"
     if not pairs.ref.size or share < pairing.min_match:
@@ -335,11 +299,11 @@ def _span(each: Trajectory, name: str) -> str:
 
 def _warn_of_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]) -> None:
     """Warn about an offset that is clearly larger than half an interval, if estimating it is cheap."""
-    intervals = [alignment.interval(each.stamps_ns) for each in (ref, est)]
+    intervals = [interval(each.stamps_ns) for each in (ref, est)]
     span = max(ref.stamps_ns[-1], est.stamps_ns[-1]) - min(ref.stamps_ns[0], est.stamps_ns[0])
     if span > MOST_TRIED * min(intervals) / 2:
         return
-    found = alignment.clock_offset(ref, est)
+    found = clock_offset(ref, est)
     if abs(found.seconds) * 1e9 > max(intervals) / 2 and found.score > SURE:
         side = "behind" if found.seconds > 0 else "ahead"
         by = f"{abs(found.seconds):.3f} s {side} (score {found.score:.3f})"
@@ -373,7 +337,7 @@ def _mounted(pairs: Pairs, fitting: Fitting) -> Pairs:
         raise ValueInvalid("a mount needs rotations of the estimate")
     if isinstance(mount, str):  # the lever arm from the fit, and a rotation common to all pairs
         up, shared = np.array(fitting.up), None
-        arm = alignment.lever_arm(fitting.align, ref, est, up)
+        arm = lever_arm(fitting.align, ref, est, up)
         shifted = est.with_poses(est.poses @ Transform(Rotation.identity(), arm))
         placed = fitted(fitting.align, ref, shifted, up).moved(shifted)
         if ref.rotation is not None and placed.rotation is not None:
@@ -418,23 +382,22 @@ def _relative(
         along = delta.along(walked)
         if along is None:
             why = "there are no rotations" if delta.unit == "deg" else "there are no stamps"
-        elif along[-1] + delta.amount * (1 - alignment.ROUNDING) == along[-1]:
+        elif along[-1] + delta.amount * (1 - trajectory_errors.ROUNDING) == along[-1]:
             why = f"the delta is lost in rounding: the path is {along[-1]:g} {delta.unit} long"
             if reporting.deltas:
                 raise ValueInvalid(f"rpe {delta}: {why}")
         else:
-            ends = alignment.chained(along, delta.amount)
+            ends = trajectory_errors.chained(along, delta.amount)
             if reporting.all_pairs:
-                ends = alignment.all_pairs(along, delta.amount, reporting.tolerance * (delta.unit != "frames"))
+                ends = trajectory_errors.all_pairs(along, delta.amount, reporting.tolerance * (delta.unit != "frames"))
             why = "" if len(ends[0]) else "no two poses are so far apart"
         if not why:
-            yield delta, alignment.relative_errors(ref, est, *ends)
+            yield delta, trajectory_errors.relative_errors(ref, est, *ends)
         elif reporting.deltas:
             hints.append(f"rpe {delta} is left out: {why}")
 
 
-# --- reports and limits ---
-
+# --- the numbers of a comparison ---
 
 SQRT8 = 8**0.5
 
@@ -524,70 +487,3 @@ def rows(found: Comparison, which: str = "ate") -> Iterator[dict[str, Any]]:
         absent = [None] * len(columns["stamp_ns"])
         cells = [absent if column is None else np.asarray(column).tolist() for column in columns.values()]
         yield from (dict(zip(columns, row, strict=True)) for row in zip(*cells, strict=True))
-
-
-SHORT = {
-    "ate": "ate.m.rmse", "max": "ate.m.max", "deg": "ate.deg.rmse", "along": "ate.along_m.rmse",
-    "across": "ate.across_m.rmse", "up": "ate.up_m.rmse", "kitti": "kitti.percent", "scale": "transform.scale",
-    "paired": "poses.paired", "offset": "offset_s",
-}  # fmt: skip
-UNITS = {"": 1.0, "m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "deg": 1.0, "rad": 57.29577951308232, "s": 1.0,
-         "ms": 0.001, "%": 1.0}  # fmt: skip
-SIGNS: dict[str, Callable[..., bool]] = {">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt}
-_LIMIT = r"([\w:.]+?)\s*(>=|<=|>|<)\s*([-+]?(?:\d++\.?\d*+|\.\d++)(?:e[-+]?\d+)?)\s*([a-z]*|%)"
-
-
-class Limit(NamedTuple):
-    """A number by its name or its path in the JSON, and its limit."""
-
-    text: str
-    name: str
-    sign: str
-    bound: float
-    unit: str
-
-    def passed(self, found: dict[str, Any]) -> float | None:
-        """Return the number of a comparison if it exceeds the limit, else None.
-
-        Raises ValueInvalid if there is no such number.
-        """
-        kind, _, delta = self.name.partition(":")
-        if kind == "rpe" and delta:
-            row = next((row for row in found["rpe"] if row["delta"] == delta), None)
-            value = number_at(row, {"%": "percent", "deg": "deg.rmse", "rad": "deg.rmse"}.get(self.unit, "m.rmse"))
-        else:
-            value = number_at(found, SHORT.get(self.name, self.name))
-            if self.name == "paired" and self.unit == "%" and value is not None:
-                value = 100.0 * value / max(found["poses"]["possible"], 1)
-        if not isinstance(value, int | float):
-            raise ValueInvalid(f"{self.text}: {found['est']} has no such number; -f json shows those there are")
-        return float(value) if SIGNS[self.sign](value, self.bound) else None
-
-
-def parse_limits(text: str) -> list[Limit]:
-    """Parse limits separated by commas: a name or path, > >= < or <=, a number with its unit.
-
-    Bare numbers are metres, degrees, poses, and percent of KITTI.  Raises ValueInvalid.
-    """
-    found = []
-    for part in filter(None, map(str.strip, text.split(","))):
-        match = re.fullmatch(_LIMIT, part)
-        if match is None or match[4] not in UNITS:
-            raise ValueInvalid(f"{shown(part)} is not a limit; write a name, > or <, and a bound: ate>5cm, paired<90%")
-        name = match[1]
-        if "." not in name and not name.startswith("rpe:") and name not in SHORT:
-            raise ValueInvalid(f"no number is called {shown(name)}{alternatives(name, [*SHORT, 'rpe:10m'], 'numbers')}")
-        found.append(Limit(part, name, match[2], float(match[3]) * UNITS[match[4]], match[4]))
-    if not found:
-        raise ValueInvalid("no limit; write one as ate>5cm")
-    return found
-
-
-def number_at(value: Any, path: str) -> Any:
-    """Follow a path of keys and indices into a mapping; None if it ends."""
-    for step in path.split("."):
-        try:
-            value = value[int(step) if isinstance(value, list) else step]
-        except (KeyError, IndexError, TypeError, ValueError):
-            return None
-    return value

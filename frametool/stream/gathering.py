@@ -250,8 +250,8 @@ def means_of(rows: MeanRows, values: list[float] | None, *, robust: bool) -> Ite
 
     values: the weights of poses that are arguments
     """
-    from frametool.fit.calibration import solve_mean
     from frametool.fit.least_squares import length, off_text
+    from frametool.fit.robust_mean import solve_mean
 
     if not rows.blocks:
         raise ValueInvalid("no poses to take the mean of")

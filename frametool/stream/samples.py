@@ -17,7 +17,7 @@ import numpy as np
 from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import InputFile
 from frametool.errors import FormatError, ValueInvalid, bare, first_of, shown, warn
-from frametool.fit.alignment import between, nearest
+from frametool.fit.pairing import between, nearest
 from frametool.formats.detect import detect
 from frametool.formats.table import FORMATS
 from frametool.formats.trees.tree_reader import MOST_KEYS

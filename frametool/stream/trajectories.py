@@ -267,7 +267,8 @@ def compare(
     more: other fields of the groups of `frametool.fit.comparison.Settings`; align_first as "10s", times in nanoseconds
     Raises ValueInvalid if the two have no stamps in common, or a fit is not determined; FormatError.
     """
-    from frametool.fit.comparison import AUTO, EVO, SETTINGS, Settings, compared, parse_delta
+    from frametool.fit.comparison import AUTO, EVO, SETTINGS, Settings, compared
+    from frametool.fit.trajectory_errors import parse_delta
 
     argument = {"align": align, "mount": mount, **more}
     for name, words in WORDS.items():
@@ -301,8 +302,8 @@ def resample(
 
     Times beyond its ends, or in gaps longer than max_gap_ns (default: 3 median intervals), have no pose.
     """
-    from frametool.fit.alignment import between, stamps_at_rate, stamps_every
-    from frametool.fit.comparison import parse_delta
+    from frametool.fit.pairing import between, stamps_at_rate, stamps_every
+    from frametool.fit.trajectory_errors import parse_delta
 
     argument = in_order(_taken(trajectory, "trajectory"), "trajectory")
     if sum(each is not None for each in (rate, at, every)) != 1:

@@ -18,7 +18,7 @@ import numpy as np
 from frametool import __version__
 from frametool.documents.writers import dump_json
 from frametool.errors import printable
-from frametool.fit.comparison import SHORT, number_at
+from frametool.fit.limits import SHORT, number_at
 from frametool.formats.rows.csv import write_points
 from frametool.grammar.result import Style
 from frametool.view import pictures

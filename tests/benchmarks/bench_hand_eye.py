@@ -17,7 +17,7 @@ import numpy as np
 sys.path[:0] = [str(Path(__file__).parents[1] / "support"), str(Path(__file__).parents[2])]
 from rigs import Rig, rig  # noqa: E402
 
-from frametool.fit.calibration import solve_hand_eye  # noqa: E402
+from frametool.fit.hand_eye import solve_hand_eye  # noqa: E402
 from frametool.geometry.transform import Transform  # noqa: E402
 
 METHODS = ("TSAI", "PARK", "HORAUD", "ANDREFF", "DANIILIDIS")

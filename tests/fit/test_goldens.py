@@ -9,22 +9,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from frametool.fit.alignment import (
-    ALIGNMENTS,
-    Pairs,
-    Unaligned,
+from frametool.fit.alignment import ALIGNMENTS, Unaligned, fitted, lever_arm
+from frametool.fit.clock_offset import clock_offset
+from frametool.fit.pairing import Pairs, paired
+from frametool.fit.trajectory_errors import (
+    Delta,
     absolute_errors,
     all_pairs,
     chained,
-    clock_offset,
-    fitted,
-    lever_arm,
-    paired,
+    parse_delta,
     relative_errors,
     segment_errors,
     statistics,
 )
-from frametool.fit.comparison import Delta, parse_delta
 from frametool.frames.trajectory import Trajectory, way
 from frametool.geometry.transform import Rotation, Transform
 

@@ -12,7 +12,7 @@ import pytest
 from rigs import Rig, replaced, rig, small
 
 from frametool.errors import ValueInvalid, overheard
-from frametool.fit.calibration import HandEye, solve_hand_eye
+from frametool.fit.hand_eye import HandEye, solve_hand_eye
 from frametool.fit.least_squares import draws
 from frametool.geometry.transform import Rotation, Transform
 

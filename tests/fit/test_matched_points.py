@@ -11,7 +11,7 @@ import pytest
 
 from frametool.errors import ValueInvalid, overheard
 from frametool.fit.alignment import umeyama
-from frametool.fit.calibration import PointsFit, solve_points
+from frametool.fit.matched_points import PointsFit, solve_points
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:

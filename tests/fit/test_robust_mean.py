@@ -10,7 +10,7 @@ import pytest
 from rigs import replaced, small
 
 from frametool.errors import ValueInvalid
-from frametool.fit.calibration import solve_mean
+from frametool.fit.robust_mean import solve_mean
 from frametool.geometry.transform import Rotation, Transform
 
 CASES = {each["name"]: each for each in json.loads((Path(__file__).parents[1] / "golden" / "hand_eye.json").read_text())["mean"]}

@@ -8,8 +8,9 @@ from rigs import rig
 from worlds import ring
 
 from frametool.errors import overheard
-from frametool.fit.alignment import clock_offset
-from frametool.fit.calibration import FEWEST, solve_hand_eye
+from frametool.fit.alignment import FEWEST
+from frametool.fit.clock_offset import clock_offset
+from frametool.fit.hand_eye import solve_hand_eye
 from frametool.fit.measured_tree import solve_tree
 from frametool.frames.trajectory import Trajectory
 

@@ -27,7 +27,9 @@ from frametool.text.numbers import parse_lengths, parse_share
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.fit.comparison import Comparison, Delta, Limit
+    from frametool.fit.comparison import Comparison
+    from frametool.fit.limits import Limit
+    from frametool.fit.trajectory_errors import Delta
     from frametool.frames.trajectory import Trajectory
 
 UP = {
@@ -54,13 +56,13 @@ def _read_limit(text: str) -> tuple[bool, int]:
 
 def read_delta(text: str, *units: str) -> Delta:
     """Parse a step in one of the units, all by default; a number of frames needs no unit."""
-    from frametool.fit.comparison import parse_delta
+    from frametool.fit.trajectory_errors import parse_delta
 
     return parse_delta(f"{text}frames" if text.isdigit() and "frames" in units else text, *[units] * bool(units))
 
 
 def _read_limits(text: str) -> list[Limit]:
-    from frametool.fit.comparison import parse_limits
+    from frametool.fit.limits import parse_limits
 
     return parse_limits(text)
 
@@ -238,7 +240,7 @@ def resample_command(inputs: Inputs) -> int:
     output = Output(inputs, "poses", otherwise=by_name(path, writers("poses")) or "csv")
     (fmt,) = options.for_each(inputs.input_formats, 1)
     found, name, skipped = trajectory(inputs, path, fmt, inputs.on_error)
-    from frametool.fit.alignment import between, stamps_at_rate, stamps_every
+    from frametool.fit.pairing import between, stamps_at_rate, stamps_every
     from frametool.stream.trajectories import in_order
 
     found = in_order(found, name)

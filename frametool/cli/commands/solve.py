@@ -120,7 +120,7 @@ def _solution(
 
 def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
     """Estimate the pose of a camera on a gripper, or next to a robot: two files of poses, or one of samples."""
-    from frametool.fit.calibration import solve_hand_eye
+    from frametool.fit.hand_eye import solve_hand_eye
     from frametool.stream.samples import paired_samples, read_samples
 
     eye_to_hand = inputs.eye_to_hand
@@ -156,7 +156,7 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
 
 def solved_points(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
     """Estimate the transform between two files of matched points."""
-    from frametool.fit.calibration import solve_points
+    from frametool.fit.matched_points import solve_points
     from frametool.stream.samples import matched, read_points
 
     policy = partial(BadRows, tell=say_error)

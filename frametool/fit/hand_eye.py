@@ -1,8 +1,7 @@
-"""The mean of poses, the transform between matched points, a = c R b + t, and hand-eye calibration, G X C = Z.
+"""Hand-eye calibration, G X C = Z, solved for X and Z from pairs of poses, robust against outliers.
 
-All are robust against outliers.  Hand-eye is solved for X and Z from pairs of poses.  G: base_from_gripper, C:
-camera_from_target, X: gripper_from_camera, Z: base_from_target.  With a camera fixed to the base, inv(G) replaces G, so
-that X is base_from_camera and Z gripper_from_target.
+G: base_from_gripper, C: camera_from_target, X: gripper_from_camera, Z: base_from_target.  With a camera fixed to the
+base, inv(G) replaces G, so that X is base_from_camera and Z gripper_from_target.
 """
 
 from __future__ import annotations
@@ -15,8 +14,8 @@ import numpy as np
 
 from frametool.errors import ValueInvalid, warn
 from frametool.fit import least_squares as lsq
-from frametool.fit.alignment import STILL, THIN, Fit, centre, principal_axes, umeyama
-from frametool.geometry import validation
+from frametool.fit.alignment import FEWEST
+from frametool.fit.matched_points import BETTER, FEWEST_ROBUST, ONE
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
@@ -27,243 +26,6 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Array, Indices, Numbers
 
     Batch: TypeAlias = Transform | Numbers | Sequence[Transform]
-
-
-FEWEST = 3  # points, samples; of two poses that disagree neither is the outlier
-MOST_TRIED = 200  # poses that are tried as the middle of the others
-LEAST_GAP = 1e-9  # between the two largest eigenvalues, relative to their sum
-
-
-class MeanFit(NamedTuple):
-    """The mean of the inliers and their distances from it.
-
-    rms, most: the weighted root mean square and the largest distance of the inliers, metres and radians
-    used: the inliers; left_out: outliers with a weight; u: the residual of each in sigmas
-    residuals: [t_i - t, Log(R_i R')], (n, 6); sigma: of each axis of a pose of weight 1, metres and radians
-    dof: 3 n - 3 of the inliers, for each sigma; covariance: of one pose, 6x6 as in ROS, None for a single pose
-    """
-
-    transform: Transform
-    rms: tuple[float, float]
-    most: tuple[float, float]
-    used: Mask
-    left_out: Mask
-    u: Array
-    residuals: Array
-    sigma: tuple[float, float]
-    dof: int
-    covariance: Array | None
-
-
-def solve_mean(
-    poses: Transform | Numbers | Sequence[Transform], *, weights: Numbers | None = None, robust: bool = True
-) -> MeanFit:
-    """Return the mean of poses, transforms or matrices (n, 4, 4); outliers are rejected.
-
-    weights: (n,), proportional to 1 / variance; a pose of weight 0 is ignored
-    Without outliers exactly the mean of `Transform.mean`.
-    Raises ValueInvalid if there is no pose, and if the rotations are so different that they have no mean.
-    """
-    poses = lsq.batch_of(poses, "poses")
-    mass = validation.masses(weights, poses.shape)
-    counts, roots = mass > 0.0, np.sqrt(mass)[:, None]
-    own, weight, robust = poses[counts], mass[counts], robust and counts.sum() >= FEWEST
-
-    def apart(at: int) -> float:
-        """Return how far a pose is from the others, by the medians of metres and radians."""
-        return sum(log(max(np.median(roots[counts, 0] * off), lsq.LEAST)) for off in own[at].distance(own))
-
-    def mean_of(_: Transform, kept: Array) -> Transform:
-        return own[kept > 0.0].mean(weight[kept > 0.0])
-
-    tried = range(len(own)) if len(own) <= MOST_TRIED else next(lsq.draws(1, MOST_TRIED, len(own)))
-    start = own[min(tried, key=apart)] if robust else own[0]
-    found = lsq.robust_fit(
-        start, lambda middle: roots[counts] * lsq.errors(own, middle),
-        lambda _, weights: own.mean(weights * weight), mean_of, unknown=3, robust=robust,
-    )  # fmt: skip
-    used, mean = counts.copy(), found.model
-    used[counts] = found.kept
-    inliers, shares = poses[used], mass[used]
-    *_, second, first = np.linalg.eigvalsh(np.array(validation.second_moment(inliers.components[3:], shares)))
-    if first - second <= LEAST_GAP * (first + second):  # two eigenvectors of sum(w q q^T) are equally good
-        raise ValueInvalid("the rotations lie so far apart that none is their mean; leave some out, or give weights")
-    distances = np.stack(mean.distance(inliers))
-    rms, most = np.sqrt((shares * distances**2).sum(1) / shares.sum()), distances.max(1)
-    off = lsq.errors(poses, mean)
-    count, kept = int(used.sum()), roots[used] * off[used]
-    covariance = kept.T @ kept * (count / shares.sum() / (count - 1)) if count > 1 else None
-    s_t, s_r = found.sigmas.tolist()
-    return MeanFit(
-        mean, tuple(rms.tolist()), tuple(most.tolist()), used, counts & ~used,
-        lsq.deviations(roots * off, found.sigmas), off, (s_t, s_r), 3 * count - 3, covariance,
-    )  # fmt: skip
-
-
-FEWEST_ROBUST = 5  # three points always fit, so that with four the outlier cannot be identified
-TRIPLES = 500
-MOST = 2000  # points on which a triple is tested
-ROUNDING = 1e-12  # relative to the largest coordinate: no distance is more accurate
-BETTER = 5.0  # ratio: an alternative that fits this much better was meant
-UNITS = {1000.0: "millimetres?", 100.0: "centimetres?"}
-ABOUT = 0.05  # of a scale: still a unit conversion
-ONE = Transform.identity()
-MIRROR = np.array([1.0, 1.0, -1.0])
-
-
-class PointsFit(NamedTuple):
-    """target_from_source and the scale c, with their covariance (6x6, as in ROS) and the scale's sigma.
-
-    used: the inliers; left_out: outliers with a weight
-    residuals: target - (c R source + t), (n, 3); u: the residual of each in sigmas; sigma: of each axis for weight 1
-    dof: 3 n - 6, with a scale 3 n - 7; rms: of the inliers, metres and None
-    """
-
-    transform: Transform
-    scale: float
-    scale_sigma: float | None
-    covariance: Array
-    used: Mask
-    left_out: Mask
-    residuals: Array
-    u: Array
-    sigma: float
-    dof: int
-    rms: tuple[float, None]
-
-
-def solve_points(
-    target: Numbers, source: Numbers, *, weights: Numbers | None = None, scale: bool = False, robust: bool = True,
-    names: tuple[str, str] = ("A", "B"),
-) -> PointsFit:  # fmt: skip
-    """Estimate the transform from source points to the matching target points, (n, 3) each; outliers are rejected.
-
-    weights: (n,), proportional to 1 / variance; a pair of weight 0 is ignored
-    scale: estimate one too, target = scale R source + t; names: of target and source, for messages
-    Returns .transform (target_from_source), .scale, .covariance, .used and more.
-    Raises ValueInvalid if the points are too few, on a line, or mirrored.
-    """
-    a, b = _points(target, "target"), _points(source, "source")
-    if len(a) != len(b):
-        raise ValueInvalid(f"target has {len(a)} points, source {len(b)}")
-    mass = np.ones(len(a)) if weights is None or not len(a) else validation.masses(weights, a.shape[:1])
-    if (count := int((mass > 0.0).sum())) < FEWEST:
-        raise ValueInvalid(f"{count} matched point{'s'[: count != 1]}; {FEWEST} are needed, not on a line")
-    pairs = _Pairs(a[mass > 0.0], b[mass > 0.0], mass[mass > 0.0])
-    pairs.require_plane()
-    robust = robust and count >= FEWEST_ROBUST
-    start, typical = pairs.start(with_scale=scale, robust=robust)
-    mirrored = pairs._replace(source=pairs.source * MIRROR).start(with_scale=scale, robust=robust)[1]
-    if BETTER * mirrored <= typical:
-        off = f"{1000.0 * mirrored:.1f} mm, not {1000.0 * typical:.1f} mm"
-        raise ValueInvalid(f"a mirror image fits ({off}): one set is left-handed")
-
-    def rough(_: Fit, weights: Array) -> Fit:
-        return umeyama(*pairs[:2], pairs.mass * weights, with_scale=scale)
-
-    def fit(_: Fit, kept: Array) -> Fit:
-        chosen = pairs.at(kept > 0.0)
-        chosen.require_plane()
-        return umeyama(*chosen, with_scale=scale)
-
-    found = lsq.robust_fit(start, pairs.weighted_residuals, rough, fit, unknown=6 + scale, robust=robust)
-    best, sigma, kept = found.model, float(found.sigmas[0]), found.kept
-    covariance, scale_sigma = pairs.at(kept).covariance(best, sigma, with_scale=scale)
-    used = mass > 0.0
-    used[used] = kept
-    residuals = _Pairs(a, b, mass).residuals(best)
-    if not scale:
-        scaled, its_typical = pairs.start(with_scale=True, robust=robust)
-        if BETTER * its_typical <= typical and scaled.scale > 0.0:
-            is_great = scaled.scale > 1.0
-            (great, small), ratio = (names, scaled.scale) if is_great else (names[::-1], 1.0 / scaled.scale)
-            unit = next((unit for unit in UNITS if abs(ratio / unit - 1.0) < ABOUT), ratio)
-            warn(f"{great} is {unit:.4g} times {small}: {UNITS.get(unit, 'a scale?')}")
-    return PointsFit(
-        best.transform.canonical(), best.scale, scale_sigma, covariance, used, (mass > 0.0) & ~used, residuals,
-        np.sqrt(mass / 3.0) * lsq.length(residuals) / sigma, sigma, 3 * int(kept.sum()) - 6 - scale,
-        (sqrt((residuals[used] ** 2).sum() / used.sum()), None),
-    )  # fmt: skip
-
-
-class _Pairs(NamedTuple):
-    """Matched points (n, 3) and their weights."""
-
-    target: Array
-    source: Array
-    mass: Array
-
-    def at(self, index: Rows) -> _Pairs:
-        return _Pairs(*(part[index] for part in self))
-
-    def residuals(self, fit: Fit) -> Array:
-        placed: Array = fit.transform.rotation.apply(fit.scale * self.source) + fit.transform.xyz
-        return self.target - placed
-
-    def weighted_residuals(self, fit: Fit) -> Array:
-        found: Array = np.sqrt(self.mass)[:, None] * self.residuals(fit)
-        return found
-
-    def start(self, *, with_scale: bool, robust: bool) -> tuple[Fit, float]:
-        """Return the fit of all or of a triple with the least typical distance, and that distance.
-
-        The typical distance is the median, but at least the fourth: three always fit.  It is never below rounding.
-        """
-        count = len(self.mass)
-        seen = self.at(next(lsq.draws(1, MOST, count))) if count > MOST else self
-        middle = min(max(len(seen.mass) // 2, 3), len(seen.mass) - 1)
-        best = (np.inf, Fit(ONE))
-        triples: Iterable[Rows] = lsq.draws(TRIPLES * robust, 3, count)
-        for few in chain([slice(None)], triples):
-            chosen = self.at(few)
-            if chosen.is_line():
-                continue
-            fit = umeyama(*chosen, with_scale=with_scale)
-            off = (seen.weighted_residuals(fit) ** 2).sum(-1)
-            best = min(best, (float(np.partition(off, middle)[middle]), fit), key=lambda each: each[0])
-        return best[1], max(sqrt(best[0]), ROUNDING * max(np.abs(self.target).max(), np.abs(self.source).max()))
-
-    def is_line(self) -> bool:
-        """Return True if target or source are on a line, or in one point."""
-        for xyz in self[:2]:
-            first, second, _ = principal_axes(xyz)
-            if second <= max(THIN * first, STILL * np.abs(xyz).max()):
-                return True
-        return False
-
-    def require_plane(self) -> None:
-        if len(self.mass) < FEWEST or self.is_line():
-            raise ValueInvalid("the points lie on a line: the turn about it cannot be known")
-
-    def covariance(self, fit: Fit, sigma: float, *, with_scale: bool) -> tuple[Array, float | None]:
-        """Return the inverse Hessian of pose and scale: the pose's part, and the scale's sigma if it is estimated.
-
-        At the points' centre position, rotation and scale are independent; the lever arm transforms it to the source's
-        origin.
-        """
-        middle = centre(self.source, self.mass)
-        arms = fit.transform.rotation.apply(self.source - middle)
-        unit = np.broadcast_to(np.eye(3), (len(arms), 3, 3))
-        slopes = np.concatenate([unit, -lsq.skew(fit.scale * arms), arms[:, :, None]], 2)[:, :, : 6 + with_scale]
-        about = lsq.inverse(np.einsum("n,nij,nik->jk", self.mass, slopes, slopes))
-        lever = fit.transform.rotation.apply(middle)
-        levers = np.eye(6 + with_scale)
-        levers[:3, 3:6], levers[:3, 6:] = lsq.skew(fit.scale * lever), -lever[:, None]
-        found = levers @ about @ levers.T
-        found = sigma**2 / 2.0 * (found + found.T)
-        return found[:6, :6], sqrt(found[6, 6]) if with_scale else None
-
-
-def _points(values: Numbers, name: str) -> Array:
-    xyz = np.stack(np.atleast_1d(*validation.columns(values, 3, name)), -1)
-    if xyz.ndim != 2:
-        raise ValueInvalid(f"{name}: expected shape (n, 3), got {xyz.shape}")
-    validation.all_finite((xyz,), name)
-    lsq.require_near(xyz, name)
-    return xyz
-
-
-# --- hand-eye ---
 
 NAMES = ("base", "gripper", "camera", "target")
 FEWEST_APART = 4  # with three, rotations alone can fit all positions: the closed form is the result
@@ -326,17 +88,13 @@ def solve_hand_eye(
     holder = names[0] if eye_to_hand else names[1]
     robust = robust and count >= FEWEST_ROBUST
     _require_two_axes(_turns(hand), 0.0, holder, names[2])
-    start, medians = _start(samples, robust=robust)
-    others = _start(other, robust=robust)[1]
-    if (CLEARLY * others <= medians).all() and BETTER**2 * others.prod() <= medians.prod():
-        raise ValueInvalid(
-            f"the samples do not fit ({lsq.off_text(*medians)}); they do ({lsq.off_text(*others)}) "
-            f"{'without' if eye_to_hand else 'with'} --eye-to-hand, or with TARGET inverted ({names[3]}<-{names[2]})"
-        )
+    start, medians = _initial_model(samples, robust=robust)
+    others = _initial_model(other, robust=robust)[1]
+    _refuse_other_setting(medians, others, f"{'without' if eye_to_hand else 'with'} --eye-to-hand", names)
 
     def likeliest(model: _Model, weights: Array) -> _Model:
         if (kept := weights > 0.0).sum() < FEWEST:
-            raise _unfitting(medians)
+            raise _misfit_error(medians)
         _require_two_axes(_turns(hand[kept]), 0.0, holder, names[2])
         begin, steps = (model, STEPS) if kept.sum() >= FEWEST_APART else (start, 0)
         models = (samples.fitted(begin._replace(cut=cut), weights, steps) for cut in CUTS)
@@ -351,11 +109,11 @@ def solve_hand_eye(
     rms = np.sqrt((lsq.lengths(found.residuals[found.kept]) ** 2).mean(0))
     turns = _turns(hand[found.kept])
     if turns[0] < lsq.KEPT * s_r * sqrt(2.0):
-        raise _unfitting(rms)
+        raise _misfit_error(rms)
     _require_two_axes(turns, s_r, holder, names[2])
     covariance = lsq.inverse(model.hessian)
     both = " fit with and without --eye-to-hand, and" * bool(others.prod() <= BETTER**2 * medians.prod())
-    _warn_of(samples.at(found.kept), model.x, turns, holder, both)
+    _warn_of_limits(samples.at(found.kept), model.x, turns, holder, both)
     noise_at = "base" if eye_to_hand and model.cut == "gripper" else model.cut
     return HandEye(
         model.x.canonical(), model.z.canonical(), covariance[:6, :6], covariance[6:, 6:],
@@ -438,7 +196,7 @@ class _Samples(NamedTuple):
         return model._replace(hessian=slopes.T @ (weighed * slopes), misfit=misfit), gradient[:, 0]
 
 
-def _start(samples: _Samples, *, robust: bool) -> tuple[_Model, Array]:
+def _initial_model(samples: _Samples, *, robust: bool) -> tuple[_Model, Array]:
     """Return the best closed form of all samples and of small random subsets, with the medians of its errors."""
     count = len(samples.gripper)
     best = (np.inf, _Model(ONE, ONE), np.full(2, np.inf))
@@ -476,7 +234,16 @@ def _motions(gripper: Transform, camera: Transform) -> tuple[Transform, Transfor
     return gripper[i].inverse() @ gripper[j], camera[i] @ camera[j].inverse()
 
 
-def _warn_of(samples: _Samples, x: Transform, turns: tuple[float, float, str], holder: str, both: str) -> None:
+def _refuse_other_setting(medians: Array, others: Array, setting: str, names: Sequence[str]) -> None:
+    """Raise ValueInvalid if the samples fit the other setting clearly better, by the medians of the errors of both."""
+    if (CLEARLY * others <= medians).all() and BETTER**2 * others.prod() <= medians.prod():
+        raise ValueInvalid(
+            f"the samples do not fit ({lsq.off_text(*medians)}); they do ({lsq.off_text(*others)}) "
+            f"{setting}, or with TARGET inverted ({names[3]}<-{names[2]})"
+        )
+
+
+def _warn_of_limits(samples: _Samples, x: Transform, turns: tuple[float, float, str], holder: str, both: str) -> None:
     """Warn of what limits the result; both: of a few samples that another setting fits too, else ""."""
     if turns[1] < SLIGHT:
         small = f"{degrees(turns[1]):.1f} deg rms, first axis {turns[2]} in {holder}"
@@ -528,6 +295,6 @@ def _require_two_axes(turns: tuple[float, float, str], s_r: float, holder: str, 
         )
 
 
-def _unfitting(off: Array) -> ValueInvalid:
+def _misfit_error(off: Array) -> ValueInvalid:
     text = lsq.off_text(*off)
     return ValueInvalid(f"the samples do not fit ({text}); does each row of GRIPPER belong to that of TARGET?")
