@@ -78,7 +78,7 @@ class Members:
     @cached_property
     def on_earth(self) -> bool:
         """Return True if it has a geodetic position, complete or not."""
-        if not any(map(readers.may_be_on_earth, self.value)):
+        if POSE_KEYS.issuperset(self.value) or not any(map(readers.may_be_on_earth, self.value)):
             return False
         from frametool.stream.earth_columns import is_on_earth
 
