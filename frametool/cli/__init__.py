@@ -10,7 +10,7 @@ import sys
 from io import TextIOWrapper
 
 IN_OUT, INTERRUPTED = 5, 130  # exit codes
-COLLECTED_EVERY = (50_000, 20, 100)  # objects, and collections: scanning a large tree again and again is slow
+COLLECTED_EVERY = (100_000, 20, 100)  # objects, and collections: scanning a large tree again and again is slow
 
 
 def main(arguments: list[str] | None = None) -> None:
