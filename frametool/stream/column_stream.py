@@ -25,8 +25,8 @@ from frametool.geometry.rigid import EXACT
 from frametool.grammar.readers import NORMALS, in_nanoseconds
 from frametool.stream.array_writer import DOUBLE, ColumnsWriter
 from frametool.stream.faults import SKIP, STOP, Fault, Outcome
+from frametool.stream.record_results import Out, Word
 from frametool.stream.request import NO_STAMPS, VELOCITIES, Operation, Request
-from frametool.stream.row_layout import Out, Word
 from frametool.stream.rows import Block, RowPoses, coded_texts, is_typed, objects, taken
 from frametool.stream.table import PlannedRows, Table
 from frametool.stream.table_plan import Kept, Named, New

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from frametool.geometry.types import Components, Rigid
-    from frametool.stream.row_layout import Piece
+    from frametool.stream.record_results import Piece
 
 COLUMNS_REMEDY = "give --deg, or name the columns _deg"
 

@@ -14,8 +14,9 @@ from frametool.documents.document import parse_documents
 from frametool.errors import FormatError, Misused, ValueInvalid, bare, did_you_mean, first_of, listing, shown, warn
 from frametool.formats.table import FORMATS
 from frametool.geometry import quaternion, rigid
+from frametool.stream.record_results import Word, one_of
 from frametool.stream.request import Formula, Shown
-from frametool.stream.row_layout import POINT, POSE, Word, one_of
+from frametool.stream.row_layout import POINT, POSE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

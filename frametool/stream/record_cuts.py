@@ -22,9 +22,10 @@ from frametool.grammar.readers import AXES_KEY, NAME_KEYS, PARENT_KEYS, Path, ma
 from frametool.stream.evaluate import Plan
 from frametool.stream.faults import SKIP, Fault
 from frametool.stream.record import KEYS_REMEDY
+from frametool.stream.record_results import Const, In, Renamed
 from frametool.stream.record_search import POINT_KEYS
 from frametool.stream.record_values import MOST_ENTRIES
-from frametool.stream.row_layout import POSE, Const, In, Renamed
+from frametool.stream.row_layout import POSE
 from frametool.stream.rows import Block, Coded, chosen, numbered, one_text, spans_of, stamps_in
 from frametool.stream.splice import OURS, column_in, quoted_name, stretches_of
 from frametool.text.spans import MARGIN, Bytes, Ints, Spans, without_quotes

@@ -14,7 +14,7 @@ from frametool.geometry.representations import HEADING, Notation, notation
 from frametool.geometry.rigid import EXACT, SCALED, UNCERTAIN
 from frametool.grammar.pose import SCALE, VELOCITY
 from frametool.stream.faults import STOP
-from frametool.stream.row_layout import MOVERS, POINT, POSE, RATE, SIX, TURNED, VECTOR, Shape, Unit, Word
+from frametool.stream.row_layout import MOVERS, POINT, POSE, RATE, SIX, TURNED, VECTOR, Shape, Unit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from frametool.geometry.place import Earth, Place
     from frametool.geometry.types import Components, Namespace, Number, Rigid
     from frametool.grammar.result import Style
+    from frametool.stream.record_results import Word
 
     Rename: TypeAlias = Callable[[str | None, str | None], tuple[str | None, str | None]]
 
@@ -87,6 +88,7 @@ class Shown(NamedTuple):
     def values(self, prefix: str, numbers: Components) -> dict[str, Any]:
         """Return the members of a record."""
         from frametool.documents.source import Verbatim
+        from frametool.stream.record_results import Word
 
         found: dict[str, Any] = {}
         for key, value in self.members.items():

@@ -23,7 +23,8 @@ from frametool.frames.stamps import BILLION, read_header_stamp, read_stamp
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.readers import in_nanoseconds
 from frametool.grammar.result import NoResult, Result, with_entries
-from frametool.stream.row_layout import AS_READ, MAPPINGS, NOWHERE, PARTS, POINT, POSE, IfLocked, In, Out, Piece, Word
+from frametool.stream.record_results import IfLocked, In, Out, Piece, Word
+from frametool.stream.row_layout import AS_READ, MAPPINGS, NOWHERE, PARTS, POINT, POSE
 from frametool.text.parse import FURTHEST, parse_stamps
 from frametool.text.spans import MARGIN, Floats, Ints, Spans, framed, join, without_quotes
 from frametool.text.write import float_spans, replaced, rounded_to_single

@@ -24,9 +24,10 @@ from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream import row_layout
 from frametool.stream.faults import Fault
 from frametool.stream.record import outermost
+from frametool.stream.record_results import Const, IfLocked, In, Out, Piece, Renamed, Word, number_text, one_of
 from frametool.stream.record_search import POINT_KEYS, QUATERNION, STALE, XYZ
 from frametool.stream.record_values import Answer, Entry, Outside, RecordText, json_documents, written
-from frametool.stream.row_layout import POSE, SIX, Const, IfLocked, In, Out, Piece, Renamed, Word, number_text, one_of
+from frametool.stream.row_layout import POSE, SIX
 from frametool.text.lines import with_edits
 
 if TYPE_CHECKING:

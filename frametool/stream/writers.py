@@ -29,9 +29,9 @@ from frametool.geometry import arrays, floats, quaternion, rigid
 from frametool.grammar.pose import SCALE
 from frametool.grammar.readers import EARTH_FRAMES
 from frametool.grammar.result import Result, Style
-from frametool.stream.record_results import BlockResults, Documents, ResultWriter, csv_rows
+from frametool.stream.record_results import BlockResults, Const, Documents, In, Out, Piece, ResultWriter, csv_rows
 from frametool.stream.request import target_of
-from frametool.stream.row_layout import AS_READ, POSE, SIX, Const, In, Out, Piece
+from frametool.stream.row_layout import AS_READ, POSE, SIX
 from frametool.stream.rows import (
     RowPoses,
     assemble,
