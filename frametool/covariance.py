@@ -21,8 +21,8 @@ from frametool.geometry import rigid, uncertainty, validation
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from frametool.geometry import Components, Numbers
     from frametool.geometry.transform import Transform
-    from frametool.geometry.types import Components, Numbers
 
     Covariance = Numbers | list[list[float]] | None
 

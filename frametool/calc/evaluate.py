@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.calc.functions import RowValues
+    from frametool.geometry import Array, Components
     from frametool.geometry.place import Earth
-    from frametool.geometry.types import Array, Components
 
 NAME = "literal"
 AXES = ("x", "y", "z")

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from frametool.frames.lookups import Frames
-    from frametool.geometry.types import Components, Namespace, Number, Rigid
+    from frametool.geometry import Components, Namespace, Number, Rigid
 
     Kernel = Callable[..., Components]
     Check = Callable[..., str | None]

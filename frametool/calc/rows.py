@@ -29,7 +29,7 @@ from frametool.stream.request import Formula, Request, RowOptions, target_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.geometry.types import Components, Namespace, Number
+    from frametool.geometry import Components, Namespace, Number
     from frametool.grammar.result import Style
 
 RESULT = "result"  # the column of a number without a name

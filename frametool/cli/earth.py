@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.cli.command import Inputs
-    from frametool.geometry.types import Vector
+    from frametool.geometry import Vector
 
 FIRST = "first"
 EARTH_OPTIONS = {"origin": ("origin",), "axes": ("local_axes",), "zone": ("zone",)}  # field of Earth -> options

@@ -28,8 +28,9 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
 
 INLINE = "argument"
-# records and tables: a mapping, or a header; compiled when first needed
-_PLAIN = r"""\s*(?![ijk]\s*$|[xyzw]:\s*[-+.\d]+\s*,|Out\[)(?:\{\s*["}\w][^,{]*:|[A-Za-z_"'%#][\w"'-]*\s*(?:[,:\t]|$))"""
+# records and tables begin with one of these, each compiled when first needed
+_MAPPING = r'\s*\{\s*["}\w][^,{]*:'
+_HEADER = r"""\s*(?![ijk]\s*$|[xyzw]:\s*[-+.\d]+\s*,|Out\[)[A-Za-z_"'%#][\w"'-]*\s*(?:[,:\t]|$)"""
 _COMMAS = r"\s*[-+]?[.\d][-+.\deE]*(?:[ \t]*,[ \t]*[-+]?[.\d][-+.\deE]*)+[ \t\r]*(?:\n|\Z)"
 # pasted text that looks like the header of a table; the last: GTSAM, Gazebo, tf2_echo
 _NO_HEADER = r"\s*[A-Za-z_]\w*:\s*\n|\s*\w+\s*=|\s*(?:R|Model|- Pose[^:]*|Translation):\s*\[|\s*Rotation: in "
@@ -40,14 +41,6 @@ def is_inline(text: str) -> bool:
     while found := _inverted(text):
         text = (found[1] or found[2] or "").strip()
     return text.startswith(("{", "["))
-
-
-def _is_mapping(text: str) -> bool:
-    """Return True for `{key: ..`, as `_PLAIN` does, whose compiling takes longer than reading a pose."""
-    key, colon, _ = text.strip().partition(":")
-    first = key[1:].strip()[:1]
-    is_key = first in ('"', "}", "_") or first.isalnum()
-    return bool(colon) and key[:1] == "{" and is_key and "," not in key and "{" not in key[1:]
 
 
 def is_pasted(text: str, notation: Notation | None = None) -> bool:
@@ -65,7 +58,8 @@ def is_pasted(text: str, notation: Notation | None = None) -> bool:
 @lru_cache(8)  # `is_pasted` and `pose_source` read an argument, and its warnings are written once
 def rewritten(source: Source, notation: Notation | None, *, normalize: bool, points: bool) -> Source | None:
     """Return pasted text as a mapping of the grammar of poses; None for text that already is one."""
-    if (_is_mapping(source.text) or re.match(_PLAIN, source.text)) and "\n" not in source.text.strip():
+    text = source.text.strip()
+    if "\n" not in text and (re.match(_MAPPING, text) or re.match(_HEADER, text)):
         return None
     from frametool.ros.pasted_blocks import in_grammar
 
@@ -93,7 +87,7 @@ def pasted_stream(
     notation, place: the notation, or the format of geodetic positions, of --from
     """
     head = stream.peek()[:4096].decode("utf-8", "replace").lstrip("\ufeff")
-    if re.match(_PLAIN, head) and not re.match(_NO_HEADER, head):
+    if (re.match(_MAPPING, head) or re.match(_HEADER, head)) and not re.match(_NO_HEADER, head):
         return None, stream
     if found := re.match(_COMMAS, head):  # rows in the notation of --from without a header, not rows of a matrix
         rep = notation and notation.representation

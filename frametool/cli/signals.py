@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+# the module `signal` makes enumerations of its numbers, which are 2 % of the start of `compose`
+import _signal as signal  # type: ignore[import-not-found]
 import os
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    import signal
     from collections.abc import Callable
     from types import FrameType
-else:
-    import _signal as signal  # `signal` makes enumerations of its numbers, 2 % of the start of `compose`
 
 # those that the system has, with their names: Windows has no SIGHUP
 ENDING = {getattr(signal, name): name for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)}

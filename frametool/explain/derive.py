@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
     from frametool.explain.run import Values
     from frametool.frames.track import Track
+    from frametool.geometry import Rigid
     from frametool.geometry.representations import Notation
-    from frametool.geometry.types import Rigid
     from frametool.grammar.pose import Pose
     from frametool.grammar.readers import Quaternion, Vector
     from frametool.grammar.result import Style

@@ -16,7 +16,7 @@ from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
     from frametool.frames.trajectory import Trajectory
-    from frametool.geometry.types import Array
+    from frametool.geometry import Array
 
 ALIGNMENTS = ("none", "origin", "yaw", "se3", "sim3")
 SCALED = ("sim3", "origin+scale")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.frames.lookups import FrameTree
-    from frametool.geometry.types import Array, Rigid
+    from frametool.geometry import Array, Rigid
 
 
 class Measurement(NamedTuple):

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from frametool.frames.trajectory import Trajectory
-    from frametool.geometry.types import Array
+    from frametool.geometry import Array
 
 LIMIT_S = 10.0
 REFINED_S = 1e-7

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.fit.trajectory_errors import AbsoluteErrors, RelativeErrors, SegmentErrors
-    from frametool.geometry.types import Array
+    from frametool.geometry import Array
 
 AUTO = "auto"
 CLEAR = 0.5  # score of a reliable clock offset

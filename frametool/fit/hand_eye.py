@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from typing import TypeAlias
 
     from frametool.fit.least_squares import Mask, Rows
-    from frametool.geometry.types import Array, Indices, Numbers
+    from frametool.geometry import Array, Indices, Numbers
 
     Batch: TypeAlias = Transform | Numbers | Sequence[Transform]
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from frametool.fit.tree_problem import Fitted
-    from frametool.geometry.types import Array
+    from frametool.geometry import Array
 
     Mask: TypeAlias = NDArray[np.bool_]
     Rows: TypeAlias = slice | list[int] | Mask

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from frametool.fit.least_squares import Mask, Rows
-    from frametool.geometry.types import Array, Numbers
+    from frametool.geometry import Array, Numbers
 
 FEWEST_ROBUST = 5  # three points always fit, so that with four the outlier cannot be identified
 TRIPLES = 500

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from frametool.fit.blunders import Measurement
     from frametool.fit.bodies import Bodies
     from frametool.frames.lookups import Frames
-    from frametool.geometry.types import Array
+    from frametool.geometry import Array
 
 
 class TreeFit:

@@ -14,8 +14,8 @@ from frametool.frames.stamps import BILLION
 if TYPE_CHECKING:
     from frametool.fit.trajectory_errors import Delta
     from frametool.frames.trajectory import Trajectory
+    from frametool.geometry import Array, Indices
     from frametool.geometry.transform import Transform
-    from frametool.geometry.types import Array, Indices
 
 GAP = 3  # median intervals between two neighbours that may be interpolated
 

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.fit.least_squares import Mask
+    from frametool.geometry import Array, Numbers
     from frametool.geometry.transform import Transform
-    from frametool.geometry.types import Array, Numbers
 
 FEWEST = 3  # of two poses that disagree neither is the outlier
 MOST_TRIED = 200  # poses that are tried as the middle of the others

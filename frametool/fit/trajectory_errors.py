@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.frames.trajectory import Trajectory
-    from frametool.geometry.types import Array, Indices
+    from frametool.geometry import Array, Indices
 
 CHORD = 0.1  # metres of path before and after a pose that define its direction
 ROUNDING = 1e-9  # of a delta

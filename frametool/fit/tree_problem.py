@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from frametool.fit.blunders import Measurement
     from frametool.fit.bodies import Bodies
-    from frametool.geometry.types import Array
+    from frametool.geometry import Array
 
 
 TREES = 200

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from frametool.frames.buffer import TransformBuffer
+    from frametool.geometry import Components, Rigid
     from frametool.geometry.camera import Camera
-    from frametool.geometry.types import Components, Rigid
     from frametool.grammar.edges import Report
 
 

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
+    from frametool.geometry import Rigid
     from frametool.geometry.transform import Transform
-    from frametool.geometry.types import Rigid
 
 
 class TransformBuffer(Frames):

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
     from typing import Any
 
+    from frametool.geometry import Components, Rigid
     from frametool.geometry.camera import Camera
-    from frametool.geometry.types import Components, Rigid
 
 MOST_KEPT = 1 << 14  # queries
 

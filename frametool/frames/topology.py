@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Container, Mapping, Sequence
 
     from frametool.frames.lookups import Frames
-    from frametool.geometry.types import Components, Rigid
+    from frametool.geometry import Components, Rigid
 
 MOST_SHOWN = 16  # frames of a path or a cycle
 OTHER_CLOCK = 10**8 * BILLION  # three years: beyond it, only one of two clocks counts from 1970

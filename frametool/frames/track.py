@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
     from typing import Any, Literal, TypeAlias
 
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
 
     Way: TypeAlias = tuple[float, float, float, float, float, float, float, float]
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import Frames
     from frametool.frames.topology import FramePath, Query
     from frametool.frames.track import MovingTrack
-    from frametool.geometry.types import Array, Rigid
+    from frametool.geometry import Array, Rigid
 
     Stamps = NDArray[np.int64]
     Floats = NDArray[np.float64]

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from typing import Any
 
-    from frametool.geometry.types import Array, Components, Condition, Four, Indices, Kernel, Number, Two
+    from frametool.geometry import Array, Components, Condition, Four, Indices, Kernel, Number, Two
 
 BLOCK = 12288  # rows: amortises the cost of numpy calls, and a kernel's temporaries stay in the cache
 fmod, frexp, ldexp, maximum, minimum, sqrt = np.fmod, np.frexp, np.ldexp, np.maximum, np.minimum, np.sqrt

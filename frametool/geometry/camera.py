@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from typing import Any
 
-    from frametool.geometry.types import Array, Condition, Functions, N, Number, Numbers, Rigid, Six, Three, Two, Vector
+    from frametool.geometry import Array, Condition, Functions, N, Number, Numbers, Rigid, Six, Three, Two, Vector
 
     Seen = tuple[N, N, Condition]
     Found = tuple[N, N, N, Condition]

@@ -33,8 +33,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
+    from frametool.geometry import Components, Four, Functions, N, Numbers, Seven, Three, Two
     from frametool.geometry.transform import Transform
-    from frametool.geometry.types import Components, Four, Functions, N, Numbers, Seven, Three, Two
 
 A, F = 6378137.0, 1.0 / 298.257223563  # the equator's radius in metres, and the flattening
 E2, EC = F * (2.0 - F), 1.0 - F  # the eccentricity squared; the polar radius over the equator's

@@ -11,7 +11,7 @@ from frametool.geometry.quaternion import EPS, settled
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from frametool.geometry.types import Condition, Four, Functions, N, Three
+    from frametool.geometry import Condition, Four, Functions, N, Three
 
 LOCK = EPS * EPS  # of the squared radii: above 1 eps the angles are determined, and dropping them would be an error
 

@@ -16,7 +16,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.geometry.types import Condition, Functions, N, Two
+    from frametool.geometry import Condition, Functions, N, Two
 
 copysign, fmod, frexp, ldexp, sqrt = math.copysign, math.fmod, math.frexp, math.ldexp, math.sqrt
 DEGREE, RADIAN = pi / 180.0, 180.0 / pi  # a degree in radians and a radian in degrees

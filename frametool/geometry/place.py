@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from typing import Self
 
-    from frametool.geometry.types import Components, Namespace, Rigid, Vector
+    from frametool.geometry import Components, Namespace, Rigid, Vector
 
 ECEF, ENU, NED, GRID = "ecef", "enu", "ned", "grid"  # axes; ENU and NED are notations too, with an origin
 LLA, UTM = "lla", "utm"

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
-    from frametool.geometry.types import Condition, Four, Functions, N, Nine, Three, Two
+    from frametool.geometry import Condition, Four, Functions, N, Nine, Three, Two
 
 EPS = 2.0**-52
 UNIT = 4 * EPS  # one normalisation leaves |n^2 - 1| below 3 eps: within 4, bits are preserved

@@ -16,7 +16,7 @@ from frametool.geometry import euler, floats, matrix, quaternion
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.geometry.types import Components, Kernel, Namespace, Quaternion
+    from frametool.geometry import Components, Kernel, Namespace, Quaternion
 
 LIST, MAP, NAMED, ROWS = "list", "map", "named", "rows"  # how documents hold the numbers of a rotation
 NAMED_AXES = "AXES"

@@ -21,7 +21,7 @@ from frametool.geometry.quaternion import cross, either, length
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
-    from frametool.geometry.types import Components, Functions, N, Number, Rigid, Seven, Six, Three, Two
+    from frametool.geometry import Components, Functions, N, Number, Rigid, Seven, Six, Three, Two
 
 EXACT, SCALED, UNCERTAIN = 7, 8, 43  # components of a full pose: alone, with a scale, with a covariance
 NOT_BOTH = "the covariance cannot be carried through a scale; leave one of them out"

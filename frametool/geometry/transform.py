@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import Any, Self
 
-    from frametool.geometry.types import Array, Components, Kernel, Numbers, Quaternion, Rigid
+    from frametool.geometry import Array, Components, Kernel, Numbers, Quaternion, Rigid
 
 NEAR = 1e-9  # rad: the default of `is_close`, three digits above the rounding of long chains
 NEAR_BY = 1e-9  # metres: the same for translations

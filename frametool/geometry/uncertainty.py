@@ -16,7 +16,7 @@ from frametool.geometry import quaternion
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from frametool.geometry.types import Array, Components, Number, Rigid
+    from frametool.geometry import Array, Components, Number, Rigid
 
     Entries: TypeAlias = Sequence[Any]
     Rows: TypeAlias = list[list[Any]]

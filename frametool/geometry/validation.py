@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from typing import Any
 
+    from frametool.geometry import Array, Components, Indices, Kernel, Namespace, Numbers
     from frametool.geometry.representations import BatchRule, Notation
-    from frametool.geometry.types import Array, Components, Indices, Kernel, Namespace, Numbers
 
 
 def single(components: Components) -> bool:

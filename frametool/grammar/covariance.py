@@ -21,7 +21,7 @@ from frametool.text.numbers import LENGTHS as UNITS_OF_LENGTH
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.geometry.types import Components
+    from frametool.geometry import Components
     from frametool.grammar.readers import Path
 
 COVARIANCE, SIGMA = "covariance", "sigma"

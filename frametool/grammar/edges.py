@@ -13,8 +13,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
+    from frametool.geometry import Components, Rigid
     from frametool.geometry.camera import Camera
-    from frametool.geometry.types import Components, Rigid
 
     Report = Callable[[FormatError], None]
 

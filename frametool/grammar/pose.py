@@ -23,10 +23,10 @@ from frametool.text.numbers import half_unit, parse_angle, parse_length, parse_n
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
+    from frametool.geometry import Components, Rigid
     from frametool.geometry.place import Spot
     from frametool.geometry.representations import Notation
     from frametool.geometry.transform import Transform
-    from frametool.geometry.types import Components, Rigid
     from frametool.grammar.readers import Path, Quaternion, Vector
 
     Spelled = tuple[Notation, Sequence[Any], Sequence[Path]]  # notation, one text per component, the path of each

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from frametool.frames.lookups import Frames
-    from frametool.geometry.types import Components
+    from frametool.geometry import Components
     from frametool.grammar.readers import Vector
 
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")

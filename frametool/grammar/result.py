@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from frametool.frames.lookups import Frames
+    from frametool.geometry import Rigid, Three
     from frametool.geometry.place import Place
     from frametool.geometry.transform import Transform
-    from frametool.geometry.types import Rigid, Three
 
 INFINITE = float("inf")
 ROUNDED_TO_ZERO = 1e-12  # smaller numbers, on a screen

@@ -20,7 +20,7 @@ from frametool.grammar.edges import stop
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.geometry.types import Array, Indices
+    from frametool.geometry import Array, Indices
     from frametool.grammar.edges import Edge, Report
     from frametool.lint.rules import Statement
 

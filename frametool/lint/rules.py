@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import Source
     from frametool.frames.lookups import FrameTree
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
     from frametool.grammar.edges import Edge
     from frametool.grammar.readers import Misfit
 

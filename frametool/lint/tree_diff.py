@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from frametool.frames.lookups import Frames
+    from frametool.geometry import Rigid
     from frametool.geometry.camera import Camera
-    from frametool.geometry.types import Rigid
 
 ROUNDING = 2.0**-46  # of the largest position: the maximum error of a product of some dozens of poses
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from frametool.documents.source import InputFile
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
     from frametool.grammar.edges import Answers, Diagnostics, EdgeColumns, Options
 
 

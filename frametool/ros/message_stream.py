@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
     from typing import BinaryIO
 
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
 
 
 def _axes(part: str, axes: str = "xyz") -> list[str]:

@@ -25,7 +25,7 @@ from frametool.geometry.rigid import EXACT
 from frametool.grammar.readers import NORMALS, in_nanoseconds
 from frametool.stream.array_writer import DOUBLE, ColumnsWriter
 from frametool.stream.faults import SKIP, STOP, Fault, Outcome
-from frametool.stream.record_results import Out, Word
+from frametool.stream.pieces import Out, Word
 from frametool.stream.request import NO_STAMPS, VELOCITIES, Operation, Request
 from frametool.stream.rows import Block, RowPoses, coded_texts, is_typed, objects, taken
 from frametool.stream.table import PlannedRows, Table
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Sequence
 
     from frametool.formats.rows.column_file import Batch, ColumnWriter, Kind
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
     from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
     from frametool.recordings.messages import PointCloud

@@ -30,8 +30,8 @@ from frametool.text.spans import Flags, Floats, Ints, Spans
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from frametool.geometry.types import Components, Rigid
-    from frametool.stream.record_results import Piece
+    from frametool.geometry import Components, Rigid
+    from frametool.stream.pieces import Piece
 
 COLUMNS_REMEDY = "give --deg, or name the columns _deg"
 

@@ -23,7 +23,7 @@ from frametool.stream.row_layout import IDENTITY, MOVERS, NORMAL, PARTS, POINT, 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
-    from frametool.geometry.types import Components, Namespace
+    from frametool.geometry import Components, Namespace
     from frametool.stream.record import Record
     from frametool.stream.request import Operation, Request
     from frametool.stream.table import Table

@@ -14,7 +14,7 @@ from frametool.documents.document import parse_documents
 from frametool.errors import FormatError, Misused, ValueInvalid, bare, did_you_mean, first_of, listing, shown, warn
 from frametool.formats.table import FORMATS
 from frametool.geometry import quaternion, rigid
-from frametool.stream.record_results import Word, one_of
+from frametool.stream.pieces import Word, one_of
 from frametool.stream.request import Formula, Shown
 from frametool.stream.row_layout import POINT, POSE
 
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from frametool.formats.robots.joints import JointColumn, JointState
     from frametool.formats.robots.model import Robot
+    from frametool.geometry import Components, Namespace, Number, Rigid
     from frametool.geometry.camera import Camera
-    from frametool.geometry.types import Components, Namespace, Number, Rigid
 
 ALL, INSIDE, OUTSIDE, UNSIZED = "", "in the image", "outside it", "with a pixel"
 BEHIND, BEYOND, HORIZON = "behind the camera", "beyond the model", "above the horizon"

@@ -21,8 +21,8 @@ from frametool.grammar.pose import DESCRIPTIVE, LISTED_WORDS, POSE_KEYS, ROTATIO
 from frametool.grammar.readers import AXES_KEY, NAME_KEYS, PARENT_KEYS, Path, may_be_uncertain
 from frametool.stream.evaluate import Plan
 from frametool.stream.faults import SKIP, Fault
+from frametool.stream.pieces import Const, In, Renamed
 from frametool.stream.record import KEYS_REMEDY
-from frametool.stream.record_results import Const, In, Renamed
 from frametool.stream.record_search import POINT_KEYS
 from frametool.stream.record_values import MOST_ENTRIES
 from frametool.stream.row_layout import POSE

@@ -1,7 +1,4 @@
-"""What results are written as: the pieces of the text of a row, and blocks of results for another format.
-
-In a block what is alike becomes rows together, all else a result at a time.
-"""
+"""Results in another format, block by block: what is alike becomes rows together, all else a result at a time."""
 
 from __future__ import annotations
 
@@ -9,7 +6,7 @@ import re
 from functools import cached_property
 from itertools import chain, islice
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol
 
 from frametool import sizes
 from frametool.errors import NamedTuple
@@ -17,7 +14,7 @@ from frametool.formats.rows.csv import cells_of, row
 from frametool.grammar.result import Style, write_poses
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
     from tempfile import SpooledTemporaryFile
 
     from frametool.stream.record_values import Value
@@ -25,65 +22,6 @@ if TYPE_CHECKING:
     from frametool.stream.writers import AlikeRows
     from frametool.text.spans import Ints, Spans
 
-
-# --- the pieces that the text of a row is made of ---
-
-
-class In(NamedTuple):
-    """A stretch of the input, by its key among the spans a format found."""
-
-    part: Any
-
-
-class Out(NamedTuple):
-    """Numbers of the result, from the first up to before the last, each followed by `between` but for the last."""
-
-    first: int
-    last: int
-    between: bytes = b","
-
-
-class Word(NamedTuple):
-    """A number of the result in other words than digits; nan is a row without it."""
-
-    number: int
-    text: Callable[[float], bytes]
-
-
-def one_of(words: Sequence[str], quote: bytes = b"", null: bytes = b"") -> Callable[[float], bytes]:
-    """Return what writes a number as the word that it encodes, between quotes or not: the zone of UTM."""
-    return lambda number: quote + words[int(number)].encode() + quote if number == number else null  # noqa: PLR0124 - nan
-
-
-def number_text(number: float, fmt: str, exponent: str) -> str:
-    """Write a number in a format of Python's; exponent: what 1e-05 has for its e, in YAML `.0e`."""
-    text = format(number, fmt)
-    return text if "." in text else text.replace("e", exponent)
-
-
-class Renamed(NamedTuple):
-    """The name of a frame in the result, in place of the one that begins at `at` in the text that was learned."""
-
-    at: int
-    text: bytes
-
-
-class Const(NamedTuple):
-    """The same text in every row."""
-
-    text: bytes
-
-
-class IfLocked(NamedTuple):
-    """Text that is only in rows whose angles are not unique."""
-
-    text: bytes
-
-
-Piece: TypeAlias = In | Out | Const | IfLocked | Word | Renamed
-
-
-# --- results in another format ---
 
 TOGETHER = 1 << 13  # results that are written as one block
 

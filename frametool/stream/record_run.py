@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
     from frametool.frames.lookups import Frames
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
     from frametool.grammar.edges import EdgeColumns, Options
     from frametool.recordings.read import Channel, RecordingReader
 

@@ -33,7 +33,7 @@ from frametool.text.lines import Pieces, read_blocks, readiness, whole_lines, wi
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 
-    from frametool.geometry.types import Components
+    from frametool.geometry import Components
     from frametool.stream.evaluate import Run, State
     from frametool.stream.record_cuts import Hit, RecordCutter
     from frametool.stream.record_rows import RecordRows

@@ -42,7 +42,7 @@ from frametool.stream.row_layout import FLAT, LEAVES_PLANE, PARTS, POSE, ROTATIO
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from frametool.geometry.types import Components, Rigid
+    from frametool.geometry import Components, Rigid
     from frametool.stream.request import Operation
     from frametool.stream.row_layout import Shape
 

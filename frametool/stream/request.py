@@ -19,10 +19,10 @@ from frametool.stream.row_layout import MOVERS, POINT, POSE, RATE, SIX, TURNED, 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from frametool.geometry import Components, Namespace, Number, Rigid
     from frametool.geometry.place import Earth, Place
-    from frametool.geometry.types import Components, Namespace, Number, Rigid
     from frametool.grammar.result import Style
-    from frametool.stream.record_results import Word
+    from frametool.stream.pieces import Word
 
     Rename: TypeAlias = Callable[[str | None, str | None], tuple[str | None, str | None]]
 
@@ -88,7 +88,7 @@ class Shown(NamedTuple):
     def values(self, prefix: str, numbers: Components) -> dict[str, Any]:
         """Return the members of a record."""
         from frametool.documents.source import Verbatim
-        from frametool.stream.record_results import Word
+        from frametool.stream.pieces import Word
 
         found: dict[str, Any] = {}
         for key, value in self.members.items():

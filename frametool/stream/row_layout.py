@@ -14,9 +14,9 @@ from frametool.text.numbers import read_number_or_angle
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from frametool.geometry import Components, Namespace, Quaternion
     from frametool.geometry.place import Place, Spot
     from frametool.geometry.representations import Notation, Whole
-    from frametool.geometry.types import Components, Namespace, Quaternion
 
 POINT, VECTOR, POSE, TWIST, WRENCH, ACCEL = "point", "vector", "pose", "twist", "wrench", "accel"
 ROTATION = "rotation"  # without a position, which no move gives it

@@ -23,7 +23,7 @@ from frametool.frames.stamps import BILLION, read_header_stamp, read_stamp
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.readers import in_nanoseconds
 from frametool.grammar.result import NoResult, Result, with_entries
-from frametool.stream.record_results import IfLocked, In, Out, Piece, Word
+from frametool.stream.pieces import IfLocked, In, Out, Piece, Word
 from frametool.stream.row_layout import AS_READ, MAPPINGS, NOWHERE, PARTS, POINT, POSE
 from frametool.text.parse import FURTHEST, parse_stamps
 from frametool.text.spans import MARGIN, Floats, Ints, Spans, framed, join, without_quotes
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from frametool.geometry import Components
     from frametool.geometry.place import Place, Spot
-    from frametool.geometry.types import Components
     from frametool.stream.faults import Fault
     from frametool.stream.record_values import Value
 

@@ -39,7 +39,7 @@ from frametool.text.numbers import parse_number
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.geometry.types import Array, Indices
+    from frametool.geometry import Array, Indices
     from frametool.grammar.edges import Answers
     from frametool.text.lines import ByteStream
 

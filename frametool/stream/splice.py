@@ -23,8 +23,8 @@ from frametool.grammar.readers import AXES_KEY, EARTH_FRAMES, PLACE_KEYS
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream import row_layout
 from frametool.stream.faults import Fault
+from frametool.stream.pieces import Const, IfLocked, In, Out, Piece, Renamed, Word, one_of
 from frametool.stream.record import outermost
-from frametool.stream.record_results import Const, IfLocked, In, Out, Piece, Renamed, Word, number_text, one_of
 from frametool.stream.record_search import POINT_KEYS, QUATERNION, STALE, XYZ
 from frametool.stream.record_values import Answer, Entry, Outside, RecordText, json_documents, written
 from frametool.stream.row_layout import POSE, SIX
@@ -293,6 +293,12 @@ class Splicer:
 def _item(before: str, behind: str, none: str, fmt: str, exponent: str, number: float) -> bytes:
     """Write a number of a list with what is around it, or another text for nan."""
     return none.encode() if isnan(number) else f"{before}{number_text(number, fmt, exponent)}{behind}".encode()
+
+
+def number_text(number: float, fmt: str, exponent: str) -> str:
+    """Write a number in a format of Python's; exponent: what 1e-05 has for its e, in YAML `.0e`."""
+    text = format(number, fmt)
+    return text if "." in text else text.replace("e", exponent)
 
 
 def _joined(parts: Sequence[Pieces], gap: Const) -> Pieces:

@@ -26,7 +26,7 @@ from frametool.grammar.readers import EARTH_FRAMES, NORMALS, in_nanoseconds, sta
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import Fault, Outcome, RowNote
 from frametool.stream.header import has_pose_column, listed
-from frametool.stream.record_results import In, Out
+from frametool.stream.pieces import In, Out
 from frametool.stream.request import SOME
 from frametool.stream.row_layout import NORMAL, POSE, RATE, Shape
 from frametool.stream.rows import (

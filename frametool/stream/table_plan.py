@@ -13,7 +13,7 @@ from frametool.grammar.readers import AXES_KEY, may_be_uncertain, nanoseconds_be
 from frametool.stream import header, row_layout
 from frametool.stream.evaluate import Plan
 from frametool.stream.header import XYZ, PoseColumns, listed, row_shape
-from frametool.stream.record_results import Const, In, Out, Word, one_of
+from frametool.stream.pieces import Const, In, Out, Word, one_of
 from frametool.stream.request import NO_STAMPS, PAIR, PLAIN, Request
 from frametool.stream.row_layout import POINT, POSE, SIX, Shape, place_of, six_names
 from frametool.text.numbers import number_or_none
@@ -21,7 +21,7 @@ from frametool.text.numbers import number_or_none
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.stream.record_results import Piece
+    from frametool.stream.pieces import Piece
     from frametool.stream.table import Table
 
 class Kept(NamedTuple):

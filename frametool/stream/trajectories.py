@@ -42,8 +42,8 @@ if TYPE_CHECKING:
 
     from frametool.fit.comparison import Comparison
     from frametool.frames.buffer import TransformBuffer
+    from frametool.geometry import Array
     from frametool.geometry.transform import Transform
-    from frametool.geometry.types import Array
     from frametool.grammar.edges import Report
     from frametool.text.lines import ByteStream
 

@@ -29,7 +29,8 @@ from frametool.geometry import arrays, floats, quaternion, rigid
 from frametool.grammar.pose import SCALE
 from frametool.grammar.readers import EARTH_FRAMES
 from frametool.grammar.result import Result, Style
-from frametool.stream.record_results import BlockResults, Const, Documents, In, Out, Piece, ResultWriter, csv_rows
+from frametool.stream.pieces import Const, In, Out, Piece
+from frametool.stream.record_results import BlockResults, Documents, ResultWriter, csv_rows
 from frametool.stream.request import target_of
 from frametool.stream.row_layout import AS_READ, POSE, SIX
 from frametool.stream.rows import (
@@ -50,7 +51,7 @@ from frametool.text.spans import Floats, Ints, Spans, join, without_quotes
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-    from frametool.geometry.types import Components
+    from frametool.geometry import Components
     from frametool.stream.record_values import Value
 
 LEARNED = ("csv", "json", "yaml")

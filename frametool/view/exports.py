@@ -37,7 +37,7 @@ from frametool.view.terminal import BACKGROUND, ON_WHITE, colours_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import SimulationStep
     from frametool.sim.turtle import Pen, TurtleState

@@ -26,7 +26,7 @@ from frametool.view.scene import text_width
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from frametool.geometry.types import Number
+    from frametool.geometry import Number
     from frametool.view.scene import Box
 
     Point = tuple[float, float]

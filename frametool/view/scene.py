@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from frametool.frames.lookups import Frames
     from frametool.frames.track import MovingTrack
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
 
     Point = tuple[float, float, float]
     Eye = tuple[float, float]  # azimuth and elevation, radians

@@ -12,7 +12,7 @@ from frametool.fit.least_squares import Undetermined, align_vectors, inverse, so
 from frametool.geometry.transform import Rotation
 
 if TYPE_CHECKING:
-    from frametool.geometry.types import Array
+    from frametool.geometry import Array
 
 DRAWN = np.random.default_rng(4)
 EPS = 2.0**-52

@@ -15,7 +15,7 @@ from frametool.fit.matched_points import PointsFit, solve_points
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
-    from frametool.geometry.types import Array
+    from frametool.geometry import Array
 
 pytestmark = pytest.mark.filterwarnings("ignore::frametool.errors.FrametoolWarning")  # what looks odd is in the result too
 

@@ -15,7 +15,7 @@ from frametool.formats.robots.dh import Amount, column_of
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from frametool.geometry.types import Array
+    from frametool.geometry import Array
 
 # theta, d, a, alpha of three joints
 ROWS = ((0.3, 0.1, 0.05, pi / 2), (-0.7, 0.0, -0.4, 0.0), (1.1, 0.2, 0.03, -pi / 2))

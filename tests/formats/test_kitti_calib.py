@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from frametool.geometry.types import Array
+    from frametool.geometry import Array
 
 FOCAL = 700.0
 CAM0_VELO = np.eye(4)

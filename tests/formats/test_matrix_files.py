@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from frametool.geometry.types import Array
+    from frametool.geometry import Array
 
 KNOWN = {"me": "cam1", "before": "cam0", "imu": "imu", "body": "body", "sensor": "imu"}
 

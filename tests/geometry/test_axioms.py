@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
-    from frametool.geometry.types import Array
+    from frametool.geometry import Array
 
 QUATERNIONS = samples.quaternions()
 SHIFTS = np.random.default_rng(2).normal(size=(len(QUATERNIONS), 3))

@@ -16,7 +16,7 @@ from frametool.geometry.representations import ROTATIONS, Notation, notation
 from frametool.geometry.validation import read_rotations, require_rotations
 
 if TYPE_CHECKING:
-    from frametool.geometry.types import Array, Quaternion
+    from frametool.geometry import Array, Quaternion
 
 SPECS = [*(name for name in ROTATIONS if name != "euler"), "euler:rzyx"]
 SIZES = (

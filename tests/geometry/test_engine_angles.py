@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from conftest import Outcome
 
-    from frametool.geometry.types import Quaternion
+    from frametool.geometry import Quaternion
 
     Run = Callable[..., Outcome]
 

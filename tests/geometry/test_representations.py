@@ -16,7 +16,7 @@ from frametool.geometry.representations import ROTATIONS, Notation, axes_name, n
 from frametool.geometry.transform import Rotation
 
 if TYPE_CHECKING:
-    from frametool.geometry.types import Quaternion
+    from frametool.geometry import Quaternion
 
 SPECS = [*(name for name in ROTATIONS if name != "euler"), "euler:rzyx", "euler:sxzx"]
 ROWS = samples.quaternions(10)

@@ -13,7 +13,7 @@ from frametool.geometry import arrays, euler, floats, quaternion
 from frametool.geometry.representations import ROTATIONS, notation
 
 if TYPE_CHECKING:
-    from frametool.geometry.types import Quaternion, Vector
+    from frametool.geometry import Quaternion, Vector
 
 EXACT = {0.0, 0.5, samples.SQRT_HALF, 1.0}
 TURNS = list(itertools.product((-270.0, -90.0, 0.0, 90.0, 180.0, 360.0), repeat=3))

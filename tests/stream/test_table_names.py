@@ -14,7 +14,7 @@ from frametool.errors import UnknownFrame, ValueInvalid
 if TYPE_CHECKING:
     from conftest import Outcome
 
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
 
     class Run(Protocol):
         def __call__(self, *arguments: str, stdin: str = ..., files: dict[str, str] | None = None) -> Outcome: ...

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from io import BufferedIOBase
 
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
     from frametool.grammar.pose import Pose
 
 Asked: TypeAlias = Request

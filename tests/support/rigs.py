@@ -9,7 +9,7 @@ import numpy as np
 from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
-    from frametool.geometry.types import Array
+    from frametool.geometry import Array
 
 NOISE = (5e-4, 2e-3)  # metres, radians, of each axis
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from frametool.explain.derive import WrittenPose
-    from frametool.geometry.types import Components
+    from frametool.geometry import Components
     from frametool.grammar.result import Style
     from frametool.recordings.messages import PointCloud
     from frametool.stream.request import Formula

@@ -26,7 +26,7 @@ from frametool.stream.faults import NULL, SKIP, RowsSkipped
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.geometry.types import Components
+    from frametool.geometry import Components
     from frametool.grammar.result import Result
 
 WITH_COVARIANCE = ("json", "yaml", "csv")

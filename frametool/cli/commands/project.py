@@ -25,8 +25,8 @@ from frametool.text.numbers import parse_length, parse_number
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from frametool.geometry import Components
     from frametool.geometry.camera import Camera
-    from frametool.geometry.types import Components
     from frametool.stream.formulas import Seen
 
 AXES = ("optical", "opengl", "flu")

@@ -24,8 +24,8 @@ from frametool.view.reports import Solution, sigma_entry, write_left_out, write_
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
 
+    from frametool.geometry import Array
     from frametool.geometry.transform import Transform
-    from frametool.geometry.types import Array
 
 
 NAMES = ("base", "gripper", "camera", "target")

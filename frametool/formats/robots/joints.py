@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
     from frametool.formats.robots.model import Value
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
 
     Series = Mapping[int | None, Value]
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.documents.source import InputFile
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
     from frametool.grammar.readers import Path, Quaternion, Vector
 
     Attributes = dict[str, Element]  # name -> the element, or the default, that has it

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
     from frametool.documents.xml import Element
-    from frametool.geometry.types import Components, Condition, Namespace, Number, Numbers, Rigid
+    from frametool.geometry import Components, Condition, Namespace, Number, Numbers, Rigid
     from frametool.grammar.edges import Options
 
     Value: TypeAlias = "JointValue | Rigid"

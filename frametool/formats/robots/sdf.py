@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
 
 
 def read_pose(holder: Element, options: Options) -> tuple[Rigid, str]:

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.frames.lookups import Frames
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 _XACRO = f"xacro, not yet URDF; {UNSUPPORTED['xacro'].remedy}"

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from frametool.formats.rows.column_file import Kind, Made, OutColumn
     from frametool.frames.lookups import Frames
-    from frametool.geometry.types import Components
+    from frametool.geometry import Components
     from frametool.grammar.result import Style
     from frametool.text.spans import Flags, Floats, Ints
 

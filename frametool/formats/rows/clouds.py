@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
     from frametool.formats.rows.column_file import Batch, Kind, Made, OutColumn
-    from frametool.geometry.types import Components
+    from frametool.geometry import Components
     from frametool.grammar.result import Style
     from frametool.text.spans import Floats, Ints
 

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from frametool.geometry.types import Components
+    from frametool.geometry import Components
     from frametool.grammar.result import Style
     from frametool.text.spans import Flags, Floats, Ints
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Made, OutColumn
-    from frametool.geometry.types import Components
+    from frametool.geometry import Components
     from frametool.grammar.result import Style
     from frametool.text.spans import Ints
 

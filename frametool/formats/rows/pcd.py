@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.formats.rows.column_file import Batch, Kind, OutColumn
-    from frametool.geometry.types import Components, Rigid
+    from frametool.geometry import Components, Rigid
     from frametool.grammar.result import Style
 
 DATA = ("ascii", "binary", "binary_compressed")

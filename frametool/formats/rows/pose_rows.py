@@ -48,7 +48,7 @@ from frametool.text.numbers import parse_number
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.geometry.types import Components
+    from frametool.geometry import Components
     from frametool.grammar.result import Style
 
 

@@ -78,7 +78,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from frametool.frames.lookups import Frames
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
 
 ANGLES = (*XYZ, "roll", "pitch", "yaw")
 QUATERNION = (*XYZ, "qx", "qy", "qz", "qw")

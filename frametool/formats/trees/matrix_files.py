@@ -44,7 +44,7 @@ from frametool.grammar.result import Style, rows_of, static_edges
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
 
 # pattern of the key, target, source; <a> and <b> are names in it, {..} are named by the file or the user:
 # {me} the block of the key, {before} the camera before it, {imu} {body} the common reference frame
