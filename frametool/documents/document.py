@@ -236,7 +236,7 @@ def nodes_of(events: Iterable[Event]) -> list[Node]:
 # --- JSON, which the module json reads ten times faster than any parser of YAML, without places ---
 
 
-JSON_BLANKS = " \t\n\r"
+BLANKS = " \t\n\r"  # of JSON
 
 
 class _NoJson(FormatError):
@@ -245,8 +245,8 @@ class _NoJson(FormatError):
 
 def looks_like_json(text: str) -> bool:
     """Return True if the first non-blank character opens an array, or an object with a quoted key or no key."""
-    begun = text.lstrip(JSON_BLANKS)  # without a pattern, whose compiling takes longer than a short text
-    return begun[:1] == "[" or (begun[:1] == "{" and begun[1:].lstrip(JSON_BLANKS)[:1] in ("", '"', "}"))
+    # without a pattern, whose compiling takes longer than a short text; an empty rest is in any text
+    return (begun := text.lstrip(BLANKS))[:1] == "[" or (begun[:1] == "{" and begun[1:].lstrip(BLANKS)[:1] in '"}')
 
 
 def parse_json(source: Source) -> list[Any] | None:

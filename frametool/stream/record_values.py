@@ -40,7 +40,7 @@ from frametool.stream.request import NO_STAMPS, Request, RowOptions
 from frametool.stream.row_layout import FLAT, LEAVES_PLANE, PARTS, POSE, ROTATION, VECTOR, checked_rotation
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from frametool.geometry import Components, Rigid
     from frametool.stream.request import Operation
@@ -302,7 +302,10 @@ def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
     known = read_text(source, request)
     for record in known.records:
         poses.append(pose_of(record, request)._replace(stamp_ns=stamp_of(known.values, record, source)))
-        extra.update(_header_stamp(record), _other_fields(partial(value_at, known.values), record))
+        own, keys = value_at(known.values, record.path), record.keys
+        ours = {keys.position, keys.rotation, *keys.flat, *keys.members}
+        if record.path[1:] or type(own) is list or not ours.issuperset(own):  # else the nodes are not needed
+            extra.update(_header_stamp(record), _rest(known.root, record))
     if not poses:
         raise FormatError("nothing in it; a pose is {xyz: [x, y, z], rpy_deg: [roll, pitch, yaw]}", source=source.name)
     return poses, extra
@@ -480,26 +483,20 @@ def stamp_key(members: dict[str, Any]) -> str:
 
 def _rest(root: Node, record: Record) -> dict[str, Any]:
     """Return the other fields of a record and of the mappings around it, without pose, frames and header."""
-    places = _other_fields(lambda path: root.at(path).value, record)
-    return {key: plain(root.at(path)) for key, path in places.items()}
-
-
-def _other_fields(value_of: Callable[[Path], Any], record: Record) -> dict[str, Path]:
-    """Return the paths of the other fields by key; value_of: returns the value, or the members, at a path."""
     keys, used = record.keys, {*NOT_PLAIN, *PARTS.get(record.shape.kind, ())}  # no longer true of the result
     used |= {keys.position, keys.rotation, *keys.others, *keys.flat, *keys.members, *keys.placed}
     names = {*record.name.paths, *record.parent.paths}
-    rest: dict[str, Path] = {}
+    rest: dict[str, Any] = {}
     for depth in range(len(_unit_of(record)), len(record.path) + 1):
         path = record.path[:depth]
-        holder = value_of(path)
-        if type(holder) is not dict:
+        holder = root.at(path)
+        if type(holder.value) is not dict:
             continue
         on_the_way = {*record.path[depth : depth + 1], "header", *keys.covariances}
-        for key in holder:
+        for key, (_, value) in holder.value.items():
             is_used = key in on_the_way or (*path, key) in names or (path == record.path and key in used)
             if not is_used and key not in rest:
-                rest[key] = *path, key
+                rest[key] = plain(value)
     return rest
 
 
