@@ -50,16 +50,14 @@ def is_pasted(text: str, notation: Notation | None = None) -> bool:
     """
     if is_inline(text) or text == "-" or os.path.exists(text):
         return is_inline(text)
-    if _inverted(text) or "\n" in text or re.match(r"\w+: *[\[{]", text):
-        return True
-    return rewritten(Source(INLINE, text), notation, normalize=False, points=False) is not None
+    is_known = _inverted(text) or "\n" in text or re.match(r"\w+: *[\[{]", text)
+    return bool(is_known or rewritten(Source(INLINE, text), notation, normalize=False, points=False))
 
 
 @lru_cache(8)  # `is_pasted` and `pose_source` read an argument, and its warnings are written once
 def rewritten(source: Source, notation: Notation | None, *, normalize: bool, points: bool) -> Source | None:
     """Return pasted text as a mapping of the grammar of poses; None for text that already is one."""
-    text = source.text.strip()
-    if "\n" not in text and (re.match(_MAPPING, text) or re.match(_HEADER, text)):
+    if (re.match(_MAPPING, source.text) or re.match(_HEADER, source.text)) and "\n" not in source.text.strip():
         return None
     from frametool.ros.pasted_blocks import in_grammar
 
