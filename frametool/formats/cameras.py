@@ -203,7 +203,7 @@ def _read(file: InputFile) -> Found:
 def _in_document(value: Any, file: InputFile) -> Found:
     """Yield the cameras of one document."""
     if isinstance(value, list) and any(isinstance(each, dict) and "camera_intrinsic" in each for each in value):
-        from frametool.formats.trees.calibrations import read
+        from frametool.formats.trees.nuscenes import read
 
         for edge in read(file, _options(file)):  # calibrated_sensor.json of nuScenes, by the names of the frames
             record = value[edge.path[-1]] if edge.parent is not None else {}  # type: ignore[index]
@@ -312,7 +312,7 @@ def _nerf(value: dict[str, Any]) -> dict[str, Any]:
 
 def _kitti(file: InputFile) -> Found:
     """Yield the cameras of a KITTI calibration."""
-    from frametool.formats.trees.calibrations import CAMERAS, RECTIFICATIONS, kitti_lines, kitti_name
+    from frametool.formats.trees.kitti_calib import CAMERAS, RECTIFICATIONS, kitti_lines, kitti_name
 
     options = _options(file)
     numbers = {name: line.numbers for name, line in kitti_lines(file, options).items()}

@@ -318,7 +318,7 @@ FORMATS = {
         required_options=("direction", "frames"), reads=_CAMERAS,
     ),
     "kalibr": _read_tree(
-        "results of Kalibr as text", "frametool.formats.trees.calibrations",
+        "results of Kalibr as text", "frametool.formats.trees.kalibr",
         magic=(
             ("text", r"(?im)^[ \t]*(?:baseline T_\d+_\d+:|Camera-system parameters:)"),
             ("text", r"(?im)^[ \t]*(?:Transformation[ \t]+)?T_(?:ci|ic|\w{1,40}_\w{1,40}):?[ \t]*\(\w{1,40} to \w"),
@@ -348,7 +348,7 @@ FORMATS = {
         conventions="parent<-child, metres, quaternion by name; its euler_angles_degree are not used",
     ),
     "kitti-calib": _read_tree(
-        "KITTI calibration", "frametool.formats.trees.calibrations", magic=(("text", _KITTI),),
+        "KITTI calibration", "frametool.formats.trees.kitti_calib", magic=(("text", _KITTI),),
         conventions="parent<-child, metres, optical axes of cameras by default",
         required_options=("frames", "camera_axes"), reads=_CAMERAS,
     ),
@@ -358,7 +358,7 @@ FORMATS = {
         conventions="effector (base if not on the hand)<-tracking base, metres, x y z w",
     ),
     "nuscenes": _read_tree(
-        "nuScenes table", "frametool.formats.trees.calibrations",
+        "nuScenes table", "frametool.formats.trees.nuscenes",
         magic=(("text", r'\A\s*\[\s*\{[^{}]*?"(?:sensor_)?token"\s*:\s*"'),),
         conventions="ego<-sensor, global<-ego, metres, w first, microseconds", required_options=("frames",),
         reads=_CAMERAS,

@@ -11,7 +11,7 @@ from calibrations import matrix, read
 from scipy.spatial.transform import Rotation as Peer
 
 from frametool.errors import FormatError, Unanswered
-from frametool.formats.trees.matrix_files import Meaning, meaning_of
+from frametool.formats.trees.matrix_keys import Meaning, meaning_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

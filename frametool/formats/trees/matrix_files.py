@@ -13,9 +13,8 @@ Metres, row-major.  The parent of the cameras is the IMU: `imu`, or okvis' `body
 name of its folder: mav0/cam0/sensor.yaml.  A pair rvec, tvec maps points of the object to the camera, as everywhere
 in OpenCV, whose files are YAML, JSON or XML.
 
-A table has the meanings of keys; other keys are never guessed: the user has to state their direction.  Matrices are
-nested lists, one long list, or OpenCV's map of rows, cols and data.  A duplicate, also inverted or along another path,
-is not an edge but a check.
+The table of keys has their meanings.  Matrices are nested lists, one long list, or OpenCV's map of rows, cols and data.
+A duplicate, also inverted or along another path, is not an edge but a check.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from frametool.documents.source import TAG, InputFile
 from frametool.documents.writers import flow, quoted
 from frametool.documents.xml import Element, read_xml
 from frametool.errors import FormatError, ValueInvalid, bare, first_of, listing, shown, warn
-from frametool.formats.table import DIRECTIONS
+from frametool.formats.trees.matrix_keys import FRAME_KEYS, NO_POSE, Meaning, directed, meaning_of, partner_of
 from frametool.formats.trees.tree_reader import document_edges, dotted, named, remember
 from frametool.frames import topology
 from frametool.frames.lookups import Frames, FrameTree
@@ -42,118 +41,9 @@ from frametool.grammar.readers import Misfit, Path, Reading, Unclear, answerable
 from frametool.grammar.result import Style, rows_of, static_edges
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator
 
     from frametool.geometry import Rigid
-
-# pattern of the key, target, source; <a> and <b> are names in it, {..} are named by the file or the user:
-# {me} the block of the key, {before} the camera before it, {imu} {body} the common reference frame
-KEYS = (
-    ("T_cn_cnm1", "{me}", "{before}"),  # Kalibr: from camera n-1 to camera n
-    ("T_i_b", "{me}", "{imu}"),  # Kalibr: from the body, which is its first IMU, to this one
-    ("T_cam_imu", "{me}", "{imu}"),  # Kalibr
-    ("T_imu_cam", "{imu}", "{me}"),  # OpenVINS
-    ("T_cam_body", "{me}", "{body}"),
-    ("T_body_cam", "{body}", "{me}"),
-    ("T_SC", "{sensor}", "{me}"),  # okvis: S is the IMU, C the camera
-    ("T_BS", "{body}", "{me}"),  # EuRoC, okvis: S is the sensor of the file or block
-    ("T_cam_<b>", "{me}", "<b>"),
-    ("T_<a>_cam", "<a>", "{me}"),
-    ("(?:T_)?<a>_from_<b>", "<a>", "<b>"),
-    ("<a>_T_<b>", "<a>", "<b>"),  # VINS-Fusion: body_T_cam0
-    ("T_<a>_<b>", "<a>", "<b>"),  # ORB-SLAM3: IMU.T_b_c1, Stereo.T_c1_c2
-    ("T<letter><letter>", "<a>", "<b>"),  # ORB-SLAM3: Tbc
-)
-# these name two frames, and both directions are in use
-AMBIGUOUS = (("(?:T_)?<a>_to_<b>", "<a>", "<b>"), ("(?:T_)?<a>2<b>", "<a>", "<b>"))
-# two keys, a rotation (3x3, or a rotation vector of three numbers) and a translation, and their frames: together they
-# map points of the second to the first; without frames, the direction must be set
-PAIRS = (
-    (r"rvec(.*)", r"tvec\1", "camera", r"object\1", ""),  # OpenCV's own: solvePnP, calibrateCamera
-    (r"extrinsicRotation", "extrinsicTranslation", "imu", "cam0", ""),  # VINS-Mono: from the camera to the IMU
-    (r"R", "T", "cam1", "cam0", "R1|P1|Q|E|F"),  # stereoCalibrate, which writes one of these too
-    (r"R", "[Tt]", "", "", ""),
-    (r"(?i:rotation(?:_?matrix)?)", "(?i:translation(?:_?vector)?)", "", "", ""),
-)
-# keys next to a matrix that name its frames, target first (OpenLORIS-Scene, tf); the direction must be set
-FRAME_KEYS = (
-    ("parent_frame", "child_frame"), ("parent_frame_id", "child_frame_id"), ("frame_id", "child_frame_id"),
-    ("parent", "child"), ("target_frame", "source_frame"), ("destination_frame", "source_frame"),
-)  # fmt: skip
-# matrices that are not poses, although some have the size of one: projection, rectification, disparity to depth,
-# geometry of two pictures, intrinsics, distortion, covariance
-NO_POSE = (
-    r"[PRKD][0-9]?|M[0-9]|[QEFH]|.*([Pp]rojection|[Rr]ectif|[Ee]ssential|[Ff]undamental|[Hh]omography|[Ii]ntrinsic|[Dd]ist|"
-    r"[Cc]ov|[Nn]oise|[Ii]nformation).*|(P_rect|R_rect|[Cc]amera_?[Mm]atrix).*"
-)
-
-
-class Meaning(NamedTuple):
-    """The meaning of a matrix: it maps points of `source` to `target`; in a tree `child` is below the other one.
-
-    is_stated: the key states it; otherwise it is the meaning with `--direction parent-from-child`
-    """
-
-    target: str
-    source: str
-    child: str
-    is_stated: bool = True
-
-
-def meaning_of(key: str, known: Mapping[str, str], frames: Sequence[str] = ()) -> Meaning | Unclear | None:
-    """Return the meaning of a key, or the error if it may name two frames in several ways; None if not in the table.
-
-    key: without the part before its last point (`IMU.T_b_c1`).
-    known: names for the braces; frames: names set by the user, which may be parts of the key.
-    """
-    last = key.rpartition(".")[2]
-    for row in (*AMBIGUOUS, *KEYS):
-        pattern, target, source = row
-        if ways := _ways(pattern, last, frames):
-            if len(ways) > 1:
-                pairs = " or ".join(f"{bare(a)},{bare(b)}" for a, b in ways)
-                return Unclear(f"{bare(key)} may name its two frames in several ways; give --frames {pairs}", key=True)
-            names = {"<a>": ways[0][0], "<b>": ways[0][1]} | {f"{{{name}}}": frame for name, frame in known.items()}
-            child = names["{me}" if "{me}" in (target, source) else source]
-            return Meaning(names[target], names[source], child, is_stated=row not in AMBIGUOUS)
-    return None
-
-
-def _ways(pattern: str, key: str, frames: Sequence[str]) -> list[tuple[str, str]]:
-    """Return the pairs of names that a pattern finds in a key, those set by the user if they fit."""
-    if "<" not in pattern:
-        return [("", "")] if key == pattern else []
-    fits = [(a, b) for a in frames for b in frames if re.fullmatch(_filled(pattern, re.escape(a), re.escape(b)), key)]
-    if fits:
-        return fits[:1]
-    found: dict[tuple[str, str], None] = {}
-    for name in (r"[A-Za-z]\w*?", r"[A-Za-z]\w*"):  # the shortest first name, then the longest
-        if match := re.fullmatch(_filled(pattern, name, r"[A-Za-z]\w*"), key):
-            names = {"a": "", "b": ""} | match.groupdict()
-            found[names["a"], names["b"]] = None
-    return list(found)
-
-
-def _filled(pattern: str, a: str, b: str) -> str:
-    letters = pattern.replace("<letter>", "(?P<a>[a-z])", 1).replace("<letter>", "(?P<b>[a-z])", 1)
-    return letters if letters != pattern else pattern.replace("<a>", f"(?P<a>{a})").replace("<b>", f"(?P<b>{b})")
-
-
-def partner_of(key: str, others: Collection[str]) -> tuple[str, str, str] | None:
-    """Return the key of the translation that belongs to that of a rotation, and two frames as in `PAIRS`."""
-    for rotation, translation, target, source, needed in PAIRS:
-        match = re.fullmatch(rotation, key)
-        if match is None or (needed and not any(re.fullmatch(needed, other) for other in others)):
-            continue
-        if match.groups():  # a single key belongs to it, which is looked up directly
-            wanted = match.expand(translation)
-            found = wanted if wanted in others else None
-        else:
-            found = next((other for other in others if re.fullmatch(translation, other)), None)
-        if found is not None:
-            return found, target, match.expand(source)
-    return None
-
 
 MATRIX = notation("matrix")
 
@@ -271,17 +161,6 @@ def edges_of(statements: Iterable[Stated], reading: Reading) -> list[Edge]:
         Edge(track.parent, track.child, track.components, path=first[frozenset((track.parent, track.child))].path)
         for track in tree.tracks()
     ]
-
-
-def directed(what: str, path: Path, parent: str, child: str, answers: Answers) -> Meaning:
-    """Return the direction of --direction for two frames; raises Unclear if it is not set."""
-    if not answers.direction:
-        one, other = DIRECTIONS
-        a, b = bare(parent), bare(child)
-        ways = f"--direction {one} (takes points of {b} to {a}) or {other} (of {a} to {b})"
-        raise Unclear(f"{shown(what)}: the key does not say its direction: give {ways}", path, key=True)
-    ends = (parent, child) if answers.direction == DIRECTIONS[0] else (child, parent)
-    return Meaning(*ends, child)
 
 
 # --- files ---
