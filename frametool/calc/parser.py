@@ -134,10 +134,10 @@ class Branch(NamedTuple):
     parts: tuple[Branch, ...] = ()
 
 
-class Link(NamedTuple):
+class Operator(NamedTuple):
     """An operator of a chain, or `as` or `in` with the frames that they name, and its position."""
 
-    operator: str
+    text: str
     at: int
     frames: tuple[str, ...] = ()
 
@@ -245,7 +245,7 @@ class _Parser:
             first = Branch("negate", sign.start, None, (first,)) if sign.text == "-" else first
         else:
             first = self.atom()
-        links, parts = list[Link](), [first]
+        operators, parts = list[Operator](), [first]
         while self.next.kind in ("op", "name") and (binds := BINDING.get(self.next.text, -1)) >= least:
             token = self.take()
             frames: tuple[str, ...] = ()
@@ -258,8 +258,8 @@ class _Parser:
             else:  # 2^3^2 is 2^9
                 right = self.deeper(token.start, SIGN) if token.text == "^" else self.value(binds + 1)
                 parts.append(right)
-            links.append(Link(token.text, token.start, frames))
-        return Branch("chain", links[0].at, tuple(links), tuple(parts)) if links else first
+            operators.append(Operator(token.text, token.start, frames))
+        return Branch("chain", operators[0].at, tuple(operators), tuple(parts)) if operators else first
 
     def atom(self) -> Branch:
         """Parse one value."""

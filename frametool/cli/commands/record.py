@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.options import place_options, pose_options, reading_options, verbose_option
@@ -18,6 +19,9 @@ from frametool.grammar.edges import Diagnostics
 from frametool.stream.faults import ON_ERROR, STOP, BadRows
 from frametool.view.text import progress_bar
 
+if TYPE_CHECKING:
+    from frametool.frames.lookups import Frames
+
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 messages skipped, 4 lookup, 5 file."
 TRANSFORMS = ("tf", "tf_static")  # the topics of transforms, in any namespace
 
@@ -31,6 +35,26 @@ def _between(text: str) -> tuple[int, int]:
     if start > stop:
         raise ValueInvalid(f"{parts[0]} is after {parts[1]}; START comes first")
     return start, stop
+
+
+def _refuse_change(place: str, *read: str) -> None:
+    """Refuse to write to a file that is read, to its folder, or into a folder that is read."""
+    new = Path(place).resolve()
+    for each in filter(os.path.exists, read):
+        old = Path(each).resolve()
+        if old.is_relative_to(new) or new.is_relative_to(old):
+            changes = f"would change {printable(each)}, which is read; give another name"
+            raise FileProblem(f"{printable(place)}: {changes}")
+
+
+def _added_edges(inputs: Inputs, copy: str) -> Frames:
+    """Return the tree of --with; its joints need values, and covariances are left out."""
+    edges = load_tree(inputs, inputs.more[0], inputs.more[1:])
+    if resting := [name for *_, names in edges.robots for name in names]:
+        raise BadAnswer(f"joints without a value would be static: {listing(resting)}; --joint NAME=VALUE gives it")
+    if edges.covariances:
+        warn(f"{copy}: covariances left out")
+    return edges
 
 
 @command_named("record", own=("topics", "output"), epilog=EXIT_CODES)
@@ -79,17 +103,8 @@ def record_command(inputs: Inputs) -> int:
         hint = "frametool tree, convert and lookup write one: -o NEW.mcap"
         raise FormatError(f"{FORMATS[source.format].summary}: no recording of messages; {hint}", source=path)
     copy, place = copy_target(source.format, path, inputs.output, inputs.format_name)
-    new = Path(place).resolve()
-    for each in filter(os.path.exists, (path, *map(tree_file, more))):
-        read = Path(each).resolve()
-        if read.is_relative_to(new) or new.is_relative_to(read):  # the same file, or a file and its folder
-            changes = f"would change {printable(each)}, which is read; give another name"
-            raise FileProblem(f"{printable(place)}: {changes}")
-    tally, edges = Diagnostics(), load_tree(inputs, more[0], more[1:]) if more else None
-    if edges is not None and (resting := [name for *_, names in edges.robots for name in names]):
-        raise BadAnswer(f"joints without a value would be static: {listing(resting)}; --joint NAME=VALUE gives it")
-    if edges is not None and edges.covariances:
-        warn(f"{copy}: covariances left out")
+    _refuse_change(place, path, *map(tree_file, more))
+    tally, edges = Diagnostics(), _added_edges(inputs, copy) if more else None
     inputs.use(*["normalize"] * bool(more or into))
     on_error = inputs.on_error if into else STOP
     bad = BadRows(path, on_error, tell=say_error, counted="message")

@@ -90,6 +90,24 @@ def _paced(start: float) -> Watch:
     return lambda step: sleep(max(0.0, step.t_ns / BILLION - (monotonic() - start)))
 
 
+def _pictures(scene: Scene, plot: str | None, view: str | None) -> dict[str, tuple[Watch, Callable[[], str | bytes]]]:
+    """Return for each file of a picture the function called with each step, and that which then returns its content."""
+    found: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
+    if plot:
+        from frametool.view.exports import run_picture
+        from frametool.view.pictures import require_matplotlib, write_picture
+
+        if suffix_of(plot) == ".png":
+            require_matplotlib()
+        watch_run, drawn = run_picture(scene)
+        found[plot] = watch_run, lambda: write_picture(drawn(), suffix_of(plot))
+    if view:
+        from frametool.view.exports import run_page
+
+        found[view] = run_page()
+    return found
+
+
 def show_run(inputs: Inputs, scene: Scene, *, leaders: bool = False) -> None:
     """Run a scene to its end, write or draw it by the options, and write a summary to stderr.
 
@@ -108,20 +126,7 @@ def show_run(inputs: Inputs, scene: Scene, *, leaders: bool = False) -> None:
         if not os.path.isdir(os.path.dirname(path) or "."):
             raise FileProblem(f"{path}: no directory {os.path.dirname(path)}")
     summary, interrupted = RunSummary(scene, reach), False
-    # file written after the run -> function called with each step, and function that returns the content
-    pictures: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
-    if plot:
-        from frametool.view.exports import run_picture
-        from frametool.view.pictures import require_matplotlib, write_picture
-
-        if suffix_of(plot) == ".png":
-            require_matplotlib()
-        watch_run, drawn = run_picture(scene)
-        pictures[plot] = watch_run, lambda: write_picture(drawn(), suffix_of(plot))
-    if view:
-        from frametool.view.exports import run_page
-
-        pictures[view] = run_page()
+    pictures = _pictures(scene, plot, view)
     try:
         with ExitStack() as stack:  # closes the screen and the output
             watchers: list[Watch] = [summary.watch, *[_paced(monotonic())] * bool(inputs.realtime or live)]

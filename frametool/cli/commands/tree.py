@@ -24,6 +24,7 @@ from frametool.ros.publisher import FLAGS, moving_frames, read_flags, read_posit
 
 if TYPE_CHECKING:
     from frametool.formats.robots.model import Solid
+    from frametool.frames.lookups import Frames
     from frametool.view.scene import FrameScene
 
     Eye = tuple[float, float]
@@ -159,18 +160,10 @@ def view_command(inputs: Inputs) -> None:
     refuse(overlay and (source or not target), "--overlay takes two trees: frametool view AFTER BEFORE --overlay")
     refuse(inputs.path_only and not (target and source), "--path draws the way between TARGET and SOURCE; name both")
     frames = load_tree(inputs, tree, inputs.more)
-    from frametool.view.scene import FrameScene
-
-    ends = {} if overlay else {"target": target, "source": source}
-    names = ends | {"fixed": inputs.fixed, "below": inputs.below}
-    named: Any = {key: name and frame_name(name, frames) for key, name in names.items()}
-    scene = FrameScene(frames, at_ns=options.at_ns(inputs.at), only=inputs.only, path_only=inputs.path_only, **named)
+    scene, before = _scenes(inputs, frames, overlay=overlay)
     gone = [name for name, track in scene.tracks.items() if not track.covers(scene.at_ns or 0)]
     if gone and chosen != "html":  # a page shows their nearest time
         say(f"note: no data of {listing(gone, 5)} at {format_stamp(scene.at_ns or 0)}: not drawn, nor what hangs there")
-    before = None
-    if overlay:
-        before = FrameScene(load_tree(inputs, str(target)), at_ns=scene.at_ns, fixed=scene.fixed, ground=scene.ground)
     if chosen == "text" and output is None:
         color = inputs.color
         if sys.stdout.isatty():
@@ -195,6 +188,20 @@ def view_command(inputs: Inputs) -> None:
 
         say(f"the page is {path}")
         webbrowser.open(Path(path).absolute().as_uri())
+
+
+def _scenes(inputs: Inputs, frames: Frames, *, overlay: bool) -> tuple[FrameScene, FrameScene | None]:
+    """Return the scene of a tree, and that of the tree from before for --overlay, in the same frame and at its time."""
+    from frametool.view.scene import FrameScene
+
+    ends = {} if overlay else {"target": inputs.target, "source": inputs.source}
+    names = ends | {"fixed": inputs.fixed, "below": inputs.below}
+    named: Any = {key: name and frame_name(name, frames) for key, name in names.items()}
+    scene = FrameScene(frames, at_ns=options.at_ns(inputs.at), only=inputs.only, path_only=inputs.path_only, **named)
+    if not overlay:
+        return scene, None
+    before = load_tree(inputs, str(inputs.target))
+    return scene, FrameScene(before, at_ns=scene.at_ns, fixed=scene.fixed, ground=scene.ground)
 
 
 def _format(fmt: str | None, output: str | None, *, opens: bool) -> str:

@@ -426,19 +426,8 @@ def apply_arrow(
     masks = [mask for mask in map(nulls_of, inputs) if mask is not None]
     nulls = np.logical_or.reduce(masks) if masks else None
     mover = _mover(data, transform, tree, target, source, time_column, nulls)
-    moved: Components
-    if as_ == "pose":
-        rows = np.stack(numbers, axis=-1, dtype=np.float64)
-        if nulls is not None:  # values of null rows are arbitrary
-            rows[nulls] = rigid.IDENTITY
-        poses = mover @ Transform.from_arrays(rows[:, :3], rows[:, 3:])
-        moved = (*poses.components[:3], *poses.xyzw.T)
-    elif as_ == "vector":
-        moved = arrays.run(quaternion.rotate, 3, (*mover.components[3:], *numbers))
-    else:
-        moved = arrays.run(rigid.apply, 3, (*mover.components, *numbers))
     new = list(data.columns)
-    for place, each, field in zip(places, moved, fields, strict=True):
+    for place, each, field in zip(places, _moved(as_, mover, numbers, nulls), fields, strict=True):
         with np.errstate(over="ignore"):  # numbers that are too large become infinite
             values = np.asarray(each, kind_of(field.type))
         if nulls is not None and not field.nullable:
@@ -454,6 +443,19 @@ def apply_arrow(
             raise ValueInvalid(f"{field.name}[{row}]: the result is too large for {field.type}")
         new[place] = pa.array(values, type=field.type, mask=nulls)
     return type(data).from_arrays(new, schema=data.schema)
+
+
+def _moved(as_: str, mover: Transform, numbers: list[Any], nulls: Flags | None) -> Components:
+    """Return the columns of points, vectors or poses moved by a transform."""
+    if as_ == "vector":
+        return arrays.run(quaternion.rotate, 3, (*mover.components[3:], *numbers))
+    if as_ == "point":
+        return arrays.run(rigid.apply, 3, (*mover.components, *numbers))
+    rows = np.stack(numbers, axis=-1, dtype=np.float64)
+    if nulls is not None:  # values of null rows are arbitrary
+        rows[nulls] = rigid.IDENTITY
+    poses = mover @ Transform.from_arrays(rows[:, :3], rows[:, 3:])
+    return (*poses.components[:3], *poses.xyzw.T)
 
 
 def _place_of(name: str, names: Sequence[str]) -> int:
