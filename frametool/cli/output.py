@@ -100,7 +100,7 @@ class Output:
         self.chosen = named or (table.by_name(self.path, table.writers(*what)) if self.path is not None else None)
         notations, place = inputs.notations or (), None
         if inputs.peek("origin") is not None or any(map(attrgetter("representation.on_earth"), notations)):
-            from frametool.cli.earth import places_of
+            from frametool.cli.earth_options import places_of
 
             notations, place = places_of(inputs, notations)
         self.notations: tuple[Notation, ...] = notations

@@ -133,7 +133,7 @@ class Task:
         """
         if self._opened is None and self.path and is_bag(self.path):
             from frametool.grammar.edges import Diagnostics
-            from frametool.recordings.messages import open_records
+            from frametool.recordings.contents import open_records
 
             self._opened = open_records(self.path, self.inputs.topics, Diagnostics())
             self.within = "json"
@@ -399,7 +399,7 @@ class Task:
                 if not (bare.startswith("{") and ":" in bare):  # not a mapping, whose keys name the representation
                     inputs.use("from_rep")
         if is_on_earth := bool(style.place or self.place or any(map(inputs.peek, options.OF_EARTH))):
-            from frametool.cli.earth import earth
+            from frametool.cli.earth_options import earth
 
             fields["earth"] = earth(inputs)
         fields = {

@@ -87,7 +87,7 @@ def _tree(summary: str, module: str, **fields: Any) -> Format:
 
 _DRAWINGS = "frametool.formats.trees.drawings"
 _MESSAGES = "frametool.ros.message_stream"
-BAG = "frametool.recordings.messages"
+BAG = "frametool.recordings.contents"
 
 
 def _arrays(

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from frametool.geometry import Rigid
     from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
-    from frametool.recordings.messages import PointCloud
+    from frametool.recordings.contents import PointCloud
     from frametool.stream.evaluate import Run
     from frametool.text.spans import Flags, Floats
 

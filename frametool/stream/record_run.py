@@ -22,7 +22,7 @@ from frametool.frames.stamps import BILLION, format_stamp
 from frametool.frames.topology import resolve_name, static_and_moving, to_root, two_parents
 from frametool.geometry import floats, quaternion, rigid, uncertainty
 from frametool.grammar.edges import Answers, Diagnostics, Edge, Names, Topics
-from frametool.recordings.messages import POSE_ARRAY, TYPES, numbers_of, posed_messages, raw_transforms, recorded_edges
+from frametool.recordings.contents import POSE_ARRAY, TYPES, numbers_of, posed_messages, raw_transforms, recorded_edges
 from frametool.recordings.read import Recorded, typestore
 from frametool.recordings.write import KINDS, SECONDS_ROS2, RecordingFile, new_channel, serialised
 from frametool.ros.message_stream import unit_components

@@ -96,7 +96,7 @@ def read_trajectory(
         topics, inside = inside, []
     file, body = None, BODY
     if not inside and (fmt or by_suffix(name, RECORDINGS) or of_folder(name)) in RECORDINGS:
-        from frametool.recordings.messages import open_trajectory
+        from frametool.recordings.contents import open_trajectory
 
         if (found := open_trajectory(name, topics, Diagnostics())) is not None:
             file, fmt, body = InputFile(name, found[0]), "json", body_of(found[1], answers)

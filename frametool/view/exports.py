@@ -30,8 +30,17 @@ from frametool.geometry.rigid import IDENTITY
 from frametool.sim.turtle import SIZE as WORLD
 from frametool.sim.turtle import single
 from frametool.view import pictures
+from frametool.view.frame_scene import (
+    EYES,
+    FrameScene,
+    Projection,
+    Size,
+    can_be_drawn,
+    placed_names,
+    rounded,
+    text_width,
+)
 from frametool.view.pictures import PALETTE, ChartLine, Picture, box, dot, line, shade_of, stacked, svg_text
-from frametool.view.scene import EYES, FrameScene, Projection, Size, can_be_drawn, placed_names, rounded, text_width
 from frametool.view.terminal import BACKGROUND, ON_WHITE, colours_of
 
 if TYPE_CHECKING:
@@ -41,8 +50,8 @@ if TYPE_CHECKING:
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import SimulationStep
     from frametool.sim.turtle import Pen, TurtleState
+    from frametool.view.frame_scene import Eye
     from frametool.view.pictures import Point, SvgElement
-    from frametool.view.scene import Eye
 
     Stroke = tuple[str, Pen, list[Point]]  # turtle, pen, and a line drawn with it; metres, y up
 

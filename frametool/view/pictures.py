@@ -21,13 +21,13 @@ from xml.sax.saxutils import escape
 
 from frametool.documents.source import opened
 from frametool.errors import FileProblem, FormatError, ValueInvalid, printable
-from frametool.view.scene import text_width
+from frametool.view.frame_scene import text_width
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from frametool.geometry import Number
-    from frametool.view.scene import Box
+    from frametool.view.frame_scene import Box
 
     Point = tuple[float, float]
     Place = Callable[[float, float], Point]  # maps data to pixels

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from frametool.errors import cells, printable
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.sim.turtle import SIZE, TurtleState
-from frametool.view.scene import EYES, Flat, FrameScene, Projection, Size, placed_names, rounded, words_of
+from frametool.view.frame_scene import EYES, Flat, FrameScene, Projection, Size, placed_names, rounded, words_of
 from frametool.view.text import coloured_console
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import IssuedCommand, SimulationStep
-    from frametool.view.scene import Eye, Label
+    from frametool.view.frame_scene import Eye, Label
 
     Run = tuple[str, str]  # text and its style
     Spot = tuple[int, int]  # line and column

@@ -26,7 +26,7 @@ ALLOWED = {
     ("cli/__init__.py", "sys.stderr.write"),  # where no module can be opened, the voice cannot either
     ("view/pictures.py", "catch_warnings"),  # what a drawing library says of fonts
     ("cli/commands/batch.py", "catch_warnings"),  # filters of the program that runs a command are put back
-    ("view/scene.py", "catch_warnings"),  # what Python says of an expression
+    ("view/frame_scene.py", "catch_warnings"),  # what Python says of an expression
     ("formats/trees/launch.py", "catch_warnings"),  # what Python says of a file of somebody else's
 }  # fmt: skip
 MOVE = ["apply", "--transform", "{xyz: [1, 0, 0]}"]

@@ -199,7 +199,7 @@ def test_a_command_on_single_items_loads_few_modules(arguments: list[str], most:
 
 OF_THE_EARTH = {
     f"frametool.{name}"
-    for name in ("cli.earth", "geometry.earth", "geometry.place", "geometry.transverse_mercator", "grammar.place",
+    for name in ("cli.earth_options", "geometry.earth", "geometry.place", "geometry.transverse_mercator", "grammar.place",
                  "stream.earth_columns")
 }  # fmt: skip
 

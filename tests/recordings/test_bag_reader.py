@@ -175,7 +175,7 @@ def test_transforms_that_lie_alike_are_the_same_edges_one_by_one(
         return [*file.edges(tell=False)], [*file.tally.findings()]
 
     at_once = edges_and_notes()
-    monkeypatch.setattr("frametool.recordings.messages.alike", lambda *_: ())
+    monkeypatch.setattr("frametool.recordings.contents.alike", lambda *_: ())
     assert at_once == edges_and_notes()
     assert len(at_once[0]) == 120 * count + 3
 

@@ -19,7 +19,7 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
 from frametool.grammar.edges import Diagnostics
-from frametool.recordings.messages import RECORDS, open_records
+from frametool.recordings.contents import RECORDS, open_records
 from frametool.recordings.read import MessageTypes
 
 if TYPE_CHECKING:
@@ -252,7 +252,7 @@ def test_messages_that_lie_alike_become_the_same_lines_at_once(
     found = [lines(sent[:40])]
     assert singly == 1
     found.append(lines(sent))
-    monkeypatch.setattr("frametool.recordings.messages.layout_of", lambda *_: None)
+    monkeypatch.setattr("frametool.recordings.contents.layout_of", lambda *_: None)
     assert [lines(sent[:40]), lines(sent)] == found
     assert [json.loads(line)["header"]["frame_id"] for line in found[1].splitlines()] == texts
 

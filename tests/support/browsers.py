@@ -11,7 +11,7 @@ from console import ROOT
 
 import frametool
 from frametool.view.exports import write_page
-from frametool.view.scene import FrameScene
+from frametool.view.frame_scene import FrameScene
 
 if TYPE_CHECKING:
     from collections.abc import Callable

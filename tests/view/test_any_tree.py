@@ -15,8 +15,8 @@ from frametool.errors import FrametoolError, ValueInvalid
 from frametool.frames.buffer import TransformBuffer
 from frametool.geometry.transform import Transform
 from frametool.view.exports import still_picture, write_glb, write_page
+from frametool.view.frame_scene import FrameScene
 from frametool.view.pictures import write_svg
-from frametool.view.scene import FrameScene
 from frametool.view.terminal import terminal_text
 
 VALUES = (0.0, 1.0, -1.0, 1e-9, 1e-300, 5e-324, 1e9, 1e29, 1e150, 1e300, -1e300, 1.7e308, 123.456)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 import frametool
-from frametool.view.scene import FrameScene
+from frametool.view.frame_scene import FrameScene
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -14,7 +14,7 @@ import frametool
 from frametool.frames.buffer import TransformBuffer
 from frametool.geometry.transform import Transform
 from frametool.view.exports import write_glb
-from frametool.view.scene import FrameScene
+from frametool.view.frame_scene import FrameScene
 
 SIZES = {5126: ("f", 4), 5123: ("H", 2), 5121: ("B", 1)}
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}

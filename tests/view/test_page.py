@@ -23,7 +23,7 @@ from frametool.frames.buffer import TransformBuffer
 from frametool.frames.lookups import FrameTree
 from frametool.geometry.transform import Transform
 from frametool.view.exports import SCRIPTS, write_page
-from frametool.view.scene import FrameScene
+from frametool.view.frame_scene import FrameScene
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -20,7 +20,7 @@ from samples import LATTICE, LOCK_GAPS, random_quaternions
 import frametool
 from frametool.geometry import euler, floats, quaternion
 from frametool.view.exports import write_page
-from frametool.view.scene import FrameScene
+from frametool.view.frame_scene import FrameScene
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

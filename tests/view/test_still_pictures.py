@@ -18,8 +18,8 @@ from frametool.errors import FileProblem
 from frametool.frames.lookups import FrameTree
 from frametool.geometry.transform import Transform
 from frametool.view.exports import HEIGHT, SIZE, WIDTH, still_picture
+from frametool.view.frame_scene import EYES, FrameScene, Projection, placed_names, rounded
 from frametool.view.pictures import write_png, write_svg
-from frametool.view.scene import EYES, FrameScene, Projection, placed_names, rounded
 from frametool.view.terminal import Canvas, terminal_lines, terminal_text
 
 if TYPE_CHECKING:

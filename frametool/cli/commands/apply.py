@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from frametool.explain.derive import WrittenPose
     from frametool.geometry import Components
     from frametool.grammar.result import Style
-    from frametool.recordings.messages import PointCloud
+    from frametool.recordings.contents import PointCloud
     from frametool.stream.request import Formula
     from frametool.stream.written import ByTree
 
@@ -54,7 +54,7 @@ def bag_of_clouds(task: streaming.Task) -> Callable[[Mover], int]:
 
     Topics of --topic that are not clouds are left to the tree.
     """
-    from frametool.recordings.messages import cloud_topics, read_clouds
+    from frametool.recordings.contents import cloud_topics, read_clouds
     from frametool.recordings.read import opened_recording
     from frametool.stream.column_stream import moved_cloud
 
@@ -375,7 +375,7 @@ def _is_apart(argument: str) -> bool:
 def sources_of(inputs: Inputs, arguments: Sequence[str], kind: str = "", place: str = "") -> Iterator[str | Source]:
     """Yield the texts of records: bare numbers in threes become points, the rest is unchanged."""
     if place and not any(map(is_record, arguments)):
-        from frametool.cli.earth import mapping_of
+        from frametool.cli.earth_options import mapping_of
 
         yield mapping_of(inputs, arguments, place)
         return

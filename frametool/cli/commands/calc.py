@@ -324,7 +324,7 @@ def calc_command(inputs: Inputs) -> int:
     output = task.output
     scope = Scope(degrees=inputs.deg, normalize=inputs.normalize)
     if any(map(inputs.peek, OF_EARTH)):
-        from frametool.cli.earth import earth
+        from frametool.cli.earth_options import earth
 
         scope.earth = earth(inputs)
     alone = () if inputs.arguments == ("-",) else inputs.arguments  # a single - is standard input

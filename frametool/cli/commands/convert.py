@@ -69,7 +69,7 @@ def convert_command(inputs: Inputs) -> int:
         _report_axes(axes, world, request.rows.given, output, is_anew=bool(values) and values != ("-",))
     is_numbers = _are_numbers(values, has_from=request.rows.given is not None or bool(request.rows.given_place))
     if is_numbers and request.rows.given_place:
-        from frametool.cli.earth import mapping_of
+        from frametool.cli.earth_options import mapping_of
 
         values, is_numbers = (mapping_of(inputs, values, request.rows.given_place),), False
     is_alone = operation.turns and not values and (task.plan or not task.has_input())

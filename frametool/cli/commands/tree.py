@@ -25,7 +25,7 @@ from frametool.ros.publisher import FLAGS, moving_frames, read_flags, read_posit
 if TYPE_CHECKING:
     from frametool.formats.robots.model import Solid
     from frametool.frames.lookups import Frames
-    from frametool.view.scene import FrameScene
+    from frametool.view.frame_scene import FrameScene
 
     Eye = tuple[float, float]
 
@@ -111,7 +111,7 @@ PIPE_SIZE = (100, 30)  # columns and lines, if not known
 
 
 def _eye(text: str) -> Eye:
-    from frametool.view.scene import parse_eye
+    from frametool.view.frame_scene import parse_eye
 
     return parse_eye(text)
 
@@ -192,7 +192,7 @@ def view_command(inputs: Inputs) -> None:
 
 def _scenes(inputs: Inputs, frames: Frames, *, overlay: bool) -> tuple[FrameScene, FrameScene | None]:
     """Return the scene of a tree, and that of the tree from before for --overlay, in the same frame and at its time."""
-    from frametool.view.scene import FrameScene
+    from frametool.view.frame_scene import FrameScene
 
     ends = {} if overlay else {"target": inputs.target, "source": inputs.source}
     names = ends | {"fixed": inputs.fixed, "below": inputs.below}
