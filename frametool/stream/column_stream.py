@@ -237,7 +237,6 @@ def run_columns(file: ColumnFile, request: Request, style: Style, *, source: str
     rows = ColumnRows(file, request, source)
     columns = rows.out_columns()
     move_along(file, request)
-    _say_rounded([rows])
     drops = request.on_error == SKIP or request.operation.of == VELOCITIES
     writer: ColumnWriter = file.rewriter(columns, None if drops else file.count, style)
     for batch in file.batches():
@@ -272,7 +271,6 @@ class OtherColumns:
         others = dict.fromkeys(name for columns in every for name in columns if name not in self.kinds)
         if others:
             warn(f"{listing(others)} left out: not all of the clouds have it")
-        _say_rounded([rows for _, rows in self.parts])
         for file, request, _ in files:
             move_along(file, request)
 
@@ -299,13 +297,6 @@ class OtherColumns:
             yield outcome._replace(text=self.writer.of_columns(len(chosen), found))
         if rows is self.parts[-1][1]:
             yield from map(Outcome, self.writer.end())
-
-
-def _say_rounded(every: Sequence[ColumnRows]) -> None:
-    """Warn of columns of fewer digits than results are computed with."""
-    begin = f"{every[0].table.source}: " if len(every) == 1 else ""
-    if kinds := sorted({kind.name for rows in every for kind in rows.narrow.values()}):
-        warn(f"{begin}{', '.join(kinds)} columns are computed as float64 and rounded once")
 
 
 def move_along(file: ColumnFile, request: Request) -> None:

@@ -106,7 +106,6 @@ def test_each_message_moves_at_its_stamp_by_the_tree_of_the_same_bag(run: Run, t
         assert np.allclose(points["xyz"], wanted(at + 0.5), rtol=1e-6, atol=1e-6)
         assert points["intensity"].tolist() == [0, 1000, 2000, 3000, 4000, 5000]
     assert f"{bag}: 18 points in map, metres, in 3 files (/points)" in done.err
-    assert done.err.count("computed as float64") == 1
 
 
 def test_the_sensor_stands_where_its_frame_does(run: Run, tmp_path: Path) -> None:
