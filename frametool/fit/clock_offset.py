@@ -88,8 +88,7 @@ def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit
     courses = [course - mask * (course.sum() / mask.sum()) for course, mask in zip(courses, masks, strict=True)]
 
     def correlated(x: Array, y: Array) -> Array:
-        found: Array = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
-        return found
+        return np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
 
     count = np.maximum(correlated(*masks), 1e-9)
     sums = correlated(courses[0], masks[1]), correlated(masks[0], courses[1])

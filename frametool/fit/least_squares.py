@@ -74,21 +74,18 @@ def align_vectors(source: Array, target: Array) -> Rotation:
 
 def applied(matrices: Array, vectors: Array) -> Array:
     """Return matrices times vectors: (.., n, k) and (.., k)."""
-    found: Array = (matrices @ vectors[..., None])[..., 0]
-    return found
+    return (matrices @ vectors[..., None])[..., 0]
 
 
 def sigmas(errors: Array, information: Array) -> Array:
     """Return the root mean square of errors (.., 6) in sigmas; information: the inverse covariances, (.., 6, 6)."""
     squares = (errors * applied(information, errors)).sum(-1)
-    found: Array = np.sqrt(np.maximum(squares, 0.0) / 6)
-    return found
+    return np.sqrt(np.maximum(squares, 0.0) / 6)
 
 
 def length(vectors: Array) -> Array:
     """Return the lengths of vectors along the last axis."""
-    found: Array = np.linalg.norm(vectors, axis=-1)
-    return found
+    return np.linalg.norm(vectors, axis=-1)
 
 
 NEAR = 1e-4  # radians: below, the series of J^-1 is exact to the last bits
@@ -264,8 +261,7 @@ def lengths(residuals: Array) -> Array:
 def deviations(residuals: Array, sigmas: Array) -> Array:
     """Return u of rows: the root mean square of their numbers in sigmas."""
     off = lengths(residuals) / sigmas
-    u: Array = np.sqrt((off**2).sum(-1) / (3.0 * off.shape[1]))
-    return u
+    return np.sqrt((off**2).sum(-1) / (3.0 * off.shape[1]))
 
 
 def fitted_sigmas(residuals: Array, weights: Array | Mask, unknown: int) -> Array:

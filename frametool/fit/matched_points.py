@@ -121,8 +121,7 @@ class _Pairs(NamedTuple):
         return self.target - placed
 
     def weighted_residuals(self, fit: Fit) -> Array:
-        found: Array = np.sqrt(self.mass)[:, None] * self.residuals(fit)
-        return found
+        return np.sqrt(self.mass)[:, None] * self.residuals(fit)
 
     def start(self, *, with_scale: bool, robust: bool) -> tuple[Fit, float]:
         """Return the fit of all or of a triple with the least typical distance, and that distance.

@@ -287,8 +287,7 @@ class MovingTrack:
             from frametool.frames.trajectory import TrackTable
 
             self.table = TrackTable(self)
-        found: Rigid = self.table.at(times)
-        return found
+        return self.table.at(times)
 
 
 Track = StaticTransform | MovingTrack  # of one child frame; `is_static` distinguishes them

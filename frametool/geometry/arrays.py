@@ -73,8 +73,7 @@ def copysign(size: Array | float, sign: Array) -> Array:
 
 def _sign_bits(x: Array | float) -> Indices:
     """Return the sign bit of every number, all other bits 0."""
-    bits: Indices = np.asarray(x, np.float64).view(np.int64) & SIGN_BIT
-    return bits
+    return np.asarray(x, np.float64).view(np.int64) & SIGN_BIT
 
 
 def canonical_sign(x: Array, y: Array, z: Array, w: Array) -> Four[Array]:

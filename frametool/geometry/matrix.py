@@ -145,8 +145,7 @@ def explained(parts: Sequence[Any], halves: Sequence[Any], xp: Functions[Any]) -
             room = sum((abs(parts[a + at]) * halves[b + at] + (abs(parts[b + at]) + halves[b + at]) * halves[a + at]
                         for at in range(3)), 0.0)  # fmt: skip
             found = found & (abs(dot) <= room + SILENT)
-    made: Condition = found
-    return made
+    return found
 
 
 def remark(*entries: float) -> str:

@@ -221,8 +221,7 @@ def second_moment(components: Components, mass: Array) -> Array:
     import numpy as np
 
     q = np.stack(components, axis=-1)
-    moment: Array = np.einsum("n,n...i,n...j->...ij", mass, q, q)
-    return moment
+    return np.einsum("n,n...i,n...j->...ij", mass, q, q)
 
 
 def mean_quaternion(components: Components, mass: Array) -> Components:

@@ -183,8 +183,7 @@ class RecordingFile:
         if name not in self._numbers:
             self._numbers[name] = new_channel(KINDS[name], topic or f"/{name}", ros1=self.format == BAG1)
             self.begin([self._numbers[name]])
-        found: Channel = self._numbers[name]
-        return found
+        return self._numbers[name]
 
     def begin(self, channels: Iterable[Channel]) -> None:
         """Begin some channels."""

@@ -128,8 +128,7 @@ def trimmed(data: Bytes, starts: Ints, ends: Ints) -> tuple[Ints, Ints]:
 
 
 def _is_blank(characters: Bytes) -> Flags:
-    blank: Flags = (characters == ord(" ")) | (characters == ord("\t"))
-    return blank
+    return (characters == ord(" ")) | (characters == ord("\t"))
 
 
 def _split_exponent(data: Bytes, starts: Ints, ends: Ints) -> tuple[Ints, Ints, Flags]:

@@ -139,8 +139,7 @@ def _is_at_rest(joint: Joint, value: Value) -> Condition:
     """Return True, or an array, where a joint does not move anything."""
     if not isinstance(value, JointValue):
         return value == rigid.IDENTITY
-    at_rest: Condition = value.number == (joint.rest * floats.RADIAN if value.degrees else joint.rest)
-    return at_rest
+    return value.number == (joint.rest * floats.RADIAN if value.degrees else joint.rest)
 
 
 class Link(NamedTuple):

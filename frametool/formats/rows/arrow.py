@@ -74,8 +74,7 @@ def nulls_of(column: Any) -> Flags | None:
     """Return the null mask, (n,); None without nulls."""
     if not column.null_count:
         return None
-    nulls: Flags = column.is_null().to_numpy(zero_copy_only=False)
-    return nulls
+    return column.is_null().to_numpy(zero_copy_only=False)
 
 
 def stamps_of(column: Any, name: str, in_ns: int) -> tuple[Ints, Flags | None, dict[int, str]]:

@@ -74,8 +74,7 @@ class _Clipped:
     def read(self, size: int = -1) -> bytes:
         """Read this many bytes, or all that are left."""
         left = max(self._size - self._stream.tell(), 0)
-        data: bytes = self._stream.read(left if size < 0 else min(size, left))
-        return data
+        return self._stream.read(left if size < 0 else min(size, left))
 
 
 class LasBatch(column_file.StructuredBatch):
