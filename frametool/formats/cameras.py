@@ -29,7 +29,8 @@ from frametool.errors import FormatError, ValueInvalid, alternatives, listing, s
 from frametool.formats.detect import of_folder
 from frametool.formats.trees.matrix_files import TAGS, made_ordinary
 from frametool.formats.trees.tree_reader import CAMERA_KEYS, camera_fields, numbers_of
-from frametool.geometry.camera import CAMERA_MODELS, Camera
+from frametool.geometry.camera import Camera
+from frametool.geometry.lenses import CAMERA_MODELS
 from frametool.grammar.edges import Answers, Diagnostics, Options, Topics
 from frametool.text.numbers import parse_number
 

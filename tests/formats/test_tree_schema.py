@@ -13,7 +13,7 @@ from console import ROOT
 
 import frametool
 from frametool.formats.trees.schema import schema
-from frametool.geometry.camera import CAMERA_MODELS
+from frametool.geometry.lenses import CAMERA_MODELS
 from frametool.geometry.representations import POSITIONS, ROTATIONS
 
 if TYPE_CHECKING:

@@ -16,7 +16,8 @@ import pytest
 
 import frametool
 from frametool.errors import FrametoolWarning, ValueInvalid
-from frametool.geometry.camera import AXES, CAMERA_MODELS, Camera
+from frametool.geometry.camera import AXES, Camera
+from frametool.geometry.lenses import CAMERA_MODELS
 from frametool.geometry.transform import Transform
 
 GOLDEN = json.loads((Path(__file__).parent.parent / "golden" / "camera.json").read_text())

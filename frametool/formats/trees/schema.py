@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.formats.trees.tree_reader import CAMERA_KEYS, STAMP_KEYS, TREE_KEYS
-from frametool.geometry.camera import CAMERA_MODELS
+from frametool.geometry.lenses import CAMERA_MODELS
 from frametool.geometry.representations import MAP, NAMED, POSITIONS
 from frametool.grammar.pasted import WORDS
 from frametool.grammar.place import EARTH_KEYS
