@@ -22,6 +22,7 @@ from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import euler, floats, quaternion
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar import pose_algebra
+from frametool.grammar.pose import RELATIVE
 from frametool.grammar.pose_algebra import Lookups, looked_up_across
 from frametool.grammar.result import Result, pose_numbers
 
@@ -451,7 +452,7 @@ def relative(style: Style, a: WrittenPose, b: WrittenPose) -> Explanation:
         found = sheet.play("relative", named("a", one[:3]) | named("b", other[:3]) | turns, **words)
         pose = pose_of(found, "c")
         values = sheet.play("extent", posed("", pose), frame=frames[1])
-        for name, key in zip(pose_algebra.RELATIVE_EXTRAS, ("d", "angle", "angle_deg"), strict=True):
+        for name, key in zip(RELATIVE, ("d", "angle", "angle_deg"), strict=True):
             value = values[key]
             if abs(value - own.extras[name]) > 100.0 * CLOSE * sheet.reach:
                 raise DerivationWrong(f"the derived {name} is {value!r}, not {own.extras[name]!r}; {REPORT}")

@@ -55,8 +55,9 @@ POSITION_KEYS |= dict.fromkeys(POSITION_WORDS, 1.0)
 TIMES = ("stamp_ns", "source_stamp_ns", "fixed")
 SPREAD = ("count", "used", "distance_rms", "distance_max", "angle_rms", "angle_rms_deg", "angle_max", "angle_max_deg",
           "std_x", "std_y", "std_z", "std_angle", "std_angle_deg")  # fmt: skip
+RELATIVE = ("distance", "angle", "angle_deg")  # m, rad
 VELOCITY = ("linear_x", "linear_y", "linear_z", "angular_x", "angular_y", "angular_z")  # m/s, rad/s
-DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "angle_deg", *SPREAD, *VELOCITY))
+DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, *RELATIVE, *SPREAD, *VELOCITY))
 NAMES = frozenset((*readers.NAME_KEYS, *readers.PARENT_NAMES))
 OTHER_NAMES = NAMES.difference(("name", "parent"))
 MOST_CHOICES = 10  # representations listed in an error; `help rotations` has all

@@ -14,7 +14,7 @@ from math import isfinite
 from frametool.errors import LookupFailed, ValueInvalid, shown, warn
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, quaternion, rigid
-from frametool.grammar.pose import Pose, inverted
+from frametool.grammar.pose import RELATIVE, Pose, inverted
 from frametool.grammar.result import Result, uncertain
 
 TYPE_CHECKING = False
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from frametool.geometry import Components
     from frametool.grammar.readers import Vector
 
-RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
 
 
 def product(left: Pose, right: Pose) -> Pose:
@@ -63,7 +62,7 @@ def relative(a: Pose, b: Pose) -> Result:
     """
     components = rigid.relative(*a.components, *b.components)
     distance, angle = rigid.extent(*components, floats)
-    extras = dict(zip(RELATIVE_EXTRAS, (distance, angle, math.degrees(angle)), strict=True))
+    extras = dict(zip(RELATIVE, (distance, angle, math.degrees(angle)), strict=True))
     parent, name = relative_names(a, b)
     return Result(Pose.of(components, name, parent), extras | shared_stamp((a, b)))
 

@@ -21,7 +21,9 @@ from frametool.geometry import floats
 from frametool.grammar import readers
 from frametool.grammar.pose import (
     COVARIANCE_KEYS,
+    DESCRIPTIVE,
     POSITION_KEYS,
+    RELATIVE,
     ROTATION_KEYS,
     SCALE,
     XYZ,
@@ -178,6 +180,12 @@ def _with_asked(record: Record, root: Any, request: Request) -> Record:
             text = value_at(root, found)
             number = within(found, parse_number, text if type(text) is str else "")
         record = record._replace(numbers=(*record.numbers, found), values=(*record.values, number))
+    if operation.of:  # in another format all fields of the unit are in one row
+        first = len(outermost(record.path) if request.results.canonical else record.path)
+        holders = [value_at(root, record.path[:depth]) for depth in range(first, len(record.path) + 1)]
+        for key in operation.extras(record.shape):
+            if key in DESCRIPTIVE and any(key in each and not {*RELATIVE}.issubset(each) for each in holders):
+                raise Misfit(f"key {shown(key)} is there already, where the result would stand", record.path)
     if operation.only_adds:
         holder = value_at(root, outermost(record.path))
         for name in (*operation.extras(record.shape), *(said.members if said and not said.replaces else ())):

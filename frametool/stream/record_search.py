@@ -14,6 +14,7 @@ from frametool.grammar.pose import (
     LISTED_WORDS,
     POSE_KEYS,
     POSITION_KEYS,
+    RELATIVE,
     ROTATION_KEYS,
     is_position,
     is_rotation,
@@ -23,7 +24,7 @@ from frametool.grammar.readers import NAME_KEYS, PARENT_KEYS, Misfit, Reading, k
 from frametool.stream.row_layout import PARTS
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Container, Sequence
 
     from frametool.grammar.readers import Path
     from frametool.stream.header import PoseColumns
@@ -42,7 +43,6 @@ QUATERNION = (*XYZ, "w")
 MOST_KEYS = 8  # listed in an error
 USED = KNOWN.difference(NAME_KEYS).union(ROTATION_KEYS, (readers.AXES_KEY, "sigma"), COVARIANCES, *PARTS.values())
 NUMBER_BEGINS = frozenset("+-.0123456789n")  # n: of nan
-STALE = ("gimbal_lock", "distance", "angle", "angle_deg")  # they describe the pose before the operation
 # other names of a rotation or position; a list or mapping under them is not taken for an extra field
 OTHER_WORDS = dict.fromkeys(("q", "quats", "quaternions", "orient", "so3"), "quaternion") | {
     "loc": "xyz", "location": "xyz", "xzy": "xyz",
@@ -92,7 +92,7 @@ class Members:
         """
         value, rotations = self.value, self.rotations
         scalars = [key for key in value if key not in self.lists]
-        others = NOTHING_BUT.difference(STALE) if "axis_x" in value else NOTHING_BUT
+        others = NOTHING_BUT.difference(RELATIVE) if "axis_x" in value else NOTHING_BUT
         names = [key for key in scalars if key not in others]  # that may be numbers of a pose
         is_flat = not rotations and POINT_KEYS.keys().isdisjoint(value)
         if not (names or (is_flat and len(scalars) >= 6)):
@@ -312,6 +312,12 @@ def bare_numbers(value: list[Any]) -> Misfit:
 def covariance_keys(field: str) -> Sequence[str]:
     """Return the keys of the covariance of a field of a message, or of a record."""
     return (f"{field}_covariance",) if field else COVARIANCES
+
+
+def outdated(members: Container[str]) -> set[str]:
+    """Return the keys that describe a pose as it was; a distance or an angle by itself is something else."""
+    is_relative = all(key in members for key in RELATIVE)
+    return {"gimbal_lock", *RELATIVE} if is_relative else {"gimbal_lock"}
 
 
 def value_at(value: Any, path: Path) -> Any:

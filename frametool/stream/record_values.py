@@ -35,7 +35,7 @@ from frametool.grammar.result import Result, Style, with_entries
 from frametool.stream import row_layout
 from frametool.stream.faults import ZONES, RowNote
 from frametool.stream.record import Record, find_records, key_path, pose_of
-from frametool.stream.record_search import STALE, value_at
+from frametool.stream.record_search import outdated, value_at
 from frametool.stream.request import NO_STAMPS, Request, RowOptions
 from frametool.stream.row_layout import FLAT, LEAVES_PLANE, PARTS, POSE, ROTATION, VECTOR, checked_rotation
 
@@ -53,7 +53,6 @@ MOST_LEAVES = 2000  # scalars of a record from which a template is learned: for 
 MOST_ENTRIES = 8  # points or poses of a record for which rows are made together
 SIX_BY_SIX = 36  # entries of the covariance of a pose
 SPELLED = ("yaml", "json", "csv")  # formats that preserve the names of other keys
-NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
 
 
 class Outside(FrametoolError):
@@ -415,7 +414,7 @@ def _result(root: Node, made: Answer, request: Request, fmt: str) -> Value:
             return with_stamp_ns(plain(node), fmt) | extras if type(node.value) is dict else extras
         if kind != POSE or request.rows.poses:
             record = record._replace(stamp_ns=None)
-    said = _header_stamp(record) | extras | with_stamp_ns(_rest(root, record), fmt)
+    said = _header_stamp(record) | extras | with_stamp_ns(_rest(root, record), fmt) | extras  # new ones count
     seen_from = "frame" if kind or record.shape.kind != POSE else "parent"
     named = {key: name for key, name in (("name", entry.name), (seen_from, entry.parent)) if name is not None}
     if kind in (POSE, ROTATION):
@@ -483,7 +482,7 @@ def stamp_key(members: dict[str, Any]) -> str:
 
 def _rest(root: Node, record: Record) -> dict[str, Any]:
     """Return the other fields of a record and of the mappings around it, without pose, frames and header."""
-    keys, used = record.keys, {*NOT_PLAIN, *PARTS.get(record.shape.kind, ())}  # no longer true of the result
+    keys, used = record.keys, {"angles", "inverse", *PARTS.get(record.shape.kind, ())}
     used |= {keys.position, keys.rotation, *keys.others, *keys.flat, *keys.members, *keys.placed}
     names = {*record.name.paths, *record.parent.paths}
     rest: dict[str, Any] = {}
@@ -493,6 +492,7 @@ def _rest(root: Node, record: Record) -> dict[str, Any]:
         if type(holder.value) is not dict:
             continue
         on_the_way = {*record.path[depth : depth + 1], "header", *keys.covariances}
+        used |= outdated(holder.value)
         for key, (_, value) in holder.value.items():
             is_used = key in on_the_way or (*path, key) in names or (path == record.path and key in used)
             if not is_used and key not in rest:

@@ -12,7 +12,7 @@ from frametool.geometry import quaternion, rigid
 from frametool.geometry.floats import RADIAN
 from frametool.geometry.representations import HEADING, Notation, notation
 from frametool.geometry.rigid import EXACT, SCALED, UNCERTAIN
-from frametool.grammar.pose import SCALE, VELOCITY
+from frametool.grammar.pose import RELATIVE, SCALE, VELOCITY
 from frametool.stream.faults import STOP
 from frametool.stream.row_layout import MOVERS, POINT, POSE, RATE, SIX, TURNED, VECTOR, Shape, Unit
 
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     Rename: TypeAlias = Callable[[str | None, str | None], tuple[str | None, str | None]]
 
-RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
 START, PREVIOUS, VELOCITIES = "start", "previous", "velocities"  # what a row is compared with that comes before it
 PAIR = "pair"  # the two poses of a row
 ALL, SOME, NO_STAMPS = "all", "some", "none"
@@ -137,7 +136,7 @@ class Operation(NamedTuple):
         """Name the numbers that come with the result of a row, and have no place in the row as it was read."""
         if self.formula is not None:
             return self.formula.extras(shape.kind)
-        compared = RELATIVE_EXTRAS + VELOCITY * (self.of == VELOCITIES) if self.of and shape.kind == POSE else ()
+        compared = RELATIVE + VELOCITY * (self.of == VELOCITIES) if self.of and shape.kind == POSE else ()
         return compared if shape.covariance and not shape.rewritten else (*compared, *self.carried(shape))
 
     def carried(self, shape: Shape) -> tuple[str, ...]:
@@ -274,7 +273,7 @@ class Operation(NamedTuple):
             poses, took = ([own], None) if before is None else before(own)
             found = self.pose(poses, edge, xp)
             if self.of == VELOCITIES:  # linear R_A' (p_B - p_A) / dt, angular the rotation vector of A^-1 B over dt
-                last = EXACT + len(RELATIVE_EXTRAS)
+                last = EXACT + len(RELATIVE)
                 steps = (*found[:3], *quaternion.as_rotvec(found[3], found[4], found[5], found[6], xp))
                 found = (*found[:last], *(step / took for step in steps), *found[last:])
             found = (*found, *extra)

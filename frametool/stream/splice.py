@@ -25,7 +25,7 @@ from frametool.stream import row_layout
 from frametool.stream.faults import Fault
 from frametool.stream.pieces import Const, IfLocked, In, Out, Piece, Renamed, Word, one_of
 from frametool.stream.record import outermost
-from frametool.stream.record_search import POINT_KEYS, QUATERNION, STALE, XYZ
+from frametool.stream.record_search import POINT_KEYS, QUATERNION, XYZ, outdated
 from frametool.stream.record_values import Answer, Entry, Outside, RecordText, json_documents, written
 from frametool.stream.row_layout import POSE, SIX
 from frametool.text.lines import with_edits
@@ -104,7 +104,7 @@ class Splicer:
                 position = [self._place("xyz" if self.kind == POSE else self.kind)] if unit is not None else []
                 self.behind[self.tail] += [*position, *self._rotation(), *self._extras(size)]
                 self.dropped |= {keys.position, keys.rotation, *keys.others, *keys.members, *keys.flat}
-                self.dropped |= {*STALE, "inverse", "angles"}
+                self.dropped |= {*outdated(self.members), "inverse", "angles"}
             elif self.members:
                 self._in_place()
             else:
@@ -173,7 +173,7 @@ class Splicer:
             self._numbers(range(there), 0)
         at, made = "", list[Pieces]()
         if shape.kind in row_layout.TURNED:
-            self.dropped.update({*STALE, "inverse", *keys.others}.difference(keys.flat))
+            self.dropped.update({*outdated(self.members), "inverse", *keys.others}.difference(keys.flat))
             slots = range(there, shape.own_size)
             at = keys.rotation
             if self._same_rotation() and None not in [self.slots[slot] for slot in slots]:
@@ -217,6 +217,7 @@ class Splicer:
         said, prefix = self.request.operation.shown, self.request.results.prefix
         if said is None:
             names = [prefix + name for name in self.target.extras]
+            self.dropped.update(names)  # of an earlier comparison
             return [self._member(with_entries(dict.fromkeys(names, 0.5)), first)] if names else []
         members = []
         for name, value in said.members.items():

@@ -152,6 +152,30 @@ def test_another_form_of_output_says_the_same(run: Run, option: str) -> None:
     assert all(key in there[0] for key in keys)
 
 
+DETECTION = '{"xyz": [1, 2, 3], "distance": 7, "id": 4}\n'
+
+
+@pytest.mark.parametrize("copies", [1, 200])
+def test_a_distance_of_the_user_is_neither_dropped_nor_replaced(run: Run, copies: int) -> None:
+    assert run("invert", stdin=DETECTION * copies).out == DETECTION.replace("1, 2, 3", "-1.0, -2.0, -3.0") * copies
+    assert run("convert", "-f", "csv", stdin=DETECTION * copies).out.startswith("x,y,z,qx,qy,qz,qw,distance,id\n1.0,2.0,3.0")
+    for fmt in ([], ["-f", "csv"]):
+        refused = run("relative", "--first", *fmt, stdin=DETECTION * copies)
+        assert (refused.status, refused.out) == (1, "")
+        assert refused.err == "frametool: stdin:1:1: key 'distance' is there already, where the result would stand\n"
+
+
+@pytest.mark.parametrize("fmt", ["json", "csv"])
+def test_the_velocities_of_velocities_are_written_once(run: Run, fmt: str) -> None:
+    rows = [f'{{"t": {at}, "xyz": [{at * at}, 0, 0]}}\n' for at in range(90)]
+    for count in (5, 90):
+        once = run("relative", "--consecutive", "--velocity", stdin="".join(rows[:count])).out
+        twice = run("relative", "--consecutive", "--velocity", "-f", fmt, stdin=once).out
+        assert twice.count("linear_x") == (count - 2 if fmt == "json" else 1)
+        last = json.loads(twice.splitlines()[-1]) if fmt == "json" else [*csv.DictReader(io.StringIO(twice))][-1]
+        assert float(last["linear_x"]) == float(last["distance"]) == 2.0
+
+
 @pytest.mark.parametrize("option", ["--first", "--consecutive"])
 def test_a_file_may_be_named_as_an_argument(run: Run, option: str) -> None:
     files = {"walk.tum": STREAMS["tum"]}
