@@ -25,7 +25,7 @@ class Measurement(NamedTuple):
     """The pose of a child in its parent, as somebody measured it.
 
     components: tx, ty, tz, x, y, z, w; metres
-    covariance: 36 numbers as ROS orders them, in the parent's axes; None where nobody gave it
+    covariance: 36 numbers as ROS orders them, in the parent's axes; None if unknown
     place: where it is, `m.yaml:12`, and its column behind that where several are on a line
     written: how its rotation was written, "rpy" or "rotvec", with the three numbers as read, in radians
     """

@@ -55,7 +55,7 @@ def clock_offset(
     step = min(float(np.median(np.diff(each))) for each in times) / 2
     best = ClockOffset(0.0, -1.0)
     for turning in (True, False):
-        courses: list[tuple[Array, Array]] = []  # the intervals between poses, and the angular speed or speed there
+        speeds: list[tuple[Array, Array]] = []  # the intervals between poses, and the angular speed or speed there
         for each, at in zip((ref, est), times, strict=True):
             rotation = each.rotation if turning else None
             if turning and rotation is None:
@@ -63,15 +63,15 @@ def clock_offset(
             moved = length(np.diff(each.xyz, axis=0)) if rotation is None else rotation[:-1].distance(rotation[1:])
             speed = moved / np.diff(at)
             if not np.std(speed) < 1e-6 * max(TINY, np.max(speed)):  # a constant speed shows no lag
-                courses.append(((at[1:] + at[:-1]) / 2, speed))
-        if len(courses) < len(times):
+                speeds.append(((at[1:] + at[:-1]) / 2, speed))
+        if len(speeds) < len(times):
             continue
-        best = max(best, _best_lag(courses[0], courses[1], step, limit_s), key=lambda found: found.score)
+        best = max(best, _best_lag(speeds[0], speeds[1], step, limit_s), key=lambda found: found.score)
         if by_turning and turning and best.score > 0:
-            seconds = _refined_speeds(courses[0], courses[1], best.seconds, step)
+            seconds = _refined_by_speeds(speeds[0], speeds[1], best.seconds, step)
             break
     else:
-        seconds = _refined(ref, est, shift, best.seconds, step, kind) if best.score > 0 else 0.0
+        seconds = _refined_by_path(ref, est, shift, best.seconds, step, kind) if best.score > 0 else 0.0
     return ClockOffset(seconds + shift / 1e9, best.score, None if best.rival is None else best.rival + shift / 1e9)
 
 
@@ -84,16 +84,16 @@ def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit
     grid = low + step * np.arange(int((high - low) / step) + 1)
     size = 1 << (2 * len(grid) - 1).bit_length()
     masks = [((grid >= at[0]) & (grid <= at[-1])).astype(float) for at, _ in (a, b)]
-    courses = [np.interp(grid, at, speed) * mask for (at, speed), mask in zip((a, b), masks, strict=True)]
-    courses = [course - mask * (course.sum() / mask.sum()) for course, mask in zip(courses, masks, strict=True)]
+    speeds = [np.interp(grid, at, speed) * mask for (at, speed), mask in zip((a, b), masks, strict=True)]
+    speeds = [each - mask * (each.sum() / mask.sum()) for each, mask in zip(speeds, masks, strict=True)]
 
     def correlated(x: Array, y: Array) -> Array:
         return np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
 
     count = np.maximum(correlated(*masks), 1e-9)
-    sums = correlated(courses[0], masks[1]), correlated(masks[0], courses[1])
-    squares = correlated(courses[0] ** 2, masks[1]), correlated(masks[0], courses[1] ** 2)
-    covariance = correlated(*courses) - sums[0] * sums[1] / count
+    sums = correlated(speeds[0], masks[1]), correlated(masks[0], speeds[1])
+    squares = correlated(speeds[0] ** 2, masks[1]), correlated(masks[0], speeds[1] ** 2)
+    covariance = correlated(*speeds) - sums[0] * sums[1] / count
     spread = [np.maximum(square - total**2 / count, TINY) for square, total in zip(squares, sums, strict=True)]
     lags = np.arange(size)
     lags[size // 2 :] -= size
@@ -128,7 +128,7 @@ def _newton(start: float, step: float, change_of: Callable[[float], float]) -> f
     return seconds if abs(seconds - start) < NEARBY * step else start
 
 
-def _refined_speeds(a: tuple[Array, Array], b: tuple[Array, Array], seconds: float, step: float) -> float:
+def _refined_by_speeds(a: tuple[Array, Array], b: tuple[Array, Array], seconds: float, step: float) -> float:
     """Refine a lag until the speeds a match the speeds b best."""
 
     def change_of(found: float) -> float:
@@ -141,7 +141,7 @@ def _refined_speeds(a: tuple[Array, Array], b: tuple[Array, Array], seconds: flo
     return _newton(seconds, step, change_of)
 
 
-def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step: float, kind: str) -> float:
+def _refined_by_path(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step: float, kind: str) -> float:
     """Refine the offset from the residuals along the velocity after the fit.
 
     Drift is along the velocity too, but correlated from pose to pose: if the residuals are so correlated that they are

@@ -33,7 +33,7 @@ CLEAR = 0.5  # score of a reliable clock offset
 SURE = 0.8  # score of one that is reported without being requested
 MOST_TRIED = 20_000  # points of its grid then
 FEW = 0.5  # of the possible pairs
-APART = radians(2.0)  # a rotation between bodies that is reported, if it is also
+NOTABLE = radians(2.0)  # a rotation between bodies that is reported, if it is also
 STEADY = 5.0  # this many times as large as its spread
 NEAR_A_LINE = 3.0  # residuals that the second axis of positions must exceed
 SLENDER = 0.1  # of the first axis: what is wider is not a line
@@ -192,11 +192,11 @@ def compared(
     pairing, fitting, reporting = settings
     for each, name in zip((ref, est), names, strict=True):
         require_near(each.xyz, name)
-    both = ref, est = _on_the_ground((ref, est), names, hints)
+    both = ref, est = _in_local_axes((ref, est), names, hints)
     if not reporting.evo:
         hints += [*ref.disorder(names[0]), *est.disorder(names[1])]
         both = ref.in_order(), est.in_order()
-    pairs = _mounted(_cut(_paired(*both, settings, names, hints), pairing), fitting)
+    pairs = _mounted(_in_window(_paired(*both, settings, names, hints), pairing), fitting)
     up, first = np.array(fitting.up), pairs
     if (limit := fitting.align_first) is not None:
         along = limit.along(pairs.ref)
@@ -208,7 +208,7 @@ def compared(
     moved = fit.moved(pairs.est)
     ate = trajectory_errors.absolute_errors(pairs.ref, moved, up)
     if fitting.mount is None and not reporting.evo:
-        _warn_of_bodies(pairs.ref, moved, fitting, hints)
+        _hint_at_rotation(pairs.ref, moved, fitting, hints)
     by_alignment: dict[str, float | None] = {}
     for kind in ALIGNMENTS:
         try:
@@ -216,20 +216,20 @@ def compared(
             by_alignment[kind] = sqrt((gap**2).sum() / len(gap))
         except Unaligned:
             by_alignment[kind] = None
-    noise = by_alignment["sim3"]  # what is not significant is not, even for a fit with a scale
+    noise = by_alignment["sim3"]  # the smallest residuals, those of the fit with a scale
     if fitting.align in ("se3", "sim3") and noise is not None:
         long, second, _ = principal_axes(first.ref.xyz)
         if second < min(NEAR_A_LINE * noise, SLENDER * long):
             hints.append("positions lie nearly on a line: the turn about it rests on noise")
-    walked = pairs.ref if reporting.pairs_from == "reference" else moved
+    path_of = pairs.ref if reporting.pairs_from == "reference" else moved
     return Comparison(
         names, settings, ref, est, pairs, moved, fit, by_alignment, ate,
-        list(_relative(pairs.ref, moved, walked, reporting, hints)),
+        list(_relative(pairs.ref, moved, path_of, reporting, hints)),
         trajectory_errors.segment_errors(pairs.ref, moved, reporting.segments, reporting.segment_step), hints,
     )  # fmt: skip
 
 
-def _on_the_ground(
+def _in_local_axes(
     both: tuple[Trajectory, Trajectory], names: tuple[str, str], hints: list[str]
 ) -> tuple[Trajectory, Trajectory]:
     """Return trajectories of the Earth's frame along east, north, up of the first position, so that z is up."""
@@ -280,7 +280,7 @@ def _paired(ref: Trajectory, est: Trajectory, settings: Settings, names: tuple[s
     share = pairs.ref.size / max(pairs.possible, 1)
     counted = f"{pairs.ref.size} of {pairs.possible} poses have a partner in {names[0]}"
     if not pairs.ref.size or share < pairing.min_match:
-        spans = ", ".join(_span(each, name) for each, name in zip((ref, shifted), names, strict=True))
+        spans = ", ".join(_time_span(each, name) for each, name in zip((ref, shifted), names, strict=True))
         more = f"try --offset auto, {'--max-diff' if is_nearest else '--max-gap'}, --min-match 0"
         raise ValueInvalid(f"{names[1]}: {counted} ({100 * share:.1f} %): {spans}; {more}")
     if share < FEW:
@@ -288,17 +288,17 @@ def _paired(ref: Trajectory, est: Trajectory, settings: Settings, names: tuple[s
     if pairs.shared:
         hints.append(f"{pairs.shared} poses have more than one partner")
     if pairing.offset is None:
-        _warn_of_clock(ref, est, names[1], hints)
+        _hint_at_clock(ref, est, names[1], hints)
     return pairs._replace(offset_ns=offset_ns, offset_score=score)
 
 
-def _span(each: Trajectory, name: str) -> str:
+def _time_span(each: Trajectory, name: str) -> str:
     first, last = (format_stamp(int(each.stamps_ns[at]))[:-6] for at in (0, -1))
     return f"{name} {first} .. {last} s"
 
 
-def _warn_of_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]) -> None:
-    """Warn about an offset that is clearly larger than half an interval, if estimating it is cheap."""
+def _hint_at_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]) -> None:
+    """Add a hint at an offset that is clearly larger than half an interval, if estimating it is cheap."""
     intervals = [interval(each.stamps_ns) for each in (ref, est)]
     span = max(ref.stamps_ns[-1], est.stamps_ns[-1]) - min(ref.stamps_ns[0], est.stamps_ns[0])
     if span > MOST_TRIED * min(intervals) / 2:
@@ -310,7 +310,7 @@ def _warn_of_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]
         hints.append(f"the clock of {name} seems {by}; --offset auto")
 
 
-def _cut(pairs: Pairs, pairing: Pairing) -> Pairs:
+def _in_window(pairs: Pairs, pairing: Pairing) -> Pairs:
     """Keep the pairs from the start to the end, both inclusive."""
     if pairing.start is pairing.stop is None:
         return pairs
@@ -323,8 +323,8 @@ def _cut(pairs: Pairs, pairing: Pairing) -> Pairs:
     )
     found = pairs.at((begin <= stamps) & (stamps <= end))
     if not found.ref.size:
-        asked = f"{format_stamp(int(begin))} to {format_stamp(int(end))} s"
-        raise ValueInvalid(f"no pair from {asked}; there are some in{_span(pairs.ref, '')}")
+        window = f"{format_stamp(int(begin))} to {format_stamp(int(end))} s"
+        raise ValueInvalid(f"no pair from {window}; there are some in{_time_span(pairs.ref, '')}")
     return found
 
 
@@ -341,7 +341,7 @@ def _mounted(pairs: Pairs, fitting: Fitting) -> Pairs:
         shifted = est.with_poses(est.poses @ Transform(Rotation.identity(), arm))
         placed = fitted(fitting.align, ref, shifted, up).moved(shifted)
         if ref.rotation is not None and placed.rotation is not None:
-            shared = _shared(placed.rotation.inverse() @ ref.rotation)
+            shared = _common_rotation(placed.rotation.inverse() @ ref.rotation)
         mount = Transform(Rotation.identity() if shared is None else shared, arm)
     return pairs._replace(est=est.with_poses(est.poses @ mount), mount=mount)
 
@@ -351,13 +351,13 @@ def _spread(rotations: Rotation) -> float:
     return sqrt((rotations.distance(rotations.mean()) ** 2).mean())
 
 
-def _warn_of_bodies(ref: Trajectory, moved: Trajectory, fitting: Fitting, hints: list[str]) -> None:
-    """Warn about a constant rotation between the two bodies, or between worlds that were not aligned."""
+def _hint_at_rotation(ref: Trajectory, moved: Trajectory, fitting: Fitting, hints: list[str]) -> None:
+    """Add a hint at a constant rotation between the two bodies, or between worlds that were not aligned."""
     if ref.rotation is None or moved.rotation is None:
         return
     of_bodies, of_worlds = moved.rotation.inverse() @ ref.rotation, moved.rotation @ ref.rotation.inverse()
     is_of_worlds = fitting.align == "none" and _spread(of_worlds) < _spread(of_bodies)
-    shared = _shared(of_worlds if is_of_worlds else of_bodies)
+    shared = _common_rotation(of_worlds if is_of_worlds else of_bodies)
     if shared is None:
         return
     apart = f"{np.degrees(float(shared.angle())):.1f} deg apart"
@@ -368,18 +368,18 @@ def _warn_of_bodies(ref: Trajectory, moved: Trajectory, fitting: Fitting, hints:
     )  # fmt: skip
 
 
-def _shared(rotations: Rotation) -> Rotation | None:
+def _common_rotation(rotations: Rotation) -> Rotation | None:
     """Return the mean of rotations if it is significant and about the same for all."""
     mean = rotations.mean()
-    return mean if float(mean.angle()) > max(APART, STEADY * _spread(rotations)) else None
+    return mean if float(mean.angle()) > max(NOTABLE, STEADY * _spread(rotations)) else None
 
 
 def _relative(
-    ref: Trajectory, est: Trajectory, walked: Trajectory, reporting: Reporting, hints: list[str]
+    ref: Trajectory, est: Trajectory, path_of: Trajectory, reporting: Reporting, hints: list[str]
 ) -> Iterator[tuple[Delta, RelativeErrors]]:
     """Yield the relative errors for every delta that the path is long enough for."""
     for delta in reporting.deltas or DELTAS:
-        along = delta.along(walked)
+        along = delta.along(path_of)
         if along is None:
             why = "there are no rotations" if delta.unit == "deg" else "there are no stamps"
         elif along[-1] + delta.amount * (1 - trajectory_errors.ROUNDING) == along[-1]:

@@ -33,14 +33,14 @@ FEWEST_CERTAIN = 6  # with fewer the sigmas are rough: with 8 they are within a 
 DRAWS, DRAWN = 60, 5
 MOST_PAIRS = 10_000  # pairs that are used, or one of each sample
 STEPS, ROUGH_STEPS = 100, 4
-DONE = 1e-12  # of the extent, and radians
-STUCK = 1e9  # damping
+CONVERGED = 1e-12  # of the extent, and radians
+MOST_DAMPED = 1e9  # damping
 UNDAMPED = 1e-12
 OBSERVABLE = 1e-8  # of the largest singular value
-CLEARLY = 2.0  # ratio by which both metres and radians must be better
-FLAT, FLAT_SHARE = radians(0.5), 0.02  # about the second axis: none, also relative to the first
-SLIGHT = radians(5.0)
-CLEAR = (radians(1.0), radians(175.0))  # rotations of a pair whose axis is certain
+CLEARLY_BETTER = 2.0  # ratio by which both metres and radians must be better
+LEAST_TURN, LEAST_SHARE = radians(0.5), 0.02  # about the second axis: none, also relative to the first
+SMALL_TURN = radians(5.0)
+CERTAIN_AXIS = (radians(1.0), radians(175.0))  # rotations of a pair whose axis is certain
 
 
 class HandEye(NamedTuple):
@@ -97,11 +97,11 @@ def solve_hand_eye(
             raise _misfit_error(medians)
         _require_two_axes(_turns(hand[kept]), 0.0, holder, names[2])
         begin, steps = (model, STEPS) if kept.sum() >= FEWEST_APART else (start, 0)
-        models = (samples.fitted(begin._replace(cut=cut), weights, steps) for cut in CUTS)
+        models = (samples.fitted(begin._replace(noise_at=noise_at), weights, steps) for noise_at in FACTORS)
         return min(models, key=lambda fit: fit.misfit)
 
     def rough(model: _Model, weights: Array) -> _Model:
-        return samples.fitted(model._replace(cut="target"), weights, ROUGH_STEPS)
+        return samples.fitted(model._replace(noise_at="target"), weights, ROUGH_STEPS)
 
     found = lsq.robust_fit(start, samples.residuals, rough, likeliest, unknown=6, robust=robust)
     model = found.model
@@ -114,7 +114,7 @@ def solve_hand_eye(
     covariance = lsq.inverse(model.hessian)
     both = " fit with and without --eye-to-hand, and" * bool(others.prod() <= BETTER**2 * medians.prod())
     _warn_of_limits(samples.at(found.kept), model.x, turns, holder, both)
-    noise_at = "base" if eye_to_hand and model.cut == "gripper" else model.cut
+    noise_at = "base" if eye_to_hand and model.noise_at == "gripper" else model.noise_at
     return HandEye(
         model.x.canonical(), model.z.canonical(), covariance[:6, :6], covariance[6:, 6:],
         None if s_t == s_r == lsq.LEAST else noise_at, found.kept, found.u, found.residuals, (s_t, s_r),
@@ -127,14 +127,14 @@ class _Model(NamedTuple):
 
     x: Transform
     z: Transform
-    cut: str = "target"
+    noise_at: str = "target"
     hessian: Array = np.eye(12)
     misfit: float = 0.0
 
 
 # the errors E = left X right = before inv(Z) after, by the location of the noise: the factors around X and Z
 Factors = tuple[Transform, Transform, Transform, Transform]
-CUTS: dict[str, Callable[[Transform, Transform, Transform, Transform], Factors]] = {
+FACTORS: dict[str, Callable[[Transform, Transform, Transform, Transform], Factors]] = {
     "target": lambda g, c, x, z: (z.inverse() @ g, c, ONE, g @ x @ c),
     "camera": lambda g, c, x, z: (c @ z.inverse() @ g, ONE, c, g @ x),
     "gripper": lambda g, c, x, z: (ONE, c @ z.inverse() @ g, x @ c, g),
@@ -152,7 +152,7 @@ class _Samples(NamedTuple):
 
     def residuals(self, model: _Model) -> Array:
         """Return [t(E), Log R(E)] of a model."""
-        left, right, _, _ = CUTS[model.cut](*self, model.x, model.z)
+        left, right, _, _ = FACTORS[model.noise_at](*self, model.x, model.z)
         off = left @ model.x @ right
         return np.concatenate([off.xyz, off.rotation.as_rotvec()], 1)
 
@@ -167,17 +167,17 @@ class _Samples(NamedTuple):
             step = -lsq.solve_normal(bent, gradient[:, None])[:, 0]
             moved = now._replace(x=lsq.stepped(now.x, step[:6]), z=lsq.stepped(now.z, step[6:]))
             tried, its_gradient = self._linear(moved, weights)
-            if tried.misfit <= now.misfit + DONE:
+            if tried.misfit <= now.misfit + CONVERGED:
                 now, gradient, damping = tried, its_gradient, max(damping / 10.0, UNDAMPED)
-                if (np.abs(step) <= DONE * units).all():
+                if (np.abs(step) <= CONVERGED * units).all():
                     break
-            elif (damping := max(10.0 * damping, 1e-6)) > STUCK:
+            elif (damping := max(10.0 * damping, 1e-6)) > MOST_DAMPED:
                 break
         return now
 
     def _linear(self, model: _Model, weights: Array) -> tuple[_Model, Array]:
         """Return a model with its Hessian and its cost, and the gradient."""
-        left, right, before, after = CUTS[model.cut](*self, model.x, model.z)
+        left, right, before, after = FACTORS[model.noise_at](*self, model.x, model.z)
         errors = self.residuals(model)
         turn, back = left.rotation.as_matrix(), (before.rotation @ model.z.rotation.inverse()).as_matrix()
         bent = lsq.inverse_left_jacobian(errors[:, 3:])
@@ -203,7 +203,7 @@ def _initial_model(samples: _Samples, *, robust: bool) -> tuple[_Model, Array]:
     fives: Iterable[Rows] = lsq.draws(DRAWS * robust, min(DRAWN, count - 1), count)
     for few in chain([slice(None)], fives):
         chosen = samples.at(few)
-        if _turns(chosen.gripper)[1] < FLAT:
+        if _turns(chosen.gripper)[1] < LEAST_TURN:
             continue
         x = park_martin(*chosen)
         z = (chosen.gripper @ x @ chosen.camera).mean()
@@ -221,7 +221,7 @@ def park_martin(gripper: Transform, camera: Transform) -> Transform:
     a, b = _motions(gripper, camera)
     alpha, beta = a.rotation.as_rotvec(), b.rotation.as_rotvec()
     angle = lsq.lengths(alpha)[:, 0]
-    if (clear := (angle > CLEAR[0]) & (angle < CLEAR[1])).sum() > 1:
+    if (clear := (angle > CERTAIN_AXIS[0]) & (angle < CERTAIN_AXIS[1])).sum() > 1:
         a, b, alpha, beta = a[clear], b[clear], alpha[clear], beta[clear]
     turn = lsq.align_vectors(beta, alpha)
     wanted = (turn.apply(b.xyz) - a.xyz).reshape(-1)
@@ -236,7 +236,7 @@ def _motions(gripper: Transform, camera: Transform) -> tuple[Transform, Transfor
 
 def _refuse_other_setting(medians: Array, others: Array, setting: str, names: Sequence[str]) -> None:
     """Raise ValueInvalid if the samples fit the other setting clearly better, by the medians of the errors of both."""
-    if (CLEARLY * others <= medians).all() and BETTER**2 * others.prod() <= medians.prod():
+    if (CLEARLY_BETTER * others <= medians).all() and BETTER**2 * others.prod() <= medians.prod():
         raise ValueInvalid(
             f"the samples do not fit ({lsq.off_text(*medians)}); they do ({lsq.off_text(*others)}) "
             f"{setting}, or with TARGET inverted ({names[3]}<-{names[2]})"
@@ -245,7 +245,7 @@ def _refuse_other_setting(medians: Array, others: Array, setting: str, names: Se
 
 def _warn_of_limits(samples: _Samples, x: Transform, turns: tuple[float, float, str], holder: str, both: str) -> None:
     """Warn of what limits the result; both: of a few samples that another setting fits too, else ""."""
-    if turns[1] < SLIGHT:
+    if turns[1] < SMALL_TURN:
         small = f"{degrees(turns[1]):.1f} deg rms, first axis {turns[2]} in {holder}"
         warn(f"turns about a second axis are small ({small}): turn more")
     if (count := len(samples.gripper)) < FEWEST_CERTAIN:
@@ -286,9 +286,9 @@ def _turns(gripper: Transform) -> tuple[float, float, str]:
 
 def _require_two_axes(turns: tuple[float, float, str], s_r: float, holder: str, camera: str) -> None:
     first, second, axis = turns
-    if first < FLAT:
+    if first < LEAST_TURN:
         raise ValueInvalid(f"{holder} does not turn ({degrees(first):.2f} deg); hand-eye needs turns about two axes")
-    if second < max(FLAT, FLAT_SHARE * first, lsq.KEPT * s_r * sqrt(2.0)):
+    if second < max(LEAST_TURN, LEAST_SHARE * first, lsq.KEPT * s_r * sqrt(2.0)):
         raise ValueInvalid(
             f"all turns are about one axis ({axis} in {holder}): where {camera} is along it cannot be known; "
             "turn about a second one"

@@ -122,40 +122,40 @@ class TreeFit:
             for rival in rivals:
                 pose = self._pose_without(rival, row)
                 words[rival] = best_blunder(measurements[rival], pose, information[rival])
-            blamed = [each for each, blunder in words.items() if blunder]
-            unsure = self._with_doubt(row, least_information[row])
-            if not blamed and self.errors[row] @ unsure @ self.errors[row] <= 6 * lsq.KEPT**2:
+            mistaken = [each for each, blunder in words.items() if blunder]
+            unsure = self._with_fit_uncertainty(row, least_information[row])
+            if not mistaken and self.errors[row] @ unsure @ self.errors[row] <= 6 * lsq.KEPT**2:
                 noise.append(row)
             if not rivals:
-                doubted = self._with_doubt(row, information[row])
-                fits[row] = words[row] or best_blunder(measurements[row], self.poses[row], doubted)
-            elif blamed == [row]:
+                uncertain = self._with_fit_uncertainty(row, information[row])
+                fits[row] = words[row] or best_blunder(measurements[row], self.poses[row], uncertain)
+            elif mistaken == [row]:
                 fits[row] = words[row]
-            elif len(blamed) == 1:
-                swaps.append((row, blamed[0]))
+            elif len(mistaken) == 1:
+                swaps.append((row, mistaken[0]))
             else:
                 undecided = undecided or (row, rivals)
         return fits, noise, swaps, undecided
 
-    def _with_doubt(self, row: int, information: Array) -> Array:
+    def _with_fit_uncertainty(self, row: int, information: Array) -> Array:
         """Return the information of a row relative to the fit, whose own uncertainty between the frames is included."""
         parent, child = self.problem.pairs[row]
-        doubt = self.covariance((parent, self.parents[row]), (child, self.children[row]))
-        return information if doubt is None else lsq.inverse(lsq.inverse(information) + doubt)
+        uncertainty = self.covariance((parent, self.parents[row]), (child, self.children[row]))
+        return information if uncertainty is None else lsq.inverse(lsq.inverse(information) + uncertainty)
 
     def _pose_without(self, rival: int, row: int) -> Transform:
         """Return the pose that a rival would measure if the rejected row placed the bodies below it."""
-        measured, pairs, hanging = self.problem.measured[row], self.problem.pairs, set[int]()
+        measured, pairs, below = self.problem.measured[row], self.problem.pairs, set[int]()
         for body in self.tree.order:
-            if self.tree.row[body] == rival or self.tree.parent[body] in hanging:
-                hanging.add(body)
+            if self.tree.row[body] == rival or self.tree.parent[body] in below:
+                below.add(body)
         parent, child = self.parents[row], self.children[row]
-        if pairs[row][1] in hanging:
+        if pairs[row][1] in below:
             moved = parent @ measured @ child.inverse()
         else:
             moved = child @ measured.inverse() @ parent.inverse()
         ends = self.parents[rival], self.children[rival]
-        parent, child = (moved @ end if body in hanging else end for end, body in zip(ends, pairs[rival], strict=True))
+        parent, child = (moved @ end if body in below else end for end, body in zip(ends, pairs[rival], strict=True))
         return parent.inverse() @ child
 
 

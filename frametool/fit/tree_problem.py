@@ -26,7 +26,7 @@ TREES = 200
 SINGULAR = 1e-12  # of the correlations: the least eigenvalue of a valid covariance
 STEPS = 100
 MOST_DAMPED = 1e12
-REST = 1e-12  # of the extent, radians, and of a sigma: convergence of steps
+CONVERGED = 1e-12  # of the extent, radians, and of a sigma: convergence of steps
 BORROWED = 0.3  # degrees of freedom of metres that radians add, and vice versa, if loops are few
 LEAST_SHARE = 0.04  # of the rows in loops, relative to the unknowns
 
@@ -104,7 +104,7 @@ class TreeProblem:
         across = self.in_parent @ self.measured @ self.in_child.inverse()  # parent_from_child, of bodies
         both = across.inverse(), across
         self._across = [[*zip(*(part.tolist() for part in each.components), strict=True)] for each in both]
-        self._moves = (self.parent != self.child)[:, None, None]  # a row within a body has no effect
+        self._has_effect = (self.parent != self.child)[:, None, None]  # a row within a body has no effect
 
     def place(self, row: int) -> str:
         """Return the place of a measurement, else its number."""
@@ -173,7 +173,7 @@ class TreeProblem:
         """Return J'LJ and J'Lr, six rows for each unknown body, and r'Lr."""
         (parent, child), count = self.ends(bodies), self.count
         off = lsq.errors(parent.inverse() @ child, self.measured)
-        by_parent, by_child = (self._moves * by for by in jacobians(parent, child, off[:, 3:]))
+        by_parent, by_child = (self._has_effect * by for by in jacobians(parent, child, off[:, 3:]))
         sides = [
             (self.parent, by_body_step(by_parent, bodies[self.parent], parent)),
             (self.child, by_body_step(by_child, bodies[self.child], child)),
@@ -200,7 +200,7 @@ class TreeProblem:
             moved, size = lsq.stepped(bodies, step), float(np.abs(step / ([extent] * 3 + [1.0] * 3)).max())
             off = self.errors(moved)
             after = float((off * lsq.applied(information, off)).sum())
-            if size <= REST or after <= before * (1 + 1e-12):
+            if size <= CONVERGED or after <= before * (1 + 1e-12):
                 return moved, size, damping / 10 if damping > 1e-9 else 0.0
             damping = max(damping * 10, 1e-6)
         return bodies, 0.0, 0.0
@@ -291,7 +291,7 @@ class TreeProblem:
             bodies, size, damping = self.damped_step(bodies, information, damping)
             before, noise = noise, self.estimated_noise(bodies, kept, noise, estimate=estimate, few_loops=few_loops)
             changes = (abs(new / old - 1) for new, old in zip(noise, before, strict=True))
-            if size <= REST and max(changes) <= REST:
+            if size <= CONVERGED and max(changes) <= CONVERGED:
                 break
         return Fitted(bodies, kept, noise, estimate, few_loops, self.u(self.errors(bodies), noise))
 
