@@ -111,6 +111,21 @@ class Element:
         return line, column
 
 
+def _parse(parser: expat.XMLParserType, xml: XmlFile) -> None:
+    """Pass the whole text to the parser; its errors and those of Python's codecs become FormatErrors."""
+    try:
+        parser.Parse(xml.data, True)  # noqa: FBT003 - expat's only way to say that this is all
+    except expat.ExpatError as error:
+        if what := not_text(xml.data):
+            raise FormatError(what, source=xml.source.name, line=1, column=1) from None
+        problem = "it ends too early" if error.code == _ENDS_EARLY else expat.ErrorString(error.code)
+        raise xml.at(error.lineno, error.offset + 1, f"not XML: {problem}") from None
+    except (LookupError, ValueError) as error:
+        if isinstance(error, FormatError):
+            raise
+        raise xml.at(1, 1, f"not XML: {error}") from None
+
+
 def read_xml(file: InputFile, root: str = "", fmt: str = "") -> Element:
     """Return the root element.
 
@@ -152,17 +167,7 @@ def read_xml(file: InputFile, root: str = "", fmt: str = "") -> Element:
     parser.CharacterDataHandler = add_text
     parser.StartDoctypeDeclHandler = check_doctype
     parser.EntityDeclHandler = parser.ExternalEntityRefHandler = refuse
-    try:
-        parser.Parse(xml.data, True)  # noqa: FBT003 - expat's only way to say that this is all
-    except expat.ExpatError as error:
-        if what := not_text(xml.data):
-            raise FormatError(what, source=file.name, line=1, column=1) from None
-        problem = "it ends too early" if error.code == _ENDS_EARLY else expat.ErrorString(error.code)
-        raise xml.at(error.lineno, error.offset + 1, f"not XML: {problem}") from None
-    except (LookupError, ValueError) as error:  # of Python's codecs
-        if isinstance(error, FormatError):
-            raise
-        raise xml.at(1, 1, f"not XML: {error}") from None
+    _parse(parser, xml)
     (found,) = top.children
     if root and found.tag != root:
         expected = f"{fmt} begins with <{root}>" if fmt else f"expected <{root}>"

@@ -31,6 +31,7 @@ from frametool.text.numbers import NotFinite, parse_length
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from frametool.cli.output import Output
     from frametool.explain.derive import WrittenPose
     from frametool.geometry import Components
     from frametool.grammar.result import Style
@@ -49,6 +50,24 @@ PLACEHOLDERS: dict[str, Callable[[PointCloud], str]] = {
 _WRITTEN = f"formats: {', '.join(writers('arrays'))}"
 
 
+def _write_cloud(cloud: PointCloud, pose: Components, output: Output, path: str, names: dict[str, int]) -> None:
+    """Write a moved cloud of a bag to its file; names: the files written before, each with its message's number."""
+    from frametool.stream.column_stream import moved_cloud
+
+    texts = {place: re.sub(r"[/\0]|^\.+", "_", text(cloud)) for place, text in PLACEHOLDERS.items()}  # no path
+    name = re.sub(r"\{(\w+)\}", lambda found: texts.get(found[1], found[0]), str(output.path))
+    if name in names:
+        both = f"messages {names[name]} and {cloud.number} would both become {shown(name)}"
+        raise FormatError(f"{both}; put {{stamp_ns}} or {{number}} into its name", source=path)
+    style = output.style.changed(format=output.chosen or "")
+    with writing(name, force=output.force) as write:
+        for outcome in moved_cloud(cloud, pose, style, path):
+            for fault in outcome.faults:
+                raise FormatError(f"message {cloud.number}: point {fault.line + 1}: {fault.reason}", source=path)
+            write(outcome.text)
+    names[name] = cloud.number
+
+
 def bag_of_clouds(task: streaming.Task) -> Callable[[Mover], int]:
     """Return a function that moves the clouds of the bag of -i, writes each to its file and returns the exit status.
 
@@ -56,7 +75,6 @@ def bag_of_clouds(task: streaming.Task) -> Callable[[Mover], int]:
     """
     from frametool.recordings.contents import cloud_topics, read_clouds
     from frametool.recordings.read import opened_recording
-    from frametool.stream.column_stream import moved_cloud
 
     inputs, output, path, chosen = task.inputs, task.output, task.name, task.inputs.topics
     inputs.use("input_path")
@@ -69,21 +87,6 @@ def bag_of_clouds(task: streaming.Task) -> Callable[[Mover], int]:
         opened = opening.pop_all()
     clouds = {topic.strip("/") for topic in topics}
     inputs.update(topics=tuple(topic for topic in chosen if topic.strip("/") not in clouds))
-
-    def write_one(cloud: PointCloud, pose: Components) -> int:
-        texts = {place: re.sub(r"[/\0]|^\.+", "_", text(cloud)) for place, text in PLACEHOLDERS.items()}  # no path
-        name = re.sub(r"\{(\w+)\}", lambda found: texts.get(found[1], found[0]), str(output.path))
-        if name in names:
-            both = f"messages {names[name]} and {cloud.number} would both become {shown(name)}"
-            raise FormatError(f"{both}; put {{stamp_ns}} or {{number}} into its name", source=path)
-        style = output.style.changed(format=output.chosen or "")
-        with writing(name, force=output.force) as write:
-            for outcome in moved_cloud(cloud, pose, style, path):
-                for fault in outcome.faults:
-                    raise FormatError(f"message {cloud.number}: point {fault.line + 1}: {fault.reason}", source=path)
-                write(outcome.text)
-        names[name] = cloud.number
-        return len(cloud.rows)
 
     def move_all(mover: Mover) -> int:
         bad = task.policy(path, "message")
@@ -101,7 +104,8 @@ def bag_of_clouds(task: streaming.Task) -> Callable[[Mover], int]:
                 except FrametoolError as error:
                     bad.take([Fault(cloud.number, "", error)])
                 else:
-                    points += write_one(cloud, pose)
+                    _write_cloud(cloud, pose, output, path, names)
+                    points += len(cloud.rows)
             for finding in tally.findings():
                 once(f"{path}: {finding.message}", finding.rule)
         if not count:

@@ -95,10 +95,9 @@ def convert_command(inputs: Inputs) -> int:
         output.style = _matching_style(found, inputs.find, inputs.tolerance, output.style)
     if task.plan:
         refuse(len(found) != 1, f"--explain derives one pose, found {len(results)}")
-        if not sources:
-            sources = [_source_of(values, request.rows.given, pose if values else found[0])]
+        source = sources[0] if sources else _source_of(values, request.rows.given, pose if values else found[0])
         change = _named_change(axes, world, operation) if values else None
-        return task.derive("convert", task.read_written(sources[0], warned=True), own=found[0], change=change)
+        return task.derive("convert", task.read_written(source, warned=True), own=found[0], change=change)
     output.values(results)
     if len(found) == 1 and any(is_locked(found[0], each) for each in output.style.notations):
         say("note: gimbal lock: the angles are not unique; the third was set to 0")
