@@ -36,7 +36,7 @@ from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Answers, Diagnostics, EdgeColumns, Options, Topics
 from frametool.grammar.readers import EARTH_FRAMES
-from frametool.grammar.result import Result, Style
+from frametool.grammar.result import Style
 from frametool.stream.faults import NULL, SKIP, BadRow, Fault, Outcome, written_by
 from frametool.stream.record_results import BlockResults, ResultWriter, blocks_of
 from frametool.stream.request import NO_STAMPS, SOME, Request, RowOptions
@@ -86,12 +86,9 @@ class Blocks(ResultWriter):
         """Return the text of a block of poses, or of results, many together."""
         if isinstance(block, RowPoses):
             return self._write(block)
-        if (posed := block.posed()) is not None:
-            return self._write(posed)
-        values, to_arrays = [*block.in_order()], holds(self.style.format, "arrays")
-        has_any = any(not isinstance(each, Result) or each.pose.position is not None for each in values)
-        block = block_of(values, timed=not to_arrays)._replace(placed=has_any or not to_arrays)
-        return self._write(block) if values else b""
+        is_text = not holds(self.style.format, "arrays")
+        made = block_of(block, timed=is_text)
+        return self._write(made._replace(placed=made.placed or is_text)) if len(made.numbers) else b""
 
     def end(self) -> Iterator[bytes]:
         """Yield what comes behind the last."""

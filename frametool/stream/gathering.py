@@ -50,16 +50,9 @@ def posed(outcomes: Iterable[Outcome], source: str, *, timed: bool = True) -> It
     """
     for outcome in outcomes:
         results: BlockResults = outcome.results or BlockResults((), [])  # type: ignore[assignment]
-        found = results.posed()
-        if found is None:
-            pairs = results.placed()
-            values = [value for _, value in pairs]
-            found = block_of(values, timed=timed, as_poses=True)
-            found = found._replace(lines=np.array([place for place, _ in pairs], np.int64))
-            if found.kind not in (POSE, POINT):
-                raise FormatError("expected poses, or points", source=source)
-            for row, pose in enumerate(each.pose for each in values if isinstance(each, Result)):
-                found.numbers[row, [not pose.position] * 3 + [not pose.rotation] * 4] = np.nan
+        found = block_of(results, timed=timed, as_poses=True)
+        if found.kind not in (POSE, POINT):
+            raise FormatError("expected poses, or points", source=source)
         ends = np.flatnonzero(np.frombuffer(results.text, np.uint8) == ord("\n"))
         yield found._replace(lines=np.searchsorted(ends, found.lines)), outcome
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from importlib import import_module
-from math import isnan
+from math import isnan, nan
 from operator import itemgetter
 from types import MappingProxyType, NoneType
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from frametool.geometry import Components
     from frametool.geometry.place import Place, Spot
     from frametool.stream.faults import Fault
+    from frametool.stream.record_results import BlockResults
     from frametool.stream.record_values import Value
 
     Cells: TypeAlias = Spans | NDArray[Any]
@@ -409,15 +410,19 @@ def is_typed(cells: Any) -> bool:
     return isinstance(cells, np.ndarray) and cells.ndim == 1 and cells.dtype.kind in "fiubM"
 
 
-def block_of(values: Sequence[Value], *, timed: bool = True, as_poses: bool = False) -> RowPoses:
-    """Return results as one block of poses, points, vectors, twists or wrenches.
+def block_of(results: BlockResults, *, timed: bool = True, as_poses: bool = False) -> RowPoses:
+    """Return results as one block of poses, points, vectors, twists or wrenches, with their places as lines.
 
     What a pose lacks is 0 or the identity; stamps that only some have are another column.
-    timed: either all have a stamp, or none; as_poses: a position without a rotation is a pose too, not a point
+    timed: either all have a stamp, or none
+    as_poses: a position without a rotation is a pose too, not a point; what a pose lacks is nan
     Raises ValueInvalid for things of several kinds, for other mappings, and for stamps that are missing.
     """
-    if not values:
+    if (alike := results.posed()) is not None:
+        return alike
+    if not (pairs := results.placed()):
         return NO_ROWS
+    places, values = zip(*pairs, strict=True)
     rows = (_row_of(value, as_poses=as_poses) for value in values)
     kinds, numbers, frames, others = zip(*rows, strict=True)
     if len({*kinds}) > 1:
@@ -430,9 +435,10 @@ def block_of(values: Sequence[Value], *, timed: bool = True, as_poses: bool = Fa
         raise ValueInvalid("some poses have a stamp and some have none; add it, or leave it out of all")
     stamps_ns = np.array(columns.pop("stamp_ns"), np.int64) if all(type(stamp) is int for stamp in stamps) else None
     return RowPoses(
-        np.array(numbers, np.float64) + 0.0, stamps_ns, np.arange(len(numbers)), parents, names,  # none is -0.0
+        np.array(numbers, np.float64) + 0.0, stamps_ns, np.array(places, np.int64), parents, names,  # none is -0.0
         {key: objects(column) for key, column in columns.items()},
         None if None in read else np.array(read, np.float64), kinds[0],
+        placed=not all(isinstance(value, Result) and value.pose.position is None for value in values),
     )  # fmt: skip
 
 
@@ -443,6 +449,8 @@ def _row_of(value: Value, *, as_poses: bool) -> tuple[str, Sequence[Any], Frames
         if pose.rotation is None and pose.position is not None and not as_poses:
             return POINT, pose.position, (pose.parent, None), ({"name": pose.name} if pose.name else {}) | extras
         scale = {} if pose.scale == 1.0 else {SCALE: pose.scale}
+        if as_poses:
+            pose = pose._replace(position=pose.position or (nan,) * 3, rotation=pose.rotation or (nan,) * 4)
         return POSE, pose.components, (pose.parent, pose.name), scale | extras
     kind, keys = next((each for each in MAPPINGS if {*each[1]} <= value.keys()), MAPPINGS[0])
     numbers: list[Any] = []

@@ -210,12 +210,11 @@ class RowsWriter(PoseWriter):
         super().__init__(style, first)
         self.documents = None if style.format == "csv" else Documents(style)
         self.names: dict[str, None] = {}  # of the columns of a table: those of the first rows
-        self.empty: RowPoses | None = None  # a block without rows says what columns there are
+        self.head = first  # which has the columns of a table without rows
 
     def of_block(self, block: RowPoses) -> bytes:
         """Return the text of a block of poses; numbers are metres and x y z w."""
         if not len(block.numbers):
-            self.empty = block
             return b""
         self.settle(block)
         # rows without a result are written one by one, and those whose angles are not unique
@@ -248,8 +247,8 @@ class RowsWriter(PoseWriter):
 
     def end(self) -> Iterator[bytes]:
         """Yield the names of the columns if there were no rows."""
-        if self.documents is None and not self.names and self.empty is not None:
-            yield row(cells_of(self._marked(self.empty).value, self.style), self.style).encode()
+        if self.documents is None and not self.names:
+            yield row(cells_of(self._marked(self.head).value, self.style), self.style).encode()
 
     def _marked(self, block: RowPoses) -> Marked:
         """Make a result with what this block's have; what differs from row to row is marked."""

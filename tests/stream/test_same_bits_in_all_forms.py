@@ -13,6 +13,7 @@ from clouds import pcd, pcd_rows, ply, ply_rows
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
+from frametool.stream.record_results import BlockResults
 from frametool.stream.row_layout import NOWHERE
 from frametool.stream.rows import block_of
 from frametool.stream.writers import RowsWriter
@@ -79,7 +80,9 @@ def test_any_form_becomes_any_other_with_the_same_bits(moved: Callable[[str, str
 
 @pytest.mark.parametrize("form", ["csv", "json"])
 def test_blocks_whose_rows_all_name_one_frame_each_name_their_own(form: str) -> None:
-    blocks = [block_of([Result(Pose.of(NOWHERE, None, frame))] * 2) for frame in ("map", "odom")]
+    frames = ("map", "odom")
+    results: list[Any] = [[*enumerate([Result(Pose.of(NOWHERE, None, frame))] * 2)] for frame in frames]
+    blocks = [block_of(BlockResults((), values)) for values in results]
     writer = RowsWriter(Style(form, (notation("quaternion"),)), blocks[0])
     texts = [writer.of_block(block).decode() for block in blocks]
     assert ["map" in text for text in texts] == [True, False]
