@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
     from frametool.grammar.edges import Edge, Options
 
 # a baseline by its two numbers; a matrix between two frames; a matrix below the number of its IMU

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
 
 CAMERAS = ("cam0", "cam1", "cam2", "cam3")
 RECTIFICATIONS = ("R0_rect", "R_rect")

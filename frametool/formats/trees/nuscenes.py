@@ -21,12 +21,14 @@ from frametool.formats.trees.tree_reader import XYZ, document_edges
 from frametool.geometry import rigid
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.pose import read_rotation
-from frametool.grammar.readers import Misfit, Path, Reading, as_mapping, kind, read_numbers, within
+from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, read_numbers, within
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.geometry.types import Rigid
+    from frametool.geometry import Rigid
+
+    Records = list[dict[str, Any]]
 
 SENSORS = "sensor.json"
 
@@ -37,53 +39,58 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 
 def _edges(file: InputFile, options: Options, value: Any, reading: Reading) -> Iterator[Edge]:
-    """Yield one edge per pose of a sensor, or one sample per ego pose; of sensor.json only the frame above the sensors.
-
-    If a sensor has several poses, each name includes the token.
-    """
+    """Yield one edge per pose of a sensor, one sample per ego pose, or of sensor.json the frame above the sensors."""
     world, ego = options.answers.names("global", "ego")
     records = _records(value)
-    moves = "sensor_token" not in records[0]
-    if moves and not {"translation", "rotation", "timestamp"} <= records[0].keys():
-        if "channel" not in records[0]:
-            raise Misfit("no poses in this table of nuScenes: they are in calibrated_sensor.json and ego_pose.json")
+    if "sensor_token" in records[0]:
+        yield from _sensors(file, options, ego, records, reading)
+    elif {"translation", "rotation", "timestamp"} <= records[0].keys():
+        for path, microseconds, pose in _poses(records, "timestamp", reading):
+            yield Edge(world, ego, pose, int(microseconds) * 1000, path=path)
+    elif "channel" in records[0]:
         yield Edge(None, ego, rigid.IDENTITY)
-        return
-    channels = None if moves else channels_of(file)
-    poses: dict[str, dict[Rigid, tuple[str, Path]]] = {}
+    else:
+        raise Misfit("no poses in this table of nuScenes: they are in calibrated_sensor.json and ego_pose.json")
+
+
+def _poses(records: Records, key: str, reading: Reading) -> Iterator[tuple[tuple[int], str, Rigid]]:
+    """Yield the path of each valid record, the text of a key of it, and its pose."""
     for index, record in enumerate(records):
-        path: Path = (index,)
-        reading.here = path
+        path = reading.here = (index,)
         try:
-            word = within(path, _text, record, "timestamp" if moves else "sensor_token")
-            if moves and not re.fullmatch(r"(?a)\d{1,18}", word):
-                raise Misfit(f"expected whole microseconds, found {shown(word)}", (index, "timestamp"))
-            for key in ("translation", "rotation"):
-                if key not in record:
-                    raise Misfit(f"missing {key}", path)
+            word = within(path, _text, record, key)
+            if key == "timestamp" and not re.fullmatch(r"(?a)\d{1,18}", word):
+                raise Misfit(f"expected whole microseconds, found {shown(word)}", (index, key))
+            for part in ("translation", "rotation"):
+                if part not in record:
+                    raise Misfit(f"missing {part}", path)
             rotation = record["rotation"]  # w, x, y, z, or the 3x3 matrix of some forks
             rows = type(rotation) is list and any(type(row) is list for row in rotation)
             x, y, z = within((index, "translation"), read_numbers, record["translation"], XYZ)
             turn = within((index, "rotation"), read_rotation, "matrix" if rows else "wxyz", rotation, reading)[1]
         except Misfit as misfit:
             reading.refuse(misfit)
-            continue
-        if moves:
-            yield Edge(world, ego, (x, y, z, *turn), int(word) * 1000, path=path)
         else:
-            known = poses.setdefault((channels or {}).get(word, word), {})
-            known.setdefault((x, y, z, *turn), (str(record.get("token")), path))
+            yield path, word, (x, y, z, *turn)
+
+
+def _sensors(file: InputFile, options: Options, ego: str, records: Records, reading: Reading) -> Iterator[Edge]:
+    """Yield the poses of sensors by name; if a sensor has several, each name includes the token of its record."""
+    channels = channels_of(file)
+    sensors: dict[str, dict[Rigid, tuple[int]]] = {}
+    for path, word, pose in _poses(records, "sensor_token", reading):
+        sensors.setdefault((channels or {}).get(word, word), {}).setdefault(pose, path)
     unnamed = f"sensors are called by their tokens ({SENSORS} has the names: --with it)" if channels is None else ""
-    several = next((name for name, found in poses.items() if len(found) > 1), None)
+    several = next((name for name, found in sensors.items() if len(found) > 1), None)
     more = f"those of several poses as {bare(several)}/TOKEN" if several else ""
-    if not moves:
-        options.tally.assumed = ", ".join(filter(None, (unnamed, more)))
-    for name, found in poses.items():
-        for pose, (token, path) in found.items():
-            yield Edge(ego, f"{name}/{token}" if len(found) > 1 else name, pose, path=path)
+    options.tally.assumed = ", ".join(filter(None, (unnamed, more)))
+    for name, found in sensors.items():
+        for pose, path in found.items():
+            token = f"/{records[path[0]].get('token')}" if len(found) > 1 else ""
+            yield Edge(ego, f"{name}{token}", pose, path=path)
 
 
-def _records(value: Any) -> list[dict[str, Any]]:
+def _records(value: Any) -> Records:
     if type(value) is not list or not value:
         raise Misfit(f"expected a list of records, found {kind(value) if value else 'an empty one'}")
     return [within((index,), as_mapping, record, "a record") for index, record in enumerate(value)]
