@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from frametool.fit.tree_problem import Fitted
     from frametool.geometry import Array
 
     Mask: TypeAlias = NDArray[np.bool_]
@@ -156,7 +155,6 @@ def stacked(transforms: Iterable[Transform]) -> Transform:
 
 
 Model = TypeVar("Model")
-Found = TypeVar("Found", bound="RobustFit[Any] | Fitted")
 
 KEPT = 3.0  # sigmas: a larger residual is an outlier
 CERTAIN = 2.5  # sigmas: up to here a first weight is 1
@@ -239,7 +237,9 @@ def first_inliers(
     return model, u <= KEPT
 
 
-def refit_inliers(found: Found, fit: Callable[[Found, Mask], Found], *, robust: bool) -> Found:
+def refit_inliers(
+    found: RobustFit[Model], fit: Callable[[RobustFit[Model], Mask], RobustFit[Model]], *, robust: bool
+) -> RobustFit[Model]:
     """Fit the rows that are kept, and those within 3 sigmas of that fit again, until they do not change.
 
     fit: returns a better fit of some rows, with the rows that it used as `kept`, and `u` of all

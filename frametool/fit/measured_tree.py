@@ -19,7 +19,7 @@ from frametool.errors import ValueInvalid, alternatives, first_of, printable, sh
 from frametool.fit import least_squares as lsq
 from frametool.fit.blunders import best_blunder
 from frametool.fit.bodies import bodies_of, bridges
-from frametool.fit.tree_problem import Fitted, Noise, TreeProblem, by_body_step, jacobians
+from frametool.fit.tree_problem import Noise, TreeModel, TreeProblem, by_body_step, jacobians
 from frametool.frames.lookups import FrameTree
 from frametool.frames.topology import Groups, Snapshot
 from frametool.geometry.transform import Transform
@@ -36,17 +36,17 @@ if TYPE_CHECKING:
 class TreeFit:
     """A fit with its inliers: residuals, rows in no loop, covariances; and the verdicts on its outliers."""
 
-    def __init__(self, problem: TreeProblem, found: Fitted) -> None:
+    def __init__(self, problem: TreeProblem, found: lsq.RobustFit[TreeModel]) -> None:
         """Store a fit; covariances are not computed yet."""
         self.problem, self.found = problem, found
         kept = np.flatnonzero(found.kept).tolist()
         self.tree = problem.tree(kept)
         self.unchecked = bridges(self.tree, problem.pairs, kept)
-        self.parents, self.children = problem.ends(found.bodies)
+        self.parents, self.children = problem.ends(found.model.bodies)
         self.poses = self.parents.inverse() @ self.children
         self.errors = lsq.errors(self.poses, problem.measured)
         self._known = Groups[int]()
-        for row in np.flatnonzero(found.kept & (problem.stated | found.estimated)).tolist():
+        for row in np.flatnonzero(found.kept & (problem.stated | found.model.estimated)).tolist():
             self._known.join(*problem.pairs[row])
 
     def covariance(self, target: tuple[int, Transform], source: tuple[int, Transform]) -> Array | None:
@@ -59,7 +59,7 @@ class TreeFit:
         if self._known.of(target[0]) != self._known.of(source[0]):
             return None
         by_ends = zip((target, source), jacobians(target[1], source[1], np.zeros(3)), strict=True)
-        slopes = np.hstack([by_body_step(by, self.found.bodies[body], frame) for (body, frame), by in by_ends])
+        slopes = np.hstack([by_body_step(by, self.found.model.bodies[body], frame) for (body, frame), by in by_ends])
         ends = [target[0], source[0]]
         found: Array = slopes @ self._of_bodies[ends][:, :, ends].reshape(12, 12) @ slopes.T
         return (found + found.T) / 2.0
@@ -68,10 +68,10 @@ class TreeFit:
     def _of_bodies(self) -> Array:
         """Return the covariance of all bodies, (bodies, 6, bodies, 6); zeros for the root."""
         problem, found = self.problem, self.found
-        information = problem.information(found.noise) * found.kept[:, None, None]
+        information = problem.information(found.model.noise) * found.kept[:, None, None]
         whole = np.zeros((problem.count, 6, problem.count, 6))
         if problem.unknown:
-            normal = problem.normal_equations(found.bodies, information)[0]
+            normal = problem.normal_equations(found.model.bodies, information)[0]
             whole[1:, :, 1:] = lsq.inverse(normal).reshape(problem.unknown, 6, problem.unknown, 6)
         return whole
 
@@ -93,7 +93,7 @@ class TreeFit:
                 break
             tried.add(kept.tobytes())
             bodies = problem.poses_along(problem.tree(np.flatnonzero(kept).tolist()))
-            start = Fitted(bodies, kept, fit.found.noise)
+            start = lsq.RobustFit(TreeModel(bodies, fit.found.model.noise), kept)
             fit = TreeFit(problem, lsq.refit_inliers(start, problem.refitted, robust=True))
         if undecided:
             row, rivals = undecided
@@ -110,9 +110,9 @@ class TreeFit:
         Returns the mistake of each row; rows without one that the uncertainty of the fit explains; rows to exchange,
         (rejected, rival); and the first row whose loop does not identify the outlier, with its rivals.
         """
-        measurements, noise_found = self.problem.measurements, self.found.noise
+        measurements, noise_found = self.problem.measurements, self.found.model.noise
         information = self.problem.information(noise_found, noise_found.factor)
-        floor = noise_found.at_least(Noise()) if self.found.few_loops else noise_found
+        floor = noise_found.at_least(Noise()) if self.found.model.few_loops else noise_found
         least_information = self.problem.information(floor, floor.factor)
         fits: list[str | None] = [None] * self.problem.size
         noise, swaps, undecided = list[int](), list[tuple[int, int]](), None
@@ -210,11 +210,11 @@ class TreeSolution:
         self._number, self._fit = bodies.number, fit
         self.residuals, self.used = fit.errors, found.kept
         self.u = found.u
-        self.sigma = (found.noise.translation, found.noise.rotation) if found.estimated else None
-        self.sigma_factor = found.noise.factor
+        self.sigma = (found.model.noise.translation, found.model.noise.rotation) if found.model.estimated else None
+        self.sigma_factor = found.model.noise.factor
         loops = int(found.kept.sum()) - problem.unknown
         self.dof = max(3 * loops, 0)
-        if found.estimated and found.few_loops and loops < FEW_LOOPS:
+        if found.model.estimated and found.model.few_loops and loops < FEW_LOOPS:
             verb = "loop does" if loops == 1 else "loops do"
             warn(f"{loops} {verb} not tell metres from radians: the sigmas are rough; give sigma")
         squares = (fit.errors[found.kept] ** 2).reshape(-1, 2, 3).sum((0, 2))
@@ -228,7 +228,7 @@ class TreeSolution:
         ends = Counter(name for each in used for name in each[:2])
         self.rows = {name: ends[name] for name in self.frames}
         number = np.array([bodies.number[name] for name in self.frames])
-        self._poses = found.bodies[number] @ lsq.stacked(bodies.pose[name] for name in self.frames)
+        self._poses = found.model.bodies[number] @ lsq.stacked(bodies.pose[name] for name in self.frames)
         self.poses = dict(zip(self.frames, self._poses.canonical(), strict=True))
         self.tree, top = FrameTree("the result"), Snapshot(fixed).roots.get(self.root, self.root)
         for name in self.frames:

@@ -46,20 +46,17 @@ class Noise(NamedTuple):
 LOWEST = Noise(0.001, math.radians(0.1))  # medians if loops are few: most rows of a tree have no residual
 
 
-class Fitted(NamedTuple):
-    """Bodies that fit the inliers best.
+class TreeModel(NamedTuple):
+    """The poses of the bodies, and the noise of measurements.
 
-    estimated: whether these rows determine their own noise
+    estimated: whether the used rows determine their own noise
     few_loops: whether rotations can close all loops, so that metres alone do not determine their sigma
-    u: the residual of each row in sigmas
     """
 
     bodies: Transform
-    kept: Any
     noise: Noise
     estimated: bool = False
     few_loops: bool = False
-    u: Array = np.ones(0)
 
 
 def jacobians(parent: Transform, child: Transform, turned: Array) -> tuple[Array, Array]:
@@ -250,7 +247,7 @@ class TreeProblem:
             noise = Noise(s_t, s_r, noise.factor)
         return noise.at_least(LOWEST) if looped.sum() <= 2 * unknown else noise
 
-    def fitted(self, *, robust: bool) -> Fitted:
+    def fitted(self, *, robust: bool) -> lsq.RobustFit[TreeModel]:
         """Select the rows that agree, or all, and fit them by plain least squares."""
         every = range(self.size)
         bodies, noise = self.initial_bodies(TREES if robust and self.size > self.unknown else 1), Noise()
@@ -269,14 +266,14 @@ class TreeProblem:
         if robust and looped.any():
             bodies, kept = lsq.first_inliers(bodies, by_medians, rough)
             noise = self.median_noise(self.errors(bodies), looped)
-        return lsq.refit_inliers(Fitted(bodies, kept, noise), self.refitted, robust=robust)
+        return lsq.refit_inliers(lsq.RobustFit(TreeModel(bodies, noise), kept), self.refitted, robust=robust)
 
-    def refitted(self, found: Fitted, kept: Any) -> Fitted:
+    def refitted(self, found: lsq.RobustFit[TreeModel], kept: Any) -> lsq.RobustFit[TreeModel]:
         """Fit the used rows, and the nearest of the others if frames would be disconnected.
 
         Bodies and noise are those of the least-squares solution, both converged.
         """
-        bodies, noise = found.bodies, found.noise
+        bodies, noise, *_ = found.model
         u = self.u(self.errors(bodies), noise)
         tree = self.tree(np.lexsort((u, ~kept)).tolist() if not kept.all() else range(self.size))
         reached = np.isin(np.arange(self.size), tree.row)
@@ -293,7 +290,8 @@ class TreeProblem:
             changes = (abs(new / old - 1) for new, old in zip(noise, before, strict=True))
             if size <= CONVERGED and max(changes) <= CONVERGED:
                 break
-        return Fitted(bodies, kept, noise, estimate, few_loops, self.u(self.errors(bodies), noise))
+        model = TreeModel(bodies, noise, estimate, few_loops)
+        return lsq.RobustFit(model, kept, u=self.u(self.errors(bodies), noise))
 
 
 def _odd_count(values: Array) -> Array:
