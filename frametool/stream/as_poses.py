@@ -1,6 +1,6 @@
-"""Streams whose results come out in another format than theirs: rows of tables and listed poses, block by block.
+"""Convert streams to another format, block by block: tables, columns of numbers, and files that list poses.
 
-rows or listed poses -> the operation -> blocks of poses -> the text of the other format
+rows -> the operation -> blocks of poses or points -> the other format
 
 `read` makes of the rows of a table frames that move, of which each is a pose at its time:
 
@@ -83,25 +83,24 @@ class Blocks(ResultWriter):
         self.writer: PoseWriter | None = None
 
     def of_block(self, block: RowPoses | BlockResults) -> bytes:
-        """Return the text of a block of poses, or of results, many together."""
-        if isinstance(block, RowPoses):
-            return self._write(block)
-        is_text = not holds(self.style.format, "arrays")
-        made = block_of(block, timed=is_text)
-        return self._write(made._replace(placed=made.placed or is_text)) if len(made.numbers) else b""
-
-    def end(self) -> Iterator[bytes]:
-        """Yield what comes behind the last."""
-        if self.writer is None:
-            self._write(NO_ROWS)
-        yield from self.writer.end()  # type: ignore[union-attr]
-
-    def _write(self, block: RowPoses) -> bytes:
+        """Return what is written of a block of rows, or of results."""
+        if not isinstance(block, RowPoses):
+            is_text = not holds(self.style.format, "arrays")
+            block = block_of(block, timed=is_text)
+            block = block._replace(placed=block.placed or is_text)
+            if not len(block.numbers):
+                return b""
         if self.writer is None:
             self.writer = writer_for(self.style, block)
         if block.kind != self.writer.kind:
             raise ValueInvalid(f"one file holds things of one kind, found {self.writer.kind} and {block.kind}")
         return self.writer.of_block(block._replace(placed=self.writer.placed))
+
+    def end(self) -> Iterator[bytes]:
+        """Yield what comes behind the last."""
+        if self.writer is None:
+            self.of_block(NO_ROWS)
+        yield from self.writer.end()  # type: ignore[union-attr]
 
 
 def poses_text(values: Iterable[Value], style: Style) -> str:
@@ -113,7 +112,7 @@ def poses_text(values: Iterable[Value], style: Style) -> str:
 class FormatConverter:
     """Convert a stream of poses or points to another format, block by block.
 
-    rows: those of a table, or of columns of numbers, once steps have begun
+    rows: the planned rows, from the first step on
     tally: what was assumed about a trajectory
     """
 
@@ -122,7 +121,7 @@ class FormatConverter:
     def __init__(
         self, fmt: str, request: Request, source: str, style: Style = AS_VALUES, answers: Answers = Answers()  # noqa: B008
     ) -> None:
-        """Take what is asked for; raises Misused for what only a table can hold."""
+        """Store the request; raises Misused for options that need a table in its own format."""
         if request.results.keep or (request.results.prefix and request.operation.formula is None):
             raise Misused("--keep and --prefix are for tables that stay in their form")
         self.fmt = fmt
@@ -145,7 +144,7 @@ class FormatConverter:
             warn(f"{self.source}:{finding.line}: {finding.message}")
 
     def _to_write(self, stream: ByteStream, *, header: bool) -> Iterator[Outcome]:
-        """Yield the blocks that are written."""
+        """Yield the results to be written, with the warnings about them."""
         operation, place = self.request.operation, self.style.place
         for poses, outcome in self.steps(stream, header=header):
             has_more = poses.more and poses.kind != POSE and operation.formula is not None
@@ -212,7 +211,7 @@ class FormatConverter:
         return ColumnRows(columns, self.request, self.source)
 
     def _without_gaps(self, rows: TableRows | ColumnRows) -> Iterator[Step]:
-        """Yield the results of columns but for rows without numbers, which have no place in a text."""
+        """Yield the results of columns without the rows that have no numbers; text has no place for these."""
         left_out = 0
         for poses, outcome in rows.steps():
             there = np.flatnonzero(~np.isnan(poses.numbers[:, 0]))

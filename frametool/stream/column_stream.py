@@ -1,4 +1,4 @@
-"""Files of columns of numbers as streams: planned as tables are, evaluated in the same blocks, no text in between.
+"""Stream files of columns of numbers: they are planned like tables and evaluated in the same blocks, without text.
 
 The points of a message are such a file too: moved by one pose, and written as a file of their own.
 """
@@ -86,7 +86,7 @@ class ListedPoses(ColumnFile):
 
 
 class ColumnRows(PlannedRows):
-    """Turn the rows of one batch after the other into results."""
+    """The rows of a file of columns, batch by batch."""
 
     def __init__(self, file: ColumnFile, request: Request, source: str) -> None:
         """Plan the rows; raises FormatError or Misused as for a table of the same columns."""

@@ -98,7 +98,7 @@ def find_pose(header: Header, request: Request, source: str) -> PoseColumns | No
 def _find(kind: str, header: Header, groups: Groups, key: tuple[str, str], earth: Earth) -> Columns | None:
     """Return the columns of a position of one kind, if they are there.
 
-    Raises ValueInvalid for heights that are not above the ellipsoid, and for a zone that nobody says.
+    Raises ValueInvalid for heights that are not above the ellipsoid, and for a missing zone.
     """
     row, spots = POSITIONS[kind], groups[key]
     if kind == UTM and (zone := spots.get(ZONE) or groups.get(finder.BARE, {}).get(ZONE)):
@@ -179,7 +179,7 @@ def along(
 ) -> tuple[tuple[int, ...], Shape]:
     """Return what the covariance with a place is expressed in; that of a NavSatFix is, where nothing else is there.
 
-    Raises ValueInvalid where nobody says so.
+    Raises ValueInvalid where neither a row nor an option states it.
     """
     fix = {int(match[1]): at for at, name in enumerate(names) if (match := FIX_ENTRY.fullmatch(name))}
     if not places and shape.kind == POINT and len(fix) == 9:  # field.position_covariance0, or [0]
@@ -250,7 +250,7 @@ def settle(
 ) -> tuple[Request, tuple[Shape, ...]]:
     """Check what rows on the Earth need: axes for rotations, a height; and that the frame of places is the Earth's.
 
-    Raises ValueInvalid for a rotation whose axes nobody says.
+    Raises ValueInvalid for a rotation without stated axes.
     """
     operation, asked, names = request.operation, request.results, table.names or ()
     if on_earth and (place := shapes[0].place) is not None:
@@ -301,7 +301,7 @@ def placed_record(
 
     empty: the record without what it says; inner: reads the pose that comes with a place, and names its keys
     The numbers of latitude, longitude and height stay members of the record; no other has a place of its own.
-    Raises Misfit for half a place, for a pose whose axes nobody says, and for what is no place.
+    Raises Misfit for an incomplete place, for a pose without stated axes, and for an invalid place.
     """
     own = [key for key in value if key in grammar.EARTH_KEYS]
     in_ecef = value.get("frame", value.get("parent")) in EARTH_FRAMES

@@ -38,7 +38,7 @@ LETTERS = {
     WRENCH: ((*FORCES, "tx", "ty", "tz"), (*FORCES, "mx", "my", "mz")),
 }
 MOST_SHOWN, MOST_LISTED = 8, 40  # columns in a message
-# behind an underscore or a blank: these are units of no length, and those are lengths that nobody should have to guess
+# behind an underscore or a blank: the first are read, the second are units of a length that are refused
 UNITS = re.compile(r"[_ ](deg|rad|mm|cm|um|m)(?![^\W_])|[_ ](km|in|ft|s|e7)$")
 TOKEN = re.compile(r"[^\W_]+")
 
@@ -377,7 +377,7 @@ def _half_rotation(header: Header, expected: Notation | None) -> str:
                 return f"{half}; add what is missing, or choose with --columns"
     folded = {name.lower(): name for name in reversed(header.names)} if expected is None else {}
     stems = [name[:-1] for name in folded if name[-1:] == "w" and len(name) > 1] + ["q", "q_"]
-    for stem, letters in product(stems, ("xyzw", "0123", "1234")):  # names that nobody has agreed upon: ox oy oz ow
+    for stem, letters in product(stems, ("xyzw", "0123", "1234")):  # names without a standard order: ox oy oz ow
         found = [folded[stem + letter] for letter in letters if stem + letter in folded]
         if len(found) == len(letters) and (stem, letters) != ("q", "xyzw"):
             return (

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 LISTS = ("measurements", "frames")
 CHILD = "child"
 OURS = frozenset((*KNOWN, *NAME_KEYS, *STAMP_KEYS, *INNER, CHILD, "id", "children", "samples", "header"))
-MISSPELT = ("parent", CHILD, *COVARIANCE_KEYS, "inverse", "angles")  # keys that nobody else would miss
+MISSPELT = ("parent", CHILD, *COVARIANCE_KEYS, "inverse", "angles")  # keys of measurements alone
 LIKE = "a measurement is {parent: .., child: .., xyz: [..], rpy_deg: [..]}"
 WRAPPED = rb'"(?:op|msg|message|topic|transforms?)"'  # of JSON that holds messages rather than rows
 TABLES = ("csv", "tsv", "semicolon")
@@ -238,7 +238,7 @@ def _of_documents(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
 
 
 def _rows(value: Any, path: Path, reading: Reading) -> Iterator[tuple[Path, Any]]:
-    """Yield the rows of a document with their paths; what is nested gets the names that nesting tells."""
+    """Yield the rows of a document with their paths; nested frames get the names of their parents."""
     reading.degrees = False
     if type(value) is dict and (keys := [key for key in LISTS if key in value]):
         key = keys[0]

@@ -1,4 +1,4 @@
-"""What is asked of a stream, whatever its format: the operation, how rows are read, how results are written.
+"""The request of a stream in any format: the operation, how rows are read, how results are written.
 
 One `Operation` serves floats and arrays alike.
 """
@@ -102,7 +102,7 @@ class Shown(NamedTuple):
 
 
 class Operation(NamedTuple):
-    """What is done to each row: turned around if asked for, then multiplied with fixed poses, then compared.
+    """What is done to each row: it is inverted if requested, then multiplied with fixed poses, then compared.
 
     left, right: applied as left @ row @ right[0] @ right[1] ..
     inverse: the row itself is inverted first
@@ -381,7 +381,7 @@ class ResultOptions(NamedTuple):
     """How results are written.
 
     notations: of their rotations; none means as read
-    by_default: nobody asked for these notations, so that what has no rotation gets none
+    by_default: no option chose these notations; what has no rotation gets none
     keep, prefix: results are added to the input, under other names
     unwrap: angles go on beyond half a turn
     all_numbers: all numbers of a result are wanted, also those that do not change
@@ -495,7 +495,7 @@ class Request(NamedTuple):
         return target._replace(unit=unit)
 
     def _unit(self, shape: Shape) -> Unit | None:
-        """Return how positions are written: as asked for, as they were read, or in metres, as those of places are."""
+        """Return how positions are written: as requested, as they were read, or in metres, as those of places are."""
         asked = self.results
         if asked.place is not None and shape.unit is not None:
             return asked.place
@@ -503,7 +503,7 @@ class Request(NamedTuple):
         return 1.0 if own is not None and asked.all_numbers and (asked.notations or shape.notation is None) else own
 
     def for_kind(self, kind: str) -> Request:
-        """Return what is asked of rows of one kind: how an expression names its result depends on it."""
+        """Return the request for rows of one kind, on which the frames of an expression's result depend."""
         formula = self.operation.formula
         if formula is None:
             return self

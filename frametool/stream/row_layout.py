@@ -205,7 +205,7 @@ class Shape(NamedTuple):
 
     @property
     def bare_angles(self) -> tuple[int, ...]:
-        """Return which of the rotation's numbers are angles in radians whose unit nobody said."""
+        """Return which of the rotation's numbers are angles without a stated unit, taken as radians."""
         fmt = self.notation
         return () if fmt is None or self.degrees or fmt.degrees is not None else tuple(fmt.representation.angles)
 

@@ -235,15 +235,14 @@ def run_table(
 class PlannedRows:
     """Rows that are planned: what is done with each, what it is called, and what one block leaves for the next.
 
-    A request for all numbers makes poses of them; its notations say which numbers come out.
-    off: how far the worst rotation was from one; mended: how many were normalised
-    inputs: the numbers of the last rows that became poses as read, a row a column
-    before: the frame of the rows before
-    unasked: the column of stamps that no option names
+    With `all_numbers` in the request, results are computed for another format and no text is planned.
+    off: the largest deviation of a rotation; mended: how many were normalised
+    inputs: the numbers of the last block as read, one column per row
+    unasked: the column of stamps, where rows move and no option names it
     """
 
     def __init__(self, table: Table, request: Request) -> None:
-        """Plan the rows of a table; raises FormatError or Misused where they do not fit what is asked for."""
+        """Plan the rows of a table; raises FormatError or Misused where the request does not fit them."""
         timed, extra, operation, self.unasked = request.timed, request.rows.extra_column, request.operation, None
         usual = "" if (at := stamp_places(table.names)[0]) is None else table.name(at)
         is_cut = (request.window or request.offset_ns) and extra is None and not (timed and timed.name)

@@ -1,4 +1,4 @@
-"""From a table's columns and what is asked for to the plan of its rows: which are read, where the results go."""
+"""Plan the rows of a table from its columns and the request: which columns are read, and where results are written."""
 
 from __future__ import annotations
 
@@ -304,7 +304,7 @@ def _columns(
             pose, target, request, shape, first, table.delimiter, several=several, same=is_same
         )
         first += target.size
-        # whether each number of the result stands where one of the input does
+        # whether each number of the result replaces one of the input
         read, written = ((each.unit is None, each.whole, len(each.absent)) for each in (shape, target))
         in_place = bool(pose.places) and read == written and shape.place is target.place is None
         in_place = in_place and (is_same or not target.notations or shape.notation is None)
