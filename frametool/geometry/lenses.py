@@ -47,7 +47,7 @@ class Lens(NamedTuple):
     end: float = inf
 
 
-# ---------------------------------------------------------------- where a distortion stops growing
+# --- where a distortion stops growing ---
 
 
 def _slope(coefficients: Sequence[float]) -> list[float]:
@@ -85,7 +85,7 @@ def _equidistant_end(d: Sequence[float]) -> float:
     return min([*map(sqrt, _roots(_angle_slope(d), pi * pi)), pi])
 
 
-# ---------------------------------------------------------------- distortion and undistortion in the plane
+# --- distortion and undistortion in the plane ---
 
 
 def divisor(value: N, xp: Functions[N]) -> N:
@@ -166,7 +166,7 @@ def _undistorted(x: N, y: N, lens: Lens, xp: Functions[N]) -> Seen[N]:
     return a, b, close & (a * a + b * b < lens.end * lens.end)
 
 
-# ---------------------------------------------------------------- models: points to the plane, the plane to directions
+# --- models: points to the plane, the plane to directions ---
 
 
 def _to_omni(x: N, y: N, z: N, lens: Lens, xp: Functions[N]) -> Seen[N]:
