@@ -166,7 +166,7 @@ def _placed(source: str, name: str = "", line: int = 0) -> Iterator[None]:
         raise FormatError(f"{name}: {what}" if name else what, source=source, line=line) from None
 
 
-# ---------------------------------------------------------------- which format
+# --- which format ---
 
 
 def _read(file: InputFile) -> Found:
@@ -246,7 +246,7 @@ def _ours(value: Any, name: str) -> Found:
             yield from _ours(each, str(key) if isinstance(value, dict) and key not in ("frames", "children") else name)
 
 
-# ---------------------------------------------------------------- CameraInfo, OpenCV
+# --- CameraInfo, OpenCV ---
 
 
 def _by_keys(value: dict[str, Any], end: str = "") -> dict[str, Any]:
@@ -272,7 +272,7 @@ def _by_keys(value: dict[str, Any], end: str = "") -> dict[str, Any]:
     return found if "K" in found else {}
 
 
-# ---------------------------------------------------------------- COLMAP, NeRF
+# --- COLMAP, NeRF ---
 
 
 def _of_colmap(name: str, numbers: Sequence[float], size: Sequence[int] | None) -> dict[str, Any]:
@@ -308,7 +308,7 @@ def _nerf(value: dict[str, Any]) -> dict[str, Any]:
     return {"colmap": model, "numbers": [{**usual, **known}.get(each, 0.0) for each in names], "size": size}
 
 
-# ---------------------------------------------------------------- KITTI
+# --- KITTI ---
 
 
 def _kitti(file: InputFile) -> Found:
