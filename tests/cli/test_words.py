@@ -176,7 +176,7 @@ def test_publisher_arguments_in_quotes_are_read(run: Run) -> None:
     ("command", "said"),
     [
         (("calc", "-e", P, "-f", "ply"), "ply holds columns of numbers"),
-        (("relative", "-i", "images.txt"), "colmap lists one pose after the other; two a row are wanted"),
+        (("relative", "-i", "images.txt"), "columns of two poses are wanted, found x y z; qx qy qz qw"),
         (("apply", "--transform", "{rpy: [0, 0, 1]}", "[1, 2, 3]", "--as", "twist"), "a twist has linear and angular, two vectors"),
         (("invert", "list.txt", "--time-offset", "first"), "list.txt:1:1: a key must be one text"),
     ],
