@@ -40,13 +40,13 @@ from frametool.grammar.result import Style
 from frametool.stream.faults import NULL, SKIP, BadRow, Fault, Outcome, written_by
 from frametool.stream.record_results import BlockResults, ResultWriter, blocks_of
 from frametool.stream.request import NO_STAMPS, SOME, Request, RowOptions
-from frametool.stream.row_layout import POSE
+from frametool.stream.row_layout import POINT, POSE
 from frametool.stream.rows import NO_ROWS, NO_STAMP, RowPoses, block_of, kept
 from frametool.stream.table import TableRows
 from frametool.stream.writers import LEARNED, PoseWriter, RowsWriter, SingleWriter, TextWriter
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterable, Iterator
+    from collections.abc import Generator, Iterable, Iterator, Sequence
 
     from frametool.formats.rows.column_file import ColumnFile
     from frametool.stream.column_stream import ColumnRows
@@ -167,29 +167,25 @@ class FormatConverter:
         """
         is_table, other = self.is_table, self.style.format
         rows = TableRows(stream, self.fmt, self.request, self.source, header=header) if is_table else self._rows(stream)
-        self.rows, shape, unit = rows, rows.shape, rows.plan.targets[0].unit
-        lacks_rotation = shape.kind == POSE or (self.request.converts and "points" not in FORMATS[other].writes)
-        is_bare = shape.notation is None and lacks_rotation and self.request.keeps_position
-        if is_bare and self.request.rows.poses:
-            raise FormatError(NO_ROTATION.format(rows.columns), source=self.source, line=int(is_table))
+        self._begin(rows)
         operation, fmt = self.request.operation, Rows() if self.answers.edges else FORMATS[self.fmt].rows
         # stamps that only count are no loss where the other format has no place for them
         counts = bool(fmt.counted) and not self.answers.stamps
         has_no_place = holds(other, "recording") or FORMATS[other].rows.counted
         are_lost = counts and (self.request.rows.stamps == NO_STAMPS or has_no_place)
-        more = tuple(map(self.request.results.prefix.__add__, operation.extras(shape)))
+        kind, names = operation.result_kind(self.shape.kind), operation.extras(self.shape)
+        more = tuple(map(self.request.results.prefix.__add__, names))
         file = StampFile(self.answers.stamps) if self.answers.stamps and is_table else None
-        kind, count = operation.result_kind(shape.kind), 0
+        is_placed, count = self.looks_up_places or self.shape.kind == POINT or self.shape.place is not None, 0
         for found, outcome in rows.steps() if is_table else self._without_gaps(rows):
-            is_placed = self.looks_up_places or shape.place is not None
-            poses = self._as_read(found) if is_placed and len(found.numbers) else found
+            poses = self._placed(found, names) if is_placed else found
             before, count = count, count + len(poses.numbers)
             stamps = None if are_lost else poses.stamps_ns
             if file is not None:
                 stamps = np.array(file.between(before, count), np.int64)
             elif counts and stamps is None and not are_lost:
                 stamps = np.arange(before, count) * BILLION
-            yield poses._replace(stamps_ns=stamps, kind=kind, placed=unit is not None, more=more), outcome
+            yield poses._replace(stamps_ns=stamps, kind=kind, placed=self.placed, more=more), outcome
         if file is not None:
             file.finish(count, self.source)
         if is_table and is_trajectory(self.fmt):
@@ -222,13 +218,31 @@ class FormatConverter:
             what = f"{left_out} {'row' if left_out == 1 else 'rows'} without numbers left out"
             warn(f"{self.source}: {what}: {self.style.format} has no place for them")
 
-    def _as_read(self, poses: RowPoses) -> RowPoses:
-        """Return places with their lat, lon, alt as they were read, where these are written again."""
-        place = self.rows.shape.place
+    def _begin(self, rows: TableRows | ColumnRows) -> None:
+        """Decide what rows become: without a rotation points, where no option chose one; raises FormatError."""
+        self.rows, shape, (target, *_) = rows, rows.shape, rows.plan.targets
+        self.placed = target.unit is not None
+        is_bare = shape.kind == POSE and shape.notation is None and bool(self.request.rows.poses)
+        has_none = is_bare and not target.notations
+        no_points = "points" not in FORMATS[self.style.format].writes
+        if (is_bare and self.request.keeps_position and not has_none) or (has_none and no_points):
+            raise FormatError(NO_ROTATION.format(rows.columns), source=self.source, line=int(self.is_table))
+        self.shape = shape._replace(kind=POINT) if has_none else shape
+
+    def _placed(self, poses: RowPoses, names: Sequence[str]) -> RowPoses:
+        """Return points with their own covariance, and places with lat, lon, alt as read where these are written again.
+
+        names: of what comes with each
+        """
+        place, operation = self.shape.place, self.request.operation
         if self.looks_up_places:
             poses = poses._replace(parents=EARTH_FRAMES[:1])
+        every = operation.extras(self.rows.shape)
+        if self.shape.kind == POINT and len(names) < len(every):  # of rows that were read as poses
+            columns = [*range(3), *(3 + every.index(name) for name in names)]
+            poses = poses._replace(numbers=poses.numbers[:, columns])
         is_written = holds(self.style.format, "recording") or self.style.place
-        if not is_written or place is None or place.name != "lla" or not self.request.operation.keeps_frames:
+        if not is_written or place is None or place.name != "lla" or not operation.keeps_frames:
             return poses
         inputs = self.rows.inputs
         inputs[:, np.isnan(poses.numbers[:, 0])] = np.nan
@@ -253,7 +267,7 @@ def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
     for block, outcome in converter.steps(cast("ByteStream", file.stream)):
         if not line:
             rows, line = converter.rows, 1
-            if rows.shape.kind != POSE:  # positions on the Earth
+            if converter.shape.kind != POSE:  # positions on the Earth
                 raise FormatError(NO_ROTATION.format(rows.columns), source=file.name, line=1)
             named = {role: rows.table.name(at) for role, at in enumerate(rows.layout.named) if at is not None}
             lacking = ", ".join(name for role, name in enumerate(("parent", "name")) if role not in named)
@@ -261,7 +275,7 @@ def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
                 wanted = "frames that stand still have parent and name, one that moves stamp or stamp_ns"
                 missing = f"no column {lacking} nor stamp among {rows.columns}; {wanted}, or --stamps FILE"
                 raise FormatError(missing, source=file.name, line=1)
-            fmt = fmt if rows.shape.place is None else fmt._replace(frames=(EARTH_FRAMES[0], *fmt.frames[1:]))
+            fmt = fmt if converter.shape.place is None else fmt._replace(frames=(EARTH_FRAMES[0], *fmt.frames[1:]))
         nameless = {
             row: Fault(line + int(block.lines[row]), column, "no name of a frame")
             for role, column in named.items()

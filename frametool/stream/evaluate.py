@@ -367,7 +367,8 @@ class Run:
                     self._blame(row, "", LEAVES_PLANE.format(name, number[row]))
             if target.notations and (flags := target.locked(parts)) is not None:
                 locked |= flags
-        width = len(numbers) if self.count else sum(target.size for target in self.plan.targets)  # without rows, no mover
+        # without rows nothing moves them, so that covariances are missing among the numbers
+        width = len(numbers) if self.count else sum(target.size for target in self.plan.targets)
         results = np.empty((self.count, width))
         for column, number in enumerate(numbers):
             results[:, column] = number

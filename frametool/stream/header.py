@@ -407,7 +407,7 @@ def row_shape(pose: PoseColumns, request: Request, kind: str) -> Shape:
     unit = position.unit if position and not (rotation and rotation.whole) else None
     if rotation is None or rotation.notation is None:
         moved = request.operation.takes_points and kind != POSE
-        return Shape((kind or POINT) if moved else POINT if request.converts else POSE, unit)
+        return Shape((kind or POINT) if moved else POSE, unit)
     if kind not in ("", POSE) and request.operation.moves:
         raise Misused(
             f"rows have a rotation, {rotation.shown}, and cannot be taken for a {kind}; "

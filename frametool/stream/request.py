@@ -444,11 +444,6 @@ class Request(NamedTuple):
         return self.results.unwrap or self.operation.looks_back or takes_first
 
     @property
-    def converts(self) -> bool:
-        """Return True if rows only change their format, in which positions without a rotation are points."""
-        return self.results.all_numbers and self.results.by_default and self.operation.changes_nothing
-
-    @property
     def keeps_position(self) -> bool:
         """Return True if positions stay as they are written."""
         return self.operation.keeps_position and self.results.place is None
