@@ -41,6 +41,11 @@ if TYPE_CHECKING:
     from frametool.geometry.transform import Rotation as Rotation
     from frametool.geometry.transform import Transform as Transform
     from frametool.lint.tree_diff import diff as diff
+    from frametool.rows.measurements import solve as solve
+    from frametool.rows.trajectories import align as align
+    from frametool.rows.trajectories import compare as compare
+    from frametool.rows.trajectories import load_trajectory as load_trajectory
+    from frametool.rows.trajectories import resample as resample
     from frametool.sim.followed import explain as explain
     from frametool.sim.followed import follow_steps as follow_steps
     from frametool.sim.scene import tutorial as tutorial
@@ -48,11 +53,6 @@ if TYPE_CHECKING:
     from frametool.sim.turtle import FollowController as FollowController
     from frametool.sim.turtle import Turtle as Turtle
     from frametool.sim.turtle import Twist as Twist
-    from frametool.stream.measurements import solve as solve
-    from frametool.stream.trajectories import align as align
-    from frametool.stream.trajectories import compare as compare
-    from frametool.stream.trajectories import load_trajectory as load_trajectory
-    from frametool.stream.trajectories import resample as resample
 
 __version__ = "0.2.0"
 
@@ -81,8 +81,8 @@ _HOMES = {
         "frametool.sim.scene": "tutorial",
         "frametool.sim.simulate": "simulate",
         "frametool.sim.turtle": "FollowController Turtle Twist",
-        "frametool.stream.measurements": "solve",
-        "frametool.stream.trajectories": "align compare load_trajectory resample",
+        "frametool.rows.measurements": "solve",
+        "frametool.rows.trajectories": "align compare load_trajectory resample",
     }.items() for name in names.split()
 }  # fmt: skip
 __all__ = ["__version__", *_HOMES]  # noqa: PLE0604 - its keys are strings

@@ -22,9 +22,9 @@ from frametool.grammar.pose import COVARIANCE_KEYS
 from frametool.grammar.readers import Misfit, may_be_on_earth
 from frametool.grammar.readers import tell as tell_notes
 from frametool.ros.messages import LISTS
-from frametool.stream.faults import BadRows
-from frametool.stream.gathering import samples_of
-from frametool.stream.request import Formula, Request, RowOptions, target_of
+from frametool.rows.faults import BadRows
+from frametool.rows.request import Formula, Request, RowOptions, target_of
+from frametool.rows.samples import samples_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -182,7 +182,7 @@ def poses_of_table(path: str, fmt: str, *, normalize: bool, degrees: bool) -> Te
 def values_of_document(source: Source, scope: Scope) -> Term | None:
     """Read the poses or points of a document; None for a tree."""
     from frametool.documents.document import parse_documents
-    from frametool.stream.record_values import read_poses
+    from frametool.rows.plain import read_poses
 
     documents = [document.value for document in parse_documents(source.text, source.name)]
     if any(type(each) is dict and not {"frames", *LISTS}.isdisjoint(each) for each in documents):

@@ -119,7 +119,7 @@ def _offer_columns(ctx: click.Context, incomplete: str) -> Mapping[str, str]:
     """Offer the columns, or keys, of the file of -i."""
     from frametool.documents.source import HEAD
     from frametool.formats.detect import Beginning, detect
-    from frametool.stream.table import open_table
+    from frametool.rows.sources.tables import open_table
 
     path = ctx.params.get("input_path") or ""
     path = path if isinstance(path, str) else path[0]
@@ -372,7 +372,7 @@ def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int
 
         with misuse(f"--times {text}: "):
             return parse_times(text)
-    from frametool.stream.trajectories import read_stamps
+    from frametool.rows.trajectories import read_stamps
 
     say_if_typed(text)
     return read_stamps(text, report)

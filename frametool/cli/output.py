@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
     from frametool.cli.sink import Write
     from frametool.frames.lookups import Frames
-    from frametool.stream.record_results import BlockResults, ResultWriter
-    from frametool.stream.record_values import Value
-    from frametool.stream.request import Operation
+    from frametool.rows.plain import Value
+    from frametool.rows.request import Operation
+    from frametool.rows.sinks.results import BlockResults, ResultWriter
 
 
 def _recording_path(fmt: str, output: str | None) -> str:
@@ -146,7 +146,7 @@ class Output:
         if not self._in_blocks:
             self.text(self.text_of([*values]))
             return
-        from frametool.stream.record_results import blocks_of
+        from frametool.rows.sinks.results import blocks_of
 
         writer = self.writer()
         self.pieces(filter(None, chain(map(writer.of_block, blocks_of(values)), writer.end())))
@@ -175,7 +175,7 @@ class Output:
             if len(poses) > 1 or "covariance" in keys:
                 self._shorten()
             if "scale" in keys:
-                from frametool.stream.writers import refuse_scale_in
+                from frametool.rows.sinks.as_rows import refuse_scale_in
 
                 refuse_scale_in(self.style.format, keys)
             text = self._module("frametool.view.text").write_poses(found, self.style)
@@ -215,14 +215,14 @@ class Output:
 
     def writer(self) -> ResultWriter:
         """Return the writer of the results of a stream of records."""
-        from frametool.stream.record_results import CsvTable, Documents
+        from frametool.rows.sinks.results import CsvTable, Documents
 
         self._refuse_places()
         if self.style.format in ("csv", "json", "yaml"):
             return CsvTable(self.style) if self.style.format == "csv" else Documents(self.style)
         if not self._in_blocks:
             return CollectingWriter(self)
-        from frametool.stream.as_poses import Blocks
+        from frametool.rows.conversion import Blocks
 
         return Blocks(self.style)
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from frametool.cli.streaming import Task
     from frametool.geometry.representations import Notation
     from frametool.grammar.result import Result
-    from frametool.stream.request import Request
+    from frametool.rows.request import Request
 
 INLINE = "argument"
 # records and tables begin with one of these, each compiled when first needed
@@ -132,8 +132,8 @@ def _inverses(source: Source, request: Request) -> Source:
     from frametool.documents.writers import dump_json
     from frametool.geometry.representations import notation
     from frametool.grammar.result import Style
-    from frametool.stream.record_values import results
-    from frametool.stream.request import Operation, Request, RowOptions
+    from frametool.rows.plain import results
+    from frametool.rows.request import Operation, Request, RowOptions
 
     own = request.operation
     inverses = Request(
@@ -175,7 +175,7 @@ def pose_source(argument: str | Source, request: Request) -> Source:
     source = source_of(argument)
     if request.offset_ns:
         from frametool.documents.document import parse_documents
-        from frametool.stream.record_stream import with_offset
+        from frametool.rows.sources.records import with_offset
 
         parse_documents(source.text, source.name)  # raises for invalid text
         text, count = with_offset(source.text, request.offset_ns)
@@ -188,7 +188,7 @@ def pose_source(argument: str | Source, request: Request) -> Source:
 
 def values_of(arguments: Sequence[str | Source], request: Request, output: Output) -> Iterator[Result | dict[str, Any]]:
     """Yield the results of the records of arguments."""
-    from frametool.stream.record_values import results
+    from frametool.rows.plain import results
 
     for argument in arguments:
         yield from read_with(argument, request, partial(results, style=output.style))
@@ -246,8 +246,8 @@ class ArgumentPoses(NamedTuple):
 
 def _read_argument(argument: str | Source, request: Request) -> ArgumentPoses:
     """Read all poses of one of several arguments, and collect the warnings."""
-    from frametool.stream.record_values import read_given
-    from frametool.stream.request import COMBINED
+    from frametool.rows.plain import read_given
+    from frametool.rows.request import COMBINED
 
     own = request.operation
     request = request._replace(operation=COMBINED._replace(similar=own.similar, multiples=own.multiples))

@@ -23,7 +23,7 @@ from frametool.errors import FormatError, heard_by, warn
 from frametool.formats import table
 from frametool.formats.table import BAG, FORMATS, holds, is_trajectory, readers
 from frametool.grammar.result import Style
-from frametool.stream.faults import MOST, NULL, ON_ERROR, SKIP, STOP, BadRow, BadRows, Outcome, run, written_by
+from frametool.rows.faults import MOST, NULL, ON_ERROR, SKIP, STOP, BadRow, BadRows, Outcome, run, written_by
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from frametool.explain.derive import WrittenPose
     from frametool.explain.render import Explanation
     from frametool.grammar.edges import Diagnostics
-    from frametool.stream.as_poses import Step
-    from frametool.stream.gathering import MeanRows
-    from frametool.stream.request import Request
+    from frametool.rows.conversion import Step
+    from frametool.rows.request import Request
+    from frametool.rows.samples import MeanRows
 
 TOP = 2  # lines of a table up to its first row: an error there may be in every row
 BAGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
@@ -155,8 +155,8 @@ class Task:
 
     def _rows_of_cloud(self, fmt: str, opened: BufferedReader) -> Iterator[bytes]:
         from frametool.cli.trees import answers
-        from frametool.stream.as_poses import FormatConverter
-        from frametool.stream.request import Request, ResultOptions
+        from frametool.rows.conversion import FormatConverter
+        from frametool.rows.request import Request, ResultOptions
 
         bad, row = self.policy(self.name, "row"), 1
         request = Request(on_error=self.inputs.on_error, results=ResultOptions(by_default=True))
@@ -245,7 +245,7 @@ class Task:
         refuse(looks_up and fmt in RECORDS, f"frames are looked up for the rows of a table, not of {fmt}")
         request = self._with_stream_options(request, fmt, alone=rows is None)
         if request.offset_ns and fmt in RECORDS:
-            from frametool.stream.record_stream import at_other_times
+            from frametool.rows.sources.records import at_other_times
 
             stream = at_other_times(stream, fmt, request.offset_ns)
         of_numbers = f"--time-offset is for text, {fmt} holds numbers; convert it to csv first"
@@ -289,7 +289,7 @@ class Task:
         Also returns the format of the results, and the diagnostics of the input format.
         """
         from frametool.formats.rows.pose_rows import is_turned
-        from frametool.stream.row_layout import POSE, Shape
+        from frametool.rows.shapes import POSE, Shape
 
         output, chosen = self.output, self.output.chosen
         if holds(fmt, "arrays") and (chosen is None or holds(chosen, "arrays")):
@@ -303,7 +303,7 @@ class Task:
         converts = not (is_kindred or fmt in RECORDS) and (chosen not in (None, fmt) or no_room or turns)
         if listed or converts:
             from frametool.cli.trees import answers
-            from frametool.stream.as_poses import FormatConverter
+            from frametool.rows.conversion import FormatConverter
 
             target = chosen or (fmt if "poses" in FORMATS[fmt].writes and not output.notations else "csv")
             no_stream = f"--format {target} is for single results and records, not for a stream of {fmt}"
@@ -313,14 +313,14 @@ class Task:
             return converted.outcomes(stream, header=not self.inputs.no_header), target, converted.tally
         if fmt in RECORDS:
             return *self._records(stream, fmt, request, chosen or ""), None
-        from frametool.stream.table import run_table
+        from frametool.rows.sources.tables import run_table
 
         return run_table(stream, fmt, request, source=self.name, header=not self.inputs.no_header), fmt, None
 
     def _steps(self, stream: Any, fmt: str, request: Request) -> Iterator[Step]:
         """Return the results of each block as poses that are not written."""
         from frametool.cli.trees import answers
-        from frametool.stream.gathering import steps_of
+        from frametool.rows.samples import steps_of
 
         request = request.with_results(by_default=True, notations=())
         if fmt in RECORDS:
@@ -330,7 +330,7 @@ class Task:
 
     def _records(self, stream: Any, fmt: str, request: Request, chosen: str) -> tuple[Generator[Outcome], str]:
         """Return the results of records, in place or in the chosen format, and that format."""
-        from frametool.stream.record_stream import run_records
+        from frametool.rows.sources.records import run_records
 
         if chosen in ("", fmt):
             return run_records(stream, fmt, request, source=self.name), fmt
@@ -344,7 +344,7 @@ class Task:
 
     def _columns(self, stream: Any, fmt: str, request: Request) -> Generator[Outcome]:
         """Return the results as columns of numbers, in the input's format or another one of such columns."""
-        from frametool.stream.column_stream import OtherColumns, run_columns
+        from frametool.rows.sources.column_files import OtherColumns, run_columns
 
         output = self.output
         on_terminal = output.path is None and sys.stdout.isatty()
@@ -386,7 +386,7 @@ class Task:
 
         fields: further fields of Request and RowOptions
         """
-        from frametool.stream.request import Request, ResultOptions, RowOptions
+        from frametool.rows.request import Request, ResultOptions, RowOptions
 
         inputs, style = self.inputs, self.output.style
         if self.window:
@@ -438,7 +438,7 @@ class Task:
         self.only_arguments([argument])
         values = values_of([argument], request, self.output)
         if timed is not None:
-            from frametool.stream.record_values import at_time
+            from frametool.rows.plain import at_time
 
             values = (at_time(each, timed) for each in values)
         self.output.values(values)
@@ -453,7 +453,7 @@ class Task:
             argument, is_inverse = without_inverse(argument)
             if is_inverse:
                 return self.read_written(argument, warned=warned).turned()
-        from frametool.stream.written import written_poses
+        from frametool.rows.derivations import written_poses
 
         request = self.request()
         with inline_misuse(), heard_by(lambda *_: None) if warned else nullcontext():

@@ -31,10 +31,10 @@ from frametool.geometry.representations import notation, notations
 from frametool.geometry.transform import Rotation, Transform
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Style
+from frametool.rows.derivations import ByTree, derive_record, written_poses
+from frametool.rows.request import RowOptions
 from frametool.sim.simulate import IssuedCommand, frame_of, simulate
 from frametool.sim.turtle import ARRIVED
-from frametool.stream.request import RowOptions
-from frametool.stream.written import ByTree, derive_record, written_poses
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -10,7 +10,7 @@ from frametool.formats.rows import csv
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
-from frametool.stream.record_results import BlockResults, CsvTable
+from frametool.rows.sinks.results import BlockResults, CsvTable
 
 if TYPE_CHECKING:
     from conftest import Sizes

@@ -9,7 +9,7 @@ from count_words import WORDS, rooms
 
 UNREVISED = {
     "cli": dict(zip(WORDS, (0, 2, 14, 5, 0, 4, 3, 0), strict=True)),
-    "stream": dict(zip(WORDS, (0, 7, 42, 2, 1, 20, 8, 1), strict=True)),
+    "rows": dict(zip(WORDS, (0, 7, 42, 2, 1, 20, 8, 1), strict=True)),
     "view": dict(zip(WORDS, (0, 2, 0, 1, 0, 3, 0, 1), strict=True)),
 }
 MOST = dict(zip(WORDS, (0, 9, 2, 21, 0, 6, 17, 22), strict=True))

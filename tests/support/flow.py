@@ -20,13 +20,13 @@ from frametool.frames.stamps import read_stamp
 from frametool.geometry.representations import notation
 from frametool.grammar.readers import Reading
 from frametool.grammar.result import Style
-from frametool.stream.faults import MOST, BadRows, run
-from frametool.stream.record import find_records
-from frametool.stream.record_stream import run_records
-from frametool.stream.record_values import Entry, answer, read_poses, results
-from frametool.stream.request import Operation, Request, ResultOptions, RowOptions
-from frametool.stream.rows import read_stamps
-from frametool.stream.table import run_table
+from frametool.rows.batch import read_stamps
+from frametool.rows.faults import MOST, BadRows, run
+from frametool.rows.plain import Entry, answer, read_poses, results
+from frametool.rows.record import find_records
+from frametool.rows.request import Operation, Request, ResultOptions, RowOptions
+from frametool.rows.sources.records import run_records
+from frametool.rows.sources.tables import run_table
 from frametool.text.spans import MARGIN, Spans, framed
 
 if TYPE_CHECKING:

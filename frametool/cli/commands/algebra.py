@@ -15,9 +15,9 @@ from frametool.cli.streaming import EXPLAIN, Task, one_argument, pose_stream_opt
 from frametool.errors import warn
 from frametool.grammar.pose import LEFT_OUT, Pose
 from frametool.grammar.result import Result
-from frametool.stream.faults import MOST
-from frametool.stream.request import NO_STAMPS, PREVIOUS, START, VELOCITIES, Operation, Request, RowOptions
-from frametool.stream.row_layout import VECTOR
+from frametool.rows.faults import MOST
+from frametool.rows.request import NO_STAMPS, PREVIOUS, START, VELOCITIES, Operation, Request, RowOptions
+from frametool.rows.shapes import VECTOR
 from frametool.text.numbers import parse_fractions, parse_number
 
 
@@ -198,7 +198,7 @@ def mean_command(inputs: Inputs) -> int:
     numbers are those of the plain mean. Weights are in proportion to 1 / variance.
     """
     task, weights, by, robust = Task(inputs, "poses"), inputs.weights, inputs.by, inputs.robust
-    from frametool.stream.gathering import MeanRows, means_of
+    from frametool.rows.samples import MeanRows, means_of
 
     arguments, status, numbers = inputs.poses, 0, None
     rows = MeanRows(weights, by)
@@ -250,7 +250,7 @@ def between_command(inputs: Inputs) -> None:
     valid; one is chosen and reported.
     """
     from frametool.grammar.pose_algebra import turn_between
-    from frametool.stream.record_values import read_text
+    from frametool.rows.plain import read_text
 
     output, request = Output(inputs, "poses"), Request(Operation(moves=True), RowOptions(kind=VECTOR))
     texts, found = inputs.vectors, list[Any]()

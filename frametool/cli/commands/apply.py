@@ -24,8 +24,8 @@ from frametool.geometry.rigid import EXACT, UNCERTAIN
 from frametool.geometry.uncertainty import warn_if_wide
 from frametool.grammar.edges import Diagnostics
 from frametool.grammar.readers import EARTH_FRAMES
-from frametool.stream.faults import Fault, run
-from frametool.stream.request import COMBINED, Operation, Request, RowOptions, Timed
+from frametool.rows.faults import Fault, run
+from frametool.rows.request import COMBINED, Operation, Request, RowOptions, Timed
 from frametool.text.numbers import NotFinite, parse_length
 
 if TYPE_CHECKING:
@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from frametool.geometry import Components
     from frametool.grammar.result import Style
     from frametool.recordings.contents import PointCloud
-    from frametool.stream.request import Formula
-    from frametool.stream.written import ByTree
+    from frametool.rows.derivations import ByTree
+    from frametool.rows.request import Formula
 
 
 PLACEHOLDERS: dict[str, Callable[[PointCloud], str]] = {
@@ -52,7 +52,7 @@ _WRITTEN = f"formats: {', '.join(writers('arrays'))}"
 
 def _write_cloud(cloud: PointCloud, pose: Components, output: Output, path: str, names: dict[str, int]) -> None:
     """Write a moved cloud of a bag to its file; names: the files written before, each with its message's number."""
-    from frametool.stream.column_stream import moved_cloud
+    from frametool.rows.sources.column_files import moved_cloud
 
     texts = {place: re.sub(r"[/\0]|^\.+", "_", text(cloud)) for place, text in PLACEHOLDERS.items()}  # no path
     name = re.sub(r"\{(\w+)\}", lambda found: texts.get(found[1], found[0]), str(output.path))
@@ -123,7 +123,7 @@ def several_clouds(task: streaming.Task) -> Callable[[Mover], int]:
     --frames and the --in of clouds are then not available to the tree.
     """
     from frametool.formats.detect import detect
-    from frametool.stream.column_stream import OtherColumns
+    from frametool.rows.sources.column_files import OtherColumns
 
     inputs, output, paths = task.inputs, task.output, task.inputs.input_path
     others = [path for path in paths if path == "-" or streaming.is_bag(path)]
@@ -237,7 +237,7 @@ def apply_command(inputs: Inputs) -> int:
 
 def _derived(task: streaming.Task, plan: Style, mover: Mover, record: str | Source, kind: str) -> int:
     """Write the derivation of one record."""
-    from frametool.stream.written import ByTree, derive_record
+    from frametool.rows.derivations import ByTree, derive_record
 
     request, timeless = task.request(operation=Operation(moves=True)), task.inputs.at is not None
     if isinstance(mover, TreeMover):

@@ -27,7 +27,7 @@ from frametool.cli.commands import TROUBLE, call_command, group
 from frametool.cli.sink import LOCATIONS, SYSTEM_ERRORS, say_error, system_message, wants_json
 from frametool.documents.source import ReadCache, opened
 from frametool.errors import FileProblem, FrametoolError, Misused, ValueInvalid, alternatives
-from frametool.stream.faults import ROWS_SKIPPED, SKIP, STOP, RowsSkipped
+from frametool.rows.faults import ROWS_SKIPPED, SKIP, STOP, RowsSkipped
 from frametool.text.shell_words import NAME, goes_on, has_words, pipeline, split
 
 if TYPE_CHECKING:

@@ -28,13 +28,13 @@ from frametool.formats.table import FORMATS, is_trajectory
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
 from frametool.grammar.result import write_poses as write_documents
-from frametool.stream.faults import STOP, Fault
+from frametool.rows.faults import STOP, Fault
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from frametool.cli.output import Output
-    from frametool.stream.request import Request
+    from frametool.rows.request import Request
 
 
 LIKE_A_FILE = r"(?!row\.)[^\s(){}\[\]*<>\"']*\.[A-Za-z]\w*"
@@ -156,7 +156,7 @@ def _for_programs(term: Term, style: Style) -> str:
     """Return one value as a document or line of a machine-readable format."""
     fmt, result, kind = style.format, plain_result(term, style), term.type.kind
     if kind == POSE and is_trajectory(fmt):
-        from frametool.stream.as_poses import poses_text
+        from frametool.rows.conversion import poses_text
 
         return poses_text([result], style)
     held = {"arrays": "columns of numbers", "recording": "messages"}
@@ -354,7 +354,7 @@ def _over_rows(lines: Sequence[Line], behind: int, scope: Scope, task: Task) -> 
     behind: the number of lines before those of -e
     """
     from frametool.calc.rows import RowExpressions
-    from frametool.stream.request import Operation, Timed
+    from frametool.rows.request import Operation, Timed
 
     inputs = task.inputs
     results = [line for at, line in enumerate(lines) if at >= behind or not line.name] or [lines[-1]]

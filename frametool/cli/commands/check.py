@@ -78,7 +78,7 @@ def check_command(inputs: Inputs) -> int:
         count = len(files) + len(measured)
         rows: list[Measurement] = []
         if measured:
-            from frametool.stream.measurements import read_measurements
+            from frametool.rows.measurements import read_measurements
 
             recordings = opened(inputs, measured, behind=len(files), of=count)
             rows = read_measurements(recordings, normalize=normalize)

@@ -21,7 +21,7 @@ from frametool.grammar.edges import stop
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import result_at
 from frametool.grammar.result import Result
-from frametool.stream.faults import ROWS_SKIPPED, STOP, BadRows
+from frametool.rows.faults import ROWS_SKIPPED, STOP, BadRows
 from frametool.text.numbers import parse_lengths, parse_share
 
 if TYPE_CHECKING:
@@ -241,7 +241,7 @@ def resample_command(inputs: Inputs) -> int:
     (fmt,) = options.for_each(inputs.input_formats, 1)
     found, name, skipped = trajectory(inputs, path, fmt, inputs.on_error)
     from frametool.fit.pairing import between, stamps_at_rate, stamps_every
-    from frametool.stream.trajectories import in_order
+    from frametool.rows.trajectories import in_order
 
     found = in_order(found, name)
     counted = found.stamps_ns is None
@@ -278,7 +278,7 @@ def resample_command(inputs: Inputs) -> int:
 
 def trajectory(inputs: Inputs, argument: str, fmt: str = "", on_error: str = STOP) -> tuple[Trajectory, str, bool]:
     """Read a trajectory of the command line; return it, its name in messages, and True if rows were skipped."""
-    from frametool.stream.trajectories import read_trajectory, split_name
+    from frametool.rows.trajectories import read_trajectory, split_name
 
     made: list[BadRows] = []
 
@@ -333,10 +333,10 @@ def _mount(inputs: Inputs, text: str) -> Any:
         return text
     if poses.is_pasted(text):
         from frametool.geometry.transform import Transform
-        from frametool.stream.request import Request
+        from frametool.rows.request import Request
 
         return Transform.of(*poses.one_pose(text, Request()).components)
-    from frametool.stream.trajectories import split_name
+    from frametool.rows.trajectories import split_name
 
     file, names = split_name(text)
     refuse(len(names) != 2, f"--mount {shown(text)}: a pose, auto, or FILE:BODY:POINT")

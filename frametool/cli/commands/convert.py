@@ -17,7 +17,7 @@ from frametool.geometry import floats
 from frametool.geometry.representations import REPRESENTATIONS, Notation, notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style, is_locked
-from frametool.stream.request import Operation
+from frametool.rows.request import Operation
 from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:

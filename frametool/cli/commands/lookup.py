@@ -21,7 +21,7 @@ from frametool.grammar import pose_algebra as algebra
 from frametool.grammar.edges import stop
 from frametool.grammar.pose import LEFT_OUT
 from frametool.grammar.readers import EARTH_FRAMES
-from frametool.stream.faults import NULL, SKIP, RowsSkipped
+from frametool.rows.faults import NULL, SKIP, RowsSkipped
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -161,7 +161,7 @@ def _many(task: Task, lookups: algebra.Lookups, target: str, source: str) -> int
 
 def _by_row(task: Task, lookups: algebra.Lookups, target: str | None, source: str | None) -> int:
     """Add the pose of SOURCE in TARGET to every row; a frame on the command line applies to all rows."""
-    from frametool.stream.request import Operation, Timed
+    from frametool.rows.request import Operation, Timed
 
     inputs, tree, place = task.inputs, lookups.tree, task.output.style.place
     columns = inputs.target_column, inputs.source_column
@@ -283,8 +283,8 @@ def fk_command(inputs: Inputs) -> int:
         words = " ".join((inputs.tree, inputs.base, inputs.tip, *(f"-j {each}" for each in joints)))
         raise click.UsageError(f"no rows of joint values: give -i FILE; for one posture, frametool lookup {words}")
     from frametool.formats.robots.urdf import robot_of
-    from frametool.stream.formulas import JointRows, names_in
-    from frametool.stream.request import Operation
+    from frametool.rows.formulas import JointRows, names_in
+    from frametool.rows.request import Operation
 
     (file,) = opened(inputs, (inputs.tree,), streams=True)
     robot, posture = robot_of(file)

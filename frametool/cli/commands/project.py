@@ -19,7 +19,7 @@ from frametool.cli.trees import FRAME, frame_name
 from frametool.documents.source import InputFile, Source
 from frametool.errors import FormatError, ValueInvalid, listing, shown
 from frametool.geometry.rigid import EXACT
-from frametool.stream.request import Formula, Operation, Request
+from frametool.rows.request import Formula, Operation, Request
 from frametool.text.numbers import parse_length, parse_number
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from frametool.geometry import Components
     from frametool.geometry.camera import Camera
-    from frametool.stream.formulas import Seen
+    from frametool.rows.formulas import Seen
 
 AXES = ("optical", "opengl", "flu")
 
@@ -83,7 +83,7 @@ def project_command(inputs: Inputs) -> int:
     SOURCE each row names its frame; without TREE points are in the camera's frame. With --image FILE -o FILE.svg they
     are drawn over the image. `frametool help cameras` says more.
     """
-    from frametool.stream.formulas import PixelsOfPoints
+    from frametool.rows.formulas import PixelsOfPoints
 
     overlay, image, path = None, inputs.image, inputs.output
     own = inputs if image is None else inputs.changed(output=os.devnull)  # the rows of an overlay are not written
@@ -198,7 +198,7 @@ def unproject_command(inputs: Inputs) -> int:
     Rows with columns u, v, or a key pixel, get origin_x .. ray_z in TARGET; with a depth or range, in a column or an
     option, x, y, z. They are empty outside the model and above the horizon (help cameras).
     """
-    from frametool.stream.formulas import PointsOfPixels
+    from frametool.rows.formulas import PointsOfPixels
 
     task = CameraTask(inputs, Output(inputs, "points", otherwise="yaml"), "TREE TARGET CAMERA")
     raw, rectified = task.camera, task.rectified()
@@ -259,7 +259,7 @@ def _columns(task: CameraTask, records: Sequence[Source]) -> Sequence[str]:
 
     They are those of the first record, or else of the stream.
     """
-    from frametool.stream.formulas import names_in
+    from frametool.rows.formulas import names_in
 
     inputs = task.inputs
     if records:

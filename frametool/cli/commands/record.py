@@ -16,7 +16,7 @@ from frametool.formats.load import FrameFile
 from frametool.formats.table import FOLDERS, FORMATS, holds, writers
 from frametool.frames.stamps import parse_time
 from frametool.grammar.edges import Diagnostics
-from frametool.stream.faults import ON_ERROR, STOP, BadRows
+from frametool.rows.faults import ON_ERROR, STOP, BadRows
 from frametool.view.text import progress_bar
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def record_command(inputs: Inputs) -> int:
     An MCAP file or ROS 2 bag becomes MCAP (-o NEW.mcap) or a folder (-f bag2 -o FOLDER), a ROS 1 bag one (-o NEW.bag).
     """
     from frametool.recordings.read import opened_recording
-    from frametool.stream.record_run import RecordRun
+    from frametool.rows.recording_copy import RecordRun
 
     more, into, normalize = inputs.more, inputs.into, inputs.peek("normalize")
     are_transforms = all(topic.rpartition("/")[2] in TRANSFORMS for topic in inputs.peek("moved_topics"))

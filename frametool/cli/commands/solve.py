@@ -18,7 +18,7 @@ from frametool.errors import ValueInvalid, alternatives, first_of, shown, warn
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, uncertain
-from frametool.stream.faults import BadRows
+from frametool.rows.faults import BadRows
 from frametool.view.reports import Solution, sigma_entry, write_left_out, write_solution
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
     """Estimate the tree of the measurements in files, with the edges of --fix."""
     from frametool.fit.blunders import split_place
     from frametool.fit.measured_tree import solve_tree
-    from frametool.stream.measurements import read_measurements, without
+    from frametool.rows.measurements import read_measurements, without
 
     recordings = opened(inputs, files)
     rows = read_measurements(recordings, normalize=inputs.normalize)
@@ -121,7 +121,7 @@ def _solution(
 def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
     """Estimate the pose of a camera on a gripper, or next to a robot: two files of poses, or one of samples."""
     from frametool.fit.hand_eye import solve_hand_eye
-    from frametool.stream.samples import paired_samples, read_samples
+    from frametool.rows.pairs import paired_samples, read_samples
 
     eye_to_hand = inputs.eye_to_hand
     if len(files) == 1:
@@ -157,7 +157,7 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
 def solved_points(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
     """Estimate the transform between two files of matched points."""
     from frametool.fit.matched_points import solve_points
-    from frametool.stream.samples import matched, read_points
+    from frametool.rows.pairs import matched, read_points
 
     policy = partial(BadRows, tell=say_error)
     named = zip(files, options.for_each(inputs.input_formats, 2), strict=True)

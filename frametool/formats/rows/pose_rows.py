@@ -1,7 +1,7 @@
 """How formats write poses, one after another, and how COLMAP, g2o and NeRF list them.
 
 `("seconds", b" ", Numbers(7), b"\\n")` is a row of a TUM trajectory, 1305031102.175800000 1.0 2.0 3.0 0.0 0.0 0.0 1.0.
-`frametool.stream.writers` fills in the table, for one pose or a million.
+`frametool.rows.sinks.as_rows` fills in the table, for one pose or a million.
 
 COLMAP's images.txt has two lines per image, the second its points (which may be empty, but must be there):
 

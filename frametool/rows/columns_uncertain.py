@@ -1,0 +1,280 @@
+"""What records and rows say besides a pose or point: a covariance, sigmas, a scale; read where it counts, and moved.
+
+Loaded where one of them is there.
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import chain
+from typing import TYPE_CHECKING, Any
+
+from frametool.errors import ValueInvalid, listing, warn
+from frametool.geometry import rigid, uncertainty
+from frametool.geometry.quaternion import TOLERATED
+from frametool.geometry.rigid import EXACT, NOT_BOTH, SCALED, inverse_full, pose_of, scale_of
+from frametool.geometry.uncertainty import UNKNOWN
+from frametool.grammar import covariance
+from frametool.grammar.pose import LEFT_OUT, SCALE, read_angle_unit
+from frametool.grammar.readers import RATES, Misfit, NotARotation, Path, Reading, read_number, within
+from frametool.ros.messages import whole_list
+from frametool.rows.shapes import IDENTITY, MOVERS, NORMAL, PARTS, POINT, POSE, RATE, TWIST, VECTOR, WRENCH, Shape
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Sequence
+
+    from frametool.geometry import Components, Namespace
+    from frametool.rows.record import Record
+    from frametool.rows.request import Operation, Request
+    from frametool.rows.sources.tables import Table
+
+
+PLACED = (POSE, POINT, VECTOR)
+
+
+def with_covariances(
+    record: Record, holder: Any, around: Path, keys: Sequence[str], request: Request, reading: Reading
+) -> Record:
+    """Add the numbers of the covariances of a record, or the one that its sigmas say.
+
+    holder: the mapping that says them, at the path `around`, under some of the keys
+    Where records move, one that begins with -1 is unknown and stays.
+    """
+    operation, shape, path = request.operation, record.shape, record.path
+    there = [key for key in keys if key in holder]
+    is_own = shape.kind in PLACED and around == path
+    flat = [*holder] if is_own and covariance.SIGMA not in holder and not there else []
+    flat = [flat[at] for at in covariance.find_columns(flat, 36 if shape.kind == POSE else uncertainty.POINT)[0]]
+    has_sigma = is_own and (covariance.SIGMA in holder or bool(flat))
+    said = (*there, *(flat or [covariance.SIGMA] * has_sigma))
+    is_left_out = operation.formula is not None and around == path and not operation.only_adds
+    if is_left_out:
+        reading.here = path
+        reading.note(LEFT_OUT.format("calc"), rule="left-out")
+    if is_left_out:
+        return record._replace(keys=record.keys._replace(others=(*record.keys.others, *said)))
+    if operation.keeps_frames and not (shape.inverse or (has_sigma and request.results.canonical)):
+        for key in there * is_own:
+            within((*around, key), _entries, holder[key], (36, 9))
+        return record
+    if operation.formula is not None or (not operation.moves and there not in ([], [covariance.COVARIANCE])):
+        what = "the covariance would be wrong afterwards; leave it out, or move the message with apply"
+        raise Misfit(what, (*around, [*there, covariance.SIGMA][0]))
+    if has_sigma:
+        return _with_sigmas(record, holder, path, reading, flat)
+    sizes = (36,) if shape.kind in PARTS else (36, 9)[: 1 + operation.moves] if shape.kind == POSE else (9,)
+    for key in there:
+        below = (*around, key)
+        found = within(below, _entries, holder[key], sizes)
+        paths, numbers = tuple((*below, *at) for at, _ in found), [number for _, number in found]
+        if numbers[0] == UNKNOWN and operation.moves:
+            record = record._replace(begins=(*record.begins, paths[0]))
+            continue
+        within(below, covariance.check, numbers)
+        record = _with_numbers(record._replace(begins=(*record.begins, paths[0])), key, paths, numbers)
+    return record
+
+
+def _with_numbers(record: Record, key: str, paths: Sequence[Path | None], numbers: Sequence[float]) -> Record:
+    """Add numbers that come last: a covariance, or a scale."""
+    return record._replace(
+        shape=record.shape._replace(covariance=(*record.shape.covariance, len(numbers))),
+        numbers=(*record.numbers, *paths), values=(*record.values, *numbers),
+        keys=record.keys._replace(covariances=(*record.keys.covariances, key)),
+    )  # fmt: skip
+
+
+def _entries(value: Any, sizes: Sequence[int]) -> list[tuple[Path, float]]:
+    """Read a covariance, as `entries_of`; one that was cut short when it was printed says so."""
+    return covariance.entries_of(whole_list(value, " or ".join(f"{size} numbers" for size in sizes)), sizes)
+
+
+def is_unknown(value: Any, sizes: Sequence[int]) -> bool:
+    """Return True if a covariance begins with -1: nothing is known of it, nor of what it would be of."""
+    return _entries(value, sizes)[0][1] == UNKNOWN
+
+
+def _with_unit(sigma: Sequence[tuple[int, str]], *, degrees: bool) -> tuple[tuple[int, str], ...]:
+    """Return the sources of six sigmas with the unit of bare angles."""
+    return tuple((at, unit or "deg" * (degrees and axis > 2)) for axis, (at, unit) in enumerate(sigma))
+
+
+def _of_sources(numbers: Sequence[Any], sigma: Sequence[tuple[int, str]], size: int) -> Components:
+    """Return the covariance of sigmas, each from one of some numbers in its unit, or 0."""
+    zero = numbers[0] - numbers[0]
+    entries = covariance.of_sigmas([zero if at < 0 else covariance.in_unit(numbers[at], unit) for at, unit in sigma])
+    return entries if size == len(entries) else covariance.of_position(entries)
+
+
+def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Reading, flat: Sequence[str]) -> Record:
+    """Add the covariance that sigmas say; none of its entries is in the text, and the result names them anew."""
+    size = 36 if record.shape.kind == POSE else uncertainty.POINT
+    degrees = read_angle_unit(own["angles"]) if "angles" in own else reading.degrees
+    if not flat:
+        entries = within(path, covariance.read_covariance, own, reading=Reading(reading.source, degrees=degrees))
+    elif covariance.find_columns(flat, size)[1]:  # keys as columns: sigma_x ..
+        said = [(key, (key,), own[key]) for key in flat]
+        entries = covariance.of_sigmas(within(path, covariance.read_sigmas, said, size, degrees=degrees))
+    else:  # c11 .. c66
+        entries = tuple(within((*path, key), read_number, own[key]) for key in flat)
+        within((*path, flat[0]), covariance.check, entries)
+    if size < len(entries) and any(entries[18:]):
+        raise Misfit("a point does not turn; its sigma has xyz alone", (*path, covariance.SIGMA))
+    entries = entries if size == len(entries) else covariance.of_position(entries)
+    keys = record.keys._replace(others=(*record.keys.others, *(flat or (covariance.SIGMA,))))
+    record = record._replace(shape=record.shape._replace(sigma=()), keys=keys)
+    return _with_numbers(record, covariance.SIGMA, [None] * size, entries)
+
+
+def with_scale(record: Record, value: Any, around: Path, request: Request) -> Record:
+    """Add the scale of a pose, where the operation takes one; else it can only be 1."""
+    if not request.operation.similar or around != record.path or type(value) in (dict, list):
+        within(around, covariance.refuse_scale, value)
+        return record
+    scale = within(around, covariance.read_scale, value)
+    if record.shape.covariance and request.operation.of != "arguments":
+        raise NotARotation(NOT_BOTH, (*around, SCALE), key=True)
+    return _with_numbers(record, SCALE, [(*around, SCALE)], [scale])
+
+
+OTHER_ENTRIES = r"(?:(?!.*twist).*[._/])?covariance[._\[]?\d*\]?"  # as other tools name them
+
+
+def covariance_columns(
+    table: Table, request: Request, shapes: tuple[Shape, ...]
+) -> tuple[tuple[int, ...], tuple[Shape, ...]]:
+    """Find the columns of a covariance or of sigmas where they count; return their places and the shapes with them."""
+    kinds = [shape.kind for shape in shapes]
+    passes = request.operation.keeps_frames
+    own, place = shapes[0].place if shapes else None, request.results.place
+    if passes and own and place and own.axes != place.axes:  # its columns would stay along axes that the result has not
+        for found, _ in (covariance.find_columns(table.names or (), size) for size in (9, 36)):
+            message = f"the covariance is along {own.axes or 'the axes there'}, the result along {place.axes}"
+            remedy = "" if own.axes else f", or say --local-axes {place.axes}"
+            if found:
+                raise ValueInvalid(f"{message}; leave its columns out{remedy}")
+    if passes or not kinds or not {*PLACED}.issuperset(kinds):
+        return (), shapes
+    places, sigma = covariance.find_columns(table.names or (), 36 if POSE in kinds else 9)
+    shape = shapes[0]
+    if own is not None:
+        from frametool.rows.columns_earth import along
+
+        places, shape = along(own, shape, table.names or (), places)
+    stay = [name for name in table.names or () if re.fullmatch(OTHER_ENTRIES, name)]
+    if stay and not places and request.operation.formula is None:
+        warn(f"{table.source}: not moved: {listing(stay, 3)}; the columns of a covariance are c11, c12 ..")
+    if places and request.operation.formula is not None:
+        warn(f"{table.source}: {LEFT_OUT.format('calc')}", rule="left-out")
+    if not places or request.operation.formula is not None:
+        return (), shapes
+    if len(shapes) != 1:
+        raise ValueInvalid("a covariance beside several poses in a row: whose it is nobody can tell")
+    sigma = _with_unit(sigma, degrees=request.rows.degrees)
+    return places, (shape._replace(covariance=(len(places),), sigma=sigma),)
+
+
+def find_rates(
+    names: Sequence[str], taken: Collection[int], operation: Operation, source: str
+) -> list[tuple[tuple[int, ...], str]]:
+    """Find the velocities and rates in a table's columns, three by three, which turn with the axes of poses.
+
+    Warns of those that are taken to be along the axes of the world, and of those that stay.
+    """
+    rates: dict[tuple[str, ...], list[int]] = {}
+    for name, place in sorted(zip(names, range(len(names)), strict=True)):
+        if (match := re.fullmatch(RATES, name)) and place not in taken:
+            rates.setdefault(match.groups(""), []).append(place)
+    turns = operation.turns and not operation.mirrors
+    turned = [tuple(each) for each in rates.values() if len(each) == 3 and turns]
+    if stay := [names[at] for each in rates.values() if tuple(each) not in turned for at in each]:
+        three = next((",".join(names[at] for at in each) for each in rates.values() if len(each) == 3), "")
+        remedy = f"; --columns {three} --as vector turns velocities" * bool(three)
+        apart = f"stay as they are: points and poses move{remedy}"
+        why = "keep to the old axes: poses and covariances turn alone" if operation.turns else apart
+        warn(f"{source}: {listing(stay, 9)} {why}")
+    kinds = [NORMAL if names[each[0]][0] in "vV" else RATE for each in turned]
+    at_world = [names[at] for each, kind in zip(turned, kinds, strict=True) if kind == NORMAL for at in each]
+    if at_world and operation.right:
+        warn(f"{source}: {listing(at_world, 9)} are along the axes of the world; call those of the body body_vx ..")
+    return [*zip(turned, kinds, strict=True)]
+
+
+MIRRORED = "the covariance cannot be carried through axes that mirror; leave it out"
+SCALED_ALONE = (POINT, VECTOR, NORMAL, POSE)  # what a similarity moves
+
+
+def with_own(
+    shape: Shape, pose: Components, extra: Components, mover: Components | None, *, mirrors: bool
+) -> tuple[Components, Components]:
+    """Return a row's pose with its own covariance or scale, and what else comes with it."""
+    size = shape.covariance[0]
+    entries, rest = extra[:size], extra[size:]
+    if mirrors and size > 1:
+        raise ValueInvalid(MIRRORED)
+    if size == uncertainty.POINT:  # of the position, or of the turn, alone: they turn as that of a vector
+        if mover is not None and len(mover) > EXACT:
+            raise ValueInvalid(f"covariance has {size} numbers; 36 are needed (6x6) where others count too")
+        count = sum(shape.covariance)
+        parts = [extra[at : at + size] for at in range(0, count, size)]
+        turned = [part if mover is None else uncertainty.rotate_covariance(part, *mover[3:]) for part in parts]
+        return pose, (*chain.from_iterable(turned), *extra[count:])
+    if shape.inverse:
+        back = inverse_full((*rigid.inverse(*pose), *entries))
+        return (back if size == 1 else (*pose, *back[EXACT:])), rest
+    return (*pose, *entries), rest
+
+
+def of_multiple(
+    shape: Shape, own: Components, rotation: Callable[[Components], Components], xp: Namespace
+) -> Components:
+    """Return the pose of a matrix that may be s R, and s: the root mean square of what each row is long.
+
+    An s that is 1 to what a rotation may be off is 1; whether the rest is a rotation, `rotation` tells.
+    """
+    size = xp.sqrt(sum(entry * entry for entry in shape.rotation(own)) / 3.0)
+    s = xp.where(abs(size - 1.0) <= TOLERATED, size - size + 1.0, size)
+    bare = tuple(number / s if at in shape.rotation_at else number for at, number in enumerate(own))
+    pose = pose_of((*shape.position(own), *rotation(bare)))
+    return inverse_full((*pose, s)) if shape.inverse else (*pose, s)
+
+
+def in_full(shape: Shape, own: Components, extra: Components) -> tuple[Shape, Components]:
+    """Return what comes with a row with its covariance in full, that of sigmas too, and at a place along ECEF."""
+    size, place = shape.covariance[0], shape.place
+    entries = extra[:size]
+    if shape.sigma:
+        entries = _of_sources(entries, shape.sigma, 36 if shape.kind == POSE else uncertainty.POINT)
+    if place is not None:
+        turn = place._replace(level=False).turned(own[: place.size], IDENTITY)
+        entries = uncertainty.rotate_covariance(entries, *turn)
+    full = shape._replace(covariance=(len(entries), *shape.covariance[1:]), sigma=())
+    return full, (*entries, *extra[size:])
+
+
+def move(shape: Shape, own: Components, extra: Components, mover: Components, *, mirrors: bool) -> Components:
+    """Move what is no pose by one, with its covariances; one that has a covariance gives what moves its own."""
+    pose, kind = pose_of(mover), shape.kind
+    if mirrors and shape.covariance:
+        raise ValueInvalid(MIRRORED)
+    if len(mover) == SCALED:
+        if kind not in SCALED_ALONE or shape.covariance:
+            what = "a covariance" if shape.covariance else f"a {kind}"
+            raise ValueInvalid(f"{what} cannot be carried through a scale; points, vectors and poses can")
+        s = scale_of(mover)
+        x, y, z = own
+        return (*MOVERS[kind](*pose, s * x, s * y, s * z), *extra)
+    moved = MOVERS[kind](*pose, *own)
+    if len(mover) > EXACT and kind != NORMAL:
+        if kind not in (POINT, VECTOR):
+            raise ValueInvalid(f"the covariance cannot be carried through to a {kind}; leave --covariance out")
+        size = sum(shape.covariance[:1])
+        found = uncertainty.of_three(pose, mover[EXACT:], own, extra[:size] or None, is_vector=kind == VECTOR)
+        return (*moved, *(found or ()), *extra[size:])
+    for size in shape.covariance:
+        if kind in (TWIST, WRENCH):
+            turned = uncertainty.of_moved(MOVERS[kind], pose, extra[:size])
+        else:
+            turned = uncertainty.rotate_covariance(extra[:size], *pose[3:])
+        moved, extra = (*moved, *turned), extra[size:]
+    return (*moved, *extra)

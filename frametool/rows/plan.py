@@ -1,0 +1,418 @@
+"""Plan the rows of a table from its columns and the request: which columns are read, and where results are written."""
+
+from __future__ import annotations
+
+import re
+from contextlib import suppress
+from itertools import pairwise
+from typing import TYPE_CHECKING, TypeAlias
+
+from frametool.errors import FormatError, Misused, NamedTuple, ValueInvalid, alternatives, shown
+from frametool.grammar import readers
+from frametool.grammar.readers import AXES_KEY, may_be_uncertain, nanoseconds_beside, stamp_places, without_mark
+from frametool.rows import columns as header
+from frametool.rows.columns import XYZ, PoseColumns, listed, row_shape
+from frametool.rows.evaluate import Plan
+from frametool.rows.request import NO_STAMPS, PAIR, PLAIN, Request
+from frametool.rows.shapes import NORMAL, POINT, POSE, SIX, Shape, place_of, six_names
+from frametool.rows.sinks import Const, In, Out, Word, one_of
+from frametool.text.numbers import number_or_none
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from frametool.rows.sinks import Piece
+    from frametool.rows.sources.tables import Table
+
+class Kept(NamedTuple):
+    """A column of the input."""
+
+    place: int
+
+
+class New(NamedTuple):
+    """A column of the result: its name, and a number, the word that it encodes, or the same text in every row."""
+
+    name: str
+    piece: Out | Word | Const
+
+
+class Named(NamedTuple):
+    """A frame's name in place of a column: the result's parent (role 0) or what it is the pose of (1)."""
+
+    place: int
+    role: int
+
+
+Column: TypeAlias = Kept | New | Named
+
+
+class Layout(NamedTuple):
+    """The columns of the output, and of the input what is read.
+
+    places: the columns our numbers are read from
+    times: that of the stamps, and of the nanoseconds of stamps whose seconds are whole
+    frames: those that name the frame a row is expressed in, for look-ups the two frames
+    named: those of the parent and of the name of a row's pose
+    """
+
+    columns: tuple[Column, ...]
+    places: tuple[int, ...]
+    frames: tuple[int, ...]
+    times: tuple[int, ...] = ()
+    named: tuple[int | None, int | None] = (None, None)
+
+
+def plan_table(table: Table, request: Request) -> tuple[Plan, Layout]:
+    """Choose the columns that are read and written; raises ValueInvalid that names the columns there are.
+
+    Where all numbers are wanted no text is put together.
+    """
+    formula, poses, names = request.operation.formula, list[PoseColumns](), table.names or ()
+    is_needed = formula is None or formula.reads_row or bool(request.rows.columns)
+    with suppress(*() if is_needed else (FormatError, ValueInvalid)):
+        poses = _find(table, request)
+    on_earth = bool(poses) and poses[0].position is not None and place_of(poses[0].position.unit) is not None
+    is_point = request.operation.turns and poses and poses[0].rotation is None
+    passes = not (request.operation.moves or request.results.all_numbers or is_point)
+    if request.rows.poses == 1 and not on_earth and passes and request.keeps_position:
+        poses = [_without_position(poses[0], request, table)]
+    shapes, places = tuple[Shape, ...](), tuple[int, ...]()
+    for pose, kind in zip(poses, request.rows.kinds or (request.rows.kind,) * len(poses), strict=True):
+        for columns in filter(None, pose):
+            if columns.wrong:
+                raise ValueInvalid(columns.wrong)
+        shapes, places = (*shapes, row_shape(pose, request, kind)), places + pose.places
+    if formula is not None:  # the numbers that it asks for come last
+        shapes = ((shapes[0] if shapes else Shape("", None))._replace(extras=formula.columns),)
+    if on_earth or request.results.place is not None:
+        from frametool.rows.columns_earth import readers_of, settle
+
+        request, shapes = settle(request, shapes, table, on_earth=on_earth)
+    extra: tuple[int, ...] = ()
+    if any(map(may_be_uncertain, names)):
+        from frametool.rows.columns_uncertain import covariance_columns
+
+        extra, shapes = covariance_columns(table, request, shapes)
+    request = request.for_kind(shapes[0].kind) if shapes else request
+    places += extra
+    if len({*places}) < len(places):
+        twice = sorted({table.name(place) for place in places if places.count(place) > 1})
+        raise Misused(f"--columns: {', '.join(twice)} appears twice")
+    places += tuple(_place(name, table) for name in request.operation.columns)
+    for pose, kind in _turning_along(table, poses, request):
+        poses, shapes, places = [*poses, pose], (*shapes, Shape(kind)), places + pose.places
+    has_one = not shapes or request.operation.of == PAIR  # what becomes of a row is one thing
+    targets = tuple(map(request.target, shapes[:1] or (Shape(POSE),) if has_one else shapes))
+    frames = _frame_columns(table, request, on_earth=on_earth)
+    parent, name = frames[0] if frames and request.rows.poses else None, None
+    if request.rows.poses and not (request.operation.moves and request.rename is None):
+        name = _first_called(readers.NAME_KEYS, table)
+    moves_each = on_earth or request.rows.frames or (frames and request.operation.moves)
+    asked_at = range(shapes[0].own_size, shapes[0].size) if request.operation.shown else ()  # empty cells are not
+    words, marked, staying = readers_of(shapes[0]) if on_earth else ({}, dict.fromkeys(asked_at, number_or_none), 0)
+    if on_earth and (position := poses[0].position):  # the status of a fix is read and stays as it is
+        position = position._replace(places=position.places[: len(position.places) - staying])
+        poses = [poses[0]._replace(position=position)]
+    written = _columns(table, poses, shapes, targets, request, (parent, name), extra)
+    if table.header:
+        refuse_repeated(written, names)
+    times = _stamp_columns(table, request, places, frames)
+    pieces = () if request.results.all_numbers else pieces_of(written, table.width, table.delimiter)
+    layout = Layout(tuple(written), places, frames, tuple(times), (parent, name))
+    return Plan(
+        shapes, targets, request, tuple(map(table.name, places)), pieces, b"" if table.delimiter else b"nan",
+        request.pose_from_frame if moves_each else None, table.name(frames[0]) if len(frames) == 1 else "",
+        words=words, marked=marked,
+    ), layout  # fmt: skip
+
+
+def _find(table: Table, request: Request) -> list[PoseColumns]:
+    """Find the columns of the poses, by --columns, by name, or by their number where there are no names.
+
+    With a pose a twist is another column.
+    """
+    asked, specs, width = request.rows, request.rows.columns, table.width
+    if not asked.poses:
+        return []
+    other = asked.extra_column if asked.stamps == NO_STAMPS else None
+    apart = None if other is None else _place(other, table)
+    if specs and len(specs) != asked.poses:
+        raise Misused(f"--columns is given {len(specs)} times, for {asked.poses} poses in a row")
+    if specs or not table.names:
+        kinds = (asked.kinds if specs else ()) or (asked.kind,) * max(len(specs), 1)
+        choose: Callable[..., PoseColumns] = header.chosen_pose
+        if asked.given_place:
+            from frametool.rows.columns_earth import chosen_pose as choose
+        specs = specs or ("" if asked.given_place else _by_width(width, request),)
+        chosen = zip(specs, kinds, strict=True)
+        return [choose(spec, table.names, width, request, kind) for spec, kind in chosen]
+    hidden = {at for at, name in enumerate(table.names) if at == apart or name == asked.extra_column}
+    every = header.Header(table.names, hidden)
+    six = header.find_six(every, asked.kind if asked.kind in SIX else "")
+    if asked.kind in SIX and six is None:
+        wanted = " ".join(six_names(asked.kind))
+        found = f"no columns of a {asked.kind} ({wanted}) among: {listed(every.names)}; name them with --columns"
+        raise ValueInvalid(found)
+    others = every.without(six.places if six else ())
+    if six is not None and (asked.kind in SIX or not others.has_pose):
+        return [PoseColumns(six, None)]
+    if not (request.operation.moves or request.operation.changes_nothing):
+        others = every  # what a pose has with it would no longer be true
+    if asked.poses == 1 and (asked.given_place or any(map(readers.may_be_on_earth, every.names))):
+        from frametool.rows.columns_earth import find_pose
+
+        if (pose := find_pose(others, request, table.source)) is not None:
+            return [pose]
+    return header.find_poses(others, asked.given, asked.poses)
+
+
+def _by_width(width: int, request: Request) -> str:
+    """Choose all columns of a table without names: a point, a pose, or what --from says, behind a stamp or not."""
+    asked, said = request.rows, request.rows.given
+    begin = 1 if asked.kind in SIX or width in header.by_count(said) else 2
+    if asked.poses == 1 and (begin == 1 or (said is not None and width - 1 in {*said.counts[1:]})):
+        return f"{begin}-{width}"
+    reason = f"{width} columns without names do not say what they are; give --from REP, or --columns"
+    if asked.poses == 1 and said:
+        reason = f"{said.counted}; found {width} columns without names; or give --columns"
+    raise ValueInvalid(reason)
+
+
+def _turning_along(table: Table, poses: Sequence[PoseColumns], request: Request) -> list[tuple[PoseColumns, str]]:
+    """Find the vectors that turn along with the point or pose of a row, each with its kind."""
+    operation, names, kind = request.operation, table.names or (), request.rows.kind
+    if not poses or request.rows.columns or operation.formula is not None:
+        return []
+    found = list[tuple[tuple[int, ...], str]]()
+    for each in table.normals if kind in ("", POINT) else ():
+        if not {*names} >= {*XYZ, *each}:
+            continue
+        if operation.turns and (operation.left is not None or operation.mirrors):
+            remedy = "--columns x,y,z turns the points alone, apply all of them"
+            raise Misused(f"{' '.join(each)} would keep to the old axes; {remedy}")
+        if operation.moves:
+            found.append((tuple(map(names.index, each)), NORMAL))
+    if operation.turns or (operation.moves and re.search(r"(?i) (?:body[_.])?[vw]x\b", f" {' '.join(names)}")):
+        from frametool.rows.columns_uncertain import find_rates
+
+        found += find_rates(names, poses[0].places, operation, table.source)
+    return [(PoseColumns(header.Columns(at, tuple(names[each] for each in at)), None), kind) for at, kind in found]
+
+
+def _without_position(pose: PoseColumns, request: Request, table: Table) -> PoseColumns:
+    """Leave the position to pass as it is where only the rotation is rewritten."""
+    if pose.rotation is None and request.results.by_default:
+        return pose
+    if pose.rotation is None:
+        wanted = "; give --from REP or --columns" if request.rows.given is None else ""
+        found = f"no columns of a rotation among: {listed(table.called)}{wanted}"
+        raise ValueInvalid(found)
+    leaves_plane = pose.position and not pose.position.wrong and pose.position.absent and request.results.notations
+    is_whole = len(request.results.notations) == 1 and request.results.notations[0].representation.whole is not None
+    stays = not (is_whole or pose.rotation.whole or leaves_plane)
+    return PoseColumns(None, pose.rotation) if stays else pose
+
+
+def _frame_columns(table: Table, request: Request, *, on_earth: bool) -> tuple[int, ...]:
+    """Find the columns that name frames: for look-ups those named, else the one a row is expressed in."""
+    asked = request.rows
+    names = table.names or ()
+    if on_earth:
+        return tuple(place for place, name in enumerate(names) if name == readers.PARENT_KEYS[0])[:1]
+    if not (asked.poses or asked.frames):
+        return ()
+    if asked.frames and asked.frames != ("",):
+        return tuple(_place(name, table) for name in asked.frames)
+    found = _first_called(readers.PARENT_COLUMNS, table)
+    if found is None and asked.frames:
+        unsaid = "rows do not say their frame; name SOURCE, or give --frame-column; columns"
+        raise ValueInvalid(f"{unsaid}: {', '.join(names)}")
+    return () if found is None else (found,)
+
+
+def _first_called(names: Sequence[str], table: Table) -> int | None:
+    """Find the column of one of some names, the first of them that is there; a message's path may be before it."""
+    for name in names:
+        for place, column in enumerate(table.names or ()):
+            if column == name or ("_id" in name and column.endswith(f".{name}")):
+                return place
+    return None
+
+
+def _place(name: str, table: Table) -> int:
+    """Return the place of a column; raises Misused for one that is not there, or twice."""
+    names, source = table.called, table.source
+    if name not in names and names.count(bare := without_mark(name)) == 1:
+        name = bare
+    if name not in names:
+        raise Misused(f"no column {shown(name)}{alternatives(name, names, 'columns')}", source=source, line=1)
+    if names.count(name) > 1:
+        raise Misused(f"column {shown(name)} appears twice", source=source, line=1)
+    return names.index(name)
+
+
+def _stamp_columns(table: Table, request: Request, places: Sequence[int], frames: Sequence[int]) -> list[int]:
+    """Find the column of stamps by its name or number, and that of the nanoseconds of such stamps.
+
+    Where all numbers are wanted it may be one that no option names.
+    """
+    if request.rows.stamps == NO_STAMPS:
+        return []
+    name = request.timed.name if request.timed else request.rows.extra_column
+    if name is not None:
+        time = _place(name, table)
+        try:
+            readers.in_nanoseconds(table.name(time))
+        except ValueInvalid as error:
+            raise Misused(str(error), source=table.source, line=1) from None
+        below = nanoseconds_beside(table.names, time) if table.names else None
+        return [time] if below is None else [time, below]
+    if not (table.stamped and request.results.all_numbers):
+        return []
+    usual, below = stamp_places(table.names)
+    if not (table.names or request.rows.columns) and min(places, default=1) == 1 and not frames:
+        usual = 0  # what is before the numbers that --from speaks of, or all there is
+    return [] if usual in frames else [place for place in (usual, below) if place is not None]
+
+
+def _columns(
+    table: Table, poses: Sequence[PoseColumns], shapes: Sequence[Shape], targets: Sequence[Shape], request: Request,
+    named: Sequence[int | None], covariance: Sequence[int],
+) -> list[Column]:  # fmt: skip
+    """Put results where they come from, number for number where these are the same; else to the first of their columns.
+
+    named: the columns of the parent and the name.  Raises Misused for several that have other numbers.
+    """
+    columns: list[Column] = [Kept(place) for place in range(table.width)]
+    operation, asked = request.operation, request.results
+    only_turned = operation.changes_nothing and asked.place is None
+    if only_turned and asked.by_default and not (asked.all_numbers or targets[0].notations or asked.keep):
+        return columns
+    at: dict[int, list[Column]] = {place: [] for pose in poses for place in pose.places}
+    adds, ours = asked.keep or operation.only_adds or not at, tuple(at)
+    for role, renamed in enumerate(named if request.rename is not None and not adds else ()):
+        if renamed is not None:
+            at.setdefault(renamed, [Named(renamed, role)])
+    added, first = list[Column](), 0
+    for number, target in enumerate(targets):
+        pose = poses[number] if len(poses) == len(targets) else PoseColumns(None, None)  # of a pair
+        shape, places = shapes[number] if shapes else Shape(POSE), pose.places or ours
+        several = len(targets) > 1 and (request.rows.poses > 1 or number > 0)
+        is_same = pose.rotation is not None and [each for each, _ in target.notations] == [pose.rotation.notation]
+        position, rotation, extras = _new_columns(
+            pose, target, request, shape, first, table.delimiter, several=several, same=is_same
+        )
+        first += target.size
+        # whether each number of the result replaces one of the input
+        read, written = ((each.unit is None, each.whole, len(each.absent)) for each in (shape, target))
+        in_place = bool(pose.places) and read == written and shape.place is target.place is None
+        in_place = in_place and (is_same or not target.notations or shape.notation is None)
+        if several and (not in_place or (asked.notations and request.rows.poses > 1)):
+            raise Misused("several --columns are moved as they are written; for --to, or a rotation alone, give one")
+        if adds:
+            added += [*position, *rotation, *extras]
+            continue
+        if covariance and not number:  # its entries are the last numbers of the result
+            last = len(extras) - len(operation.carried(shape))
+            at |= {place: extras[last:] if place == min(covariance) else [] for place in covariance}
+            extras = extras[:last]
+        parts: list[tuple[Sequence[int], list[Column]]]
+        if not in_place and pose.position and pose.rotation and target.unit is not None:
+            places = pose.position.places
+            position = [*map(Kept, places), *position[len(places) :]] if only_turned else position
+            parts = [(places, position), ((min(pose.rotation.places),), [*rotation, *extras])]
+        else:
+            parts = [(places if in_place else (min(places),), [*position, *rotation, *extras])]
+        for own, new in parts:  # what is behind the last one comes after it
+            for place, column in zip(own, new, strict=False):
+                at[place].append(column)
+            at[max(own)] += new[len(own) :]
+    if adds:  # behind those that stay, or in the place of those of their names
+        gives_way = (operation.shown or PLAIN).replaces
+        more = {getattr(each, "name", at) if gives_way else at: each for at, each in enumerate(added)}
+        mixed = [more.pop(name, kept) for name, kept in zip(table.called, columns, strict=True)]
+        return [*mixed, *more.values()]
+    return [column for place, old in enumerate(columns) for column in at.get(place, [old])]
+
+
+def _new_columns(
+    pose: PoseColumns, target: Shape, request: Request, shape: Shape, first: int, delimiter: bytes,
+    *, several: bool, same: bool,
+) -> list[list[Column]]:  # fmt: skip
+    """Name the numbers of a result, from the one at `first`: position, rotation, what else there is.
+
+    several: it is one of several, so that its names are those of its columns
+    same: its rotation is written in the notation it was read in
+    """
+    rotation, alone, prefix = pose.rotation, not request.results.prefix or several, request.results.prefix
+    affixes = rotation.affixes if rotation and alone else (prefix, "")
+    moved, gone = target.position_columns, target.absent
+    turned = [name.join(affixes) for at, name in enumerate(target.names, len(moved)) if at not in gone]
+    if rotation and alone and same and rotation.whole == target.whole:
+        turned = [prefix + name for name in rotation.names]
+    moved = [name for at, name in enumerate(moved) if at not in gone]
+    if pose.position and (target.kind in SIX or (moved and alone and target.place == shape.place)):
+        moved = list(pose.position.names)
+        if target.place is None and not (target.kind in SIX or gone):
+            moved += ["z".join(pose.position.affixes)] * (len(moved) < len(XYZ))
+    words = (request.operation.shown or target.place or PLAIN).words
+    between, null = (delimiter, b"") if delimiter else (b" ", b"nan")
+    names = [*(prefix + name for name in moved), *turned, *(prefix + name for name in target.extras)]
+    new: list[Column] = []
+    for at, name in enumerate(names, first):
+        new.append(New(name, Word(at, one_of(words[at], null=null)) if at in words else Out(at, at + 1, between)))
+    axes: list[Column] = []
+    if target.place is not None and turned and not (target.place == shape.place and AXES_KEY in target.place.fields):
+        axes = [New(prefix + AXES_KEY, Const(target.place.axes.encode()))]
+    begin, end = len(moved), len(moved) + len(turned)
+    extra = [column for column, name in zip(new[end:], names[end:], strict=True) if name not in turned]
+    return [[*new[:begin], *axes], new[begin:end], extra]
+
+
+# --- the text of a row ---
+
+
+def pieces_of(columns: Sequence[Column], width: int, delimiter: bytes) -> tuple[Piece, ...]:
+    """Make the pieces of a row out of its columns, as few as can be: neighbours that pass are one stretch.
+
+    A stretch is what is between two bounds of a row: 0 is the start of the line, cells begin at 1, 3, .. and end at
+    2, 4, .., and the last is the end of the line; or it is a name that is written.
+    """
+    pieces: list[Piece] = []
+
+    def keep(begin: int, end: int) -> None:
+        last = pieces[-1] if pieces else None
+        if isinstance(last, In) and type(last.part) is tuple and last.part[1] == begin:
+            begin = pieces.pop().part[0]  # type: ignore[union-attr]
+        pieces.append(In((begin, end)))
+
+    for before, column in pairwise((None, *columns)):
+        last, new = pieces[-1] if pieces else None, column.piece if isinstance(column, New) else None
+        if isinstance(column, Kept):  # with what parts it from the column before, if there is one
+            keep(2 * column.place + (before is None and column.place > 0), 2 * column.place + 2)
+        elif isinstance(last, Out) and isinstance(new, Out) and last.last == new.first:
+            pieces[-1] = last._replace(last=new.last)
+        else:
+            if isinstance(before, Kept) and before.place < width - 1:  # with what is behind it
+                keep(2 * before.place + 2, 2 * before.place + 3)
+            elif before:
+                pieces.append(Const(delimiter or b" "))
+            pieces.append(new or In(column))
+    keep(2 * width, 2 * width + 1)
+    return tuple(pieces)
+
+
+def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:
+    """Raise Misused if a new column would be called as one that stays, or as another new one."""
+    new = [column.name for column in columns if isinstance(column, New)]
+    kept = [names[column.place] for column in columns if not isinstance(column, New)]
+    if len({*new}) < len(new):
+        twice = sorted({name for name in new if new.count(name) > 1})
+        if {*XYZ} <= {*twice}:
+            hint = "a point with a weight: --columns x,y,z; a rotation: name it qx, qy, qz, qw"
+            raise Misused(f"columns x, y, z, w are a quaternion, its position would have their names; {hint}")
+        raise Misused(f"--to: columns {', '.join(twice)} would appear twice")
+    clash = sorted(set(new).intersection(kept))
+    if clash:
+        raise Misused(f"columns {', '.join(clash)} would appear twice; name the new ones with --prefix")

@@ -1,0 +1,517 @@
+"""The request of a stream in any format: the operation, how rows are read, how results are written.
+
+One `Operation` serves floats and arrays alike.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from frametool.errors import NamedTuple, ValueInvalid
+from frametool.geometry import quaternion, rigid
+from frametool.geometry.floats import RADIAN
+from frametool.geometry.representations import HEADING, Notation, notation
+from frametool.geometry.rigid import EXACT, SCALED, UNCERTAIN
+from frametool.grammar.pose import RELATIVE, SCALE, VELOCITY
+from frametool.rows.faults import STOP
+from frametool.rows.shapes import MOVERS, POINT, POSE, RATE, SIX, TURNED, VECTOR, Shape, Unit
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from frametool.geometry import Components, Namespace, Number, Rigid
+    from frametool.geometry.place import Earth, Place
+    from frametool.grammar.result import Style
+    from frametool.rows.sinks import Word
+
+    Rename: TypeAlias = Callable[[str | None, str | None], tuple[str | None, str | None]]
+
+START, PREVIOUS, VELOCITIES = "start", "previous", "velocities"  # what a row is compared with that comes before it
+PAIR = "pair"  # the two poses of a row
+ALL, SOME, NO_STAMPS = "all", "some", "none"
+
+
+class Formula:
+    """An expression over rows: what it reads of each, what kind of thing it makes of it, and its numbers.
+
+    The kind of a row is that of its shape, "" where it holds neither point nor pose.
+    columns: the columns, or keys, whose numbers it reads; reads_row: it reads the row's own point or pose
+    needs_time: it reads the row's own time; adds: rows keep their columns and results are added
+    shown: how its numbers are written, if not as they are
+    """
+
+    columns: tuple[str, ...] = ()
+    reads_row = True
+    needs_time = False
+    adds = True
+    shown: Shown | None = None
+
+    def kind(self, row: str) -> str:  # noqa: ARG002 - by default all rows get numbers alone
+        """Return whether a row becomes a pose, a point or a vector; "" for numbers alone, which are `extras`."""
+        return ""
+
+    def extras(self, row: str) -> tuple[str, ...]:  # noqa: ARG002 - none by default
+        """Name the numbers that come with a pose or point."""
+        return ()
+
+    def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:  # noqa: ARG002
+        """Return the frames of the result of a row with these; raise FrametoolError where they do not fit."""
+        return parent, name
+
+    def result(
+        self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace
+    ) -> Components:
+        """Return the components of the result and then the extras; of floats raises FrametoolError where none are."""
+        raise NotImplementedError
+
+
+class Shown(NamedTuple):
+    """How the numbers of a formula are written in a row; nan is an empty cell, or null.
+
+    words: in tables, the words that a number encodes, by its place
+    members: in records, what is under each key: a text, a word, or the places of its numbers
+    replaces: columns and members of these names give way, where no prefix makes others of them
+    """
+
+    words: Mapping[int, tuple[str, ...]]
+    members: Mapping[str, str | Word | tuple[int, ...]]
+    replaces: bool = False
+
+    def cells(self, names: Sequence[str], numbers: Components) -> dict[str, Any]:
+        """Return the cells of a table."""
+        return {
+            name: self.words[at][int(number)] if at in self.words else _or_none(number)
+            for at, (name, number) in enumerate(zip(names, numbers, strict=True))
+        }
+
+    def values(self, prefix: str, numbers: Components) -> dict[str, Any]:
+        """Return the members of a record."""
+        from frametool.documents.source import Verbatim
+        from frametool.rows.sinks import Word
+
+        found: dict[str, Any] = {}
+        for key, value in self.members.items():
+            made: Any = value
+            if isinstance(value, Word):
+                made = Verbatim(value.text(numbers[value.number]).decode())
+            elif not isinstance(value, str):
+                made = [_or_none(numbers[at]) for at in value]
+                made = None if None in made else made if made[1:] else made[0]
+            found[prefix + key] = made
+        return found
+
+
+class Operation(NamedTuple):
+    """What is done to each row: it is inverted if requested, then multiplied with fixed poses, then compared.
+
+    left, right: applied as left @ row @ right[0] @ right[1] ..
+    inverse: the row itself is inverted first
+    of: what a row is compared with; "" for nothing, "first" inverse(fixed) row, "second" inverse(row) fixed,
+        "pair" the two poses of a row, "previous" the row before and this one, "start" the first row and this one,
+        "velocities" as "previous", with the twist that leads from one row to the next in the time between them
+    fixed: the pose that "first" and "second" need
+    moves: the row is moved rather than composed: points and vectors are allowed
+    turns: axes change: on the right only the rotation, the position, if there is one, stays as it is
+    mirrors: the row is seen in a mirror across y, before all that is on its left
+    formula: an expression, instead of all this; it is given points that are moved by their edge, or that edge alone
+    uncertain: what moves rows, each by its frame or its time, has a covariance that counts
+    similar: a scale with a pose counts, and is that of the result; multiples: so is that of a matrix s R
+    Poses are seven components, and may have a covariance or a scale behind them, as `geometry.rigid` has it.
+    """
+
+    left: Components | None = None
+    right: tuple[Components, ...] = ()
+    inverse: bool = False
+    of: str = ""
+    fixed: Components | None = None
+    moves: bool = False
+    turns: bool = False
+    mirrors: bool = False
+    formula: Formula | None = None
+    uncertain: bool = False
+    similar: bool = False
+    multiples: bool = False
+
+    def extras(self, shape: Shape) -> tuple[str, ...]:
+        """Name the numbers that come with the result of a row, and have no place in the row as it was read."""
+        if self.formula is not None:
+            return self.formula.extras(shape.kind)
+        compared = RELATIVE + VELOCITY * (self.of == VELOCITIES) if self.of and shape.kind == POSE else ()
+        return compared if shape.covariance and not shape.rewritten else (*compared, *self.carried(shape))
+
+    def carried(self, shape: Shape) -> tuple[str, ...]:
+        """Name the entries of the covariance, or the scale, that the results of rows of a shape have."""
+        stays = self.keeps_frames and not (self.uncertain or shape.inverse or shape.rewritten)
+        passes = self.formula is not None or stays
+        if passes or shape.kind not in (POSE, POINT, VECTOR):
+            return ()
+        sizes = {*map(len, filter(None, (self.left, *self.right, self.fixed)))}
+        if SCALED in sizes or (1 in shape.covariance and not shape.sigma) or self.reads_scale(shape):
+            return () if self.moves else (SCALE,)
+        of_position = shape.kind == POSE and 9 in shape.covariance and not shape.rewritten  # it stays what it is
+        if of_position or not (self.uncertain or shape.covariance or UNCERTAIN in sizes):
+            return ()
+        from frametool.grammar.covariance import columns
+
+        return columns(36 if shape.kind == POSE else 9)
+
+    def reads_scale(self, shape: Shape) -> bool:
+        """Return True if the matrix of a shape may be a multiple of one of a rotation, whose scale counts.
+
+        A scale that comes with it says it already.
+        """
+        return self.multiples and shape.notation is not None and (
+            shape.notation.representation.whole is not None and (1 not in shape.covariance or bool(shape.sigma))
+        )
+
+    def result_kind(self, kind: str) -> str:
+        """Return what a row of some kind becomes; "" for numbers alone."""
+        return kind if self.formula is None else self.formula.kind(kind)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Name the columns whose numbers are read with those of points and poses."""
+        return () if self.formula is None else self.formula.columns
+
+    @property
+    def shown(self) -> Shown | None:
+        """Return how the numbers of an expression are written, if it says so."""
+        return None if self.formula is None else self.formula.shown
+
+    @property
+    def only_adds(self) -> bool:
+        """Return True if rows keep their columns and results are added."""
+        return self.formula is not None and self.formula.adds
+
+    @property
+    def keeps_child(self) -> bool:
+        """Return True if a result is the pose of what its row is the pose of: of a camera with the same axes."""
+        return not (self.inverse or self.right or self.formula) and (self.of in ("", "first") or self.looks_back)
+
+    @property
+    def looks_back(self) -> bool:
+        """Return True if a row's result depends on the rows before it."""
+        return self.of in (START, PREVIOUS, VELOCITIES)
+
+    @property
+    def takes_points(self) -> bool:
+        """Return True if points and vectors have a result: where they are moved, and where they get other axes."""
+        return self.moves or self.turns
+
+    @property
+    def changes_nothing(self) -> bool:
+        """Return True if rows only change their notation."""
+        changed = self.left or self.right or self.of or self.moves or self.mirrors
+        return not (changed or self.inverse)
+
+    @property
+    def keeps_frames(self) -> bool:
+        """Return True if records stay in the frames they name."""
+        return self.shown is not None or (self.changes_nothing and (self.formula is None or self.formula.adds))
+
+    @property
+    def keeps_position(self) -> bool:
+        """Return True if positions stay as they are written."""
+        return self.changes_nothing or (self.turns and self.left is None and not (self.mirrors or self.inverse))
+
+    def move(self, shape: Shape, own: Components, extra: Components, edge: Components | None) -> Components:
+        """Move what is no pose, with its covariances, by `edge`, else by `left`; what else comes with it stays."""
+        mover = edge or self.left
+        if shape.kind == RATE:  # along the axes of the body
+            mover = rigid.inverse(*self.right[0]) if self.right else None
+        if self.mirrors:
+            own = (own[0], -own[1], *own[2:])
+        if mover is not None and len(mover) == EXACT and not shape.covariance:
+            return (*MOVERS[shape.kind](*mover, *own), *extra)
+        if mover is None:
+            return (*own, *extra)
+        from frametool.rows.columns_uncertain import move
+
+        return move(shape, own, extra, mover, mirrors=self.mirrors)
+
+    def result(
+        self,
+        shape: Shape,
+        numbers: Components,
+        edge: Components | None,
+        xp: Namespace,
+        *,
+        rotation: Callable[[Components], Components],
+        before: Callable[[Components], tuple[Sequence[Components], Number]] | None = None,
+        times_ns: Number = None,
+    ) -> Components:
+        """Return what becomes of one thing of a shape, or of a column of them, and then what comes with it.
+
+        rotation: makes the checked quaternion of a thing's own numbers
+        before: returns what a pose is compared with, it, and the time since that
+        times_ns: its own time
+        """
+        own, extra = numbers[: shape.own_size], tuple(numbers[shape.own_size :])
+        if shape.sigma or (shape.covariance and shape.place is not None):
+            from frametool.rows.columns_uncertain import in_full
+
+            shape, extra = in_full(shape, own, extra)
+        if self.reads_scale(shape):
+            from frametool.rows.columns_uncertain import of_multiple
+
+            own = of_multiple(shape, own, rotation, xp)
+        elif shape.kind in TURNED:
+            own = thing_pose(shape, own, rotation)
+        elif shape.unit is not None:
+            own = shape.position(own)
+        if self.formula is not None:
+            mover: Any = edge or self.left
+            parts = own if mover is None else rigid.apply(*mover, *own[:3]) if own else mover
+            return self.formula.result(shape.kind, parts, extra, times_ns, xp)
+        if shape.kind != POSE:
+            found = self.move(shape, own, extra, edge)
+        else:
+            if shape.covariance:
+                from frametool.rows.columns_uncertain import with_own
+
+                own, extra = with_own(shape, own, extra, edge or self.left, mirrors=self.mirrors)
+            poses, took = ([own], None) if before is None else before(own)
+            found = self.pose(poses, edge, xp)
+            if self.of == VELOCITIES:  # linear R_A' (p_B - p_A) / dt, angular the rotation vector of A^-1 B over dt
+                last = EXACT + len(RELATIVE)
+                steps = (*found[:3], *quaternion.as_rotvec(found[3], found[4], found[5], found[6], xp))
+                found = (*found[:last], *(step / took for step in steps), *found[last:])
+            found = (*found, *extra)
+        if shape.place is None or not self.keeps_frames:
+            return found
+        from frametool.geometry.place import Spot, Unmoved  # with what it was read as, where nothing moves it
+
+        return Unmoved(found, Spot(shape.place, numbers[: shape.place.size]))
+
+    def pose(self, poses: Sequence[Components], edge: Components | None, xp: Namespace) -> Components:
+        """Return the resulting pose, how far it goes if poses are compared, and its covariance or scale, if any."""
+        result = poses[0]
+        if self.inverse:
+            result = rigid.inverse_full(result)
+        if self.mirrors:
+            result = rigid.mirrored(*result)
+        left = edge or self.left
+        if left is not None:
+            result = rigid.compose_full(left, result)
+        for right in self.right:
+            result = rigid.compose_full(result, right)
+        if self.moves and len(result) == SCALED:
+            return result[:EXACT]  # a pose that is scaled is one
+        if not self.of:
+            return result
+        others = poses[1:] if self.fixed is None else (self.fixed,)
+        first, second = (*others, result) if self.of == "first" else (result, *others)
+        result = rigid.relative_full(first, second)
+        tx, ty, tz, x, y, z, w = result[:EXACT]
+        metres, angle = rigid.extent(tx, ty, tz, x, y, z, w, xp)
+        return (*result[:EXACT], metres, angle, angle * RADIAN, *result[EXACT:])
+
+
+def _or_none(number: Number) -> Number | None:
+    return None if number != number else number  # noqa: PLR0124 - nan
+
+
+PLAIN = Shown({}, {})
+COMBINED = Operation(of="arguments")  # with each other, outside of here; they are only read
+
+
+def thing_pose(shape: Shape, own: Components, rotation: Callable[[Components], Components]) -> Rigid:
+    """Return the pose that numbers say, which may be the inverse of what is written."""
+    pose: Any = (*shape.position(own), *shape.turned(own, rotation(own)))
+    return rigid.inverse(*pose) if shape.inverse else pose
+
+
+class Timed(NamedTuple):
+    """Where the stamps of rows are, and the poses that move from a frame (None: the one SOURCE) at such times.
+
+    An expression has no such poses: it knows by itself what the stamps are for.
+
+    name: the column or key of the stamps; "" for the stamp in the header of each message
+    many: columns of poses at an array of nanoseconds, nan where there is no data
+    one: a pose at one time, or the reason raised
+    moves: True if what lies between a frame and the target depends on the time
+    width: how many numbers such a pose has, with its covariance if that counts
+    """
+
+    name: str
+    many: Callable[[str | None, Any], Components] = lambda *_: ()
+    one: Callable[[str | None, int], Components] = lambda *_: ()
+    moves: Callable[[str | None], bool] = lambda _: True
+    width: int = EXACT
+
+    @property
+    def column(self) -> str:
+        """Name the column or key for messages."""
+        return self.name or "header.stamp"
+
+    def pose(self, frame: str | None, stamp_ns: int) -> Components:
+        """Return the pose at one time, to the bit as `many` does; raises FrametoolError if absent."""
+        found = tuple(float(column[0]) for column in self.many(frame, [stamp_ns]))
+        return found if found[0] == found[0] else self.one(frame, stamp_ns)
+
+
+class RowOptions(NamedTuple):
+    """How rows are read.
+
+    poses: how many poses each row holds; 0 where rows only name frames
+    kind: what rows are taken for; "" as they look; kinds: of each of several points or poses in a row
+    given: the notation of their rotations; given_place: what unnamed numbers are of a position on the Earth
+    degrees: whether bare angles are in degrees; normalize: take any non-zero quaternion
+    columns: which columns are ours, one entry a pose; frames: columns that name a row's frame
+    extra_column: the column or key of a stamp that is read with the pose; "" is the usual stamp
+    stamps: ALL rows have stamps where one has, or SOME; NO_STAMPS are read: then the extra column holds something else
+    frame_is_counter: a decimal `frame` is a counter, because no frame is called so
+    """
+
+    poses: int = 1
+    kind: str = ""
+    kinds: tuple[str, ...] = ()
+    given: Notation | None = None
+    given_place: str = ""
+    degrees: bool = False
+    normalize: bool = False
+    columns: tuple[str, ...] = ()
+    frames: tuple[str, ...] = ()
+    extra_column: str | None = None
+    stamps: str = ALL
+    frame_is_counter: bool = True
+
+
+class ResultOptions(NamedTuple):
+    """How results are written.
+
+    notations: of their rotations; none means as read
+    by_default: no option chose these notations; what has no rotation gets none
+    keep, prefix: results are added to the input, under other names
+    unwrap: angles go on beyond half a turn
+    all_numbers: all numbers of a result are wanted, also those that do not change
+    canonical: results are written anew rather than in the text of their records
+    place: how positions on the Earth are written
+    """
+
+    notations: tuple[Notation, ...] = ()
+    by_default: bool = False
+    keep_sign: bool = False
+    precision: int | None = None
+    keep: bool = False
+    prefix: str = ""
+    unwrap: bool = False
+    all_numbers: bool = False
+    canonical: bool = False
+    place: Place | None = None
+
+
+class Request(NamedTuple):
+    """What one run does with its rows, how it reads them and how it writes the results.
+
+    pose_from_frame: the pose that moves a record expressed in a frame; timed: the poses that do so at its own time
+    rename: turns a record's (parent, name) into those of its result
+    earth: what is said of all places: the origin, the axes of rotations, the zone
+    offset_ns: added to the stamps of rows and records, also `FromFirst`; window: the first and the last that are left
+    """
+
+    operation: Operation = Operation()
+    rows: RowOptions = RowOptions()
+    results: ResultOptions = ResultOptions()
+    pose_from_frame: Callable[[str | None], Rigid] | None = None
+    timed: Timed | None = None
+    rename: Rename | None = None
+    on_error: str = STOP
+    earth: Earth | None = None
+    offset_ns: int = 0
+    window: tuple[int, int] | None = None
+
+    def with_rows(self, **fields: Any) -> Request:
+        """Return it with other options of how rows are read."""
+        return self._replace(rows=self.rows._replace(**fields))
+
+    def with_results(self, **fields: Any) -> Request:
+        """Return it with other options of how results are written."""
+        return self._replace(results=self.results._replace(**fields))
+
+    def of_inverses(self) -> Request:
+        """Return what is done with the inverse of each row; its frames have changed places."""
+        rename, operation = self.rename, self.operation
+        return self._replace(
+            operation=operation._replace(inverse=not operation.inverse),
+            rename=lambda parent, name: rename(name, parent) if rename else (name, parent),
+        )
+
+    @property
+    def in_order(self) -> bool:
+        """Return True if a row's result depends on the rows before it."""
+        takes_first = self.earth is not None and self.earth[0] is not None and self.earth[0].place is None
+        return self.results.unwrap or self.operation.looks_back or takes_first
+
+    @property
+    def keeps_position(self) -> bool:
+        """Return True if positions stay as they are written."""
+        return self.operation.keeps_position and self.results.place is None
+
+    def target(self, shape: Shape) -> Shape:
+        """Choose how results of things of a shape are written: as they were read unless set."""
+        asked, operation, in_place = self.results, self.operation, () if shape.rewritten else shape.covariance
+        kind, extras = operation.result_kind(shape.kind), operation.extras(shape)
+        target = Shape(kind, None, covariance=in_place, extras=extras, keep_sign=asked.keep_sign)
+        if kind != shape.kind:
+            shape = Shape(kind, shape.unit or 1.0)
+        if not kind or kind in SIX:
+            return target
+        if kind not in TURNED:
+            if asked.place is not None and kind != POINT:
+                raise ValueInvalid(f"a {kind} has no place on the Earth; leave --to {asked.place.name} out")
+            return target._replace(unit=self._unit(shape))
+        by_row = bool(self.rows.frames) or self.timed is not None  # which moves each its way
+        poses = filter(None, (operation.left, *operation.right, operation.fixed))
+        shifts = by_row or operation.formula is not None or any(any(pose[:3]) for pose in poses)
+        there = shape.whole or shape.unit is not None
+        placed = there or (shifts and kind == POSE)
+        if asked.notations or shape.notation is None or shape.notation.representation is HEADING:
+            changed = operation.left or operation.right or operation.of or operation.formula
+            has_none = shape.notation is None and not by_row and bool(operation.turns or not changed)
+            stays = has_none and (asked.by_default or not asked.notations)
+            notations = () if stays else asked.notations or (notation("quaternion"),)
+            whole = there and len(notations) == 1 and notations[0].representation.whole is not None
+            written = tuple((each, each.in_degrees(self.rows.degrees)) for each in notations)
+            target = target._replace(notations=written, whole=whole)
+        else:
+            if shape.inverse:  # which is written anew, with all its numbers in one unit
+                shape = shape._replace(absent=(), radians_at=())
+            ahead = 3 * (placed and shape.unit is None and not shape.whole)  # a position comes in front
+            target = target._replace(
+                notations=shape.notations, whole=shape.whole, radians_at=shape.radians_at,
+                absent=tuple(at + ahead for at in shape.absent),
+            )  # fmt: skip
+        unit = (self._unit(shape) or 1.0) if placed and not target.whole else None
+        is_matrix = len(target.notations) == 1 and target.notations[0][0].representation.whole is not None
+        if is_matrix and operation.carried(shape) == (SCALE,):  # the scale of results is in the matrix
+            extras = extras[:-1] if extras[-1:] == (SCALE,) else extras
+            return target._replace(unit=unit, scaled=True, extras=extras)
+        return target._replace(unit=unit)
+
+    def _unit(self, shape: Shape) -> Unit | None:
+        """Return how positions are written: as requested, as they were read, or in metres, as those of places are."""
+        asked = self.results
+        if asked.place is not None and shape.unit is not None:
+            return asked.place
+        own = shape.unit if shape.place is None and not (asked.canonical and shape.unit) else 1.0
+        return 1.0 if own is not None and asked.all_numbers and (asked.notations or shape.notation is None) else own
+
+    def for_kind(self, kind: str) -> Request:
+        """Return the request for rows of one kind, on which the frames of an expression's result depend."""
+        formula = self.operation.formula
+        if formula is None:
+            return self
+        return self._replace(rename=lambda parent, name: formula.rename(kind, parent, name))
+
+    def counts(self, frame: str) -> bool:
+        """Return True if what is under `frame` is a counter rather than a frame's name."""
+        return self.rows.frame_is_counter and frame.isdecimal()
+
+
+def target_of(style: Style, kind: str = POSE, *, placed: bool = True) -> Shape:
+    """Return how results are written in a style; placed: poses have a position."""
+    quaternions = notation("quaternion")
+    asked = ResultOptions(style.notations or (quaternions,), keep_sign=style.keep_sign, place=style.place)
+    shape = Shape(kind, 1.0 if placed else None, ((quaternions, False),) if kind == POSE else ())
+    return Request(rows=RowOptions(degrees=style.degrees), results=asked).target(shape)
