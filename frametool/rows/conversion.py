@@ -40,7 +40,7 @@ from frametool.grammar.result import Style
 from frametool.rows.batch import NO_ROWS, NO_STAMP, RowPoses, block_of, kept
 from frametool.rows.faults import NULL, SKIP, BadRow, Fault, Outcome, written_by
 from frametool.rows.request import NO_STAMPS, SOME, Request, RowOptions
-from frametool.rows.shapes import POINT, POSE
+from frametool.rows.shapes import POINT, POSE, Shape
 from frametool.rows.sinks.as_rows import LEARNED, PoseWriter, RowsWriter, SingleWriter, TextWriter
 from frametool.rows.sinks.results import BlockResults, ResultWriter, blocks_of
 from frametool.rows.sources.tables import TableRows
@@ -122,7 +122,7 @@ class FormatConverter:
         self, fmt: str, request: Request, source: str, style: Style = AS_VALUES, answers: Answers = Answers()  # noqa: B008
     ) -> None:
         """Store the request; raises Misused for options that need a table in its own format."""
-        if request.results.keep or (request.results.prefix and request.operation.formula is None):
+        if request.results.keep or (request.results.prefix and not request.operation.extras(Shape(POSE))):
             raise Misused("--keep and --prefix are for tables that stay in their form")
         self.fmt = fmt
         self.source = source

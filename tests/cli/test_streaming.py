@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import stat
@@ -114,6 +115,18 @@ def test_mistakes_are_one_line_with_their_status(
     assert (code, out) == (status, b"")
     assert err.startswith(message)
     assert err.count(b"\n") == 1
+
+
+@pytest.mark.parametrize("option", ["--consecutive", "--first"])
+def test_a_prefix_names_the_distances_of_a_table_in_another_format_too(option: str) -> None:
+    table = b"x,y,z,qx,qy,qz,qw,distance\n0,0,0,0,0,0,1,77\n3,4,0,0,0,0,1,78\n"
+    code, out, err = run("relative", option, "-f", "json", text=table)
+    assert (code, out) == (2, b"")
+    assert b"--prefix" in err
+    code, out, err = run("relative", option, "-f", "json", "--prefix", "rel_", text=table)
+    assert code == 0, err
+    last = json.loads(out.splitlines()[-1])
+    assert (last["xyz"], last["rel_distance"], last["distance"]) == ([3, 4, 0], 5, 78)
 
 
 def test_a_pipe_given_by_its_name_loses_nothing(tmp_path: Path) -> None:
