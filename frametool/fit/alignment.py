@@ -84,7 +84,8 @@ def fitted(
 
 def principal_axes(xyz: Array) -> Array:
     """Return the rms of positions along their principal axes, in descending order."""
-    return np.linalg.svd(xyz - centre(xyz), compute_uv=False) / np.sqrt(len(xyz))
+    spread: Array = np.linalg.svd(xyz - centre(xyz), compute_uv=False) / np.sqrt(len(xyz))
+    return spread
 
 
 def umeyama(ref: Array, est: Array, weights: Array | None = None, *, with_scale: bool, tied: bool = False) -> Fit:
@@ -100,7 +101,8 @@ def umeyama(ref: Array, est: Array, weights: Array | None = None, *, with_scale:
 
 def centre(xyz: Array, mass: Array | None = None) -> Array:
     """Return the weighted mean of positions."""
-    return xyz.mean(0) if mass is None else mass @ xyz / mass.sum()
+    found: Array = xyz.mean(0) if mass is None else mass @ xyz / mass.sum()
+    return found
 
 
 ARM_STEPS = 50

@@ -88,7 +88,8 @@ def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit
     speeds = [each - mask * (each.sum() / mask.sum()) for each, mask in zip(speeds, masks, strict=True)]
 
     def correlated(x: Array, y: Array) -> Array:
-        return np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
+        found: Array = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
+        return found
 
     count = np.maximum(correlated(*masks), 1e-9)
     sums = correlated(speeds[0], masks[1]), correlated(masks[0], speeds[1])

@@ -73,18 +73,21 @@ def align_vectors(source: Array, target: Array) -> Rotation:
 
 def applied(matrices: Array, vectors: Array) -> Array:
     """Return matrices times vectors: (.., n, k) and (.., k)."""
-    return (matrices @ vectors[..., None])[..., 0]
+    found: Array = (matrices @ vectors[..., None])[..., 0]
+    return found
 
 
 def sigmas(errors: Array, information: Array) -> Array:
     """Return the root mean square of errors (.., 6) in sigmas; information: the inverse covariances, (.., 6, 6)."""
     squares = (errors * applied(information, errors)).sum(-1)
-    return np.sqrt(np.maximum(squares, 0.0) / 6)
+    found: Array = np.sqrt(np.maximum(squares, 0.0) / 6)
+    return found
 
 
 def length(vectors: Array) -> Array:
     """Return the lengths of vectors along the last axis."""
-    return np.linalg.norm(vectors, axis=-1)
+    found: Array = np.linalg.norm(vectors, axis=-1)
+    return found
 
 
 NEAR = 1e-4  # radians: below, the series of J^-1 is exact to the last bits
@@ -261,7 +264,8 @@ def lengths(residuals: Array) -> Array:
 def deviations(residuals: Array, sigmas: Array) -> Array:
     """Return u of rows: the root mean square of their numbers in sigmas."""
     off = lengths(residuals) / sigmas
-    return np.sqrt((off**2).sum(-1) / (3.0 * off.shape[1]))
+    u: Array = np.sqrt((off**2).sum(-1) / (3.0 * off.shape[1]))
+    return u
 
 
 def fitted_sigmas(residuals: Array, weights: Array | Mask, unknown: int) -> Array:

@@ -121,7 +121,8 @@ class _Pairs(NamedTuple):
         return self.target - placed
 
     def weighted_residuals(self, fit: Fit) -> Array:
-        return np.sqrt(self.mass)[:, None] * self.residuals(fit)
+        found: Array = np.sqrt(self.mass)[:, None] * self.residuals(fit)
+        return found
 
     def start(self, *, with_scale: bool, robust: bool) -> tuple[Fit, float]:
         """Return the fit of all or of a triple with the least typical distance, and that distance.

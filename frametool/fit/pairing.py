@@ -141,4 +141,5 @@ def stamps_every(each: Trajectory, delta: Delta) -> Array:
     step = along[after] - along[after - 1]
     part = np.divide(wanted - along[after - 1], step, out=np.zeros(count), where=step > 0.0)
     gaps = each.stamps_ns[after] - each.stamps_ns[after - 1]
-    return each.stamps_ns[after - 1] + np.rint(part * gaps).astype(np.int64)
+    stamps: Array = each.stamps_ns[after - 1] + np.rint(part * gaps).astype(np.int64)
+    return stamps

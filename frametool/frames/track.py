@@ -287,7 +287,8 @@ class MovingTrack:
             from frametool.frames.trajectory import TrackTable
 
             self.table = TrackTable(self)
-        return self.table.at(times)
+        found: Rigid = self.table.at(times)
+        return found
 
 
 Track = StaticTransform | MovingTrack  # of one child frame; `is_static` distinguishes them

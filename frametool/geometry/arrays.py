@@ -73,7 +73,8 @@ def copysign(size: Array | float, sign: Array) -> Array:
 
 def _sign_bits(x: Array | float) -> Indices:
     """Return the sign bit of every number, all other bits 0."""
-    return np.asarray(x, np.float64).view(np.int64) & SIGN_BIT
+    bits: Indices = np.asarray(x, np.float64).view(np.int64) & SIGN_BIT
+    return bits
 
 
 def canonical_sign(x: Array, y: Array, z: Array, w: Array) -> Four[Array]:

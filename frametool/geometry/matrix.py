@@ -145,7 +145,8 @@ def explained(parts: Sequence[Any], halves: Sequence[Any], xp: Functions[Any]) -
             room = sum((abs(parts[a + at]) * halves[b + at] + (abs(parts[b + at]) + halves[b + at]) * halves[a + at]
                         for at in range(3)), 0.0)  # fmt: skip
             found = found & (abs(dot) <= room + SILENT)
-    return found
+    made: Condition = found
+    return made
 
 
 def remark(*entries: float) -> str:

@@ -383,7 +383,7 @@ ECEF_KERNELS = Kernels(
 def kernels(name: str) -> Kernels:
     """Return the arithmetic of a row of POSITIONS."""
     module, _, found = POSITIONS[name].kernels.partition(":")
-    return getattr(import_module(module), found)
+    return getattr(import_module(module), found)  # type: ignore[no-any-return]
 
 
 def _height(named: dict[str, Any], other: Any) -> Any:

@@ -205,7 +205,8 @@ def explained(parts: Sequence[Any], halves: Sequence[Any], xp: Functions[Any]) -
     nearest = [xp.maximum(size - half, 0.0 * half) for size, half in pairs]
     least = sum((size * size for size in nearest), 0.0)
     most = sum(((size + half) * (size + half) for size, half in pairs), 0.0)
-    return (least <= 1.0) & (most >= 1.0)
+    found: Condition = (least <= 1.0) & (most >= 1.0)
+    return found
 
 
 def repaired(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:

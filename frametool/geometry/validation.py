@@ -221,7 +221,8 @@ def second_moment(components: Components, mass: Array) -> Array:
     import numpy as np
 
     q = np.stack(components, axis=-1)
-    return np.einsum("n,n...i,n...j->...ij", mass, q, q)
+    moment: Array = np.einsum("n,n...i,n...j->...ij", mass, q, q)
+    return moment
 
 
 def mean_quaternion(components: Components, mass: Array) -> Components:

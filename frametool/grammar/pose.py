@@ -365,7 +365,7 @@ def read_rotation(key: str, value: Any, reading: Reading, *, check: bool = True)
         first, *others = [within((index,), read_rotation, key, each, reading) for index, each in enumerate(value)]
         for other in others:
             agreeing_rotation(first.rotation, other.rotation)
-        return first._replace(places=())
+        return first._replace(places=())  # type: ignore[no-any-return]
     return read_spelled(*_shape_of(key, value), reading, check=check)
 
 

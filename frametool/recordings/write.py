@@ -183,7 +183,8 @@ class RecordingFile:
         if name not in self._numbers:
             self._numbers[name] = new_channel(KINDS[name], topic or f"/{name}", ros1=self.format == BAG1)
             self.begin([self._numbers[name]])
-        return self._numbers[name]
+        found: Channel = self._numbers[name]
+        return found
 
     def begin(self, channels: Iterable[Channel]) -> None:
         """Begin some channels."""

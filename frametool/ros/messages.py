@@ -189,7 +189,8 @@ def part(message: dict[str, Any], key: str, what: str) -> dict[str, Any]:
     """Return a mapping inside a message; `what` lists the keys of the message, for errors."""
     if key not in message:
         raise Misfit(f"missing {key}; {what}")
-    return within((key,), as_mapping, message[key], f"{key} as a mapping")
+    inner: dict[str, Any] = within((key,), as_mapping, message[key], f"{key} as a mapping")
+    return inner
 
 
 def frame_of(mapping: dict[str, Any], key: str, path: Path, reading: Reading) -> str:
@@ -205,7 +206,8 @@ def header_stamp(header: Any) -> int | None:
     """Read the stamp of a header as nanoseconds; None if there is none."""
     if type(header) is not dict or "stamp" not in header:
         return None
-    return within(("header", "stamp"), read_stamp, header["stamp"])
+    stamp_ns: int = within(("header", "stamp"), read_stamp, header["stamp"])
+    return stamp_ns
 
 
 def read_stamp(value: Any) -> int:

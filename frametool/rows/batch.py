@@ -365,7 +365,7 @@ class RowPoses(NamedTuple):
         """Return the components of the rows with what they were read as, if it is known."""
         if self.read is None:
             return parts
-        return _place().Unmoved(parts, _place().spot_of(np.ascontiguousarray(self.read.T)))
+        return _place().Unmoved(parts, _place().spot_of(np.ascontiguousarray(self.read.T)))  # type: ignore[no-any-return]
 
 
 NO_ROWS = RowPoses(np.empty((0, 7)), None, np.empty(0, np.int64), (None,), (None,), {})
@@ -398,7 +398,7 @@ def taken(cells: Any, rows: Ints) -> Cells:
     if isinstance(cells, Spans):
         return Spans(cells.data, cells.starts[rows], cells.ends[rows])
     if is_typed(cells):
-        return cells[rows]
+        return cells[rows]  # type: ignore[no-any-return]
     from frametool.formats.rows.column_file import plain_value
 
     is_array = isinstance(cells, np.ndarray)

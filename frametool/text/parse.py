@@ -128,7 +128,8 @@ def trimmed(data: Bytes, starts: Ints, ends: Ints) -> tuple[Ints, Ints]:
 
 
 def _is_blank(characters: Bytes) -> Flags:
-    return (characters == ord(" ")) | (characters == ord("\t"))
+    blank: Flags = (characters == ord(" ")) | (characters == ord("\t"))
+    return blank
 
 
 def _split_exponent(data: Bytes, starts: Ints, ends: Ints) -> tuple[Ints, Ints, Flags]:

@@ -261,7 +261,8 @@ def _inside_quotes(data: Bytes, end: int, delimiter: bytes) -> Flags | None:
     closes = (after == delimiter[0]) | (after == _NEWLINE) | (after == _QUOTE) | (after == _RETURN)
     if len(quotes) % 2 or not opens.all() or not closes.all():
         return None
-    return np.bitwise_xor.accumulate(data[MARGIN:end] == _QUOTE)
+    inside: Flags = np.bitwise_xor.accumulate(data[MARGIN:end] == _QUOTE)
+    return inside
 
 
 @cache

@@ -220,7 +220,7 @@ def _path(curves: Sequence[Curve]) -> tuple[Picture, Callable[[Any], list[Point]
     ends = [*zip((middle - reach).tolist(), (middle + reach).tolist(), strict=True)]
 
     def seen(xyz: Any) -> list[Point]:
-        return (xyz[:, axes] - base).tolist()
+        return (xyz[:, axes] - base).tolist()  # type: ignore[no-any-return]
 
     lines = [ChartLine("reference", "soft", seen(ref.xyz[curves[0].chosen]), 2.0, (5.0, 4.0))]
     legend: list[SvgElement] = []

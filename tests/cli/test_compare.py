@@ -30,7 +30,7 @@ DRONE = ("drone-ref.tum", "drone-est.tum")
 def found(run: Run, *arguments: str, **more: Any) -> dict[str, Any]:
     done = run("compare", *arguments, "-f", "json", files=FILES, **more)
     assert done.status == 0, done.err
-    return json.loads(done.out)
+    return json.loads(done.out)  # type: ignore[no-any-return]
 
 
 def test_the_pairs_come_first_and_the_text_holds_the_numbers(run: Run) -> None:
@@ -288,7 +288,7 @@ def test_align_prints_an_entry_and_writes_the_whole_estimate(run: Run) -> None:
 
 
 def found_in(run: Run, *arguments: str) -> dict[str, Any]:
-    return json.loads(run("compare", *arguments, "-f", "json").out)
+    return json.loads(run("compare", *arguments, "-f", "json").out)  # type: ignore[no-any-return]
 
 
 def test_resampling_keeps_the_poses_there_are(run: Run) -> None:

@@ -122,7 +122,7 @@ class World:
 
     def value(self, node: tuple[Any, ...]) -> tuple[Any, ...]:
         kind, *rest = node
-        return getattr(self, f"of_{kind}")(*rest)
+        return getattr(self, f"of_{kind}")(*rest)  # type: ignore[no-any-return]
 
     def of_lookup(self, target: str, source: str) -> tuple[Any, ...]:
         return "pose", target, source, by.inverse(self.from_root[target]) @ self.from_root[source]

@@ -22,7 +22,7 @@ def by_default() -> None:
 
 def start(*arguments: str | bytes, **options: object) -> subprocess.Popen[bytes]:
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
-    return subprocess.Popen([*TOOL, *arguments], env=ENVIRONMENT, **pipes)  # type: ignore[call-overload]
+    return subprocess.Popen([*TOOL, *arguments], env=ENVIRONMENT, **pipes)  # type: ignore[call-overload, no-any-return]
 
 
 def run(*arguments: str | bytes, text: bytes = b"", **options: object) -> tuple[int, bytes, bytes]:

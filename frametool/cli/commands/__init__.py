@@ -99,7 +99,8 @@ class Group(WithHelp, click.Group):
             rest = f"`{ctx.command_path} --help` lists all, `frametool help WORD` searches"
             hint = f"; a file follows a command: frametool tree {cmd_name}" * os.path.isfile(cmd_name)
             raise click.UsageError(f"no command {shown(cmd_name)}{hint or any_near(cmd_name, self.table, rest)}", ctx)
-        return getattr(import_module(self.table[cmd_name][0]), f"{cmd_name}_command")
+        found: click.Command = getattr(import_module(self.table[cmd_name][0]), f"{cmd_name}_command")
+        return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """Write the commands from the table, without importing any."""

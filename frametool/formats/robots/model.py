@@ -139,7 +139,8 @@ def _is_at_rest(joint: Joint, value: Value) -> Condition:
     """Return True, or an array, where a joint does not move anything."""
     if not isinstance(value, JointValue):
         return value == rigid.IDENTITY
-    return value.number == (joint.rest * floats.RADIAN if value.degrees else joint.rest)
+    at_rest: Condition = value.number == (joint.rest * floats.RADIAN if value.degrees else joint.rest)
+    return at_rest
 
 
 class Link(NamedTuple):

@@ -74,7 +74,8 @@ def nulls_of(column: Any) -> Flags | None:
     """Return the null mask, (n,); None without nulls."""
     if not column.null_count:
         return None
-    return column.is_null().to_numpy(zero_copy_only=False)
+    nulls: Flags = column.is_null().to_numpy(zero_copy_only=False)
+    return nulls
 
 
 def stamps_of(column: Any, name: str, in_ns: int) -> tuple[Ints, Flags | None, dict[int, str]]:

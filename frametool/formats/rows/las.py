@@ -74,7 +74,8 @@ class _Clipped:
     def read(self, size: int = -1) -> bytes:
         """Read this many bytes, or all that are left."""
         left = max(self._size - self._stream.tell(), 0)
-        return self._stream.read(left if size < 0 else min(size, left))
+        data: bytes = self._stream.read(left if size < 0 else min(size, left))
+        return data
 
 
 class LasBatch(column_file.StructuredBatch):
