@@ -179,12 +179,13 @@ class FormatConverter:
         is_placed, count = self.looks_up_places or self.shape.kind == POINT or self.shape.place is not None, 0
         for found, outcome in rows.steps() if is_table else self._without_gaps(rows):
             poses = self._placed(found, names) if is_placed else found
-            before, count = count, count + len(poses.numbers)
+            every = np.union1d(poses.lines, [fault.line for fault in outcome.faults])  # bad rows have a time too
+            at, before, count = np.searchsorted(every, poses.lines), count, count + len(every)
             stamps = None if are_lost else poses.stamps_ns
             if file is not None:
-                stamps = np.array(file.between(before, count), np.int64)
+                stamps = np.array(file.between(before, count), np.int64)[at]
             elif counts and stamps is None and not are_lost:
-                stamps = np.arange(before, count) * BILLION
+                stamps = (before + at) * BILLION
             yield poses._replace(stamps_ns=stamps, kind=kind, placed=self.placed, more=more), outcome
         if file is not None:
             file.finish(count, self.source)

@@ -306,6 +306,17 @@ def test_kitti_takes_its_times_from_a_file(run: Run) -> None:
     assert json.loads(found.out)["stamp_ns"] == 207288800
 
 
+@pytest.mark.parametrize("rows", [2, 30000])
+def test_a_row_that_is_skipped_takes_its_time_with_it(rows: int, run: Run) -> None:
+    good, bad = "1 0 0 1 0 1 0 2 0 0 1 3\n", "1 0 0 x 0 1 0 2 0 0 1 3\n"
+    files = {"kitti.txt": (good + bad + "\n") * rows, "times.txt": "".join(f"{at}.5\n" for at in range(2 * rows))}
+    command = ("convert", "-i", "kitti.txt", "--in", "kitti", "-f", "tum", "--on-error", "skip")
+    for times, half in ((("--stamps", "times.txt"), 0.5), ((), 0.0)):
+        done = run(*command, *times, files=files)
+        assert done.status == 3
+        assert [float(line.split()[0]) for line in done.out.splitlines()] == [2 * at + half for at in range(rows)]
+
+
 @pytest.mark.parametrize(("times", "said"), [("0\n1\n", "2 times are too few"), ("0\n1\n2\n3\n", "4 times for the 3 poses"), ("0\nx\n2\n", "times.txt:2: 'x'")])
 @pytest.mark.parametrize("form", ["kitti", "g2o"])
 def test_times_that_do_not_fit_are_refused(form: str, times: str, said: str, run: Run) -> None:
