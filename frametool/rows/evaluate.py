@@ -94,8 +94,7 @@ class Run:
         self.mended, self.notes = list[int](), list[RowNote]()
         self.doubted, self.off = False, 0.0
         self.columns = [*np.ascontiguousarray(self._read().T)]
-        firsts = accumulate([shape.size for shape in plan.shapes], initial=0)
-        starts = zip(plan.shapes, firsts, strict=False)
+        starts = zip(plan.shapes, accumulate([shape.size for shape in plan.shapes], initial=0), strict=False)
         self.things = [(shape, first, (*self.columns[first : first + shape.size],)) for shape, first in starts]
         self._check_covariances()
         if self.count and self.request.window:
