@@ -22,7 +22,7 @@ from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import euler, floats, quaternion
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar import pose_algebra
-from frametool.grammar.pose import RELATIVE
+from frametool.grammar.pose import RELATIVE, Pose
 from frametool.grammar.pose_algebra import Lookups, looked_up_across
 from frametool.grammar.result import Result, pose_numbers
 
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from frametool.frames.track import Track
     from frametool.geometry import Rigid
     from frametool.geometry.representations import Notation
-    from frametool.grammar.pose import Pose
     from frametool.grammar.readers import Quaternion, Vector
     from frametool.grammar.result import Style
 
