@@ -232,9 +232,11 @@ class Output:
             self.style = self.style.changed(format="text")
         if tree.drawn and self.style.format != "text":
             raise ValueInvalid(f"{tree.name} has no poses to write as {self.style.format}; -f text shows its frames")
-        for what, held in (("covariances", tree.covariances), ("intrinsics of cameras", tree.cameras)):
-            if held and self.style.format not in ("yaml", "json", "text"):
-                warn(f"{self.style.format}: {what} left out")
+        fmt, is_ours = self.style.format, self.style.format in ("yaml", "json", "text")
+        cameras = (not is_ours and tree.cameras) or (fmt != "text" and tree.read_cameras())
+        for what, held in (("covariances", not is_ours and tree.covariances), ("intrinsics of cameras", cameras)):
+            if held:
+                warn(f"{fmt}: {what} left out")
         if table.holds(self.style.format, "recording"):
             self.pieces(self._module("").tree_pieces(tree, self.style))
             return
