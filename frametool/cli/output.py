@@ -233,7 +233,8 @@ class Output:
         if tree.drawn and self.style.format != "text":
             raise ValueInvalid(f"{tree.name} has no poses to write as {self.style.format}; -f text shows its frames")
         fmt, is_ours = self.style.format, self.style.format in ("yaml", "json", "text")
-        cameras = (not is_ours and tree.cameras) or (fmt != "text" and tree.read_cameras())
+        may_hold = fmt != "text" and (is_ours or "cameras" in table.FORMATS[fmt].reads)
+        cameras = (not is_ours and tree.cameras) or (may_hold and tree.read_cameras())
         for what, held in (("covariances", not is_ours and tree.covariances), ("intrinsics of cameras", cameras)):
             if held:
                 warn(f"{fmt}: {what} left out")
