@@ -168,9 +168,9 @@ class FormatConverter:
         is_table, other = self.is_table, self.style.format
         rows = TableRows(stream, self.fmt, self.request, self.source, header=header) if is_table else self._rows(stream)
         self._begin(rows)
-        operation, fmt = self.request.operation, Rows() if self.answers.edges else FORMATS[self.fmt].rows
+        operation, fmt = self.request.operation, FORMATS[self.fmt].rows
         # stamps that only count are no loss where the other format has no place for them
-        counts = bool(fmt.counted) and not self.answers.stamps
+        counts = bool(fmt.counted) and not (self.answers.stamps or (self.fmt == "g2o" and self.answers.edges))
         has_no_place = holds(other, "recording") or FORMATS[other].rows.counted
         are_lost = counts and (self.request.rows.stamps == NO_STAMPS or has_no_place)
         kind, names = operation.result_kind(self.shape.kind), operation.extras(self.shape)

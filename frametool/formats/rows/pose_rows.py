@@ -218,7 +218,7 @@ class PoseBlock(NamedTuple):
 
 def form_of(file: InputFile, options: Options) -> Rows:
     """Return the meaning of the poses of a file."""
-    return EDGES if options.answers.edges else FORMATS[file.format].rows
+    return EDGES if file.format == "g2o" and options.answers.edges else FORMATS[file.format].rows
 
 
 def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
