@@ -94,7 +94,7 @@ class Members:
         scalars = [key for key in value if key not in self.lists]
         others = NOTHING_BUT.difference(RELATIVE) if "axis_x" in value else NOTHING_BUT
         names = [key for key in scalars if key not in others]  # that may be numbers of a pose
-        is_flat = not rotations and POINT_KEYS.keys().isdisjoint(value)
+        is_flat = not self.say_pose
         if not (names or (is_flat and len(scalars) >= 6)):
             return None
         from frametool.rows.columns import Columns, Header, PoseColumns, find_six, has_pose_column, plain_pose

@@ -38,6 +38,15 @@ def test_a_flat_position_beside_a_rotation_is_its_position() -> None:
     assert record == {"x": -1.0, "y": 3.0, "z": 6.0, "quaternion": {"x": 0.0, "y": 0.0, "z": H, "w": H}}
 
 
+@pytest.mark.parametrize("scalar", ['"t":0.5', '"point":"A"'])
+@pytest.mark.parametrize("names", [("lidar_x", "lidar_y", "lidar_z"), ("x_est", "y_est", "z_est"), ("gt.x", "gt.y", "gt.z")])
+def test_a_time_or_a_label_is_no_position_that_hides_the_one_there_is(scalar: str, names: tuple[str, ...]) -> None:
+    position = ",".join(f'"{name}":{at}' for at, name in enumerate(names, 1))
+    record = moved(f'{{{scalar},{position},"qx":0,"qy":0,"qz":0,"qw":1}}')
+    assert [record[name] for name in names] == [-1.0, 3.0, 6.0]
+    assert "xyz" not in record
+
+
 @pytest.mark.parametrize("spec", ["rpy_deg", "matrix", "quaternion", "rotvec"])
 def test_flat_rotations_go_to_other_representations(spec: str) -> None:
     record = '{"x":1,"qx":0,"qy":0,"y":2,"z":3,"qz":0,"qw":1,"k":1}\n'
