@@ -34,7 +34,7 @@ from frametool.grammar.pose import (
     read_pose,
     read_rotation,
 )
-from frametool.grammar.readers import EARTH_FRAMES, NAME_KEYS, PARENT_KEYS, STAMP_KEYS, Misfit, Reading, kind, within
+from frametool.grammar.readers import EARTH_FRAMES, NAME_KEYS, PARENT_COLUMNS, STAMP_KEYS, Misfit, Reading, kind, within
 from frametool.rows.holders import POINT_KEYS, Members, bare_numbers, covariance_keys, find_holders, value_at
 from frametool.rows.shapes import ACCEL, PARTS, POINT, POSE, TURN, VECTOR, Shape, checked_rotation, doubt
 from frametool.text.numbers import parse_number, read_number_or_angle
@@ -446,7 +446,7 @@ def _with_names(record: Record, root: Any, request: Request) -> Record:
             from frametool.rows.columns_uncertain import with_scale
 
             record = with_scale(record, value[SCALE], around, request)  # not the scale of a Marker, which is a size
-        parent_keys, name_keys = (EARTH_PARENTS, EARTH_NAMES) if on_earth else (PARENT_KEYS, NAME_KEYS)
+        parent_keys, name_keys = (EARTH_PARENTS, EARTH_NAMES) if on_earth else (PARENT_COLUMNS, NAME_KEYS)
         parent = _named(value, parent_keys, around, parent, request)
         if record.shape.kind == POSE or around == path:
             name = _named(value, name_keys, around, name, request)

@@ -47,6 +47,19 @@ def test_a_time_or_a_label_is_no_position_that_hides_the_one_there_is(scalar: st
     assert "xyz" not in record
 
 
+@pytest.mark.parametrize("names", [["map"], ["map"] * 40, [f"frame {at % 3}" for at in range(40)]])
+def test_the_frame_of_a_header_in_one_key_is_the_frame_of_the_record(run: Callable[..., Any], names: list[str]) -> None:
+    rows = [{"header.frame_id": name, "child_frame_id": "b", "gt.x": 1, "gt.y": 2, "gt.z": 3, "yaw": 0} for name in names]
+    lines = "".join(json.dumps(row) + "\n" for row in rows)
+    for command, frames in {
+        ("invert",): [{"header.frame_id": "b", "child_frame_id": name} for name in names],
+        ("apply", "--transform", "{xyz: [1, 1, 1], parent: w}"): [{"header.frame_id": "w", "child_frame_id": "b"}] * len(names),
+        ("apply", "--transform", "{xyz: [1, 1, 1]}"): [{"child_frame_id": "b"}] * len(names),
+    }.items():
+        found = [json.loads(line) for line in run(*command, stdin=lines).out.splitlines()]
+        assert [{key: each[key] for key in ("header.frame_id", "child_frame_id", "parent", "name") if key in each} for each in found] == frames
+
+
 @pytest.mark.parametrize("spec", ["rpy_deg", "matrix", "quaternion", "rotvec"])
 def test_flat_rotations_go_to_other_representations(spec: str) -> None:
     record = '{"x":1,"qx":0,"qy":0,"y":2,"z":3,"qz":0,"qw":1,"k":1}\n'

@@ -18,7 +18,7 @@ from frametool import sizes
 from frametool.documents.document import JSON_NUMBER, Node
 from frametool.errors import FrametoolError
 from frametool.grammar.pose import DESCRIPTIVE, LISTED_WORDS, POSE_KEYS, ROTATION_KEYS
-from frametool.grammar.readers import AXES_KEY, NAME_KEYS, PARENT_KEYS, Path, may_be_uncertain
+from frametool.grammar.readers import AXES_KEY, NAME_KEYS, PARENT_COLUMNS, Path, may_be_uncertain
 from frametool.rows.batch import Block, Coded, chosen, numbered, one_text, spans_of, stamps_in
 from frametool.rows.evaluate import Plan
 from frametool.rows.faults import SKIP, Fault
@@ -69,7 +69,7 @@ FRAME = {
 STAMP = r"(?:0|[1-9]\d{0,8}|[1-3]\d{9})(?![.\deE])", r"(?:0|[1-9]\d{0,8})(?![.\deE])"  # seconds, nanoseconds
 NOT_UNKNOWN = r"(?!-1(?:\.0*)?(?:[eE][-+]?0+)?(?![.\deE]))"  # an unknown covariance begins with -1
 # scalars under these keys decide what a record is, at any depth ..
-DECISIVE = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *PARENT_KEYS, *NAME_KEYS))
+DECISIVE = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *PARENT_COLUMNS, *NAME_KEYS))
 # .. and these in the mappings around the record, unless their value is a single number
 _WORDS = frozenset(
     word.partition("_deg")[0].partition("_rad")[0] for word in {*OURS, *POSE_KEYS, "theta"} - LISTED_WORDS
