@@ -165,7 +165,7 @@ class PointsOfPixels(Seen):
             if pose:
                 origin, ray = rigid.apply(*pose, *origin), quaternion.rotate(*pose[3:], *ray)
             found = *origin, *ray
-        there = _is_known(u + v)
+        there = _is_known(sum(cells))
         lost = there & (found[-1] != found[-1])
         beyond = _number(lost)
         if beyond and self.into is None:

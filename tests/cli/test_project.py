@@ -197,6 +197,14 @@ def test_the_count_says_what_became_of_points(run: Run) -> None:
     assert run("project", "--camera", camera, "--quiet", stdin=table(points)).err == ""
 
 
+def test_pixels_without_a_depth_are_not_behind_the_camera(run: Run) -> None:
+    camera = "{K: [350, 350, 320, 240], size: [640, 480]}"
+    done = run("unproject", "--camera", camera, stdin="u,v,depth\n320,240,2\n1,5,\n3,4,\n5,5,\n")
+    assert (done.status, done.err) == (0, "")
+    skipped = run("unproject", "--camera", camera, "--on-error", "null", stdin="u,v,depth\n1,5,-1\n1,5,nan\n")
+    assert skipped.err.endswith("frametool: 1 pixel: 1 behind the camera\n")
+
+
 def test_axes_of_the_camera_are_those_of_the_tree_or_as_said(run: Run) -> None:
     as_said = {
         "optical": ("0.1", "0.2", "2"), "opengl": ("0.1", "-0.2", "-2"), "flu": ("2", "-0.1", "-0.2"),
