@@ -210,8 +210,8 @@ def nanoseconds(name: str, seconds: float) -> int:
 
 
 NEEDED = ("t", "linear", "angular")
-COLUMNS = {name: name for name in (*NEEDED, "linear_y")} | {"linear_x": "linear", "angular_z": "angular"}
-RECORDED = ("turtle", "distance", "leader_x", "leader_y", "leader_theta", "x", "y", "theta")  # ignored columns
+COLUMNS = {name: name for name in (*NEEDED, "linear_y", "turtle")} | {"linear_x": "linear", "angular_z": "angular"}
+RECORDED = ("distance", "leader_x", "leader_y", "leader_theta", "x", "y", "theta")  # ignored columns
 ENTRY_KEYS = ("t", "turtle", "linear", "angular", "linear_y")
 AXES = ("x", "y", "z")
 COMMAND = f"{{t: 0.5, linear: 2.0, angular: 0.0}}, a Twist message, or a key: {', '.join(KEYS)}"
@@ -234,6 +234,7 @@ def read_commands(lines: Iterable[str], name: str, *, period_ns: int = BILLION) 
     """Read commands from lines as they arrive, one document in memory at a time; otherwise as `read_script`."""
     last_ns: int | None = None
     columns: Sequence[str] | None = None
+    turtles: dict[str, None] = {}
     for piece, is_row in _pieces(lines):
         source = Source(name, piece.text)
         with counted_from(piece.line):
@@ -242,6 +243,7 @@ def read_commands(lines: Iterable[str], name: str, *, period_ns: int = BILLION) 
                     columns = _columns(source.text)
                     continue
                 for path, value in _values(source, columns):
+                    _check_turtle(value, path, turtles)
                     for t_ns, twist in timed_commands(value, path, last_ns, period_ns):
                         yield t_ns, twist
                         last_ns = t_ns
@@ -251,6 +253,14 @@ def read_commands(lines: Iterable[str], name: str, *, period_ns: int = BILLION) 
                 first = misfit.path[0] if misfit.path else 0  # the number or the name of a column
                 at = first if isinstance(first, int) else (columns or ()).index(first)
                 raise error_at(source, split_line(source.text)[at].column - 1, str(misfit)) from None
+
+
+def _check_turtle(value: Any, path: Path, turtles: dict[str, None]) -> None:
+    """Raise Misfit for commands of another turtle than those before it, which are kept in `turtles`."""
+    items = value if type(value) is list else [value]
+    turtles |= {str(item["turtle"]): None for item in items if type(item) is dict and item.get("turtle")}
+    if len(turtles) > 1:
+        raise Misfit(f"commands of {' and '.join(map(shown, turtles))}; a leader takes those of one turtle", path)
 
 
 def _values(source: Source, columns: Sequence[str] | None) -> Iterator[tuple[Path, Any]]:

@@ -83,6 +83,8 @@ def test_a_stream_is_read_one_command_at_a_time() -> None:
         (ECHO + "linear: {x: 1\n---\n", "bad:1"),
         ("up\ndwon\n", "bad:2:1: unknown key 'dwon'; did you mean 'down'?"),
         ('{"t": 0, "linear": 1}\n{"t": 1, "linear": 1e999}\n', "bad:2:20: '1e999' is not finite"),
+        ("t,turtle,linear,angular\n0,a,1,0\n1,b,1,0\n", "bad:3:1: commands of 'a' and 'b'; a leader takes those of one"),
+        ("- {turtle: a, linear: 1}\n- {turtle: b, linear: 1}\n", "bad:1:1: commands of 'a' and 'b'"),
     ],
 )
 def test_a_mistake_in_a_leader_is_placed(text: str, message: str) -> None:
