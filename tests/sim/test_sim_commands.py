@@ -111,6 +111,7 @@ def test_the_example_scene_has_three_turtles_that_come_together(run: Run) -> Non
         (("follow", "-o", "taken.svg"), 5, "taken.svg: exists; give --force"),
         (("follow", "--plot", "nowhere/f.svg"), 5, "nowhere/f.svg: no directory nowhere"),
         (("follow", "--holonomic"), 2, "--holonomic has no effect here"),
+        (("follow", "--followers", "0", "--spawn", "1,1,0", "--rate", "5"), 2, "--spawn, --rate have no effect here"),
         (("follow", "--gain-linear", "1e308"), 1, "turtle2: a velocity must be finite"),
         (("folow",), 2, "did you mean 'follow'?"),
         (("run", "bad.yaml"), 1, "bad.yaml:1:23: "),

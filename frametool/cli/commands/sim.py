@@ -64,7 +64,6 @@ def follow_options(duration: str) -> Callable[[Any], Any]:
         option("--duration S", "simulated seconds, or inf", parse_duration, default=duration),
         _of_turtles("--turtlesim", "whose turtlesim", VARIANTS, default="ros1"),
         _of_turtles("--holonomic", "use linear.y in ROS 2, like the node's parameter"),
-        _of_turtles("--seed", "seed of the random leader", click.IntRange(0), default=0),
     )  # fmt: skip
 
 
@@ -178,13 +177,15 @@ of transforms, as `lookup` does. A summary goes to stderr.
 
 sim_command = Group("sim", table=SUBCOMMANDS, help=HELP, epilog=EXIT_CODES)
 LAW_OPTIONS = ("rate", "gain_linear", "gain_angular", "max_linear", "max_angular")
-SCENE_OPTIONS = ("followers", "spawn", "target", "delay", "duration", "turtlesim")
+FOLLOW_OPTIONS = ("spawn", "target", "delay")
+SCENE_OPTIONS = ("followers", "duration", "turtlesim")
 
 
 @sim_command.command("follow", cls=Command)
 @option("--leader NAME|FILE|-", "still, circle, square, figure8, random, a file of commands, or - for standard input",
         default="still")
 @follow_options("20")
+@_of_turtles("--seed", "seed of the random leader", click.IntRange(0), default=0)
 @output_options
 @option("--explain-step N", "derive the command of step N, from 0", click.IntRange(0), under="Result")
 @explain_option(requires=("explain_step",))
@@ -234,8 +235,11 @@ def scene_of(inputs: Inputs, leader: MakeLeader) -> Scene:
     chosen = {name: getattr(inputs, name) for name in SCENE_OPTIONS}
     holonomic = chosen["turtlesim"] == "ros2" and inputs.holonomic  # ROS 1 always uses linear.y
     with misuse():
-        law = drivers.FollowController(inputs.law, **{name: getattr(inputs, name) for name in LAW_OPTIONS})
-        return tutorial(leader=leader, law=law, holonomic=holonomic, **chosen)
+        if chosen["followers"]:  # the options of followers have no effect without one
+            chosen |= {name: getattr(inputs, name) for name in FOLLOW_OPTIONS}
+            numbers = {name: getattr(inputs, name) for name in LAW_OPTIONS}
+            chosen["law"] = drivers.FollowController(inputs.law, **numbers)
+        return tutorial(leader=leader, holonomic=holonomic, **chosen)
 
 
 @sim_command.command("run", cls=Command)
