@@ -23,7 +23,7 @@ from frametool.errors import BadTopology, FileProblem, FormatError, NamedTuple, 
 from frametool.formats.detect import Beginning, detect, of_folder
 from frametool.formats.table import CHOICES, FORMATS, readers
 from frametool.frames import topology
-from frametool.frames.lookups import FrameTree
+from frametool.frames.lookups import Frames, FrameTree
 from frametool.geometry.representations import EARTH_FRAMES
 from frametool.grammar.edges import Answers, Diagnostics, Edge, EdgeColumns, Options, Topics, stop
 from frametool.grammar.readers import NAME_KEYS, PARENT_COLUMNS, alike, more_like_it
@@ -379,6 +379,11 @@ def checked_answers(answers: dict[str, Any]) -> dict[str, Any]:
     return answers
 
 
+def listed(values: Any) -> tuple[Any, ...]:
+    """Return several texts, paths or trees as a tuple; one by itself is not taken apart."""
+    return (values,) if isinstance(values, str | PathLike | Frames) else tuple(values)
+
+
 def load(
     *paths: str | PathLike[str],
     moving: bool = False,
@@ -401,13 +406,13 @@ def load(
     `frametool.formats.table`. Raises FormatError, Unanswered and BadTopology with file, line and column; FileProblem.
     """
     rules = Rules(moving=moving, keep_ns=keep_ns, normalize=normalize)
-    chosen = tuple(topics)
+    chosen = listed(topics)
     if format is not None and format not in readers("tree"):
         raise ValueInvalid(f"no trees are read from {format!r}{alternatives(format, readers('tree'), 'formats')}")
     by_name = {} if joints is None or isinstance(joints, str | PathLike) else joints
     values = {name: value if isinstance(value, str) else repr(float(value)) for name, value in by_name.items()}
     joint_files = () if joints is None or by_name is joints else (str(joints),)
-    known = Answers(tuple(frames), joints=values, joint_files=joint_files, **checked_answers(answers))
+    known = Answers(listed(frames), joints=values, joint_files=joint_files, **checked_answers(answers))
     files = opened_together(FrameFile(path, fmt=format, topics=chosen, answers=known) for path in paths)
     for ask in ("frames", *answers):
         if getattr(known, ask) and not any(ask in file.required_options for file in files):

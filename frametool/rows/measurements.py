@@ -20,7 +20,7 @@ from frametool.documents.source import Verbatim
 from frametool.errors import FormatError, ValueInvalid, alternatives, did_you_mean, first_of, shown, warn
 from frametool.fit.blunders import Measurement
 from frametool.fit.measured_tree import solve_tree
-from frametool.formats.load import EdgePlace, FrameFile, lines_of, load
+from frametool.formats.load import EdgePlace, FrameFile, lines_of, listed, load
 from frametool.formats.trees.tree_reader import MOST_KEYS, read_edges
 from frametool.frames.lookups import FrameTree, taken
 from frametool.geometry.transform import Transform
@@ -109,7 +109,7 @@ def solve(
     Returns .tree, .covariance(target, source), .residuals (n, 6), .u, .used, .fits, .checked and more.
     Raises ValueInvalid if frames are not connected or an outlier cannot be identified; FormatError.
     """
-    trees = [each if isinstance(each, FrameTree) else load(each) for each in fix]
+    trees = [each if isinstance(each, FrameTree) else load(each) for each in listed(fix)]
     if moving := next((each for each in trees if each.moves), None):
         raise ValueInvalid(f"{moving.name} moves; fixed frames must be static")
     fixed = FrameTree("the fixed frames")

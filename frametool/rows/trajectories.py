@@ -20,7 +20,7 @@ import numpy as np
 from frametool.documents.source import InputFile
 from frametool.errors import FileProblem, FormatError, ValueInvalid, alternatives, shown, warn
 from frametool.formats.detect import by_sign, detect, of_folder
-from frametool.formats.load import FrameFile, Rules, checked_answers, load_sources, opened_together
+from frametool.formats.load import FrameFile, Rules, checked_answers, listed, load_sources, opened_together
 from frametool.formats.table import BAG, FORMATS, by_suffix
 from frametool.frames.lookups import checked_rate
 from frametool.frames.stamps import BILLION, FURTHEST_NS, parse_time
@@ -73,7 +73,7 @@ def load_trajectory(
     """
     if format and format not in FORMATS:
         raise ValueInvalid(f"no trajectories are read from {format!r}{alternatives(format, FORMATS, 'formats')}")
-    known = Answers(tuple(frames), **checked_answers(answers))
+    known = Answers(listed(frames), **checked_answers(answers))
     return read_trajectory(str(path), fmt=format or "", topics=[topic] if topic else [], answers=known)
 
 

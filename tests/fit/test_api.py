@@ -74,6 +74,8 @@ def test_what_is_fixed_keeps_its_entries(tmp_path: Path) -> None:
     path.write_text(moving)
     with pytest.raises(ValueInvalid, match=r"hand\.yaml moves; fixed frames must be static"):
         frametool.solve(TUPLES, fix=[path])
+    with pytest.raises(ValueInvalid, match=r"hand\.yaml moves; fixed frames must be static"):
+        frametool.solve(TUPLES, fix=str(path))
 
 
 POSE = Transform.identity()

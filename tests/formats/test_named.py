@@ -192,6 +192,7 @@ def test_python_reads_it_with_the_same_answers(tmp_path: Path) -> None:
         load(tmp_path / "e.yaml")
     found = load(tmp_path / "e.yaml", order="wxyz", frames=["car"]).lookup("car", "lidar")
     assert found.apply([1.0, 0.0, 0.0]) == pytest.approx((0.5, 3.0, -1.0))
+    assert load(tmp_path / "e.yaml", order="wxyz", frames="car").frames == load(tmp_path / "e.yaml", order="wxyz", frames=["car"]).frames
 
 
 @pytest.mark.parametrize(
