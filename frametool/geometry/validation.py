@@ -73,7 +73,7 @@ def as_numbers(value: Numbers, name: str) -> Array:
     """Return an array of real numbers, without a copy if the argument is one.
 
     Raises:
-        ValueInvalid: ragged, or of another kind.
+        ValueInvalid: ragged, masked, or of another kind.
     """
     import numpy as np
 
@@ -83,6 +83,8 @@ def as_numbers(value: Numbers, name: str) -> Array:
         raise ValueInvalid(f"{name}: the rows differ in length; expected an array of numbers") from None
     if array.dtype.kind not in "fiu":
         raise ValueInvalid(f"{name}: expected real numbers, got an array of {array.dtype}")
+    if isinstance(value, np.ma.MaskedArray) and value.mask.any():
+        raise ValueInvalid(f"{name}: some of its numbers are masked; leave their rows out, or fill them")
     return array
 
 

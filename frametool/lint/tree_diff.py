@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import FrametoolError, ValueInvalid, listing, shown
 from frametool.formats.load import load
-from frametool.frames.stamps import format_stamp
+from frametool.frames.stamps import format_stamp, whole_stamp
 from frametool.frames.topology import Snapshot, motion
 from frametool.geometry import floats, rigid
 from frametool.geometry.transform import NEAR, NEAR_BY
@@ -183,6 +183,7 @@ def diff(
     Raises UnknownFrame for a `seen_from` that is not in both.
     """
     a, b = (load(each) if isinstance(each, str | PathLike) else each for each in (a, b))
+    at_ns = None if at_ns is None else whole_stamp(at_ns)
     pair = _Pair(a, b, at_ns, Tolerance(*tolerance), seen_from)
     common = frozenset(pair.common)
     found = [

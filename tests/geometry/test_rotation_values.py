@@ -108,6 +108,7 @@ def test_one_item_and_many_give_the_same_numbers(way: str) -> None:
         ([[0, 0, 0, 1], [0, 0, 1]], r"xyzw: the rows differ in length"),
         (["a", "b", "c", "d"], r"xyzw: expected real numbers"),
         ([1j, 0, 0, 0], r"xyzw: expected real numbers"),
+        (np.ma.masked_array([0.0, 0.0, 0.0, 1.0], [False, False, True, False]), r"xyzw: some of its numbers are masked"),
     ],
 )
 def test_bad_quaternions_are_refused_by_name_and_place(given: Any, message: str) -> None:

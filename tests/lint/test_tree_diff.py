@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation as Scipy
 
 from frametool import Camera, FrameTree, Rotation, Transform, TransformBuffer, diff
-from frametool.errors import UnknownFrame
+from frametool.errors import UnknownFrame, ValueInvalid
 from frametool.lint.tree_diff import KINDS
 
 if TYPE_CHECKING:
@@ -204,6 +204,8 @@ def test_recordings_are_compared_at_a_time() -> None:
     assert told["lidar"].seen.metres == pytest.approx(0.25)
     assert comparison.notes == []
     assert diff(a, b, at_ns=0).differences == []
+    with pytest.raises(ValueInvalid, match=r"a stamp is integer nanoseconds, found 0\.5"):
+        diff(a, b, at_ns=0.5)  # type: ignore[arg-type]
 
 
 def test_without_a_time_recordings_are_compared_at_their_latest_and_sample_by_sample() -> None:
