@@ -28,6 +28,7 @@ from frametool.frames.lookups import Frames
 from frametool.geometry import floats
 from frametool.geometry.representations import EARTH_FRAMES
 from frametool.geometry.transform import Rotation, Transform
+from frametool.geometry.validation import as_numbers
 from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose, read_pose
 from frametool.grammar.readers import Misfit, Reading, kind, may_be_on_earth, read_numbers, slash_note, within
 from frametool.text.numbers import parse_number
@@ -427,6 +428,8 @@ def calc(
     Returns a Measure, which is a float, or a Framed: `.transform`, `.xyz`, `.target`, `.source`; of a list a list.
     Raises CalcError for frames or units that do not match, LookupFailed.
     """
+    if not isinstance(tree, Frames | None):
+        raise ValueInvalid(f"expected a tree as frametool.load returns it, found {shown(tree)}")
     terms = {name: term_of(name, value) for name, value in names.items()}
     scope = Scope(tree=tree, names=terms, degrees=degrees, normalize=normalize)
     for name in names:
@@ -465,9 +468,10 @@ def term_of(name: str, value: Any) -> Term:
     else:
         import numpy as np
 
+        number: Any = None if isinstance(value, bool) else value
         try:
-            array = np.asarray(None if isinstance(value, bool) else value, dtype=np.float64)
-        except (TypeError, ValueError):
+            array = as_numbers(number, name).astype(np.float64)
+        except ValueInvalid:
             raise ValueInvalid(f"{name}: an expression knows nothing of {shown(type(value).__name__)}") from None
         if not np.isfinite(array).all():
             raise ValueInvalid(f"{name}: the numbers are not finite")

@@ -307,7 +307,7 @@ class Output:
 
         fmt: of a stream that is written in the format of its input: its own suffixes and those of text are not reported
         """
-        if not self._format_is_default or not self.path or self._inputs.peek("quiet"):
+        if not self._format_is_default or not self.path or any(map(self._inputs.peek, ("quiet", "explain"))):
             return
         suffix = splitext(self.path)[1]
         usual = (*OF_TEXT, f".{fmt}", *table.FORMATS[fmt].suffixes) if fmt else ()

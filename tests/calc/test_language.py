@@ -338,6 +338,11 @@ def test_python_gets_values_that_carry_their_frames() -> None:
         frametool.calc("pose * pose", pose=pose)
     with pytest.raises(FrametoolError, match=r"division by zero \(element 1\)"):
         frametool.calc("1 / a", a=np.array([1.0, 0.0]))
+    for value in (None, True, "x"):
+        with pytest.raises(FrametoolError, match=f"a: an expression knows nothing of '{type(value).__name__}'"):
+            frametool.calc("a", a=value)
+    with pytest.raises(FrametoolError, match=r"expected a tree as frametool\.load returns it, found 'robot\.yaml'"):
+        frametool.calc("map<-tool", tree="robot.yaml")  # type: ignore[arg-type]
 
 
 def test_every_function_is_on_the_screen_of_help(run: Callable[..., Any]) -> None:

@@ -70,9 +70,11 @@ def test_an_error_is_a_message_and_a_status(line: str | list[object], status: in
 
 
 @pytest.mark.skipif(os.name == "nt", reason="named pipes are of POSIX")
-def test_standard_input_may_be_text() -> None:
+def test_standard_input_and_files_may_be_text() -> None:
     text = "name,x,y,z\nZürich,1,2,3\n"
-    assert frametool.run("invert --quiet -f csv", text) == frametool.run("invert --quiet -f csv", text.encode())
+    expected = frametool.run("invert --quiet -f csv", text.encode())
+    assert frametool.run("invert --quiet -f csv", text) == expected
+    assert frametool.run("invert --quiet -f csv -i a.csv", files={"a.csv": text}).out == expected.out
 
 
 def test_a_reader_that_is_gone_does_not_end_the_program(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import pytest
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     from conftest import Outcome
 
@@ -71,6 +72,10 @@ def test_other_options_keep_their_meaning(arguments: list[str], run: Callable[..
     explain = [] if arguments[0] == "sim" else ["--explain"]
     outcome = run(*arguments, *explain)
     assert (outcome.status, outcome.err) == (0, "")
+
+
+def test_a_derivation_in_a_file_is_not_taken_for_its_pose(run: Callable[..., Outcome], tmp_path: Path) -> None:
+    assert run(*CONVERT, "--explain", "-o", str(tmp_path / "how.md")).err == ""
 
 
 def test_a_warning_is_told_once(run: Callable[..., Outcome]) -> None:

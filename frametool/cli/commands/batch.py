@@ -46,7 +46,7 @@ class Ran(NamedTuple):
 
 
 def run(
-    line: str | Sequence[object], stdin: bytes | str = b"", files: Mapping[str, bytes] | None = None, *,
+    line: str | Sequence[object], stdin: bytes | str = b"", files: Mapping[str, bytes | str] | None = None, *,
     columns: int = 0,
 ) -> Ran:  # fmt: skip
     """Run a command in this process as a shell would; errors become messages and a status, and never exit.
@@ -130,7 +130,7 @@ def _terminal_of(columns: int) -> Iterator[None]:
 
 
 @contextmanager
-def _folder_of(files: Mapping[str, bytes] | None) -> Iterator[dict[str, bytes]]:
+def _folder_of(files: Mapping[str, bytes | str] | None) -> Iterator[dict[str, bytes]]:
     """Enter a temporary folder with these files; yield a mapping, filled at the end with new and changed ones."""
     written: dict[str, bytes] = {}
     if files is None:
@@ -139,12 +139,13 @@ def _folder_of(files: Mapping[str, bytes] | None) -> Iterator[dict[str, bytes]]:
     if outside := [name for name in files if os.path.isabs(name) or ".." in name.replace("\\", "/").split("/")]:
         raise ValueError(f"files: {outside[0]!r} is not the name of a file in the folder of the command")
     with TemporaryDirectory() as folder, chdir(folder):
-        for name, content in files.items():
+        before = {name: content.encode() if isinstance(content, str) else content for name, content in files.items()}
+        for name, content in before.items():
             Path(name).parent.mkdir(parents=True, exist_ok=True)
             Path(name).write_bytes(content)
         yield written
         for path in filter(Path.is_file, Path().rglob("*")):
-            if files.get(name := path.as_posix()) != (content := path.read_bytes()):
+            if before.get(name := path.as_posix()) != (content := path.read_bytes()):
                 written[name] = content
 
 
