@@ -270,13 +270,13 @@ OPTIONAL = {"--explain": ("text", "markdown"), "--rows": ("ate", "rpe", "kitti")
 OF_POSES = ("compose", "convert", "interpolate", "invert", "mean", "relative")  # they take only poses
 
 
-def _kind(kind: Any) -> click.ParamType[Any]:
-    """Return the parameter type of a tuple of choices, or of a function that parses the text."""
+def _kind(kind: Any, offers: Offers = TEXT.offers) -> click.ParamType[Any]:
+    """Return the parameter type of a tuple of choices, or of a function that parses the text; offers: as for Text."""
     if isinstance(kind, click.ParamType):
         return kind
     if isinstance(kind, tuple):
         return click.Choice(kind)
-    return Text(kind)
+    return Text(kind, offers)
 
 
 def option(spec: str, about: str, kind: Any = None, name: str = "", **more: Any) -> Adds:
@@ -290,7 +290,7 @@ def option(spec: str, about: str, kind: Any = None, name: str = "", **more: Any)
     taken = " ".join(words[len(names) :])
     kind = kind or OPTIONAL.get(names[-1])
     if taken or kind:
-        more["type"] = _kind(kind or (FILE if "FILE" in taken or taken == "TREE" else TEXT))
+        more["type"] = _kind(kind or str, FILE.offers if "FILE" in taken or taken == "TREE" else TEXT.offers)
     else:
         more["is_flag"] = True
     shows = "[default" not in about and more.get("default") not in (None, (), "")

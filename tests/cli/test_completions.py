@@ -103,7 +103,8 @@ def test_a_name_of_a_file_is_left_to_the_shell(answered: Callable[[str], list[li
 @pytest.mark.parametrize(
     "words",
     ["monitor", "compare", "compare a", "align a", "resample", "static", "mean", "compose a", "convert",
-     "invert", "relative a", "solve", "record", "sim follow --leader", "solve a --fix"],
+     "invert", "relative a", "solve", "record", "sim follow --leader", "solve a --fix", "sim run", "sim follow --plot",
+     "compare a b --report", "solve a --report"],
 )  # fmt: skip
 def test_files_are_completed_wherever_one_may_be(words: str, answered: Callable[[str], list[list[str]]]) -> None:
     assert answered(f"frametool {words} tr") == [["file", "tr", ""]]

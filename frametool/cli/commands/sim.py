@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import EXIT_CODES, Command, Inputs, argument, misuse, option, refuse, say_if_typed, together
+from frametool.cli.command import EXIT_CODES, FILE, Command, argument, misuse, option, refuse, say_if_typed, together
 from frametool.cli.commands import Group
 from frametool.cli.options import PRECISION, place_options, read_path, suffix_of
 from frametool.cli.output import Output
@@ -32,6 +32,7 @@ from frametool.text.numbers import parse_number
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from frametool.cli.command import Inputs
     from frametool.sim.simulate import Watch
     from frametool.sim.turtle import MakeLeader
 
@@ -243,7 +244,7 @@ def scene_of(inputs: Inputs, leader: MakeLeader) -> Scene:
 
 
 @sim_command.command("run", cls=Command)
-@argument("scene")
+@argument("scene", FILE)
 @option("--duration S", "simulated seconds, or inf  [default: the scene's]", parse_duration)
 @option("--seed", "seed of random leaders  [default: the scene's]", click.IntRange(0), under="Turtles")
 @output_options
