@@ -197,7 +197,7 @@ def _refuse_repeated(record: Record, root: Any, request: Request) -> None:
     for holder in (value_at(root, path[:depth]) for depth in range(first, last + 1)):
         is_compared = not operation.only_adds and {*RELATIVE} <= {*holder}
         for key in (request.results.prefix + name for name in names if operation.only_adds or name in DESCRIPTIVE):
-            if key in holder and not is_compared:
+            if key in holder and not is_compared and key not in record.keys.flat:
                 raise Misfit(f"key {shown(key)} is there already{problem}", path)
 
 

@@ -165,6 +165,21 @@ def test_a_distance_of_the_user_is_neither_dropped_nor_replaced(run: Run, copies
         assert refused.err == "frametool: stdin:1:1: key 'distance' is there already, where the result would stand\n"
 
 
+AXIS_ANGLE = '{"x": 1, "y": 0, "z": 0, "axis_x": 0, "axis_y": 0, "axis_z": 1, "angle": 0.5, "id": 4}\n'
+
+
+@pytest.mark.parametrize("copies", [1, 200])
+def test_the_angle_of_an_axis_angle_is_the_angle_between_poses(run: Run, copies: int) -> None:
+    done = run("relative", "{}", "-", stdin=AXIS_ANGLE * copies)
+    first, _, last = done.out.splitlines()[-1].partition(' "id"')
+    assert (done.status, last) == (0, ": 4}")
+    wanted = json.loads(AXIS_ANGLE[:-11] + ', "distance": 1, "angle_deg": 28.64788975654116}')
+    assert json.loads(first.rstrip(",") + "}") == pytest.approx(wanted, rel=1e-15)
+    assert first.count('"angle"') == 1
+    header, row = run("relative", "{}", "-", "-f", "csv", stdin=AXIS_ANGLE * copies).out.splitlines()[:2]
+    assert (header, row[-4:]) == ("x,y,z,qx,qy,qz,qw,distance,angle,angle_deg,id", "17,4")
+
+
 @pytest.mark.parametrize("fmt", ["json", "csv"])
 def test_the_velocities_of_velocities_are_written_once(run: Run, fmt: str) -> None:
     rows = [f'{{"t": {at}, "xyz": [{at * at}, 0, 0]}}\n' for at in range(90)]

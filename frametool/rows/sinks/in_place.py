@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from functools import partial
-from itertools import chain
+from itertools import chain, groupby
 from math import isnan
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -178,6 +178,7 @@ class Splicer:
             at = keys.rotation
             if self._same_rotation() and None not in [self.slots[slot] for slot in slots]:
                 self._numbers(slots, self.target.position_size)
+                at = keys.flat[-1] if keys.flat else at
             else:
                 made = self._rotation()
                 if at:
@@ -187,7 +188,7 @@ class Splicer:
             at = at or keys.position
         else:
             self.dropped.update(keys.others)
-        self.behind[at or self.tail] += made + self._extras(target.own_size)
+        self.behind[at or self.tail] += made + self._extras(target.own_size, () if made else keys.flat)
 
     def _place(self, key: str) -> Pieces:
         """Write the position as members: x, y, z, or a geodetic one with the axes of its rotation."""
@@ -212,12 +213,16 @@ class Splicer:
             made += tuple(IfLocked(piece.text) for piece in flag if isinstance(piece, Const))
         return [made] if made else []
 
-    def _extras(self, first: int) -> list[Pieces]:
-        """Return the extra numbers of a result as members; existing ones are replaced if the operation does so."""
+    def _extras(self, first: int, there: Sequence[str] = ()) -> list[Pieces]:
+        """Return the extra numbers of a result as members; existing ones are replaced if the operation does so.
+
+        there: keys that are written already, like the angle of an axis-angle
+        """
         said, prefix = self.request.operation.shown, self.request.results.prefix
         if said is None:
-            names = [prefix + name for name in self.target.extras]
-            return [self._member(with_entries(dict.fromkeys(names, 0.5)), first)] if names else []
+            names = [(prefix + name, at) for at, name in enumerate(self.target.extras, first)]
+            groups = [dict(group) for is_new, group in groupby(names, lambda each: each[0] not in there) if is_new]
+            return [self._member(with_entries(dict.fromkeys(group, 0.5)), min(group.values())) for group in groups]
         members = []
         for name, value in said.members.items():
             key = prefix + name
