@@ -10,9 +10,8 @@ import numpy as np
 from frametool.errors import ValueInvalid
 from frametool.fit import trajectory_errors
 from frametool.fit.alignment import ALIGNMENTS, SCALED, Fit, Unaligned, fitted, lever_arm, principal_axes
-from frametool.fit.clock_offset import LIMIT_S, clock_offset
 from frametool.fit.least_squares import require_near
-from frametool.fit.pairing import Pairs, interval, paired
+from frametool.fit.pairing import LIMIT_S, Pairs, clock_offset, interval, paired
 from frametool.fit.trajectory_errors import Delta, statistics
 from frametool.frames.stamps import format_stamp
 from frametool.frames.trajectory import Trajectory, way

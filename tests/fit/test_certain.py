@@ -10,11 +10,11 @@ from rigs import rig
 from worlds import ring
 
 from frametool.errors import ValueInvalid, overheard
-from frametool.fit.clock_offset import clock_offset
 from frametool.fit.comparison import AUTO, EVO, Comparison, Settings
 from frametool.fit.comparison import compared as compare
 from frametool.fit.hand_eye import solve_hand_eye
 from frametool.fit.measured_tree import solve_tree
+from frametool.fit.pairing import clock_offset
 from frametool.fit.trajectory_errors import parse_delta
 from frametool.frames.trajectory import Trajectory
 from frametool.geometry.transform import Rotation, Transform

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from frametool.fit.alignment import ALIGNMENTS, Unaligned, fitted, lever_arm
-from frametool.fit.clock_offset import clock_offset
-from frametool.fit.pairing import Pairs, paired
+from frametool.fit.pairing import Pairs, clock_offset, paired
 from frametool.fit.trajectory_errors import (
     Delta,
     absolute_errors,

@@ -9,9 +9,9 @@ from worlds import ring
 
 from frametool.errors import overheard
 from frametool.fit.alignment import FEWEST
-from frametool.fit.clock_offset import clock_offset
 from frametool.fit.hand_eye import solve_hand_eye
 from frametool.fit.measured_tree import solve_tree
+from frametool.fit.pairing import clock_offset
 from frametool.frames.trajectory import Trajectory
 
 pytestmark = pytest.mark.filterwarnings("ignore::frametool.errors.FrametoolWarning")  # what looks odd is in the result too
