@@ -18,8 +18,7 @@ import numpy as np
 from frametool.errors import ValueInvalid, alternatives, first_of, printable, shown, warn
 from frametool.fit import least_squares as lsq
 from frametool.fit.blunders import best_blunder
-from frametool.fit.bodies import bodies_of, bridges
-from frametool.fit.tree_problem import Noise, TreeModel, TreeProblem, by_body_step, jacobians
+from frametool.fit.tree_problem import Noise, TreeModel, TreeProblem, bodies_of, bridges, by_body_step, jacobians
 from frametool.frames.lookups import FrameTree
 from frametool.frames.topology import Groups, Snapshot
 from frametool.geometry.transform import Transform
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.fit.blunders import Measurement
-    from frametool.fit.bodies import Bodies
+    from frametool.fit.tree_problem import Bodies
     from frametool.frames.lookups import Frames
     from frametool.geometry import Array
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.fit.blunders import Measurement
-from frametool.fit.bodies import bridges, spanning_tree
+from frametool.fit.tree_problem import bridges, spanning_tree
 from frametool.geometry.transform import Rotation, Transform
 
 if TYPE_CHECKING:
