@@ -24,7 +24,7 @@ from frametool.grammar.readers import EARTH_FRAMES, is_slashed
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from frametool.formats.load import EdgePlace, FrameFile, Rules
+    from frametool.formats.load import EdgePlace, FrameFile
     from frametool.formats.robots.model import Robot
     from frametool.frames.lookups import Frames
 
@@ -43,42 +43,38 @@ def load_tree(
     streams: the command also reads a stream; the last --in that can be streamed is the format of the stream
     drawings: accept a file without poses too, if it is the only one
     """
-    from frametool.formats.load import Rules  # not every command that may read trees does
-
-    rules = Rules(bool(inputs.moving), inputs.cache, bool(inputs.normalize))
+    rules = {"moving": bool(inputs.moving), "keep_ns": inputs.cache, "normalize": bool(inputs.normalize)}
     return _load(inputs, (argument, *more), rules, streams=streams, drawings=drawings and not more)[0]
 
 
 def load_sides(inputs: Inputs, a: Sequence[str], b: Sequence[str]) -> list[tuple[Frames, dict[str, EdgePlace]]]:
     """Read two trees to compare, each of several files, as `load_tree` does; with the location of each frame."""
-    from frametool.formats.load import Rules
-
     refuse_two_readers((*a, *b))
     count = len(a) + len(b)
     sides: list[tuple[Frames, dict[str, EdgePlace]]] = []
     for arguments, behind in ((a, 0), (b, len(a))):
         earth = next((name for name in EARTH_FRAMES if sides and name in sides[0][0].frames), "")
-        rules = Rules(normalize=bool(inputs.normalize), earth=earth)
+        rules = {"normalize": bool(inputs.normalize), "earth": earth}
         sides.append(_load(inputs, arguments, rules, placed=True, behind=behind, of=count))
     return sides
 
 
 def _load(
-    inputs: Inputs, arguments: Sequence[str], rules: Rules, *, placed: bool = False, **how: Any
+    inputs: Inputs, arguments: Sequence[str], rules: Mapping[str, Any], *, placed: bool = False, **how: Any
 ) -> tuple[Frames, dict[str, EdgePlace]]:
     """Merge files into a tree and return it with the location of each frame; a batch caches unchanged files.
 
-    placed: collect the locations
+    rules: fields of Rules; placed: collect the locations
     how: options of `opened`
     """
-    from frametool.formats.load import load_sources
+    from frametool.formats.load import Rules, load_sources  # not every command that may read trees does
 
     before = {*inputs.unused}
 
     def read() -> tuple[tuple[Frames, dict[str, EdgePlace]], set[str]]:
         files = opened(inputs, arguments, **how)
         places: dict[str, EdgePlace] = {}
-        tree = load_sources(files, rules, places if placed else None)
+        tree = load_sources(files, Rules(**rules), places if placed else None)
         if tree.moves:
             inputs.use("time_offset")
         report_files(inputs, files)

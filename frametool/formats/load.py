@@ -405,7 +405,6 @@ def load(
     format does not name, as (world, body).  answers: direction, camera_axes, dh, stamps as in
     `frametool.formats.table`. Raises FormatError, Unanswered and BadTopology with file, line and column; FileProblem.
     """
-    rules = Rules(moving=moving, keep_ns=keep_ns, normalize=normalize)
     chosen = listed(topics)
     if format is not None and format not in readers("tree"):
         raise ValueInvalid(f"no trees are read from {format!r}{alternatives(format, readers('tree'), 'formats')}")
@@ -416,9 +415,8 @@ def load(
     files = opened_together(FrameFile(path, fmt=format, topics=chosen, answers=known) for path in paths)
     for ask in ("frames", *answers):
         if getattr(known, ask) and not any(ask in file.required_options for file in files):
-            names = " and ".join(dict.fromkeys(file.format for file in files))
-            warn(f"{ask} has no effect: {names} specifies this itself")
-    return load_sources(files, rules)
+            warn(f"{ask} has no effect: {' and '.join({file.format: 0 for file in files})} specifies this itself")
+    return load_sources(files, Rules(moving=moving, keep_ns=keep_ns, normalize=normalize))
 
 
 def load_sources(

@@ -100,9 +100,8 @@ def lookup_command(inputs: Inputs) -> int:
     Trajectories and tables (-f tum, csv ..) hold all samples, those from --start to --stop.
     """
     task = Task(inputs, "poses")
-    columns = inputs.target_column, inputs.source_column
     output, target, source = task.output, inputs.target, inputs.source
-    by_row = {*columns, inputs.time_column} != {None}
+    by_row = {inputs.target_column, inputs.source_column, inputs.time_column} != {None}
     refuse(not by_row and source is None, f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
     if covariance := inputs.covariance:
         refuse(output.style.place, "--covariance is along the axes of ecef; leave --to PLACE out")

@@ -211,10 +211,8 @@ def follow(inputs: Inputs) -> None:
         if sys.stdin is None:
             raise FileProblem("standard input is closed")
         say_if_typed()
-        if is_paced:  # commands act when they arrive
-            leader = drivers.arriving(read_stream(sys.stdin.buffer, "stdin", period_ns=0))
-        else:
-            leader = drivers.scripted(read_stream(sys.stdin.buffer, "stdin"))
+        make, period_ns = (drivers.arriving, 0) if is_paced else (drivers.scripted, BILLION)  # acts when it arrives
+        leader = make(read_stream(sys.stdin.buffer, "stdin", period_ns=period_ns))
     else:
         if not os.path.exists(argument) and not os.path.splitext(argument)[1]:
             known = alternatives(argument, drivers.LEADERS, "leaders")
@@ -238,8 +236,7 @@ def scene_of(inputs: Inputs, leader: MakeLeader) -> Scene:
     with misuse():
         if chosen["followers"]:  # the options of followers have no effect without one
             chosen |= {name: getattr(inputs, name) for name in FOLLOW_OPTIONS}
-            numbers = {name: getattr(inputs, name) for name in LAW_OPTIONS}
-            chosen["law"] = drivers.FollowController(inputs.law, **numbers)
+            chosen["law"] = drivers.FollowController(inputs.law, **{key: getattr(inputs, key) for key in LAW_OPTIONS})
         return tutorial(leader=leader, holonomic=holonomic, **chosen)
 
 

@@ -83,9 +83,8 @@ class Splicer:
         self.flow = json or self.node.flow or not self.members
         self.head, self.tail = next(iter(self.members), ""), next(reversed(self.members), "")
         self.between = ", " if self.flow else "\n" + " " * self.members[self.head][0].column  # the separator
-        self.edits: list[Edit] = []
+        self.edits, self.dropped = list[Edit](), set[str]()
         self.ahead, self.behind = defaultdict[str, list[Pieces]](list), defaultdict[str, list[Pieces]](list)
-        self.dropped: set[str] = set()
         self.slots: list[Node | None] = [None if path is None else root.at(path) for path in record.numbers]
 
     def run(self) -> list[Edit]:
@@ -140,8 +139,8 @@ class Splicer:
         """Replace the numbers in some slots by those of the result from `first` on."""
         for out, slot in enumerate(slots, self.first + first):
             if (node := self.slots[slot]) is not None:
-                inside = node.start + bool(node.quote), node.end - bool(node.quote)
-                self.edits.append(Edit(*inside, (Out(out, out + 1, b""),)))
+                quote = bool(node.quote)
+                self.edits.append(Edit(node.start + quote, node.end - quote, (Out(out, out + 1, b""),)))
 
     def _in_place(self) -> None:
         """Write the numbers of a result in the place of the record's, or as new members."""
@@ -149,17 +148,16 @@ class Splicer:
         if target.scaled:
             self.dropped.update(keys.covariances)  # the matrix has the scale
         elif not shape.rewritten:
-            own, extras = shape.own_size, len(target.extras)
-            self._numbers(range(own, own + sum(shape.covariance)), target.own_size + extras)
+            covariances = range(shape.own_size, shape.own_size + sum(shape.covariance))
+            self._numbers(covariances, target.own_size + len(target.extras))
         if shape.kind in SIX:
             self._numbers(range(6), 0)
             return
         kind = "xyz" if shape.kind == POSE else shape.kind
         members, there = (keys.position,) if keys.position else keys.members, shape.position_size
         if keys.position in (POINT, VECTOR) and keys.position != kind:
-            node = self.members[keys.position][0]
-            text = f'"{kind}"' if self.json else kind
-            self.edits.append(Edit(node.start, node.end, (Const(text.encode()),)))
+            node, quote = self.members[keys.position][0], '"' * self.json
+            self.edits.append(Edit(node.start, node.end, (Const(f"{quote}{kind}{quote}".encode()),)))
         if shape.unit is None:
             if target.unit is not None:
                 self.ahead[keys.rotation or self.head].append(self._place("xyz"))
@@ -218,12 +216,13 @@ class Splicer:
 
         there: keys that are written already, like the angle of an axis-angle
         """
-        said, prefix = self.request.operation.shown, self.request.results.prefix
+        said, prefix, members = self.request.operation.shown, self.request.results.prefix, list[Pieces]()
         if said is None:
-            names = [(prefix + name, at) for at, name in enumerate(self.target.extras, first)]
-            groups = [dict(group) for is_new, group in groupby(names, lambda each: each[0] not in there) if is_new]
-            return [self._member(with_entries(dict.fromkeys(group, 0.5)), min(group.values())) for group in groups]
-        members = []
+            for is_there, group in groupby((prefix + name for name in self.target.extras), there.__contains__):
+                names = dict.fromkeys(group, 0.5)
+                members += [] if is_there else [self._member(with_entries(names), first)]
+                first += len(names)
+            return members
         for name, value in said.members.items():
             key = prefix + name
             member = self._member({key: value if isinstance(value, str) else 0.5}, 0)
@@ -252,8 +251,7 @@ class Splicer:
         """Rename frames where the record names them, or in new members."""
         record, place, kind = self.record, self.target.place, self.record.shape.kind
         parent, placed = "parent" if self.kind == POSE else "frame", record.keys.placed
-        is_place = place is not None and place.name not in EARTH_FRAMES and parent == "frame"
-        is_local = is_place or (place is not None and place.origin is not None)
+        is_local = bool(place and (place.origin or (self.kind != POSE and place.name not in EARTH_FRAMES)))
         said: dict[str, Any] = {}
         if record.parent.text and not record.parent.paths and not is_local:  # of a geodetic position
             said[parent] = self.entry.parent
