@@ -85,7 +85,7 @@ class Task:
 
         what: the kinds of results of the command, unless `output` is passed
         """
-        self.inputs, self.normalize = inputs, bool(inputs.normalize)
+        self.inputs, self.normalize, self.place = inputs, bool(inputs.normalize), ""
         self.output = output = output or Output(inputs, *what)
         path = inputs.peek("input_path")
         self.paths: Sequence[str] = path if isinstance(path, tuple) else () if path is None else (path,)
@@ -96,7 +96,6 @@ class Task:
         notations: Any = inputs.peek("from_rep") or (None,)
         refuse(len(notations) > 1, "--from takes one representation")
         self.notation: Any = notations[0]
-        self.place = ""
         if self.notation is not None and self.notation.representation.is_place:
             self.notation, self.place = None, self.notation.representation.name
         self.window = options.window_of(inputs)
@@ -159,7 +158,7 @@ class Task:
         from frametool.rows.request import Request, ResultOptions
 
         bad, row = self.policy(self.name, "row"), 1
-        request = Request(on_error=self.inputs.on_error, results=ResultOptions(by_default=True))
+        request = Request(on_error=self.inputs.on_error, results=ResultOptions(default_notation=True))
         for made in FormatConverter(fmt, request, self.name, Style("csv", ()), answers(self.inputs)).outcomes(opened):
             bad.take([fault._replace(line=fault.line + row) for fault in made.faults])
             row += made.lines
@@ -308,9 +307,9 @@ class Task:
             target = chosen or (fmt if "poses" in FORMATS[fmt].writes and not output.notations else "csv")
             no_stream = f"--format {target} is for single results and records, not for a stream of {fmt}"
             refuse(target not in FORMATS, no_stream)
-            request, style = request.with_results(by_default=not output.notations), output.style.changed(format=target)
-            converted = FormatConverter(fmt, request, self.name, style, answers(self.inputs))
-            return converted.outcomes(stream, header=not self.inputs.no_header), target, converted.tally
+            request = request.with_results(default_notation=not output.notations)
+            driver = FormatConverter(fmt, request, self.name, output.style.changed(format=target), answers(self.inputs))
+            return driver.outcomes(stream, header=not self.inputs.no_header), target, driver.tally
         if fmt in RECORDS:
             return *self._records(stream, fmt, request, chosen or ""), None
         from frametool.rows.sources.tables import run_table
@@ -322,7 +321,7 @@ class Task:
         from frametool.cli.trees import answers
         from frametool.rows.samples import steps_of
 
-        request = request.with_results(by_default=True, notations=())
+        request = request.with_results(default_notation=True, notations=())
         if fmt in RECORDS:
             return steps_of(stream, fmt, request, self.name)
         header = not self.inputs.no_header
@@ -336,7 +335,8 @@ class Task:
             return run_records(stream, fmt, request, source=self.name), fmt
         if request.on_error == NULL and chosen not in ("csv", *RECORDS):
             raise click.UsageError(f"--on-error null: {chosen} cannot hold a row without a result; give skip")
-        request = request.with_results(by_default=holds(chosen, "arrays", "recording") and not self.output.notations)
+        by_format = holds(chosen, "arrays", "recording") and not self.output.notations
+        request = request.with_results(default_notation=by_format)
         if table.holds(chosen, "recording"):
             request = request.with_results(place=None)  # fixes are written from ecef, or unchanged
         outcomes = run_records(stream, fmt, request, source=self.name, style=self.output.style)
@@ -351,7 +351,7 @@ class Task:
         refuse(on_terminal, f"{fmt} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
         columns = open_columns(InputFile(self.path or "-", stream), fmt)
         style = output.style.changed(format=output.chosen or fmt)
-        request = request.with_results(by_default=not output.notations)
+        request = request.with_results(default_notation=not output.notations)
         if output.chosen and FORMATS[output.chosen].writer != FORMATS[fmt].reader:
             return OtherColumns([(columns, request, self.name)], style).outcomes()
         return run_columns(columns, request, style, source=self.name)
@@ -391,7 +391,7 @@ class Task:
         inputs, style = self.inputs, self.output.style
         if self.window:
             inputs.use("start", "stop")
-            fields["extra_column"] = fields.get("extra_column") or ""
+            fields["stamp_or_weight_column"] = fields.get("stamp_or_weight_column") or ""
         for name in ("values", "poses", "pose", "a", "b"):
             value = inputs.peek(name) or ()
             for text in [value] if isinstance(value, str) else value:

@@ -262,7 +262,8 @@ def settle(
             warn(f"{table.source}: {grammar.NO_ALT}")
         if operation.keeps_frames and asked.place is None:
             bare = shape.notation is None and all(each.representation.name == "quaternion" for each in asked.notations)
-            request = request.with_results(place=Place.written((ECEF,), Earth()), by_default=asked.by_default or bare)
+            by_default = asked.default_notation or bare
+            request = request.with_results(place=Place.written((ECEF,), Earth()), default_notation=by_default)
         if shape.notation is None and not (operation.inverse or operation.similar):
             has_idle_axes = earth and earth.axes and operation.keeps_frames
             if has_idle_axes and not (asked.all_numbers or any(map(may_be_uncertain, names))):

@@ -53,7 +53,7 @@ def with_covariances(
         reading.note(LEFT_OUT.format("calc"), rule="left-out")
     if is_left_out:
         return record._replace(keys=record.keys._replace(others=(*record.keys.others, *said)))
-    if operation.keeps_frames and not (shape.inverse or (has_sigma and request.results.canonical)):
+    if operation.keeps_frames and not (shape.inverse or (has_sigma and request.results.rewrite_records)):
         for key in there * is_own:
             within((*around, key), _entries, holder[key], (36, 9))
         return record

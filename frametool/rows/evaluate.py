@@ -43,8 +43,8 @@ class Plan(NamedTuple):
     pieces: the text of a result; null: what replaces each number of a row without one
     edge_of: the pose that moves a row, or one of its shapes, by the name of the frame it is expressed in
     frame_column: the name of the column that names frames
-    remedies: for each shape, what to do where its angles are degrees
-    words: reads the numbers that are words of a table, by column: zones; marked: angles that are no plain number
+    degree_hints: for each shape, what to do if its angles are in degrees
+    categorical: reads words that stand for numbers, by column: zones; dms_columns: angles in degrees and minutes
     yaml: numbers need a point before the exponent
     """
 
@@ -56,15 +56,15 @@ class Plan(NamedTuple):
     null: bytes = b""
     edge_of: Callable[..., Rigid] | None = None
     frame_column: str = ""
-    remedies: tuple[str, ...] = ()
-    words: Mapping[int, Callable[[str], float]] = MappingProxyType({})
-    marked: Mapping[int, Callable[[str], float]] = MappingProxyType({})
+    degree_hints: tuple[str, ...] = ()
+    categorical: Mapping[int, Callable[[str], float]] = MappingProxyType({})
+    dms_columns: Mapping[int, Callable[[str], float]] = MappingProxyType({})
     yaml: bool = False
 
 
 @dataclass(slots=True)
 class State:
-    """What one block leaves for the next: the row before, its frame, and how often each angle has turned around."""
+    """What a block passes on to the next one: its last row, that row's frame, and the turns of each angle."""
 
     previous: Floats | None = None
     frame: str | None = None
@@ -142,12 +142,12 @@ class Run:
         def read(at: int) -> float:
             """Read an angle, or a length where metres are wanted, which may say its own unit; words are read below."""
             text, column = cells.text(*divmod(at, width)).decode("utf-8", "replace").strip(" \t"), at % width
-            reader = plan.marked.get(column) or readers[column]
-            return 0.0 if column in plan.words else reader(text)
+            reader = plan.dms_columns.get(column) or readers[column]
+            return 0.0 if column in plan.categorical else reader(text)
 
         for at, reason in read_each(numbers.reshape(-1), bad.tolist(), read).items():
             self._blame(at // width, plan.names[at % width], reason)
-        for column, word in plan.words.items() if self.count else ():  # also those that look like numbers
+        for column, word in plan.categorical.items() if self.count else ():  # also those that look like numbers
             own = coded(Spans(cells.data, cells.starts[:, column], cells.ends[:, column]))
             numbers[:, column], reasons = own.numbers(word)
             for row, reason in reasons.items():
@@ -301,7 +301,7 @@ class Run:
             last, now = format_stamp(int(before[index])), format_stamp(int(stamps[index]))
             what = "is that of the row before" if now == last else f"is before {last}, of the row before"
             reason = f"stamp {now} {what}: there is no velocity"
-            self._blame(int(good[index]), self.request.rows.extra_column or "", reason)
+            self._blame(int(good[index]), self.request.rows.stamp_or_weight_column or "", reason)
         if known is None:
             self.absent.add(int(good[0]))
         self.state.stamp_ns = int(stamps[-1])
@@ -336,7 +336,7 @@ class Run:
         if beyond.size and not self.doubted:
             self.doubted, row = True, int(beyond[0])
             at = max(angles, key=lambda at: abs(values[at][row]))
-            remedy = self.plan.remedies[self.plan.shapes.index(shape)] if self.plan.remedies else COLUMNS_REMEDY
+            remedy = self.plan.degree_hints[self.plan.shapes.index(shape)] if self.plan.degree_hints else COLUMNS_REMEDY
             self._note(row, first + shape.number_at(at), DEGREES, doubt(shape, values[at][row], remedy))
         return found.quaternions
 

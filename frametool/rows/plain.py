@@ -97,7 +97,7 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
         stamp = record.stamps[:2]
     elif timed is not None and operation.formula is not None and not operation.shown:
         stamp = (path_of(),)
-    elif (key := request.rows.extra_column) is not None and request.rows.stamps != NO_STAMPS:
+    elif (key := request.rows.stamp_or_weight_column) is not None and request.rows.stamps != NO_STAMPS:
         stamp = (not key and record.stamps[:2]) or (path_of((key,)) if key else path_of(),)
     elif request.pose_from_frame is not None:
         edge = request.pose_from_frame(record.parent.text)
@@ -227,7 +227,7 @@ class RecordText:
         for entry in self.entries:
             with suppress(Outside):
                 found.append(answer(entry, self.values, self.request))
-        if len(found) < len(self.entries) and (not found or not self.request.results.canonical):
+        if len(found) < len(self.entries) and (not found or not self.request.results.rewrite_records):
             raise Outside("beyond --start or --stop")
         return found
 
@@ -334,7 +334,7 @@ def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
     """
     if request.operation.looks_back:
         raise Misused("rows are compared with those before them in streams; pipe them in as JSON lines, YAML or CSV")
-    request = request.with_results(canonical=True)
+    request = request.with_results(rewrite_records=True)
     known = read_text(source, request)
     if known.lost:
         warn(f"{source.name}: frame {shown(known.lost)} is left out: the frames of the result are not known")

@@ -123,7 +123,7 @@ def plan_table(table: Table, request: Request) -> tuple[Plan, Layout]:
     return Plan(
         shapes, targets, request, tuple(map(table.name, places)), pieces, b"" if table.delimiter else b"nan",
         request.pose_from_frame if moves_each else None, table.name(frames[0]) if len(frames) == 1 else "",
-        words=words, marked=marked,
+        categorical=words, dms_columns=marked,
     ), layout  # fmt: skip
 
 
@@ -135,7 +135,7 @@ def _find(table: Table, request: Request) -> list[PoseColumns]:
     asked, specs, width = request.rows, request.rows.columns, table.width
     if not asked.poses:
         return []
-    other = asked.extra_column if asked.stamps == NO_STAMPS else None
+    other = asked.stamp_or_weight_column if asked.stamps == NO_STAMPS else None
     apart = None if other is None else _place(other, table)
     if specs and len(specs) != asked.poses:
         raise Misused(f"--columns is given {len(specs)} times, for {asked.poses} poses in a row")
@@ -147,7 +147,7 @@ def _find(table: Table, request: Request) -> list[PoseColumns]:
         specs = specs or ("" if asked.given_place else _by_width(width, request),)
         chosen = zip(specs, kinds, strict=True)
         return [choose(spec, table.names, width, request, kind) for spec, kind in chosen]
-    hidden = {at for at, name in enumerate(table.names) if at == apart or name == asked.extra_column}
+    hidden = {at for at, name in enumerate(table.names) if at == apart or name == asked.stamp_or_weight_column}
     every = header.Header(table.names, hidden)
     six = header.find_six(every, asked.kind if asked.kind in SIX else "")
     if asked.kind in SIX and six is None:
@@ -202,7 +202,7 @@ def _turning_along(table: Table, poses: Sequence[PoseColumns], request: Request)
 
 def _without_position(pose: PoseColumns, request: Request, table: Table) -> PoseColumns:
     """Leave the position to pass as it is where only the rotation is rewritten."""
-    if pose.rotation is None and request.results.by_default:
+    if pose.rotation is None and request.results.default_notation:
         return pose
     if pose.rotation is None:
         wanted = "; give --from REP or --columns" if request.rows.given is None else ""
@@ -259,7 +259,7 @@ def _stamp_columns(table: Table, request: Request, places: Sequence[int], frames
     """
     if request.rows.stamps == NO_STAMPS:
         return []
-    name = request.timed.name if request.timed else request.rows.extra_column
+    name = request.timed.name if request.timed else request.rows.stamp_or_weight_column
     if name is not None:
         time = _place(name, table)
         try:
@@ -287,7 +287,7 @@ def _columns(
     columns: list[Column] = [Kept(place) for place in range(table.width)]
     operation, asked = request.operation, request.results
     only_turned = operation.changes_nothing and asked.place is None
-    if only_turned and asked.by_default and not (asked.all_numbers or targets[0].notations or asked.keep):
+    if only_turned and asked.default_notation and not (asked.all_numbers or targets[0].notations or asked.keep):
         return columns
     at: dict[int, list[Column]] = {place: [] for pose in poses for place in pose.places}
     adds, ours = asked.keep or operation.only_adds or not at, tuple(at)

@@ -189,7 +189,7 @@ def _refuse_repeated(record: Record, root: Any, request: Request) -> None:
     """Raise Misfit if a key of the result exists, unless a comparison replaces that of an earlier one."""
     operation, said, path = request.operation, request.operation.shown, record.path
     names, last, problem = operation.extras(record.shape), len(path), ", where the result would stand"
-    first = len(outermost(path) if request.results.canonical else path)  # in another format all is in one row
+    first = len(outermost(path) if request.results.rewrite_records else path)  # in another format all is in one row
     if operation.only_adds:
         names += () if said is None or said.replaces else (*said.members,)
         first = last = len(outermost(path))

@@ -353,14 +353,14 @@ class Timed(NamedTuple):
 class RowOptions(NamedTuple):
     """How rows are read.
 
-    poses: how many poses each row holds; 0 where rows only name frames
-    kind: what rows are taken for; "" as they look; kinds: of each of several points or poses in a row
-    given: the notation of their rotations; given_place: what unnamed numbers are of a position on the Earth
-    degrees: whether bare angles are in degrees; normalize: take any non-zero quaternion
-    columns: which columns are ours, one entry a pose; frames: columns that name a row's frame
-    extra_column: the column or key of a stamp that is read with the pose; "" is the usual stamp
-    stamps: ALL rows have stamps where one has, or SOME; NO_STAMPS are read: then the extra column holds something else
-    frame_is_counter: a decimal `frame` is a counter, because no frame is called so
+    poses: the number of poses in each row; 0 if rows only name frames
+    kind: pose, point, vector, twist or wrench; "" by their columns; kinds: of each of several points or poses in a row
+    given: the notation of rotations; given_place: the kind of geodetic position that unnamed numbers are
+    degrees: bare angles are in degrees; normalize: accept any non-zero quaternion
+    columns: the pose columns by name or number, one entry a pose; frames: columns that name a row's frame
+    stamp_or_weight_column: a column or key that is read with the pose; "" is the usual stamp
+    stamps: ALL rows have stamps if one has, or SOME; with NO_STAMPS that column is a weight or a label
+    frame_is_counter: a decimal `frame` is a counter, because no frame has such a name
     """
 
     poses: int = 1
@@ -372,7 +372,7 @@ class RowOptions(NamedTuple):
     normalize: bool = False
     columns: tuple[str, ...] = ()
     frames: tuple[str, ...] = ()
-    extra_column: str | None = None
+    stamp_or_weight_column: str | None = None
     stamps: str = ALL
     frame_is_counter: bool = True
 
@@ -380,34 +380,34 @@ class RowOptions(NamedTuple):
 class ResultOptions(NamedTuple):
     """How results are written.
 
-    notations: of their rotations; none means as read
-    by_default: no option chose these notations; what has no rotation gets none
-    keep, prefix: results are added to the input, under other names
-    unwrap: angles go on beyond half a turn
-    all_numbers: all numbers of a result are wanted, also those that do not change
-    canonical: results are written anew rather than in the text of their records
-    place: how positions on the Earth are written
+    notations: of rotations; () as they were read
+    default_notation: no option chose these notations; results without a rotation get none
+    keep, prefix: results are added to the columns of the input, with this prefix
+    unwrap: angles continue beyond half a turn
+    all_numbers: write all numbers of a result, also unchanged ones
+    rewrite_records: write results as new records, not into the text of the old ones
+    place: the format of positions on the Earth
     """
 
     notations: tuple[Notation, ...] = ()
-    by_default: bool = False
+    default_notation: bool = False
     keep_sign: bool = False
     precision: int | None = None
     keep: bool = False
     prefix: str = ""
     unwrap: bool = False
     all_numbers: bool = False
-    canonical: bool = False
+    rewrite_records: bool = False
     place: Place | None = None
 
 
 class Request(NamedTuple):
     """What one run does with its rows, how it reads them and how it writes the results.
 
-    pose_from_frame: the pose that moves a record expressed in a frame; timed: the poses that do so at its own time
-    rename: turns a record's (parent, name) into those of its result
-    earth: what is said of all places: the origin, the axes of rotations, the zone
-    offset_ns: added to the stamps of rows and records, also `FromFirst`; window: the first and the last that are left
+    pose_from_frame: the pose that moves a record expressed in a frame; timed: the poses at its own time
+    rename: returns the (parent, name) of a result from those of its record
+    earth: the origin, the axes of rotations and the zone of all geodetic positions
+    offset_ns: added to all stamps, also `FromFirst`; window: the first and the last stamp that are not ignored
     """
 
     operation: Operation = Operation()
@@ -422,11 +422,11 @@ class Request(NamedTuple):
     window: tuple[int, int] | None = None
 
     def with_rows(self, **fields: Any) -> Request:
-        """Return it with other options of how rows are read."""
+        """Return the request with other options for reading rows."""
         return self._replace(rows=self.rows._replace(**fields))
 
     def with_results(self, **fields: Any) -> Request:
-        """Return it with other options of how results are written."""
+        """Return the request with other options for writing results."""
         return self._replace(results=self.results._replace(**fields))
 
     def of_inverses(self) -> Request:
@@ -469,7 +469,7 @@ class Request(NamedTuple):
         if asked.notations or shape.notation is None or shape.notation.representation is HEADING:
             changed = operation.left or operation.right or operation.of or operation.formula
             has_none = shape.notation is None and not by_row and bool(operation.turns or not changed)
-            stays = has_none and (asked.by_default or not asked.notations)
+            stays = has_none and (asked.default_notation or not asked.notations)
             notations = () if stays else asked.notations or (notation("quaternion"),)
             whole = there and len(notations) == 1 and notations[0].representation.whole is not None
             written = tuple((each, each.in_degrees(self.rows.degrees)) for each in notations)
@@ -494,7 +494,7 @@ class Request(NamedTuple):
         asked = self.results
         if asked.place is not None and shape.unit is not None:
             return asked.place
-        own = shape.unit if shape.place is None and not (asked.canonical and shape.unit) else 1.0
+        own = shape.unit if shape.place is None and not (asked.rewrite_records and shape.unit) else 1.0
         return 1.0 if own is not None and asked.all_numbers and (asked.notations or shape.notation is None) else own
 
     def for_kind(self, kind: str) -> Request:

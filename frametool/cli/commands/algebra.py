@@ -118,7 +118,7 @@ def relative_command(inputs: Inputs) -> int:
         # both rows are poses of one frame at different times, so the result has its name twice
         operation = Operation(of=VELOCITIES if velocity else PREVIOUS if inputs.consecutive else START)
         column = (inputs.time_column or "") if velocity or task.window else None
-        request = task.request(operation=operation, extra_column=column, rename=lambda _parent, name: (name, name))
+        request = task.request(operation=operation, stamp_or_weight_column=column, rename=lambda _, name: (name, name))
         status = task.write_results(a or "-", request)
         left_out = "the first pose has none before it, so no velocity: it is left out, results begin at the second"
         inputs.note(f"note: {left_out}" if velocity else None)
@@ -202,7 +202,7 @@ def mean_command(inputs: Inputs) -> int:
 
     arguments, status, numbers = inputs.poses, 0, None
     rows = MeanRows(weights, by)
-    request = task.request(kind="pose", extra_column=rows.key, stamps=NO_STAMPS)
+    request = task.request(kind="pose", stamp_or_weight_column=rows.key, stamps=NO_STAMPS)
     bare, is_inverse = poses.without_inverse(arguments[0]) if len(arguments) == 1 else ("", False)
     if bare == "-" or (bare and not task.path and not poses.is_pasted(bare, task.notation)):
         arguments = ()

@@ -64,7 +64,7 @@ def convert_command(inputs: Inputs) -> int:
     if task.plan:
         one_argument(values[0] if values else axes or world)
     notations = output.notations or QUATERNION
-    request = task.request(operation=operation, extra_column=inputs.time_column, notations=notations)
+    request = task.request(operation=operation, stamp_or_weight_column=inputs.time_column, notations=notations)
     if operation.turns and (values or task.path or task.has_input()):
         _report_axes(axes, world, request.rows.given, output, is_anew=bool(values) and values != ("-",))
     is_numbers = _are_numbers(values, has_from=request.rows.given is not None or bool(request.rows.given_place))

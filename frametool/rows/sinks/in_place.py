@@ -386,12 +386,12 @@ def attempt(text: bytes, part: Part, line: int = 0, *, fmt: str, request: Reques
             from frametool.ros.messages import without_noise
 
             decoded = without_noise(decoded)
-            if request.results.canonical and not decoded.strip():
+            if request.results.rewrite_records and not decoded.strip():
                 return Fault(line, "", Outside("printed between messages"))
         source = source._replace(text=decoded)
         found = RecordText(source, request, json=fmt == "json")
         edits, first = list[Edit](), 0
-        for entry in () if request.results.canonical else found.entries:
+        for entry in () if request.results.rewrite_records else found.entries:
             edits += Splicer(found.root, entry, request, json=found.json, first=first).run()
             first += entry.target.size
         found.edits = list(dict.fromkeys(edits))  # a name that several records share is edited once

@@ -100,7 +100,7 @@ class ColumnRows(PlannedRows):
             error.line = 0  # the names of columns are in no line here
             raise
         for at, place in enumerate(self.layout.places):
-            if file.kinds[place] is None and at not in self.plan.words:
+            if file.kinds[place] is None and at not in self.plan.categorical:
                 raise Misused(f"column {table.name(place)} holds no numbers", source=source)
         self.narrow: dict[int, Kind] = {}  # numbers that are rounded to fewer digits than they are computed with
         for column in () if request.results.all_numbers else self.layout.columns:  # all of them are written as doubles
@@ -184,8 +184,8 @@ class ColumnRows(PlannedRows):
         first = 0
         for flags, shape in zip(absent, shapes, strict=False):
             for at in range(first, first + shape.size):
-                if at in self.plan.words:
-                    columns[at], reasons = coded_texts(batch.texts(places[at])).numbers(self.plan.words[at])
+                if at in self.plan.categorical:
+                    columns[at], reasons = coded_texts(batch.texts(places[at])).numbers(self.plan.categorical[at])
                     bad |= {row: (self.plan.names[at], reason) for row, reason in reasons.items()}
                     continue
                 columns[at], missing = batch.numbers(places[at])

@@ -184,7 +184,7 @@ class RecordBlocks:
     def __init__(self, fmt: str, request: Request, source: str, style: Style | None = None) -> None:
         """Start without templates."""
         self.fmt, self.style, operation = fmt, style, request.operation
-        self.request = request if style is None else request.with_results(canonical=True)
+        self.request = request if style is None else request.with_results(rewrite_records=True)
         self.splitter = Splitter(fmt)
         self._read = partial(attempt, fmt=fmt, request=self.request, name=source)
         shows_all = operation.shown is not None or (request.results.place is not None and not operation.looks_back)

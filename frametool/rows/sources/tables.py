@@ -243,15 +243,15 @@ class PlannedRows:
 
     def __init__(self, table: Table, request: Request) -> None:
         """Plan the rows of a table; raises FormatError or Misused where the request does not fit them."""
-        timed, extra, operation, self.unasked = request.timed, request.rows.extra_column, request.operation, None
+        timed, extra, self.unasked = request.timed, request.rows.stamp_or_weight_column, None
         usual = "" if (at := stamp_places(table.names)[0]) is None else table.name(at)
         is_cut = (request.window or request.offset_ns) and extra is None and not (timed and timed.name)
         if lacks_name := extra == "" or is_cut:
-            request = request.with_rows(extra_column=usual)
+            request = request.with_rows(stamp_or_weight_column=usual)
         if timed is not None and not timed.name:  # rows move at the latest time; an expression knows what theirs is for
             self.unasked = timed._replace(name=usual) if usual else None
             request = request._replace(timed=None)
-            if operation.formula and not operation.shown:
+            if request.operation.formula and not request.operation.shown:
                 lacks_name, self.unasked = True, None
                 request = request._replace(timed=timed._replace(name=usual))
         if lacks_name and not usual:
@@ -265,8 +265,7 @@ class PlannedRows:
         self.shape = self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
         self.earth = EARTH_FRAMES[0] if self.shape.place is not None else None
         self.rename = request.for_kind(self.shape.kind).rename
-        self.state = State()
-        self.mended, self.off = 0, 0.0
+        self.state, self.mended, self.off = State(), 0, 0.0
 
     @property
     def columns(self) -> str:

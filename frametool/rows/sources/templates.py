@@ -114,7 +114,7 @@ class Template:
         named = {_text_of(node): node for node in chain(*frames) if node is not None}
         self._patterns |= {span: FRAME[self.json, node.quote] for span, node in named.items()}
         cuts = {*self._patterns, *((node.start, node.end) for node in chain(*stamps))}
-        anew, leaves = known.request.results.canonical, dict[tuple[int, int], Node]()
+        anew, leaves = known.request.results.rewrite_records, dict[tuple[int, int], Node]()
         if anew and self.regular:
             leaves = {_text_of(node): node for node in own} | named
         for leaf, pattern in () if known.is_long or (anew and not self.regular) else self._free_leaves():
@@ -378,8 +378,8 @@ class RecordCutter:
 
         The template is remembered unless the record is long.
         """
-        canonical, in_order = known.request.results.canonical, known.request.in_order
-        is_alike = self.left and not known.is_long and not (canonical and len(known.entries) > MOST_ENTRIES)
+        rewritten, in_order = known.request.results.rewrite_records, known.request.in_order
+        is_alike = self.left and not known.is_long and not (rewritten and len(known.entries) > MOST_ENTRIES)
         if not known.entries or not (is_alike or in_order):
             return None
         self.left -= bool(is_alike)
@@ -463,7 +463,7 @@ def block_of(cut: Cut, called: Called, data: Bytes, text: bytes, request: Reques
         return text.count(b"\n", 0, start), str(column_in(text, start))
 
     stamps, bad = list[Any](), dict[int, tuple[str, str]]()
-    column = request.timed.column if request.timed else request.rows.extra_column or ""
+    column = request.timed.column if request.timed else request.rows.stamp_or_weight_column or ""
     for each in template.stamps:
         found, late = stamps_in([without_quotes(parts[index]) for index in each], column)
         stamps.append(found)
@@ -493,17 +493,17 @@ def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
     timed = request.timed
     if timed is not None and not timed.name and request.operation.formula is not None:
         timed = timed._replace(name=key if len(stamp) == 1 else "")  # the key that was found has the unit in its name
-    extra = None if request.rows.extra_column is None else key
+    extra = None if request.rows.stamp_or_weight_column is None else key
     return Plan(  # bad records are taken one by one
         tuple(entry.record.shape for entry in entries),
         tuple(entry.target for entry in entries),
-        request._replace(on_error=SKIP, timed=timed, offset_ns=0).with_rows(extra_column=extra),
+        request._replace(on_error=SKIP, timed=timed, offset_ns=0).with_rows(stamp_or_weight_column=extra),
         tuple(".".join(map(str, (path or ())[1:])) for entry in entries for path in entry.record.numbers),
         (In(after + 1), *template.pieces, In(after)),
         b"null",
         edge_of=request.pose_from_frame if any(entry.edge is not None for entry in entries) else None,
         yaml=yaml,
-        remedies=tuple(
+        degree_hints=tuple(
             KEYS_REMEDY if record.keys.flat else f"write {record.keys.rotation}_deg" for record, *_ in entries
         ),
     )
