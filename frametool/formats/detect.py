@@ -51,8 +51,9 @@ class Beginning:
 
     @cached_property
     def text(self) -> str:
-        """Return the bytes as text."""
-        return self.head.decode("utf-16" if self.head.startswith(UTF16) else "utf-8-sig", "replace")
+        """Return the bytes as text, with one kind of line ends."""
+        encoding = "utf-16" if self.head.startswith(UTF16) else "utf-8-sig"
+        return self.head.decode(encoding, "replace").replace("\r\n", "\n")
 
     @cached_property
     def data_line(self) -> str:
@@ -67,8 +68,7 @@ class Beginning:
         """Return the first line that is not a comment; a comment with commas or tabs, like the rows, is a header."""
         from frametool.ros.messages import is_noise
 
-        found = (line.strip("\r") for line in self.text.split("\n") if line.strip())
-        lines = [line for line in found if not is_noise(line)]
+        lines = [line for line in self.text.split("\n") if line.strip() and not is_noise(line)]
         plain = next((line for line in lines if not line.startswith("#")), "")
         if lines and re.match("#.*[,\t]", lines[0]) and (not plain or re.search("[,\t]", plain)):
             return lines[0]

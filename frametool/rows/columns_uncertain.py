@@ -47,11 +47,9 @@ def with_covariances(
     flat = [flat[at] for at in covariance.find_columns(flat, 36 if shape.kind == POSE else uncertainty.POINT)[0]]
     has_sigma = is_own and (covariance.SIGMA in holder or bool(flat))
     said = (*there, *(flat or [covariance.SIGMA] * has_sigma))
-    is_left_out = operation.formula is not None and around == path and not operation.only_adds
-    if is_left_out:
+    if operation.formula is not None and around == path:
         reading.here = path
         reading.note(LEFT_OUT.format("calc"), rule="left-out")
-    if is_left_out:
         return record._replace(keys=record.keys._replace(others=(*record.keys.others, *said)))
     if operation.keeps_frames and not (shape.inverse or (has_sigma and request.results.rewrite_records)):
         for key in there * is_own:

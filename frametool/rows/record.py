@@ -134,7 +134,7 @@ def read_record(root: Any, holder: Holder, request: Request, reading: Reading) -
     # the covariance is in the record, or in the mapping around it as in messages
     around = (path, path[:-1]) if path[-1:] == (record.shape.kind,) else (path,)
     keys = {*covariance_keys(field), *COVARIANCE_KEYS}
-    for each in () if record.keys.placed else around:
+    for each in () if record.keys.placed or request.operation.only_adds else around:
         outer = value_at(root, each)
         if type(outer) is dict and (not keys.isdisjoint(outer) or any(map(readers.may_be_uncertain, outer))):
             from frametool.rows.columns_uncertain import with_covariances

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import independent as by
 import numpy as np
 import pytest
+import yaml
 from scipy.spatial.transform import Rotation
 
 if TYPE_CHECKING:
@@ -110,6 +111,25 @@ def test_records_are_the_same_one_by_one_and_in_bulk(form: str, shape: str, text
         assert bulk.out.count('"id"') == "".join(records).count('"id"')
     else:
         assert "frametool: stdin:1: " in bulk.err or "takes a" in bulk.err
+
+
+@pytest.mark.parametrize("begin", ["", "- "])
+@pytest.mark.parametrize(("text", "added"), [("trans(row)", {"point": [1, 2, 3]}), ("norm(trans(row))", {"result": 14**0.5}), ("-eb=row.id", {"b": 7})])
+def test_a_result_without_a_rotation_is_yaml_in_a_block_of_lines(begin: str, text: str, added: dict[str, Any], run: Callable[..., Any]) -> None:
+    pose = ["id: 7", "xyz: [1, 2, 3]", "rpy:", "- 0", "- 0", "- 1"]
+    block = begin + f"\n{' ' * len(begin)}".join(pose) + "\n"
+    found = yaml.safe_load(run("calc", text, stdin=block).out)
+    kept = {"xyz": [1, 2, 3], "rpy": [0, 0, 1]} if "b" in added else {}
+    assert (found[0] if begin else found) == {"id": 7, **kept, **added}
+
+
+@pytest.mark.parametrize("around", ["", "pose"])
+def test_numbers_are_added_beside_a_covariance_that_stays(around: str, run: Callable[..., Any]) -> None:
+    pose = {"position": {"x": 3, "y": 0, "z": 4}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
+    record: dict[str, Any] = {"covariance": np.eye(6).ravel().tolist(), **({around: pose} if around else pose)}
+    record = {"header": {"frame_id": "map"}, "pose": record} if around else record
+    done = run("calc", "-e", "d=norm(trans(row))", stdin=json.dumps(record) + "\n")
+    assert (json.loads(done.out), done.err) == ({**record, "d": 5.0}, "")
 
 
 def test_tables_and_records_have_the_same_numbers(run: Callable[..., Any]) -> None:

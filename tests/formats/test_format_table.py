@@ -157,6 +157,7 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "an array of numbers": (b"[-1, 2]", "rows records", "json"),
     "documents": (b"# c\n- {x: 1}\n", "rows records", "yaml"),
     "a document in braces": (b"{x: 1, y: 2}\n", "rows records", "yaml"),
+    "documents with the line ends of Windows": (b"t: 7\r\nx: 1\r\ny: 2\r\n", "rows records", "yaml"),
     "documents behind dashes": (b"---\nx: 1\n", "rows records", "yaml"),
     "Autoware's poses": (b"# kit\nbase/x:\n  kit:\n    x: 0\n    y: -.5\n    roll: 1e-3\n    yaw: 0.0\n", "tree", "autoware"),
     "Autoware's poses in braces": (b"base: {kit: {x: 0, y: 1, z: 2, roll: 0, pitch: 0, yaw: 0}}\n", "tree", "autoware"),

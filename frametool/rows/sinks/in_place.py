@@ -280,7 +280,7 @@ class Splicer:
 
     def _member(self, entry: dict[str, Any], first: int) -> Pieces:
         """Write members in the style of the record; each number is a piece."""
-        if self.flow:
+        if self.flow or not entry:
             text = (dump_json if self.json else flow)(entry, lambda _: MARK)[1:-1]
         else:
             text = dump_yaml(entry, lambda _: MARK).rstrip("\n").replace("\n", self.between)
