@@ -371,7 +371,7 @@ class Task:
         if (is_table or request.operation.only_adds) and alone:
             request = request.with_results(prefix=inputs.prefix or "")
         if request.rows.poses:
-            inputs.use("from_rep", *FORMATS[fmt].required_options)
+            inputs.use("from_rep", *{*FORMATS[fmt].required_options} - {"stamps"})
             request = request.with_rows(columns=inputs.columns)
         several = not is_table and "," in ",".join(request.rows.columns)
         refuse(several, "--columns names one key of records, as detections.pose")

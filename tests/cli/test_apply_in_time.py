@@ -196,5 +196,26 @@ def test_stamps_that_nobody_asks_for_are_told_once_where_the_tree_moves(
     assert told.err.startswith(f"frametool: warning: stdin:2: column {column!r} is not looked at")
 
 
+@pytest.mark.parametrize(
+    ("arguments", "status", "found"),
+    [
+        (("map", "-f", "tum"), 2, "rows move at the latest time; make --stamps a column first"),
+        (("map", "base", "-f", "tum"), 2, "rows move at the latest time; make --stamps a column first"),
+        (("map", "base"), 2, "rows move at the latest time; make --stamps a column first"),
+        (("base", "mast"), 2, "--stamps has no effect here"),
+        (("base", "mast", "-f", "tum"), 0, "4.000000000 0.0 0.0 1.0 0.0 0.0 0.0 1.0"),
+        (("map", "base", "--at", "9", "-f", "tum"), 0, "4.000000000 3.0 0.0 0.0 0.0 0.0 0.0 1.0"),
+    ],
+)
+def test_rows_do_not_move_at_the_times_of_a_file_of_stamps(
+    run: Run, arguments: tuple[str, ...], status: int, found: str
+) -> None:
+    moving = "frames: [{name: base, parent: map, samples: [{stamp: 0, xyz: [1, 0, 0]}, {stamp: 9, xyz: [3, 0, 0]}]}, "
+    files: dict[str, str | bytes] = {"t.yaml": f"{moving}{{name: mast, parent: base, xyz: [0, 0, 1]}}]", "times.txt": "4\n"}
+    told = run("apply", "t.yaml", *arguments, "--stamps", "times.txt", files=files, stdin="x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,1\n")
+    assert told.status == status
+    assert found in (told.err if status else told.out)
+
+
 def test_a_pose_is_the_same_at_all_times(run: Run) -> None:
     assert run("apply", "--transform", "{xyz: [1, 0, 0]}", stdin="t,x,y,z\n0,0,0,0\n").err == ""

@@ -151,8 +151,7 @@ def several_clouds(task: streaming.Task) -> Callable[[Mover], int]:
             merged, status = OtherColumns(planned, output.style), 0
             with writing(output.path, force=output.force) as write:
                 for at, path in enumerate(paths):
-                    policy = task.policy(path, "row")
-                    status = max(status, run(merged.outcomes(at), write, policy, lambda _rows, _size: None))
+                    status = max(status, run(merged.outcomes(at), write, task.policy(path, "row"), lambda *_: None))
         froms = f", from {', '.join(frames)}" if frames else ""
         inputs.note(f"{count} clouds{mover.into} as one{froms}; metres")
         return status
@@ -217,8 +216,7 @@ def apply_command(inputs: Inputs) -> int:
         records = list(sources_of(inputs, rest, kind))
         refuse(is_stream or len(records) != 1, f"a stream, or several records; {streaming.ONE_RECORD}")
         return _derived(task, plan, mover, records[0], kind)
-    request = mover.request(kind=kind)
-    status = 0
+    request, status = mover.request(kind=kind), 0
     if is_stream:
         if count > 1:
             request = request.with_rows(poses=count, kinds=kinds if len(kinds) == count else (kind,) * count)
@@ -335,6 +333,8 @@ class TreeMover(Mover):
                 width=UNCERTAIN if self.uncertain else EXACT,
                 moves=lambda own: tree.latest(self.target, self.start(own)) is not None,
             )  # fmt: skip
+            late = "stamps" in inputs.unused and (self.timed.moves(None) if is_named else tree.moves)
+            refuse(late, "rows move at the latest time; make --stamps a column first, by convert -f tum, or give --at")
 
     def start(self, own: str | None) -> str:
         """Return the frame in which records are expressed: SOURCE, or the one that they name."""
