@@ -56,10 +56,8 @@ class TransformBuffer(Frames):
         A different pose at an existing stamp replaces the old one, with a warning.
         Raises ValueInvalid; BadTopology for two static poses or covariances, a static frame that moves, a cycle.
         """
-        components = transform.components
-        if type(components[6]) is not float and transform.shape:
-            raise ValueInvalid(f"insert takes one transform, found {len(transform)}; insert them one by one")
-        parent, child, found = self.resolve_name(parent), self.resolve_name(child), taken(covariance)
+        parent, child = self.resolve_name(parent), self.resolve_name(child)
+        components, found = taken(transform, covariance)
         if found and (known := self.covariances.get(child, found)) != found:
             raise topology.two_covariances(parent, child, known, found)
         if self.insert_components(parent, child, components, stamp_ns, static=static):

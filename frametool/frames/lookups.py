@@ -400,13 +400,13 @@ class FrameTree(Frames):
         covariance: of this pose, as `covariance` returns it, or 6 rows of 6; None is exact.
         Adding an edge again with the same numbers changes nothing.
         Raises BadTopology for a second parent, other numbers for the same edge, a cycle, or a frame in itself;
-        ValueInvalid for numbers that are not a covariance.
+        ValueInvalid for what is not one Transform, and for numbers that are not a covariance.
         """
         parent, child = self.resolve_name(parent), self.resolve_name(child)
-        known, found = self._tracks.get(child), taken(covariance)
+        known, (components, found) = self._tracks.get(child), taken(transform, covariance)
         if known is not None and known.parent == parent and self.covariances.get(child, ()) != found:
             raise topology.two_covariances(parent, child, self.covariances.get(child), found)
-        self.add_components(parent, child, transform.components)
+        self.add_components(parent, child, components)
         if found:
             self.covariances[child] = found
 
@@ -480,11 +480,13 @@ def checked_rate(rate_hz: float) -> float:
     return rate_hz
 
 
-def taken(covariance: Any) -> Components:
-    """Return the checked entries of a covariance; () for None."""
+def taken(transform: Transform, covariance: Any) -> tuple[Rigid, Components]:
+    """Return the components of one transform and the checked entries of its covariance; () for None."""
+    if not isinstance(transform, Transform) or (type(transform.components[6]) is not float and transform.shape):
+        raise ValueInvalid(f"the pose of a frame is one Transform, found {transform!r}")
     if covariance is None:
-        return ()
+        return transform.components, ()
     from frametool.geometry import uncertainty
 
-    return uncertainty.taken(covariance)
+    return transform.components, uncertainty.taken(covariance)
 

@@ -133,11 +133,9 @@ def _measurement(argument: Any, place: str) -> Measurement:
     parent, child, transform = argument[:3]
     if wrong := [name for name in (parent, child) if not (isinstance(name, str) and name)]:
         raise ValueInvalid(f"{place}: a frame is named by a text, found {wrong[0]!r}")
-    if transform.shape:
-        raise ValueInvalid(f"{place}: expected one transform, got shape {transform.shape}")
     try:
-        covariance = taken(argument[3] if len(argument) > 3 else None) or None
-        return Measurement(parent, child, transform.components, covariance)
+        components, covariance = taken(transform, argument[3] if len(argument) > 3 else None)
+        return Measurement(parent, child, components, covariance or None)
     except ValueInvalid as error:
         raise ValueInvalid(f"{place}: {error}") from None
 

@@ -88,7 +88,7 @@ MANY = Transform.random(3, seed=1)
         (("a", "b"), "measurement 1: expected (parent, child, Transform) or with a covariance behind"),
         (("a", "b", [1, 2, 3]), "measurement 1: expected (parent, child, Transform) or with a covariance behind"),
         (("a", 7, POSE), "measurement 1: a frame is named by a text, found 7"),
-        (("a", "b", MANY), "measurement 1: expected one transform, got shape (3,)"),
+        (("a", "b", MANY), "measurement 1: the pose of a frame is one Transform, found <Transform of shape (3,)>"),
         (("a", "b", POSE, np.eye(3)), "measurement 1: covariance must be 36 numbers or 6 rows of 6"),
         (("a", "b", POSE, [1.0] * 21), "measurement 1: covariance has 21 numbers; 36 are needed (6x6, row-major: x y z, turns about X Y Z)"),
         (("a", "b", POSE, -np.eye(6)), "measurement 1: covariance[0] is -1: 'unknown' in ROS; leave the covariance out"),

@@ -31,6 +31,13 @@ def standing(kind: type[FrameTree | TransformBuffer]) -> FrameTree | TransformBu
     return frames
 
 
+@pytest.mark.parametrize("pose", [Transform.random(5, seed=1).rotation[0], Transform.random(5, seed=1), Transform.random(1, seed=1)])
+@pytest.mark.parametrize("put", [FrameTree().add, TransformBuffer().insert], ids=["add", "insert"])
+def test_a_frame_has_one_pose_and_a_rotation_is_none(put: Any, pose: Any) -> None:
+    with pytest.raises(ValueInvalid, match="the pose of a frame is one Transform, found"):
+        put("map", "base", pose)
+
+
 def answers(frames: Frames, target: str, source: str) -> list[Any]:
     questions = (
         lambda: frames.path(target, source),
