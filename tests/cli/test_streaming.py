@@ -93,6 +93,8 @@ def test_a_few_records_need_no_numpy() -> None:
     ("arguments", "text", "status", "message"),
     [
         ([*MOVE], b"", 1, b"frametool: stdin: nothing in it"),
+        ([*MOVE, "--in", "csv"], b"\n \n", 1, b"frametool: stdin: nothing in it"),
+        ([*MOVE, "--in", "csv"], b"# a comment\n", 1, b"frametool: stdin:1: no rows in it"),
         ([*MOVE], b"hello\n", 1, b"frametool: stdin:1: cannot detect the format of this text"),
         ([*MOVE, "--columns", "a,b,c"], b"x,y,z\n1,2,3\n", 2, b"frametool: --columns: no column 'a'"),
         ([*MOVE, "--columns", "x,x,z"], b"x,y,z\n1,2,3\n", 2, b"frametool: --columns: x appears twice"),

@@ -164,7 +164,8 @@ def open_table(
     if is_header:
         return own, rest[end:]
     if header and not expected and delimiter and not row.columns and own.width != len(FORMATS["tum"].rows.columns):
-        raise FormatError("the first line holds numbers and no names; give --no-header", source=source, line=1)
+        what = "the first line holds numbers and no names; give --no-header" if own.width else "no rows in it"
+        raise FormatError(what, source=source, line=1)
     return bare._replace(width=own.width), rest
 
 
@@ -364,7 +365,7 @@ class TableRows(PlannedRows):
             first += block
             if COMMENTS.fullmatch(first.removeprefix(BYTE_ORDER_MARK)) is None:
                 break
-        if not first:
+        if not first.removeprefix(BYTE_ORDER_MARK).strip():
             raise FormatError("nothing in it", source=source)
         expected = request.rows.given or request.rows.given_place
         known = has_pose_column if request.rows.poses else lambda names: stamp_column(names) is not None
