@@ -227,3 +227,15 @@ def test_points_in_millimetres_are_in_metres_elsewhere(run: Run, record: dict[st
     assert [*yaml.safe_load_all(run(*move, "yaml", stdin=stdin).out)] == [{"point": [2.0, 2.0, 0.5]}] * count
     same = json.loads(run(*move, "json", stdin=stdin).out.splitlines()[0])
     assert [*same.values()] in ([[2000.0, 2000.0, 500.0]], [2000.0, 2000.0, 500.0])
+
+
+@pytest.mark.parametrize("form", ["json", "yaml"])
+@pytest.mark.parametrize("point", [[4182105.0, 850859.0, 4724681.0], {"x": 4182105.0, "y": 850859.0, "z": 4724681.0}, {"x": 4182105.0}])
+@pytest.mark.parametrize(("words", "keys"), [
+    (("--to", "matrix"), {"matrix"}), (("--to", "rpy"), {"xyz", "rpy"}),
+    (("--to", "lla"), {"lat", "lon", "alt"}), (("--to", "enu", "--origin", "48,11,0"), {"east", "north", "up"}),
+])  # fmt: skip
+def test_a_point_that_is_written_anew_leaves_nothing_of_its_key(words: tuple[str, ...], keys: set[str], point: Any, form: str, run: Run) -> None:
+    record = {"id": 7, "point": point, "frame": "ecef"}
+    text = json.dumps(record) if form == "json" else yaml.dump(record, sort_keys=False)
+    assert {*yaml.safe_load(run("convert", *words, stdin=text + "\n").out)} == {"id", "frame", *keys}

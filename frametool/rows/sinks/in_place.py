@@ -153,18 +153,16 @@ class Splicer:
         if shape.kind in SIX:
             self._numbers(range(6), 0)
             return
-        kind = "xyz" if shape.kind == POSE else shape.kind
+        named = "xyz" if shape.kind == POSE else shape.kind
+        named = named if keys.position in (POINT, VECTOR) else keys.position or named
         members, there = (keys.position,) if keys.position else keys.members, shape.position_size
-        if keys.position in (POINT, VECTOR) and keys.position != kind:
-            node, quote = self.members[keys.position][0], '"' * self.json
-            self.edits.append(Edit(node.start, node.end, (Const(f"{quote}{kind}{quote}".encode()),)))
         if shape.unit is None:
             if target.unit is not None:
                 self.ahead[keys.rotation or self.head].append(self._place("xyz"))
         elif target.unit is None:  # becomes part of a 4x4 matrix
             self.dropped.update(members)
         elif None in self.slots[:there] or (there < 3 and not target.absent) or target.place != shape.place:
-            self.behind[members[0]].append(self._place(keys.position or kind))
+            self.behind[members[0]].append(self._place(named))
             self.dropped.update(members)
         elif not self.request.keeps_position or shape.inverse:  # else its text is unchanged
             self._numbers(range(there), 0)
@@ -186,6 +184,9 @@ class Splicer:
             at = at or keys.position
         else:
             self.dropped.update(keys.others)
+        if keys.position not in ("", named, *self.dropped):
+            node, quote = self.members[keys.position][0], '"' * self.json
+            self.edits.append(Edit(node.start, node.end, (Const(f"{quote}{named}{quote}".encode()),)))
         self.behind[at or self.tail] += made + self._extras(target.own_size, () if made else keys.flat)
 
     def _place(self, key: str) -> Pieces:
