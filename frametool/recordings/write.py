@@ -195,7 +195,8 @@ class RecordingFile:
             if self.format == BAG1:
                 number = self._writer.add_connection(
                     each.topic, each.type, msgdef=schema[2].decode() if schema else "", md5sum=each.digest or "*",
-                    callerid=known.get("callerid"), latching=int(known["latching"]) if known.get("latching") else None,
+                    callerid=known.get("callerid") or None,
+                    latching=int(known["latching"]) if known.get("latching") else None,
                 )  # fmt: skip
             else:
                 if schema and schema not in self._numbers:
@@ -337,10 +338,13 @@ def new_channel(kind: Kind, topic: str, *, ros1: bool, like: Iterable[Channel] =
     """Return a channel for new messages; like: channels of the same recording, whose type definition is used."""
     store, same = typestore(ros1=ros1), next((each for each in like if each.type == kind.type), None)
     definition, digest = store.generate_msgdef(kind.type, ros_version=2 - ros1)
-    schema: Any = kind.type, f"ros{2 - ros1}msg", definition.encode()
-    metadata = {"latching": str(int(kind.latched))}
-    if not ros1:
-        metadata, digest = {QOS: ""}, store.hash_rihs01(kind.type)
+    digest = digest if ros1 else store.hash_rihs01(kind.type)
+    own: Any = kind.type, f"ros{2 - ros1}msg", definition.encode()
+    schema, digest = (same.schema, same.digest) if same else (own, digest)
+    # rosbag play has one publisher for each topic and caller, and rosbags wants them to differ
+    callers = [each.metadata.get("callerid", "") for each in like if each.topic == topic]
+    caller = next(name for name in ("", *(f"/frametool_{at + 1}" for at in range(len(callers)))) if name not in callers)
+    metadata = {"latching": str(int(kind.latched)), "callerid": caller} if ros1 else {QOS: ""}
     if kind.latched and not ros1:  # quality of service of a latched topic: transient local
         from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
         from rosbags.rosbag2.metadata import dump_qos_v8, dump_qos_v9
@@ -350,6 +354,4 @@ def new_channel(kind: Kind, topic: str, *, ros1: bool, like: Iterable[Channel] =
                    QosLiveliness.AUTOMATIC, for_ever, avoid_ros_namespace_conventions=False)  # fmt: skip
         by_numbers = any(BY_NUMBERS.search(each.metadata.get(QOS, "")) for each in like)
         metadata[QOS] = str(dump_qos_v8([made])) if by_numbers else dump_yaml(dump_qos_v9([made]))
-    if same:
-        schema, digest = same.schema, same.digest
     return Channel(topic, kind.type, "ros1" if ros1 else read.CDR, schema, metadata, digest)

@@ -102,6 +102,19 @@ def test_adding_twice_is_adding_once(form: str, tmp_path: Path, run: Run) -> Non
     assert without_digest(read(tmp_path / name)) == without_digest(read(once))
 
 
+@pytest.mark.parametrize("form", FORMS)
+def test_other_edges_are_added_to_a_recording_that_was_written_here(form: str, tmp_path: Path, run: Run) -> None:
+    path = recording(tmp_path, form)
+    for name in ("camera", "radar", "sonar"):
+        new = {"new.yaml": f"{{name: {name}, parent: base_link, xyz: [1, 2, 3]}}"}
+        before, path = path, tmp_path / copy_name(form).replace("new", name)
+        done = run("record", str(before), "--with", "new.yaml", "-o", str(path), files=new)
+        assert (done.status, done.err.rpartition(": added on ")[2]) == (0, f"/tf_static: base_link -> {name}\n")
+    assert run("lookup", str(path), "camera", "sonar", "-f", "csv").out.splitlines()[1].startswith("sonar,camera,0.0,0.0,0.0,")
+    if form == "bag":  # or players would keep the last of them only
+        assert [each.about[1].callerid for each in read(path)[:3]] == ["/frametool_2", "/frametool_1", None]
+
+
 def test_a_latched_topic_is_made_where_there_is_none(tmp_path: Path, run: Run) -> None:
     for form in FORMS:
         folder = tmp_path / form
