@@ -103,7 +103,7 @@ def solve_hand_eye(
     def rough(model: _Model, weights: Array) -> _Model:
         return samples.fitted(model._replace(noise_at="target"), weights, ROUGH_STEPS)
 
-    found = lsq.robust_fit(start, samples.residuals, rough, likeliest, unknown=6, robust=robust)
+    found = lsq.robust_fit(start, samples.residuals, rough, likeliest, count=count, unknown=6, robust=robust)
     model = found.model
     s_t, s_r = found.sigmas.tolist()
     rms = np.sqrt((lsq.lengths(found.residuals[found.kept]) ** 2).mean(0))

@@ -201,14 +201,13 @@ class RobustFit(NamedTuple, Generic[Model]):
 
 def robust_fit(
     model: Model, residuals: Callable[[Model], Array], rough: Callable[[Model, Array], Model],
-    fit: Callable[[Model, Array], Model], *, unknown: int, robust: bool,
+    fit: Callable[[Model, Array], Model], *, count: int, unknown: int, robust: bool,
 ) -> RobustFit[Model]:  # fmt: skip
     """Fit, reject rows beyond 3 sigmas, and fit the rest again until the inliers do not change.
 
-    residuals: (n, 3) or (n, 6) of a model; unknown: the number of unknowns that each three of them share
+    residuals: (count, 3) or (count, 6) of a model; unknown: the number of unknowns that each three of them share
     rough, fit: return an improved model and the best one, for a weight per row
     """
-    count = len(residuals(model))
     kept, share = np.ones(count, bool), np.sqrt(1.0 - unknown / (3.0 * count))
 
     def by_medians(model: Model) -> Array:

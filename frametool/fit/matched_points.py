@@ -86,7 +86,8 @@ def solve_points(
         chosen.require_plane()
         return umeyama(*chosen, with_scale=scale)
 
-    found = lsq.robust_fit(start, pairs.weighted_residuals, rough, fit, unknown=6 + scale, robust=robust)
+    count = len(pairs.mass)
+    found = lsq.robust_fit(start, pairs.weighted_residuals, rough, fit, count=count, unknown=6 + scale, robust=robust)
     best, sigma, kept = found.model, float(found.sigmas[0]), found.kept
     covariance, scale_sigma = pairs.at(kept).covariance(best, sigma, with_scale=scale)
     used = mass > 0.0

@@ -69,7 +69,7 @@ def solve_mean(
     start = own[min(tried, key=apart)] if robust else own[0]
     found = lsq.robust_fit(
         start, lambda middle: roots[counts] * lsq.errors(own, middle),
-        lambda _, weights: own.mean(weights * weight), mean_of, unknown=3, robust=robust,
+        lambda _, weights: own.mean(weights * weight), mean_of, count=len(own), unknown=3, robust=robust,
     )  # fmt: skip
     used, mean = counts.copy(), found.model
     used[counts] = found.kept

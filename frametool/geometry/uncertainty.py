@@ -175,7 +175,9 @@ def problems(rows: Array) -> dict[int, str]:
     roots = np.sqrt(abs(np.diagonal(whole, axis1=1, axis2=2)))
     skewed: Any = abs(whole - whole.swapaxes(1, 2)) > ASYMMETRY * roots[:, :, None] * roots[:, None, :]
     wrong: Any = skewed.any((1, 2)) | (whole[:, 0, 0] == UNKNOWN)
-    values = np.linalg.eigvalsh(np.where(wrong[:, None, None], 0.0, whole))
+    values = np.zeros((len(whole), side))
+    doubtful = ~wrong & (abs(whole).sum(2) > 2.0 * np.diagonal(whole, axis1=1, axis2=2)).any(1)  # Gershgorin's circles
+    values[doubtful] = np.linalg.eigvalsh(whole[doubtful])
     found = {}
     for row in np.flatnonzero(wrong | (values[:, 0] < -NEGATIVE * abs(values[:, -1]))).tolist():
         if whole[row, 0, 0] == UNKNOWN:

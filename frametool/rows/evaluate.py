@@ -402,8 +402,9 @@ class Run:
 
     def refuse(self, wrong: Flags, reason: str) -> None:
         """Take results back: these rows are bad."""
-        self._blame(self.rows[wrong[self.rows]], "", reason)
-        self.rows = self.rows[~wrong[self.rows]]
+        if wrong.any():
+            self._blame(self.rows[wrong[self.rows]], "", reason)
+            self.rows = self.rows[~wrong[self.rows]]
 
     def settled(self, before: int | None = None) -> tuple[Ints, Floats]:
         """Return the rows that stay, and their numbers: nan in those that have none on purpose, or are null.

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from frametool.documents.source import Source
     from frametool.rows.conversion import Step
     from frametool.text.lines import ByteStream
-    from frametool.text.spans import Floats, Ints
+    from frametool.text.spans import Ints
 
 POSITION = 3  # numbers
 
@@ -81,11 +81,6 @@ class Gathered:
             line += outcome.lines
             yield outcome
 
-    @property
-    def numbers(self) -> Floats:
-        """Return all poses."""
-        return np.concatenate([np.empty((0, 7)), *(each.numbers for each in self.blocks)])
-
     def rows(self, source: str) -> RowPoses:
         """Return all rows as one block, with the columns that any has; raises FormatError if there are none."""
         if not self.blocks:
@@ -102,8 +97,9 @@ class Gathered:
             ))
             for key in self.keys if any(key in each.extras for each in self.blocks)
         }  # fmt: skip
+        numbers = np.concatenate([each.numbers for each in self.blocks])
         lines = np.concatenate([each.lines for each in self.blocks])
-        return RowPoses(self.numbers, np.concatenate(stamps) if stamps else None, lines, parents, names, extras)
+        return RowPoses(numbers, np.concatenate(stamps) if stamps else None, lines, parents, names, extras)
 
 
 def gathered(steps: Iterable[Step], bad: BadRows, keys: Sequence[str] = ()) -> RowPoses:
@@ -254,7 +250,7 @@ def means_of(rows: MeanRows, values: list[float] | None, *, robust: bool) -> Ite
     parents, names = (np.array(each, object) for each in named)
     weights = np.concatenate(rows.extra) if by is None and rows.extra else values
     for label, at in rows.groups(len(poses)):
-        frames, bodies = ({*each[at].tolist()} for each in (parents, names))
+        frames, bodies = ({*(each if by is None else each[at])} for each in (parents, names))
         frames = {each for each in frames if each is not None and not each.isdecimal()}  # which are no frames
         if len(frames) > 1 and not frames.issubset(EARTH_FRAMES):
             raise ValueInvalid(f"the poses are in {first_of(sorted(map(str, frames)), 3)}; use one frame for all")

@@ -158,7 +158,7 @@ class ColumnRows(PlannedRows):
         names = self.names_of(batch.size, lambda place: coded_texts(batch.texts(place)))
         stamps, late = self._stamps(batch)
         block = Block(
-            values, {}, np.arange(batch.size), batch.lines.tolist().__getitem__, names=names, stamps=stamps,
+            values, {}, np.arange(batch.size), lambda row: int(batch.lines[row]), names=names, stamps=stamps,
             bad={**late, **names.bad, **bad}, gone=gone, frames=[names.frames],
         )  # fmt: skip
         run = self.ran(block)

@@ -314,12 +314,13 @@ class Cut(NamedTuple):
         columns, data = list[list[bytes]](), np.frombuffer(text, np.uint8)
         for named in self.template.named:
             starts, ends = self.starts[:, named], self.ends[:, named]
-            only, spans = one_text(Spans(data, starts, ends)), zip(starts.tolist(), ends.tolist(), strict=True)
-            columns.append([only] if only is not None else [text[start:end] for start, end in spans])
+            only = one_text(Spans(data, starts, ends))
+            spans = zip(starts.tolist(), ends.tolist(), strict=True) if only is None else ()
+            columns.append([text[start:end] for start, end in spans] if only is None else [only])
         size = max(map(len, columns), default=1)
         rows = zip(*(each if len(each) == size else each * size for each in columns), strict=True) if columns else [()]
         known, codes = numbered([*rows])
-        return [*map(self.template.renamed, known)], np.resize(codes, len(self.starts))
+        return [*map(self.template.renamed, known)], np.broadcast_to(codes, len(self.starts))
 
 
 class RecordCutter:
