@@ -328,12 +328,13 @@ def placed_record(
     shape = Shape(POINT if is_point else POSE, 1.0, () if pose.rotation is None else ((notation("quaternion"), False),))
     if covariance and not is_point:  # of a pose whose turn is exact
         covariance = tuple(covariance[3 * i + j] if max(i, j) < 3 else 0.0 for i in range(6) for j in range(6))
-    extra = covariance
-    if not extra and pose.covariance is not None:
-        if operation.formula is None and request.results.place is None:
-            extra = of_position(tuple(pose.covariance)) if is_point else tuple(pose.covariance)
-        else:
-            reading.note(LEFT_OUT.format("a result at a place" if request.results.place else "this"), rule="left-out")
+    extra, place = covariance, request.results.place
+    said = () if extra else pose.covariance or ()
+    if (extra and place and place.axes != ECEF) or (said and (place or operation.formula)):
+        reading.note(LEFT_OUT.format("a result at a place" if place else "this"), rule="left-out")
+        extra = ()
+    elif said:
+        extra = of_position(tuple(said)) if is_point else tuple(said)
     if extra:
         shape = shape._replace(covariance=(len(extra),), sigma=())
     keys = [*own, *used, *(key for key in (AXES_KEY, *COVARIANCE_KEYS) if key in value)]
@@ -363,7 +364,8 @@ def _of_fix(value: dict[str, Any], mapping: dict[str, Any], reading: Reading, re
     status = value.get("status")
     if type(status) is dict and status.get("status") == "-1":
         raise readers.NotARotation("status -1: there was no fix", ("status", "status"))
-    if FIX not in value or value.get(FIX_TYPE, "1") == "0" or request.results.place is not None:
+    place = request.results.place
+    if FIX not in value or value.get(FIX_TYPE, "1") == "0" or (place is not None and place.axes == ENU):
         return ()
     entries = [number for _, number in within((FIX,), entries_of, value[FIX], (9,))]
     within((FIX,), check, entries)

@@ -646,6 +646,22 @@ def test_from_one_fix_to_the_next_the_covariances_of_both_add_up(run: Callable[.
     assert covariance[::7] == pytest.approx([2.0, 2.0, 2.0, 0.0, 0.0, 0.0])
 
 
+@pytest.mark.parametrize("form", ["json", "yaml"])
+@pytest.mark.parametrize(("words", "key"), [
+    (("ecef",), "covariance"), (("utm",), ""), (("ned", "--origin", "48,11,0"), ""), (("lla",), "position_covariance"),
+    (("enu", "--origin", "first"), "position_covariance"), (("utm", "--local-axes", "enu"), "position_covariance"),
+])  # fmt: skip
+def test_the_covariance_of_a_fix_is_along_the_axes_of_the_result(words: tuple[str, ...], key: str, form: str, run: Callable[..., Any]) -> None:
+    done = run("convert", "--to", *words, "-f", "json", stdin=echoed([fix(2)], form))
+    found = json.loads(done.out)
+    assert [each for each in found if "covariance" in each and "type" not in each] == [key] * bool(key)
+    assert ("covariances left out: a result at a place has none" in done.err) == (not key)
+    assert ("position_covariance_type" in found) == (key == "position_covariance")
+    turn = base("enu", LAT) if key == "covariance" else np.eye(3)
+    if key:
+        assert np.array(found[key]).reshape(3, 3) == pytest.approx(turn @ np.reshape(COVARIANCE, (3, 3)) @ turn.T, abs=2e-14)
+
+
 def test_an_expression_over_fixes_leaves_their_covariances(run: Callable[..., Any]) -> None:
     assert json.loads(run("calc", "d = norm(row)", stdin=FIX).out)["d"] == pytest.approx(6366854.272197201)
 
