@@ -41,6 +41,7 @@ BAGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
 _MAGICS: list[Any] = [what for name in BAGS for kind, what in FORMATS[name].magic if kind == "magic"]
 RECORDS = readers("records")
 ONE_RECORD = "--explain derives one record; write it as an argument"
+KEPT_FORMAT = "--unwrap is for rows that keep their format; convert them first"
 
 
 _of_rows = partial(option, under="Rows")
@@ -301,12 +302,12 @@ class Task:
         turns = output.style.axes and not output.notations and is_turned(output.style.changed(format=chosen or fmt))
         converts = not (is_kindred or fmt in RECORDS) and (chosen not in (None, fmt) or no_room or turns)
         if listed or converts:
+            refuse(request.results.unwrap, KEPT_FORMAT)
             from frametool.cli.trees import answers
             from frametool.rows.conversion import FormatConverter
 
             target = chosen or (fmt if "poses" in FORMATS[fmt].writes and not output.notations else "csv")
-            no_stream = f"--format {target} is for single results and records, not for a stream of {fmt}"
-            refuse(target not in FORMATS, no_stream)
+            refuse(target not in FORMATS, f"-f {target} is for single results and records, not for a stream of {fmt}")
             request = request.with_results(default_notation=not output.notations)
             driver = FormatConverter(fmt, request, self.name, output.style.changed(format=target), answers(self.inputs))
             return driver.outcomes(stream, header=not self.inputs.no_header), target, driver.tally
@@ -335,6 +336,7 @@ class Task:
             return run_records(stream, fmt, request, source=self.name), fmt
         if request.on_error == NULL and chosen not in ("csv", *RECORDS):
             raise click.UsageError(f"--on-error null: {chosen} cannot hold a row without a result; give skip")
+        refuse(request.results.unwrap and holds(chosen, "arrays"), KEPT_FORMAT)
         by_format = holds(chosen, "arrays", "recording") and not self.output.notations
         request = request.with_results(default_notation=by_format)
         if table.holds(chosen, "recording"):

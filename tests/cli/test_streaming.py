@@ -101,6 +101,8 @@ def test_a_few_records_need_no_numpy() -> None:
         (["invert", "--columns", "x,y"], b"x,y,z\n1,2,3\n", 2, b"frametool: --columns: 2 columns do not say"),
         ([*MOVE, "--keep"], b"x,y,z\n1,2,3\n", 2, b"frametool: columns x, y, z would appear twice; name the new"),
         (["convert", "--to", "rpy,rpy"], b"qx,qy,qz,qw\n0,0,0,1\n", 2, b"frametool: --to: columns pitch, roll"),
+        (["convert", "--to", "rpy", "--unwrap", "-f", "json"], b"qx,qy,qz,qw\n0,0,0,1\n", 2, b'{"error": "misused", "message": "convert: --unwrap'),
+        (["convert", "--to", "rpy", "--unwrap", "-f", "npy"], b'{"xyzw": [0, 0, 0, 1]}\n' * 2, 2, b"frametool: convert: --unwrap is for rows"),
         (["convert", "--to", "quaternion,xyzw"], b"roll,pitch,yaw\n0,0,0\n", 2, b"frametool: --to: columns qw"),
         (["relative", "--consecutive"], b"x,y,z,angle\n0,0,0,1\n", 2, b"frametool: columns angle would appear twice"),
         ([*MOVE, "-i", ""], b"x,y,z\n1,2,3\n", 5, b"frametool: '': no such file or directory"),
