@@ -195,8 +195,7 @@ class RecordingFile:
             if self.format == BAG1:
                 number = self._writer.add_connection(
                     each.topic, each.type, msgdef=schema[2].decode() if schema else "", md5sum=each.digest or "*",
-                    callerid=known.get("callerid") or None,
-                    latching=int(known["latching"]) if known.get("latching") else None,
+                    callerid=known.get("callerid"), latching=int(known["latching"]) if known.get("latching") else None,
                 )  # fmt: skip
             else:
                 if schema and schema not in self._numbers:
@@ -344,7 +343,7 @@ def new_channel(kind: Kind, topic: str, *, ros1: bool, like: Iterable[Channel] =
     # rosbag play has one publisher for each topic and caller, and rosbags wants them to differ
     callers = [each.metadata.get("callerid", "") for each in like if each.topic == topic]
     caller = next(name for name in ("", *(f"/frametool_{at + 1}" for at in range(len(callers)))) if name not in callers)
-    metadata = {"latching": str(int(kind.latched)), "callerid": caller} if ros1 else {QOS: ""}
+    metadata = {"latching": str(int(kind.latched)), **({"callerid": caller} if caller else {})} if ros1 else {QOS: ""}
     if kind.latched and not ros1:  # quality of service of a latched topic: transient local
         from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
         from rosbags.rosbag2.metadata import dump_qos_v8, dump_qos_v9
