@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid, listing, warn
 from frametool.geometry import rigid, uncertainty
+from frametool.geometry.place import ECEF, ENU
 from frametool.geometry.quaternion import TOLERATED
 from frametool.geometry.rigid import EXACT, NOT_BOTH, SCALED, inverse_full, pose_of, scale_of
 from frametool.geometry.uncertainty import UNKNOWN
@@ -47,15 +48,17 @@ def with_covariances(
     flat = [flat[at] for at in covariance.find_columns(flat, 36 if shape.kind == POSE else uncertainty.POINT)[0]]
     has_sigma = is_own and (covariance.SIGMA in holder or bool(flat))
     said = (*there, *(flat or [covariance.SIGMA] * has_sigma))
-    if operation.formula is not None and around == path:
+    axes = request.results.place.axes if request.results.place else ECEF  # of x, y, z on the Earth
+    turns = operation.keeps_frames and axes != ((shape.place.axes or ENU) if shape.place else ECEF)
+    if (operation.formula is not None or turns) and around == path:
         reading.here = path
-        reading.note(LEFT_OUT.format("calc"), rule="left-out")
+        reading.note(LEFT_OUT.format("a result at a place" if turns else "calc"), rule="left-out")
         return record._replace(keys=record.keys._replace(others=(*record.keys.others, *said)))
-    if operation.keeps_frames and not (shape.inverse or (has_sigma and request.results.rewrite_records)):
+    if operation.keeps_frames and not (turns or shape.inverse or (has_sigma and request.results.rewrite_records)):
         for key in there * is_own:
             within((*around, key), _entries, holder[key], (36, 9))
         return record
-    if operation.formula is not None or (not operation.moves and there not in ([], [covariance.COVARIANCE])):
+    if operation.formula is not None or turns or (not operation.moves and there not in ([], [covariance.COVARIANCE])):
         what = "the covariance would be wrong afterwards; leave it out, or move the message with apply"
         raise Misfit(what, (*around, [*there, covariance.SIGMA][0]))
     if has_sigma:
@@ -145,10 +148,11 @@ def covariance_columns(
     kinds = [shape.kind for shape in shapes]
     passes = request.operation.keeps_frames
     own, place = shapes[0].place if shapes else None, request.results.place
-    if passes and own and place and own.axes != place.axes:  # its columns would stay along axes that the result has not
+    axes = own.axes if own else ECEF
+    if passes and shapes and place and axes != place.axes:  # its columns would stay along axes that the result has not
         for found, _ in (covariance.find_columns(table.names or (), size) for size in (9, 36)):
-            message = f"the covariance is along {own.axes or 'the axes there'}, the result along {place.axes}"
-            remedy = "" if own.axes else f", or say --local-axes {place.axes}"
+            message = f"the covariance is along {axes or 'the axes there'}, the result along {place.axes}"
+            remedy = "" if axes else f", or say --local-axes {place.axes}"
             if found:
                 raise ValueInvalid(f"{message}; leave its columns out{remedy}")
     if passes or not kinds or not {*PLACED}.issuperset(kinds):
@@ -260,8 +264,7 @@ def move(shape: Shape, own: Components, extra: Components, mover: Components, *,
             what = "a covariance" if shape.covariance else f"a {kind}"
             raise ValueInvalid(f"{what} cannot be carried through a scale; points, vectors and poses can")
         s = scale_of(mover)
-        x, y, z = own
-        return (*MOVERS[kind](*pose, s * x, s * y, s * z), *extra)
+        return (*MOVERS[kind](*pose, *(s * each for each in own)), *extra)
     moved = MOVERS[kind](*pose, *own)
     if len(mover) > EXACT and kind != NORMAL:
         if kind not in (POINT, VECTOR):

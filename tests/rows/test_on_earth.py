@@ -662,6 +662,19 @@ def test_the_covariance_of_a_fix_is_along_the_axes_of_the_result(words: tuple[st
         assert np.array(found[key]).reshape(3, 3) == pytest.approx(turn @ np.reshape(COVARIANCE, (3, 3)) @ turn.T, abs=2e-14)
 
 
+@pytest.mark.parametrize("to", ["lla", "utm", "ecef", "quaternion"])
+def test_a_covariance_in_ecef_stays_in_ecef_only(to: str, run: Callable[..., Any]) -> None:
+    record = json.dumps({"frame": "ecef", "point": XYZ, "covariance": COVARIANCE}) + "\n"
+    done, is_kept = run("convert", "--to", to, stdin=record), to in ("ecef", "quaternion")
+    assert ("covariance" in json.loads(done.out), "covariances left out" in done.err) == (is_kept, not is_kept)
+    if to != "quaternion":
+        cells = ",".join(map(str, ["ecef", *XYZ, *COVARIANCE]))
+        done = run("convert", "--to", to, stdin=f"frame,x,y,z,c11,c12,c13,c21,c22,c23,c31,c32,c33\n{cells}\n")
+        assert (done.status, "the covariance is along ecef" in done.err) == ((0, False) if is_kept else (1, True))
+    fix_in_lla = run("convert", "--to", "lla", stdin=FIX).out
+    assert ("position_covariance" in json.loads(run("convert", "--to", to, stdin=fix_in_lla).out)) == (to == "lla")
+
+
 def test_an_expression_over_fixes_leaves_their_covariances(run: Callable[..., Any]) -> None:
     assert json.loads(run("calc", "d = norm(row)", stdin=FIX).out)["d"] == pytest.approx(6366854.272197201)
 

@@ -153,8 +153,8 @@ class Splicer:
         if shape.kind in SIX:
             self._numbers(range(6), 0)
             return
-        named = "xyz" if shape.kind == POSE else shape.kind
-        named = named if keys.position in (POINT, VECTOR) else keys.position or named
+        kind = "xyz" if shape.kind == POSE else shape.kind
+        named = kind if keys.position in ("", POINT, VECTOR) else keys.position
         members, there = (keys.position,) if keys.position else keys.members, shape.position_size
         if shape.unit is None:
             if target.unit is not None:
