@@ -126,6 +126,7 @@ class Header:
     """The names of a table's columns, taken apart once: which words of ours each holds, and in which unit.
 
     found: by affixes and word the first column of each unit
+    of_aircraft: roll, pitch, yaw are there by their Greek letters, theta among them is no turn about z
     """
 
     def __init__(self, names: Sequence[str], hidden: Collection[int] = ()) -> None:
@@ -133,6 +134,7 @@ class Header:
         names = ["" if at in hidden else name for at, name in enumerate(names)] if hidden else names
         self.names = names
         self.count = Counter(names)
+        self.of_aircraft = {*TOKEN.findall(" ".join(names).lower())} >= {"phi", "theta", "psi"}
         self.found: dict[tuple[str, str], dict[str, dict[str, Spot]]] = {}
         for place, name in enumerate(names):
             own = name.lstrip("#% ") if place == 0 else name
@@ -256,7 +258,7 @@ def find_rotations(header: Header, expected: Notation | None) -> list[Columns]:
         for match in chain(header.match(row.columns, angles=row.angles), maps, whole):
             found[frozenset(match.places)] = rotation_of(match, row, expected)
     alone = list[Columns]()  # of columns that say one by themselves, where none of the others is there: `yaw`, `theta`
-    for kind, word in () if found else [(row, word) for row in rows for word in row.alone]:
+    for kind, word in () if found or header.of_aircraft else [(row, word) for row in rows for word in row.alone]:
         *others, _ = kind.columns
         for match in header.match((*others, word), angles=kind.angles, partly=True):
             if header.is_plain(match) and match.absent == tuple(range(len(others))):
@@ -364,17 +366,15 @@ def _half_rotation(header: Header, expected: Notation | None) -> str:
         if not row.searched and (match := next(header.match(row.columns, angles=row.angles), None)):
             return f"columns {match.shown} may be {row.name}; then add --from {row.spelling}"
     for match in header.match(QUATERNION) if expected is None else ():
-        may_be = f"{match.shown} may be a quaternion or a point and a number"
-        return f"{may_be}; add --from xyzw, or --columns with the three"
+        return f"{match.shown} may be a quaternion or a point and a number; add --from xyzw, or --columns of the three"
     for row in _searched(expected):
         for match in header.match(row.columns, angles=row.angles, partly=True):
             if len(match.places) > 1 or (row.alone and header.is_plain(match)):
                 if len(match.places) == len(XYZ) and match.names[0].lower().endswith("rot_x"):
                     axes = "name them roll, pitch, yaw or rotvec_x, rotvec_y, rotvec_z"
                     return f"columns {match.shown} do not say what they are; {axes}"
-                missing = ", ".join(row.columns[at].join(match.affixes) for at in match.absent)
-                half = f"half a rotation: {match.shown} without {missing}"
-                return f"{half}; add what is missing, or choose with --columns"
+                parts = ", ".join(row.columns[at].join(match.affixes) for at in match.absent)
+                return f"half a rotation: {match.shown} without {parts}; add what is missing, or choose with --columns"
     folded = {name.lower(): name for name in reversed(header.names)} if expected is None else {}
     stems = [name[:-1] for name in folded if name[-1:] == "w" and len(name) > 1] + ["q", "q_"]
     for stem, letters in product(stems, ("xyzw", "0123", "1234")):  # names without a standard order: ox oy oz ow
@@ -384,7 +384,7 @@ def _half_rotation(header: Header, expected: Notation | None) -> str:
                 f"no qx, qy, qz, qw: {' '.join(found)} look like a quaternion under other names; name them so, or "
                 f"add --columns x,y,z,{','.join(found)} --from xyzw (or wxyz)"
             )
-    return ""
+    return "phi, theta, psi: name them roll, pitch, yaw, or choose with --columns" if header.of_aircraft else ""
 
 
 def find_six(header: Header, kind: str) -> Columns | None:

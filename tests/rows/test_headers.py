@@ -107,6 +107,8 @@ def test_converting_a_pose_in_the_plane_adds_its_height() -> None:
         ("x,y,z,ox,oy,oz,ow", "no qx, qy, qz, qw: ox oy oz ow look like a quaternion under other names"),
         ("x,y,z,q0,q1,q2,q3", "no qx, qy, qz, qw: q0 q1 q2 q3 look like a quaternion under other names"),
         ("x,y,z,euler_1,euler_2,euler_3", "columns euler_1 euler_2 euler_3 may be euler; then add --from euler:AXES"),
+        ("x,y,z,phi,theta,psi", "phi, theta, psi: name them roll, pitch, yaw"),
+        ("x,y,z,Phi [deg],Theta [deg],Psi [deg]", "phi, theta, psi: name them roll, pitch, yaw"),
         ("x,y,qx,qy,qz,qw", "half a position: x y without z"),
     ],
 )
