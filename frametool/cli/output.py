@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from frametool.cli.sink import Write
     from frametool.frames.lookups import Frames
+    from frametool.rows.batch import RowPoses
     from frametool.rows.plain import Value
     from frametool.rows.request import Operation
     from frametool.rows.sinks.results import BlockResults, ResultWriter
@@ -150,6 +151,21 @@ class Output:
 
         writer = self.writer()
         self.pieces(filter(None, chain(map(writer.of_block, blocks_of(values)), writer.end())))
+
+    def rows(self, found: RowPoses) -> None:
+        """Write poses or points, some thousand at a time where the format holds rows."""
+        from frametool.rows.batch import kept, values_of
+        from frametool.rows.conversion import Blocks
+        from frametool.rows.sinks.as_rows import LEARNED
+        from frametool.rows.sinks.results import TOGETHER
+
+        if not (self._in_blocks or self.style.format in LEARNED):
+            self.values(values_of(found, self.style.place))
+            return
+        self._refuse_places()
+        writer = Blocks(self.style)
+        parts = (kept(found, slice(at, at + TOGETHER)) for at in range(0, len(found.numbers), TOGETHER))
+        self.pieces(filter(None, chain(map(writer.of_block, parts), writer.end())))
 
     def _refuse_places(self) -> None:
         """Raise ValueInvalid if the format cannot hold latitude and longitude."""

@@ -19,7 +19,6 @@ from frametool.frames.stamps import parse_stamp, parse_time
 from frametool.frames.topology import seconds
 from frametool.grammar.edges import stop
 from frametool.grammar.pose import Pose
-from frametool.grammar.pose_algebra import result_at
 from frametool.grammar.result import Result
 from frametool.rows.faults import ROWS_SKIPPED, STOP, BadRows
 from frametool.text.numbers import parse_lengths, parse_share
@@ -345,16 +344,14 @@ def _mount(inputs: Inputs, text: str) -> Any:
 
 def write_trajectory(output: Output, found: Trajectory) -> None:
     """Write poses, or positions, in any format that holds them; default names of frames are omitted."""
+    import numpy as np
+
     from frametool.frames.trajectory import BODY, WORLD
+    from frametool.rows.batch import RowPoses
+    from frametool.rows.shapes import POINT, POSE
 
     world, body = (found.world, found.body) if (found.world, found.body) != (WORLD, BODY) else (None, None)
-    stamps = [None] * found.size if found.stamps_ns is None else found.stamps_ns.tolist()
-    if found.xyzw is not None:
-        rows = zip(zip(*(part.tolist() for part in found.poses.components), strict=True), stamps, strict=True)
-        output.stream_poses(result_at(row, world, body, at) for row, at in rows)
-        return
-    points = zip(found.xyz.tolist(), stamps, strict=True)
-    output.values(
-        ({} if at is None else {"stamp_ns": at}) | ({} if world is None else {"frame": world}) | {"point": xyz}
-        for xyz, at in points
-    )
+    numbers = found.xyz if found.xyzw is None else np.stack(found.poses.components, axis=-1)
+    kind, lines = POINT if found.xyzw is None else POSE, np.arange(found.size)
+    names = [body if kind == POSE else None]
+    output.rows(RowPoses(numbers + 0.0, found.stamps_ns, lines, [world], names, {}, kind=kind))  # none is -0.0
