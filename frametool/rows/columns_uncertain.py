@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 
 PLACED = (POSE, POINT, VECTOR)
+AT_EACH = "the covariance stays along {} at each position, which far from the origin differ from those there"
 
 
 def with_covariances(
@@ -48,8 +49,12 @@ def with_covariances(
     flat = [flat[at] for at in covariance.find_columns(flat, 36 if shape.kind == POSE else uncertainty.POINT)[0]]
     has_sigma = is_own and (covariance.SIGMA in holder or bool(flat))
     said = (*there, *(flat or [covariance.SIGMA] * has_sigma))
-    axes = request.results.place.axes if request.results.place else ECEF  # of x, y, z on the Earth
-    turns = operation.keeps_frames and axes != ((shape.place.axes or ENU) if shape.place else ECEF)
+    place, own = request.results.place, ((shape.place.axes or ENU) if shape.place else ECEF)
+    axes = place.axes if place else ECEF  # of x, y, z on the Earth
+    turns = shape.kind in PLACED and axes != (own if operation.keeps_frames else ECEF)
+    if place and place.origin and not turns and said:
+        reading.here = path
+        reading.note(AT_EACH.format(axes), rule="origin")
     if (operation.formula is not None or turns) and around == path:
         reading.here = path
         reading.note(LEFT_OUT.format("a result at a place" if turns else "calc"), rule="left-out")
@@ -148,13 +153,15 @@ def covariance_columns(
     kinds = [shape.kind for shape in shapes]
     passes = request.operation.keeps_frames
     own, place = shapes[0].place if shapes else None, request.results.place
-    axes = own.axes if own else ECEF
-    if passes and shapes and place and axes != place.axes:  # its columns would stay along axes that the result has not
-        for found, _ in (covariance.find_columns(table.names or (), size) for size in (9, 36)):
-            message = f"the covariance is along {axes or 'the axes there'}, the result along {place.axes}"
-            remedy = "" if axes else f", or say --local-axes {place.axes}"
-            if found:
-                raise ValueInvalid(f"{message}; leave its columns out{remedy}")
+    axes = own.axes if own and passes else ECEF
+    if shapes and place and any(covariance.find_columns(table.names or (), size)[0] for size in (9, 36)):
+        if axes != place.axes:  # its columns would be along axes that the result has not
+            there = "the axes there"
+            remedy = "" if axes or not place.axes else f", or say --local-axes {place.axes}"
+            message = f"the covariance is along {axes or there}, the result along {place.axes or there}"
+            raise ValueInvalid(f"{message}; leave its columns out{remedy}")
+        if place.origin:
+            warn(f"{table.source}: {AT_EACH.format(axes)}")
     if passes or not kinds or not {*PLACED}.issuperset(kinds):
         return (), shapes
     places, sigma = covariance.find_columns(table.names or (), 36 if POSE in kinds else 9)

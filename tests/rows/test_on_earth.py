@@ -682,3 +682,28 @@ def test_an_expression_over_fixes_leaves_their_covariances(run: Callable[..., An
 def test_the_mean_of_flat_keys_in_ecef_is_in_ecef(run: Callable[..., Any]) -> None:
     done = run("mean", stdin='{"ecef_x": 4177000.0, "ecef_y": 855000.0, "ecef_z": 4728000.0}\n')
     assert done.out.startswith("parent: ecef\nxyz: [4177000.0, 855000.0, 4728000.0]\n"), done.err
+
+
+def test_a_covariance_beside_a_place_is_along_its_axes_or_left_out(run: Callable[..., Any]) -> None:
+    site = {"site.yaml": "{frames: [{name: map, parent: ecef, lat: 48.1, lon: 11.5, alt: 0, axes: enu}]}"}
+    table = "lat,lon,alt,sigma_x,sigma_y,sigma_z\n48.1,11.5,0,1,2,3\n"
+    origin = ("--to", "enu", "--origin", "48.1,11.5,0")
+    moved = run("apply", "site.yaml", "ecef", "--local-axes", "enu", *origin, stdin=table, files=site)
+    assert (moved.status, moved.out) == (1, "")
+    assert moved.err == "frametool: stdin:1: the covariance is along ecef, the result along enu; leave its columns out\n"
+    record = '{"lat": 0, "lon": 0, "alt": 0, "position_covariance": [1, 0, 0, 0, 4, 0, 0, 0, 9]}\n'
+    left = run("apply", "site.yaml", "ecef", "--to", "lla", stdin=record, files=site)
+    assert left.out == '{"lat": 0.0, "lon": 0.0, "alt": 0.0}\n'
+    assert left.err == "frametool: warning: stdin:1:1: covariances left out: a result at a place has none\n"
+    for text in (table, record):
+        stays = run("convert", "--local-axes", "enu", *origin, stdin=text)
+        assert stays.status == 0
+        assert "the covariance stays along enu at each position, which far from the origin differ" in stays.err
+
+
+def test_a_trajectory_of_positions_is_resampled_at_places(run: Callable[..., Any]) -> None:
+    rows = "t,lat,lon,alt\n0,48,11,500\n1,48,11,500\n2,48,11,500\n"
+    found = run("resample", "gps.csv", "--rate", "1", "--to", "utm", "-f", "csv", files={"gps.csv": rows}).out.splitlines()
+    assert (found[0], len(found)) == ("utm_zone,easting,northing,alt,stamp_ns", 4)
+    same = run("convert", "--to", "utm", stdin=rows).out.splitlines()[1].split(",")
+    assert [float(each) for each in found[1].split(",")[1:4]] == pytest.approx([float(each) for each in same[2:5]], abs=1e-6)
