@@ -36,7 +36,6 @@ INPUTS = "frametool.inputs"  # another
 # values of repeatable options in commands that do not have them
 WITHOUT = {"input_formats": (), "topics": (), "joints": (), "joint_files": (), "named_frames": (), "messages": ()}
 # options on messages, which may be without effect
-OF_MESSAGES = ("quiet", "verbose")
 
 
 class Inputs:
@@ -378,7 +377,7 @@ class Command(WithHelp):
             args = [f"{each}={OPTIONAL[each][0]}" if each in OPTIONAL else each for each in args]
         passed: dict[Any, Option] = {}
         for each in () if ctx.resilient_parsing else self.make_parser(ctx).parse_args(args=[*args])[2]:
-            if isinstance(each, Option) and each.name not in OF_MESSAGES:
+            if isinstance(each, Option) and each.name not in ("quiet", "verbose"):
                 if each.name in passed and not (each.multiple or each.is_flag):
                     raise click.UsageError(f"{each.opts[-1]} appears twice; only one can be used", ctx)
                 passed[each.name] = each

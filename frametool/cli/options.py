@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 from functools import partial
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -280,7 +281,6 @@ def pose_result_options(*what: str) -> Adds:
 
 # --- times ---------------------------------------------------------------------------------------------------------
 
-LATEST = "latest"
 
 
 def read_limit(text: str) -> int:
@@ -307,12 +307,17 @@ def read_rate(text: str) -> float:
 
 def read_time(text: str) -> Any:
     """Parse a time to nanoseconds, or `latest`."""
-    if text == LATEST:
+    if text == "latest":
         return text
     try:
         return read_limit(text)
     except ValueInvalid as error:
         raise ValueInvalid(f"{error}" + ", or latest" * ("is not a time" in str(error))) from None
+
+
+def parser(module: str, name: str) -> Callable[[str], Any]:
+    """Return what parses an option by a function of a module, which is imported when there is a text."""
+    return lambda text: getattr(import_module(module), name)(text)  # noqa: PLW0108 - later
 
 
 def _offset(text: str) -> Any:

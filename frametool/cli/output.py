@@ -68,7 +68,7 @@ def copy_target(fmt: str, path: str, output: str | None, named: str | None) -> t
     return copy, place
 
 
-BATCH = 256  # poses that are written together
+BATCH, ROWS = 256, 8192  # results that are written together: for people, and as rows
 QUATERNION = (notation("quaternion"),)  # the default representation
 ZEROS = r"(?<![\w.:])(?P<dim>-?0\.0+)(?![\w.])"
 ENDS = (  # the frames of a pose
@@ -157,14 +157,13 @@ class Output:
         from frametool.rows.batch import kept, values_of
         from frametool.rows.conversion import Blocks
         from frametool.rows.sinks.as_rows import LEARNED
-        from frametool.rows.sinks.results import TOGETHER
 
         if not (self._in_blocks or self.style.format in LEARNED):
             self.values(values_of(found, self.style.place))
             return
         self._refuse_places()
         writer = Blocks(self.style)
-        parts = (kept(found, slice(at, at + TOGETHER)) for at in range(0, len(found.numbers), TOGETHER))
+        parts = (kept(found, slice(at, at + ROWS)) for at in range(0, len(found.numbers), ROWS))
         self.pieces(filter(None, chain(map(writer.of_block, parts), writer.end())))
 
     def _refuse_places(self) -> None:

@@ -49,14 +49,13 @@ def with_covariances(
     flat = [flat[at] for at in covariance.find_columns(flat, 36 if shape.kind == POSE else uncertainty.POINT)[0]]
     has_sigma = is_own and (covariance.SIGMA in holder or bool(flat))
     said = (*there, *(flat or [covariance.SIGMA] * has_sigma))
-    place, own = request.results.place, ((shape.place.axes or ENU) if shape.place else ECEF)
+    place, reading.here = request.results.place, path
     axes = place.axes if place else ECEF  # of x, y, z on the Earth
-    turns = shape.kind in PLACED and axes != (own if operation.keeps_frames else ECEF)
+    own = (shape.place.axes or ENU) if shape.place and operation.keeps_frames else ECEF
+    turns = shape.kind in PLACED and axes != own
     if place and place.origin and not turns and said:
-        reading.here = path
         reading.note(AT_EACH.format(axes), rule="origin")
     if (operation.formula is not None or turns) and around == path:
-        reading.here = path
         reading.note(LEFT_OUT.format("a result at a place" if turns else "calc"), rule="left-out")
         return record._replace(keys=record.keys._replace(others=(*record.keys.others, *said)))
     if operation.keeps_frames and not (turns or shape.inverse or (has_sigma and request.results.rewrite_records)):
@@ -156,8 +155,7 @@ def covariance_columns(
     axes = own.axes if own and passes else ECEF
     if shapes and place and any(covariance.find_columns(table.names or (), size)[0] for size in (9, 36)):
         if axes != place.axes:  # its columns would be along axes that the result has not
-            there = "the axes there"
-            remedy = "" if axes or not place.axes else f", or say --local-axes {place.axes}"
+            remedy, there = "" if axes or not place.axes else f", or say --local-axes {place.axes}", "the axes there"
             message = f"the covariance is along {axes or there}, the result along {place.axes or there}"
             raise ValueInvalid(f"{message}; leave its columns out{remedy}")
         if place.origin:

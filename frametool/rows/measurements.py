@@ -49,7 +49,6 @@ OURS = frozenset((*KNOWN, *NAME_KEYS, *STAMP_KEYS, *INNER, CHILD, "id", "childre
 MISSPELT = ("parent", CHILD, *COVARIANCE_KEYS, "inverse", "angles")  # keys of measurements alone
 LIKE = "a measurement is {parent: .., child: .., xyz: [..], rpy_deg: [..]}"
 WRAPPED = rb'"(?:op|msg|message|topic|transforms?)"'  # of JSON that holds messages rather than rows
-TABLES = ("csv", "tsv", "semicolon")
 MOVED = Operation(left=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))  # by nothing: so that covariances count
 
 
@@ -78,7 +77,7 @@ def read_measurements(
             first: dict[tuple[str, str], MeasuredRow] = {}
             rows: list[MeasuredRow] = []
             is_rows = file.format == "jsonl" and not re.search(WRAPPED, file.head())
-            read = _of_table if file.format in TABLES else _of_edges
+            read = _of_table if file.format in ("csv", "tsv", "semicolon") else _of_edges
             read = _of_documents if is_rows or not file.holds_samples else read
             for row in read(file, request):
                 if problem := _problem(row, first):

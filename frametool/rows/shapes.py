@@ -27,7 +27,6 @@ PARTS = {TWIST: ("linear", "angular"), WRENCH: ("force", "torque"), ACCEL: ("lin
 SIX = tuple(PARTS)  # two vectors, linear part first
 # the keys of the numbers in a mapping: these are lists, mappings, or single numbers
 MAPPINGS = ((POINT, ("point",)), (VECTOR, ("vector",)), (POINT, ("xyz",)), *PARTS.items(), (POINT, ("x", "y", "z")))
-THREE = (POINT, VECTOR, NORMAL, RATE)
 MOVERS: dict[str, Callable[..., Components]] = {  # by a pose, whose seven numbers come first
     "": lambda *_: (),
     POINT: rigid.apply,
@@ -227,7 +226,7 @@ class Shape(NamedTuple):
 
     def written(self, parts: Components, xp: Namespace) -> list[Any]:
         """Return all numbers of a result: those of the thing itself, then what comes with it as it is."""
-        own = 6 if self.kind in SIX else 3 if self.kind in THREE else 7
+        own = 6 if self.kind in SIX else 3 if self.kind in (POINT, VECTOR, NORMAL, RATE) else 7
         full = self._all_written(parts[:own], xp, parts[-1] if self.scaled else None, getattr(parts, "read", None))
         if self.absent:
             full = [number for place, number in enumerate(full) if place not in self.absent]

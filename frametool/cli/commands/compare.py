@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.fit.comparison import Comparison
-    from frametool.fit.limits import Limit
     from frametool.fit.trajectory_errors import Delta
     from frametool.frames.trajectory import Trajectory
 
@@ -35,6 +34,7 @@ UP = {
     "x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0),
     "-x": (-1.0, 0.0, 0.0), "-y": (0.0, -1.0, 0.0), "-z": (0.0, 0.0, -1.0),
 }  # fmt: skip
+LIMITS = options.parser("frametool.fit.limits", "parse_limits")
 ALIGN = ("se3", "sim3", "yaw", "origin", "origin+scale", "none")
 
 
@@ -58,12 +58,6 @@ def read_delta(text: str, *units: str) -> Delta:
     from frametool.fit.trajectory_errors import parse_delta
 
     return parse_delta(f"{text}frames" if text.isdigit() and "frames" in units else text, *[units] * bool(units))
-
-
-def _read_limits(text: str) -> list[Limit]:
-    from frametool.fit.limits import parse_limits
-
-    return parse_limits(text)
 
 
 gap_option = option("--max-gap TIME", "longest gap to interpolate  [default: 3 medians]", options.read_span,
@@ -104,7 +98,7 @@ EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 5 file; -
 @option("--as", "defaults of evo", ("evo",), name="like")
 @option("--rows [=ate|rpe|kitti]", "one row per pair, step or segment: CSV, JSON")
 @option("--explain", "the formulas with this run's numbers", ("text",), under="Result", excludes=("rows",))
-@option("--fail LIMIT,..", "exit with 1 if a limit is exceeded: ate>5cm", _read_limits, name="limits")
+@option("--fail LIMIT,..", "exit with 1 if a limit is exceeded: ate>5cm", LIMITS, name="limits")
 @option("--report FILE.html|svg", "also write a report in one file; with -o instead",
         partial(options.read_path, suffixes=REPORTS))  # fmt: skip
 @trajectory_options
@@ -351,7 +345,6 @@ def write_trajectory(output: Output, found: Trajectory) -> None:
     from frametool.rows.shapes import POINT, POSE
 
     world, body = (found.world, found.body) if (found.world, found.body) != (WORLD, BODY) else (None, None)
-    numbers = found.xyz if found.xyzw is None else np.stack(found.poses.components, axis=-1)
-    kind, lines = POINT if found.xyzw is None else POSE, np.arange(found.size)
-    names = [body if kind == POSE else None]
-    output.rows(RowPoses(numbers + 0.0, found.stamps_ns, lines, [world], names, {}, kind=kind))  # none is -0.0
+    kind, names = (POINT, [None]) if found.xyzw is None else (POSE, [body])
+    numbers = (found.xyz if kind == POINT else np.stack(found.poses.components, axis=-1)) + 0.0  # none is -0.0
+    output.rows(RowPoses(numbers, found.stamps_ns, np.arange(found.size), [world], names, {}, kind=kind))

@@ -64,7 +64,6 @@ class Skipped:
 
 # columns of a table of lookups: what a row has, the heading in the help, excluded options
 _COLUMNS = (("TARGET", "Rows", ()), ("SOURCE", "Rows", ()), ("time", "Time", ("at",)))
-_ONE = ("times", "source_at", "fixed", "explain")
 
 
 @command_named("lookup", own=("times", "notations"))
@@ -85,7 +84,7 @@ _ONE = ("times", "source_at", "fixed", "explain")
 @EXPLAIN
 @together(*(
     option(f"--{end.lower()}-column NAME", f"column with the {end} of each row of -i or stdin", options.COLUMN,
-           excludes=(*more, *_ONE), under=under)
+           excludes=(*more, "times", "source_at", "fixed", "explain"), under=under)
     for end, under, more in _COLUMNS
 ))  # fmt: skip
 def lookup_command(inputs: Inputs) -> int:

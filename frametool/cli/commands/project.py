@@ -175,7 +175,6 @@ class CameraTask(Task):
 
 FAR = ("depth", "range")
 WANTED = "a key pixel, or u and v"
-PIXEL = ("pixel.0", "pixel.1")
 DEPTH = '"depth"'
 
 
@@ -279,4 +278,4 @@ def _columns(task: CameraTask, records: Sequence[Source]) -> Sequence[str]:
         message = f"no columns u and v among: {listing(names)}; name them with --columns"
         raise FormatError(message, source=task.name, line=1)
     far = [each for each in FAR if each in names]
-    return *(("u", "v") if "u" in names else PIXEL), *far[:1]
+    return *(("u", "v") if "u" in names else ("pixel.0", "pixel.1")), *far[:1]

@@ -178,7 +178,6 @@ def solved_points(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solu
 
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, not solvable or undecided, 2 usage, 5 file."
 SHAPES = ("hand_eye", "points")
-FORMATS_OF_SCALE = ("text", "yaml", "json", "csv")
 
 
 @command_named("solve", epilog=EXIT_CODES)
@@ -228,7 +227,7 @@ def solve_command(inputs: Inputs) -> None:
     for name in filter(None, (report, path)):
         refuse_existing(name, force=force)
     output = Output(inputs, "tree", "trajectory")
-    if points and inputs.scale and output.style.format not in FORMATS_OF_SCALE:
+    if points and inputs.scale and output.style.format not in ("text", "yaml", "json", "csv"):
         raise ValueInvalid(f"{output.style.format} has no place for a scale; write json, yaml or csv")
     solve = solved_hand_eye if hand_eye else solved_points if points else solved_tree
     found = solve(inputs, files, robust=not inputs.no_robust)

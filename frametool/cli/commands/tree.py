@@ -107,13 +107,7 @@ def static_command(inputs: Inputs) -> None:
 
 PICTURES = ("text", "html", "svg", "glb", "png")
 SUFFIXES = {".html": "html", ".htm": "html", ".svg": "svg", ".glb": "glb", ".png": "png", ".txt": "text"}
-PIPE_SIZE = (100, 30)  # columns and lines, if not known
-
-
-def _eye(text: str) -> Eye:
-    from frametool.view.frame_scene import parse_eye
-
-    return parse_eye(text)
+EYE = options.parser("frametool.view.frame_scene", "parse_eye")
 
 
 @command_named("view", own=("output",))
@@ -126,7 +120,7 @@ def _eye(text: str) -> Eye:
 @option("--below FRAME", "only this frame and its descendants", FRAME)
 @option("--only REGEX", "only frames whose name matches")
 @option("--path", "only the frames between TARGET and SOURCE", name="path_only")
-@option("--from EYE", "slanted, front, side, top, or AZ,EL in degrees", _eye, name="eye", default="slanted")
+@option("--from EYE", "slanted, front, side, top, or AZ,EL in degrees", EYE, name="eye", default="slanted")
 @options.moving_options
 @option("-f --format", "format of the picture  [default: by the suffix of --output, else text]", PICTURES, name="fmt")
 @options.place_options
@@ -236,7 +230,7 @@ def _content(
 
         from frametool.view.terminal import terminal_text
 
-        return terminal_text(scene, *get_terminal_size(PIPE_SIZE), eye)
+        return terminal_text(scene, *get_terminal_size((100, 30)), eye)
     from frametool.view.exports import still_picture
     from frametool.view.pictures import write_picture
 

@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
-from functools import cache, cached_property, partial
+from functools import cached_property, partial
 from io import BufferedReader
 from itertools import chain, count
+from json import JSONDecoder
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +32,7 @@ from frametool.rows.sinks.results import BlockResults, text_in_order
 from frametool.text.lines import Pieces, read_blocks, readiness, whole_lines, with_edits
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+    from collections.abc import Generator, Iterable, Iterator, Sequence
 
     from frametool.geometry import Components
     from frametool.rows.evaluate import Run, State
@@ -48,7 +49,6 @@ NO_END = "the array does not end: its ] is missing"
 DOCUMENTS, LINES, VALUES, ARRAY = "documents", "lines", "values", "array"
 MARK = b"\xef\xbb\xbf"
 MUCH = 1 << 20  # bytes of one unfinished value beyond which it is scanned again only at twice the size
-TOO_DEEP = "nested too deeply"
 
 _SEPARATOR = re.compile(rb"^(?:---|\ttotal count: ?\d+---)[ \t]*\r?\n", re.MULTILINE)  # the last: ros2's note of a loss
 _NO_DOCUMENT = re.compile(rb"(?:\xef\xbb\xbf)?(?:[ \t]*(?:#[^\n]*)?\r?(?:\n|\Z))*+(?:(?:\.\.\.|---)\s*)?")
@@ -57,6 +57,7 @@ _SEVERAL = re.compile(rb"[}\]]\s*+(?:,\s*+)?+[{\[]|\}\s*+(?:,\s*+)?+[^\s,}\]]")
 _AFTER = re.compile(rb"[ \t]*,?[ \t]*\r?\n?")
 _GAP = re.compile(rb"\s*+(,?+)\s*+")
 _OPENING = re.compile(rb"(?:\xef\xbb\xbf)?\s*\[")
+_DECODE = JSONDecoder(parse_int=str, parse_float=str, parse_constant=str).raw_decode  # numbers remain text
 _WORD_AT_END = re.compile(r"[\w.+-]*\s*\Z")  # such as the 1e of 1e-05
 _BEHIND_ITEM = re.compile(rb"\s*+[^\s\[]")
 
@@ -466,22 +467,14 @@ def _layout_of(text: bytes, *, final: bool) -> str:
 def _value(text: str, at: int) -> tuple[int, str | None]:
     """Return the end of the JSON value at an offset and "", or the place and message of an error, None if cut off."""
     try:
-        return _decoder()(text, at)[1], ""
+        return _DECODE(text, at)[1], ""
     except RecursionError:
-        return at, TOO_DEEP
+        return at, "nested too deeply"
     except ValueError as error:
         place: int = getattr(error, "pos", at)
         message: str = getattr(error, "msg", str(error))
         is_cut = _WORD_AT_END.match(text, place) or message.startswith("Unterminated string")
         return place, None if is_cut else f"not JSON: {message[:1].lower()}{message[1:]}"
-
-
-@cache
-def _decoder() -> Callable[[str, int], tuple[object, int]]:
-    """Return the decoder; numbers remain text, so that none is too long."""
-    from json import JSONDecoder
-
-    return JSONDecoder(parse_int=str, parse_float=str, parse_constant=str).raw_decode
 
 
 def _scanned(data: bytes, at: int, *, array: bool, final: bool, first: bool = True) -> tuple[list[Part], bool]:

@@ -64,9 +64,7 @@ if TYPE_CHECKING:
 COUNTER = "frame"  # such a column often counts pictures
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-COMMENT = b"#"
 COMMENTS = re.compile(rb"(?:#[^\r\n]*|\s*(?:[\r\n]|\Z))*+")  # and empty lines
-QUOTE = ord('"')
 UNCLOSED = "a quote is opened here and not closed"
 
 
@@ -96,7 +94,7 @@ class Table(NamedTuple):
         """Find the cells of a block."""
         if self.delimiter:
             return split_delimited(block, self.delimiter, self.width)
-        return split_blank(block, self.width, comment=COMMENT)
+        return split_blank(block, self.width, comment=b"#")
 
     @property
     def called(self) -> tuple[str, ...]:
@@ -403,7 +401,7 @@ class TableRows(PlannedRows):
         is_run = places and places == tuple(range(places[0], places[0] + len(places)))  # then nothing is copied
         own = slice(places[0], places[-1] + 1) if is_run else list(places)
         numbers = Spans(cells.data, cells.starts[:, own], cells.ends[:, own])
-        if places and (cells.data == QUOTE).any():
+        if places and (cells.data == ord('"')).any():
             numbers = without_quotes(numbers)
         names = self.names_of(len(cells.rows), lambda place: coded(cells.column(place)))
         times = [without_quotes(cells.column(place)) for place in layout.times]
