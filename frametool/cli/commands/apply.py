@@ -311,9 +311,8 @@ class TreeMover(Mover):
 
         numbers: an argument that looks like a number is not a frame's name
         """
-        inputs = task.inputs
+        inputs, arguments = task.inputs, task.inputs.arguments
         self.task, self.at, self.uncertain = task, inputs.at, bool(inputs.covariance)
-        arguments = inputs.arguments
         refuse(len(arguments) < 2, "name TREE and TARGET, or give --transform")
         is_named = len(arguments) > 2 and not is_record(arguments[2]) and not (numbers and begins_number(arguments[2]))
         self.rest = arguments[2 + is_named :]
@@ -321,8 +320,7 @@ class TreeMover(Mover):
         self.tree = tree = load_tree(inputs, arguments[0], inputs.more, streams=self.is_stream)
         self.lookups = lookups_in(inputs, tree, carried=self.uncertain)
         self.target: str = frame_name(arguments[1], tree)
-        self.into = f" in {self.target}"
-        self.source = frame_name(arguments[2], tree) if is_named else None
+        self.into, self.source = f" in {self.target}", frame_name(arguments[2], tree) if is_named else None
         if not {self.target, self.source or self.target} <= set(tree.frames):
             tree.lookup(self.target, self.source or self.target)  # raises, and names the nearest frames
         self.counters = not any(map(str.isdecimal, tree.frames))

@@ -170,8 +170,7 @@ class Splicer:
         if shape.kind in TURNED:
             old = {*outdated(self.members), *self.target.extras, "inverse", *keys.others}
             self.dropped.update(old.difference(keys.flat))
-            slots = range(there, shape.own_size)
-            at = keys.rotation
+            slots, at = range(there, shape.own_size), keys.rotation
             if self._same_rotation() and None not in [self.slots[slot] for slot in slots]:
                 self._numbers(slots, self.target.position_size)
                 at = keys.flat[-1] if keys.flat else at
