@@ -59,6 +59,7 @@ def main(counts: list[int]) -> None:
             for name in ("ref", "est"):
                 subprocess.run([*TOOL, "convert", "-i", f"{name}.tum", "-o", f"{name}.mcap", "--force", "--quiet"], cwd=folder, check=True, stderr=subprocess.DEVNULL)
             rows["of MCAP files"] = timed([*TOOL, "compare", "ref.mcap", "est.mcap"], folder)
+            rows["resample, CSV"] = timed([*TOOL, "resample", "est.tum", "--rate", "70", "-f", "csv"], folder)
             theirs = timed([evo, "tum", "ref.tum", "est.tum", "-va"], folder)[0] if evo and count <= 100_000 else None
             for name, (seconds, memory) in rows.items():
                 print(f"{count:>8} {name:<16} {seconds:>8.2f} {memory:>6.0f}  {'' if theirs is None else f'{theirs / seconds:.1f} x'}")
