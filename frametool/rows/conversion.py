@@ -165,21 +165,22 @@ class FormatConverter:
 
         Stamps are those of a file, those of the rows, or their numbers as seconds.
         """
-        is_table, other = self.is_table, self.style.format
+        is_table, other, fmt = self.is_table, self.style.format, FORMATS[self.fmt].rows
         rows = TableRows(stream, self.fmt, self.request, self.source, header=header) if is_table else self._rows(stream)
         self._begin(rows)
-        operation, fmt = self.request.operation, FORMATS[self.fmt].rows
         # stamps that only count are no loss where the other format has no place for them
         counts = bool(fmt.counted) and not (self.answers.stamps or (self.fmt == "g2o" and self.answers.edges))
         has_no_place = holds(other, "recording") or FORMATS[other].rows.counted
         are_lost = counts and (self.request.rows.stamps == NO_STAMPS or has_no_place)
+        operation = self.request.operation
         kind, names = operation.result_kind(self.shape.kind), operation.extras(self.shape)
         more = tuple(map(self.request.results.prefix.__add__, names))
         file = StampFile(self.answers.stamps) if self.answers.stamps and is_table else None
         is_placed, count = self.looks_up_places or self.shape.kind == POINT or self.shape.place is not None, 0
         for found, outcome in rows.steps() if is_table else self._without_gaps(rows):
             poses = self._placed(found, names) if is_placed else found
-            every = np.union1d(poses.lines, [fault.line for fault in outcome.faults])  # bad rows have a time too
+            bad = [fault.line for fault in outcome.faults]  # which have a time too
+            every = np.union1d(poses.lines, bad) if bad else poses.lines
             at, before, count = np.searchsorted(every, poses.lines), count, count + len(every)
             stamps = None if are_lost else poses.stamps_ns
             if file is not None:
