@@ -179,8 +179,8 @@ class FormatConverter:
         is_placed, count = self.looks_up_places or self.shape.kind == POINT or self.shape.place is not None, 0
         for found, outcome in rows.steps() if is_table else self._without_gaps(rows):
             poses = self._placed(found, names) if is_placed else found
-            bad = [fault.line for fault in outcome.faults]  # which have a time too
-            every = np.union1d(poses.lines, bad) if bad else poses.lines
+            # bad rows have a time too
+            every = np.union1d(poses.lines, [each.line for each in outcome.faults]) if outcome.faults else poses.lines
             at, before, count = np.searchsorted(every, poses.lines), count, count + len(every)
             stamps = None if are_lost else poses.stamps_ns
             if file is not None:
