@@ -68,7 +68,7 @@ def copy_target(fmt: str, path: str, output: str | None, named: str | None) -> t
     return copy, place
 
 
-BATCH, ROWS = 256, 8192  # results that are written together: for people, and as rows
+BATCH = 256  # poses that are written together
 QUATERNION = (notation("quaternion"),)  # the default representation
 ZEROS = r"(?<![\w.:])(?P<dim>-?0\.0+)(?![\w.])"
 ENDS = (  # the frames of a pose
@@ -156,14 +156,14 @@ class Output:
         """Write poses or points, some thousand at a time where the format holds rows."""
         from frametool.rows.batch import kept, values_of
         from frametool.rows.conversion import Blocks
-        from frametool.rows.sinks.as_rows import LEARNED
+        from frametool.rows.sinks.results import TOGETHER
 
-        if not (self._in_blocks or self.style.format in LEARNED):
+        if not (self._in_blocks or self.style.format in ("csv", "json", "yaml")):
             self.values(values_of(found, self.style.place))
             return
         self._refuse_places()
         writer = Blocks(self.style)
-        parts = (kept(found, slice(at, at + ROWS)) for at in range(0, len(found.numbers), ROWS))
+        parts = (kept(found, slice(at, at + TOGETHER)) for at in range(0, len(found.numbers), TOGETHER))
         self.pieces(filter(None, chain(map(writer.of_block, parts), writer.end())))
 
     def _refuse_places(self) -> None:

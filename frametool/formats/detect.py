@@ -52,8 +52,8 @@ class Beginning:
     @cached_property
     def text(self) -> str:
         """Return the bytes as text, with one kind of line ends."""
-        known = "utf-16" if self.head.startswith(UTF16) else "utf-8-sig"
-        return self.head.decode(known, "replace").replace("\r\n", "\n")
+        encoding = "utf-16" if self.head.startswith(UTF16) else "utf-8-sig"
+        return self.head.decode(encoding, "replace").replace("\r\n", "\n")
 
     @cached_property
     def data_line(self) -> str:

@@ -369,6 +369,11 @@ def begins_number(argument: str) -> bool:
     return argument.lstrip("-+.")[:1].isdigit() and "," not in argument
 
 
+def _is_apart(argument: str) -> bool:
+    """Return True for an argument that is not a number of a point: a record, pasted text, or empty."""
+    return not argument or is_record(argument) or (not begins_number(argument) and is_pasted(argument))
+
+
 def sources_of(inputs: Inputs, arguments: Sequence[str], kind: str = "", place: str = "") -> Iterator[str | Source]:
     """Yield the texts of records: bare numbers in threes become points, the rest is unchanged."""
     if place and not any(map(is_record, arguments)):
@@ -376,8 +381,7 @@ def sources_of(inputs: Inputs, arguments: Sequence[str], kind: str = "", place: 
 
         yield mapping_of(inputs, arguments, place)
         return
-    is_apart = lambda text: not text or is_record(text) or (not begins_number(text) and is_pasted(text))  # noqa: E731
-    for are_apart, group in groupby(arguments, is_apart):
+    for are_apart, group in groupby(arguments, _is_apart):
         texts = list(group)
         if are_apart:
             yield from filter(None, texts)

@@ -178,7 +178,6 @@ of transforms, as `lookup` does. A summary goes to stderr.
 
 sim_command = Group("sim", table=SUBCOMMANDS, help=HELP, epilog=EXIT_CODES)
 LAW_OPTIONS = ("rate", "gain_linear", "gain_angular", "max_linear", "max_angular")
-FOLLOW_OPTIONS = ("spawn", "target", "delay")
 SCENE_OPTIONS = ("followers", "duration", "turtlesim")
 
 
@@ -211,7 +210,8 @@ def follow(inputs: Inputs) -> None:
         if sys.stdin is None:
             raise FileProblem("standard input is closed")
         say_if_typed()
-        make, period_ns = (drivers.arriving, 0) if is_paced else (drivers.scripted, BILLION)  # acts when it arrives
+        # paced, commands act when they arrive
+        make, period_ns = (drivers.arriving, 0) if is_paced else (drivers.scripted, BILLION)
         leader = make(read_stream(sys.stdin.buffer, "stdin", period_ns=period_ns))
     else:
         if not os.path.exists(argument) and not os.path.splitext(argument)[1]:
@@ -235,7 +235,7 @@ def scene_of(inputs: Inputs, leader: MakeLeader) -> Scene:
     holonomic = chosen["turtlesim"] == "ros2" and inputs.holonomic  # ROS 1 always uses linear.y
     with misuse():
         if chosen["followers"]:  # the options of followers have no effect without one
-            chosen |= {name: getattr(inputs, name) for name in FOLLOW_OPTIONS}
+            chosen |= {name: getattr(inputs, name) for name in ("spawn", "target", "delay")}
             chosen["law"] = drivers.FollowController(inputs.law, **{key: getattr(inputs, key) for key in LAW_OPTIONS})
         return tutorial(leader=leader, holonomic=holonomic, **chosen)
 
