@@ -15,7 +15,7 @@ from frametool.errors import FrametoolError, NamedTuple
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import arrays, floats, quaternion, uncertainty
 from frametool.geometry.representations import UPPER_ROWS, BatchRule
-from frametool.geometry.rigid import EXACT, SCALED
+from frametool.geometry.rigid import EXACT, UNCERTAIN
 from frametool.geometry.validation import read_rotations
 from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
 from frametool.grammar.pose import FEW_DIGITS
@@ -259,9 +259,10 @@ class Run:
     def _before(self, pose: Rigid) -> tuple[list[Any], Floats]:
         """Return the good row before each row, or the first of all, and the row; and the time between the two.
 
-        The very first row's is itself.
+        The very first row's is itself, and then both are exact.
         """
         good, state, seconds = self._good(), self.state, np.ones(self.count)
+        itself = good[: state.previous is None]
         if not len(good):
             return [pose, pose], seconds
         full = np.stack([np.broadcast_to(np.asarray(part, np.float64), self.count) for part in pose])
@@ -269,7 +270,7 @@ class Run:
         frames = [None if each and counts(each) else each for each in self.block.frames[0].texts]
         codes = self.block.frames[0].of_rows(self.count)[good]
         if state.previous is None:
-            state.previous, state.frame = full[:, good[0]], frames[codes[0]]
+            state.previous, state.frame = full[:, good[0]].copy(), frames[codes[0]]
         reason = f"given in another frame than {state.frame!r}, as the rows before are"
         reason = reason if state.frame else "given in a frame, as the rows before are not"
         others = np.array([each != state.frame for each in frames])[codes]
@@ -277,17 +278,16 @@ class Run:
         if not len(good := good[~others]):
             return [pose, pose], seconds
         before = state.previous
-        if len(before) == EXACT < len(full):  # exact, or of the scale 1
-            before = np.append(before, np.full(len(full) - EXACT, float(len(full) == SCALED)))
-        elif len(before) != len(full):
-            what = "what it is compared with has a covariance or a scale, which this one has not"
+        if len(before) > len(full):
+            what = "what it is compared with has a covariance, which this one has not"
             self._blame(good[: None if self.operation.of == START else 1], "", what)
-            before = np.append(before[:EXACT], full[EXACT:, good[0]])
+        before = np.append(before, np.zeros(UNCERTAIN - EXACT))[: len(full)]  # without a covariance it is exact
         earlier = np.repeat(before[:, None], self.count, axis=1)
         if self.operation.of != START:
             later = np.arange(good[0] + 1, self.count)
             earlier[:, later] = full[:, good[np.searchsorted(good, later) - 1]]
-            state.previous = full[:, good[-1]]
+            state.previous = full[:, good[-1]].copy()
+        earlier[EXACT:, itself] = full[EXACT:, itself] = 0.0
         if self.operation.of == VELOCITIES and len(good := self._good()):
             seconds[good] = self._seconds(good, self.block.stamps[0][good])
         return [tuple(earlier), tuple(full)], seconds

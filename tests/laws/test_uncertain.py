@@ -327,3 +327,13 @@ def test_columns_of_a_covariance_by_other_names_are_not_moved_and_a_warning_says
         assert done.out.endswith(",0.5\n")
         assert done.err == f"frametool: warning: stdin: not moved: {name}; the columns of a covariance are c11, c12 ..\n"
     assert run("convert", "--to", "rpy", stdin=text).err == ""
+
+
+@pytest.mark.parametrize("option", ["--first", "--consecutive"])
+def test_a_pose_seen_from_itself_is_exact(run: Run, option: str) -> None:
+    """The first row is; the others are seen from another pose, whose covariance counts."""
+    other = OTHER | {"covariance": DIAGONAL}
+    found = covariances(run("relative", option, "-f", "json", stdin="\n".join(map(json.dumps, (other, POSE | {"covariance": WHOLE}, other)))), "json")
+    start, previous = ((B, DIAGONAL), (B, DIAGONAL)) if option == "--first" else ((B, DIAGONAL), (ROW, WHOLE))
+    seen: list[Any] = [np.ravel(compose(a.inverse(), invert(a, sure), b, own)) for (a, sure), b, own in ((start, ROW, WHOLE), (previous, B, DIAGONAL))]
+    assert np.allclose(found, [[0.0] * 36, *seen], rtol=1e-14, atol=1e-17)
