@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from frametool.geometry import Components, Rigid
 
 MOST_SHOWN = 16  # frames of a path or a cycle
-OTHER_CLOCK = 10**8 * BILLION  # three years: beyond it, only one of two clocks counts from 1970
+OTHER_CLOCK = 10**8 * BILLION  # three years: where only one of two times is below, only the other counts from 1970
 
 
 Member = TypeVar("Member", bound=Hashable)
@@ -339,7 +339,7 @@ def no_data(target: str, source: str, at_ns: int, path: Sequence[str], edges: Se
         ended, begun = (f"{bare(track.parent)} -> {bare(track.child)}" for track in (early, late))
         when = f"ends at {format_stamp(end)} before {begun} begins at {format_stamp(begin)}"
         whole = f"; {ended} {when}: they never overlap"
-    clocks = "; that is years: one of the clocks counts from 1970, the other does not" if short >= OTHER_CLOCK else ""
+    clocks = "; one of the clocks counts from 1970, the other does not" * (min(at_ns, last) < OTHER_CLOCK <= short)
     message = (
         f"no data for {bare(parent)} -> {bare(worst.child)} at {format_stamp(at_ns)}; {cover} ({off}), "
         f"on the path {_arrows(path)}{whole}{clocks}"

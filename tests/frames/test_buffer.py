@@ -123,6 +123,12 @@ def test_edges_that_never_overlap_are_both_named() -> None:
 def test_two_clocks_get_a_sentence_of_their_own() -> None:
     with pytest.raises(TooEarly, match="one of the clocks counts from 1970"):
         moving().lookup("map", "base", 3 * SECOND)
+    buffer = TransformBuffer()
+    buffer.insert("a", "b", shifted(0), 1_700_000_000 * SECOND)
+    for seconds, clock in ((1_400_000_000, 1970), (1_900_000_000, 1970), (50, 0)):
+        with pytest.raises(LookupFailed) as caught:
+            buffer.lookup("a", "b", seconds * SECOND)
+        assert ("counts from 1970" in str(caught.value)) == (clock == 0)
 
 
 def test_an_unknown_frame_is_an_error_even_against_itself() -> None:
