@@ -411,8 +411,6 @@ def _result(root: Node, made: Answer, request: Request, fmt: str) -> Value:
         if operation.only_adds:
             node = root.at(_unit_of(record))
             return with_stamp_ns(plain(node), fmt) | extras if type(node.value) is dict else extras
-        if kind != POSE or request.rows.poses:
-            record = record._replace(stamp_ns=None)
     said = _header_stamp(record) | extras | with_stamp_ns(_rest(root, record), fmt) | extras  # new ones count
     seen_from = "frame" if kind or record.shape.kind != POSE else "parent"
     named = {key: name for key, name in (("name", entry.name), (seen_from, entry.parent)) if name is not None}

@@ -132,6 +132,15 @@ def test_numbers_are_added_beside_a_covariance_that_stays(around: str, run: Call
     assert (json.loads(done.out), done.err) == ({**record, "d": 5.0}, "")
 
 
+@pytest.mark.parametrize("text", ["row", "inv(row)", "trans(row)", "norm(trans(row))"])
+@pytest.mark.parametrize("count", [2, 20])
+def test_the_result_of_a_message_has_its_stamp_in_another_format(text: str, count: int, run: Callable[..., Any]) -> None:
+    pose = {"position": {"x": 3, "y": 0, "z": 4}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
+    messages = ({"header": {"stamp": {"sec": at, "nanosec": 5}, "frame_id": "map"}, "pose": pose} for at in range(count))
+    done = run("calc", text, "-f", "csv", stdin="".join(json.dumps(message) + "\n" for message in messages))
+    assert column(done.out, "stamp_ns").ravel().tolist() == [at * 1_000_000_000 + 5 for at in range(count)]
+
+
 def test_tables_and_records_have_the_same_numbers(run: Callable[..., Any]) -> None:
     lines = "".join(json.dumps(SHAPES["pose"](at)) + "\n" for at in range(COUNT))
     arguments = ("calc", f"X={LITERAL}", "-e", "p=inv(X) * row * X", "-e", "a=angle(row)")
