@@ -63,6 +63,7 @@ OTHER_NAMES = NAMES.difference(("name", "parent"))
 MOST_CHOICES = 10  # representations listed in an error; `help rotations` has all
 SCALE = "scale"
 COVARIANCE_KEYS = frozenset(("sigma", "covariance"))
+AT_EACH = "the covariance stays along {} at each position, which far from the origin differ from those there"
 LEFT_OUT = "covariances left out: {} has none"  # completed with the name of a command
 POSE_KEYS = frozenset((
     *POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, *COVARIANCE_KEYS,

@@ -27,7 +27,7 @@ from frametool.geometry.representations import HEADING, POSITIONS, notation
 from frametool.grammar import place as grammar
 from frametool.grammar import readers
 from frametool.grammar.covariance import check, entries_of, of_position
-from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose
+from frametool.grammar.pose import AT_EACH, COVARIANCE_KEYS, LEFT_OUT, Pose
 from frametool.grammar.readers import AXES_KEY, EARTH_FRAMES, FIX, Misfit, Reading, may_be_uncertain, within
 from frametool.rows import columns as finder
 from frametool.rows.faults import ZONES, RowNote
@@ -226,11 +226,9 @@ WORDS: dict[str, Reader] = {ZONE: zone_number, AXES: _axes, STATUS: _status, PAR
 
 def zone_notes(place: Place, columns: Sequence[Floats], line_of: Callable[[int], int]) -> list[RowNote]:
     """Return the zone of the first of some results in UTM, and where the first other one begins."""
-    notes = []
-    for at in place.words:
-        other = (columns[at] != columns[at][0]).nonzero()[0][:1].tolist()
-        notes += [RowNote(line_of(row), ZONES, ZONE_NAMES[int(columns[at][row])]) for row in (0, *other)]
-    return notes
+    zones = [columns[at] for at in place.words]
+    firsts = [(each, row) for each in zones for row in (0, *(each != each[0]).nonzero()[0][:1].tolist())]
+    return [RowNote(line_of(row), ZONES, ZONE_NAMES[int(each[row])]) for each, row in firsts]
 
 
 def doubt_band(place: Place, columns: Sequence[Floats], line_of: Callable[[int], int]) -> list[RowNote]:
@@ -241,8 +239,7 @@ def doubt_band(place: Place, columns: Sequence[Floats], line_of: Callable[[int],
     northing = fields["northing"]
     zone = fields[ZONE] if place.zone is None else northing * 0.0 + place.zone
     rows = ((zone < 0.0) & (northing >= 3.5e6) & (northing <= 4.5e6)).nonzero()[0][:1].tolist()
-    doubts = [(row, grammar.band_s(float(zone[row]), float(northing[row]))) for row in rows]
-    return [RowNote(line_of(row), "band-s", doubt, ZONE) for row, doubt in doubts]
+    return [RowNote(line_of(at), "band-s", grammar.band_s(float(zone[at]), float(northing[at])), ZONE) for at in rows]
 
 
 def settle(
@@ -317,28 +314,26 @@ def placed_record(
     grammar.check_parent(value, value)
     there, used = inner(grammar.without_place(value))
     mapping = {key: value[key] for key in (*own, AXES_KEY, "parent", "frame", "inverse") if key in value}
-    is_fix = "header" in value and operation.formula is None
-    covariance = _of_fix(value, mapping, reading, request) if is_fix else ()
+    covariance = () if operation.only_adds else _of_fix(value, mapping, reading, request)
     pose = grammar.placed_by(mapping, there, reading)
     if pose.rotation is None and (operation.inverse or operation.similar):
         raise Misfit(UNSAID)  # as a factor it is a pose
-    takes_points = operation.takes_points or operation.keeps_frames
-    is_point = pose.rotation is None and request.rows.kind != POSE and takes_points
+    is_point = not (pose.rotation or request.rows.kind == POSE) and (operation.takes_points or operation.keeps_frames)
     numbers: tuple[float, ...] = pose.components[: 7 if pose.rotation is not None else 3]
     shape = Shape(POINT if is_point else POSE, 1.0, () if pose.rotation is None else ((notation("quaternion"), False),))
     if covariance and not is_point:  # of a pose whose turn is exact
         covariance = tuple(covariance[3 * i + j] if max(i, j) < 3 else 0.0 for i in range(6) for j in range(6))
     extra, place = covariance, request.results.place
     said = () if extra else pose.covariance or ()
-    if (extra and place and place.axes != ECEF) or (said and (place or operation.formula)):
-        reading.note(LEFT_OUT.format("a result at a place" if place else "this"), rule="left-out")
+    if (extra or said) and (operation.formula or (place and (said or place.axes != ECEF))):
+        reading.note(LEFT_OUT.format("a result at a place" if place else "calc"), rule="left-out")
         extra = ()
     elif said:
         extra = of_position(tuple(said)) if is_point else tuple(said)
     if extra:
         shape = shape._replace(covariance=(len(extra),), sigma=())
-    keys = [*own, *used, *(key for key in (AXES_KEY, *COVARIANCE_KEYS) if key in value)]
-    keys += ["header", *[FIX, FIX_TYPE] * bool(covariance)] if "header" in value else []
+    also = (AXES_KEY, *COVARIANCE_KEYS, "header", *(FIX, FIX_TYPE) * bool(covariance))
+    keys = [*own, *used, *(key for key in also if key in value)]
     stays = False
     if pose.read and is_point and not extra:
         place, named = pose.read.place, {readers.PLACE_FIELDS.get(key): key for key in keys}
@@ -361,14 +356,16 @@ def _of_fix(value: dict[str, Any], mapping: dict[str, Any], reading: Reading, re
 
     Raises Misfit for a fix that was none.
     """
-    status = value.get("status")
+    status, place = value.get("status"), request.results.place
     if type(status) is dict and status.get("status") == "-1":
         raise readers.NotARotation("status -1: there was no fix", ("status", "status"))
-    place = request.results.place
-    if FIX not in value or value.get(FIX_TYPE, "1") == "0" or (place is not None and place.axes == ENU):
+    if FIX not in value or value.get(FIX_TYPE, "1") == "0":
+        return ()
+    if place is not None and place.axes == ENU and request.operation.keeps_frames:
+        if place.origin:
+            reading.note(AT_EACH.format(ENU), rule="origin")
         return ()
     entries = [number for _, number in within((FIX,), entries_of, value[FIX], (9,))]
     within((FIX,), check, entries)
-    level = Pose(rotation=(0.0, 0.0, 0.0, 1.0))
-    at = grammar.placed_by(mapping | {AXES_KEY: ENU}, level, Reading(reading.source))
+    at = grammar.placed_by(mapping | {AXES_KEY: ENU}, Pose(rotation=(0.0, 0.0, 0.0, 1.0)), Reading(reading.source))
     return tuple(uncertainty.rotate_covariance(tuple(entries), *at.components[3:]))

@@ -16,7 +16,7 @@ from frametool.geometry.quaternion import TOLERATED
 from frametool.geometry.rigid import EXACT, NOT_BOTH, SCALED, inverse_full, pose_of, scale_of
 from frametool.geometry.uncertainty import UNKNOWN
 from frametool.grammar import covariance
-from frametool.grammar.pose import LEFT_OUT, SCALE, read_angle_unit
+from frametool.grammar.pose import AT_EACH, LEFT_OUT, SCALE, read_angle_unit
 from frametool.grammar.readers import RATES, Misfit, NotARotation, Path, Reading, read_number, within
 from frametool.ros.messages import whole_list
 from frametool.rows.shapes import IDENTITY, MOVERS, NORMAL, PARTS, POINT, POSE, RATE, TWIST, VECTOR, WRENCH, Shape
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 
 PLACED = (POSE, POINT, VECTOR)
-AT_EACH = "the covariance stays along {} at each position, which far from the origin differ from those there"
 
 
 def with_covariances(
@@ -72,11 +71,10 @@ def with_covariances(
         below = (*around, key)
         found = within(below, _entries, holder[key], sizes)
         paths, numbers = tuple((*below, *at) for at, _ in found), [number for _, number in found]
-        if numbers[0] == UNKNOWN and operation.moves:
-            record = record._replace(begins=(*record.begins, paths[0]))
-            continue
-        within(below, covariance.check, numbers)
-        record = _with_numbers(record._replace(begins=(*record.begins, paths[0])), key, paths, numbers)
+        record = record._replace(begins=(*record.begins, paths[0]))
+        if not (numbers[0] == UNKNOWN and operation.moves):
+            within(below, covariance.check, numbers)
+            record = _with_numbers(record, key, paths, numbers)
     return record
 
 
@@ -97,11 +95,6 @@ def _entries(value: Any, sizes: Sequence[int]) -> list[tuple[Path, float]]:
 def is_unknown(value: Any, sizes: Sequence[int]) -> bool:
     """Return True if a covariance begins with -1: nothing is known of it, nor of what it would be of."""
     return _entries(value, sizes)[0][1] == UNKNOWN
-
-
-def _with_unit(sigma: Sequence[tuple[int, str]], *, degrees: bool) -> tuple[tuple[int, str], ...]:
-    """Return the sources of six sigmas with the unit of bare angles."""
-    return tuple((at, unit or "deg" * (degrees and axis > 2)) for axis, (at, unit) in enumerate(sigma))
 
 
 def _of_sources(numbers: Sequence[Any], sigma: Sequence[tuple[int, str]], size: int) -> Components:
@@ -149,35 +142,40 @@ def covariance_columns(
     table: Table, request: Request, shapes: tuple[Shape, ...]
 ) -> tuple[tuple[int, ...], tuple[Shape, ...]]:
     """Find the columns of a covariance or of sigmas where they count; return their places and the shapes with them."""
+    operation, asked, names = request.operation, request.results, table.names or ()
     kinds = [shape.kind for shape in shapes]
-    passes = request.operation.keeps_frames
-    own, place = shapes[0].place if shapes else None, request.results.place
+    passes = operation.keeps_frames or operation.only_adds
+    own, place = shapes[0].place if shapes else None, None if operation.only_adds else asked.last_place or asked.place
     axes = own.axes if own and passes else ECEF
-    if shapes and place and any(covariance.find_columns(table.names or (), size)[0] for size in (9, 36)):
+    stay = [name for name in names if re.fullmatch(OTHER_ENTRIES, name)]
+    if shapes and place and any(covariance.find_columns(names, size)[0] for size in (9, 36)):
         if axes != place.axes:  # its columns would be along axes that the result has not
             remedy, there = "" if axes or not place.axes else f", or say --local-axes {place.axes}", "the axes there"
             message = f"the covariance is along {axes or there}, the result along {place.axes or there}"
             raise ValueInvalid(f"{message}; leave its columns out{remedy}")
         if place.origin:
             warn(f"{table.source}: {AT_EACH.format(axes)}")
+    elif stay and own and place and passes and not asked.keep and (place.axes != ENU or place.origin):
+        warn(f"{table.source}: {listing(stay, 3)} stay along east, north, up at each position")
     if passes or not kinds or not {*PLACED}.issuperset(kinds):
         return (), shapes
-    places, sigma = covariance.find_columns(table.names or (), 36 if POSE in kinds else 9)
+    places, sigma = covariance.find_columns(names, 36 if POSE in kinds else 9)
     shape = shapes[0]
     if own is not None:
         from frametool.rows.columns_earth import along
 
-        places, shape = along(own, shape, table.names or (), places)
-    stay = [name for name in table.names or () if re.fullmatch(OTHER_ENTRIES, name)]
-    if stay and not places and request.operation.formula is None:
+        places, shape = along(own, shape, names, places)
+    if operation.formula is not None:
+        if places:
+            warn(f"{table.source}: {LEFT_OUT.format('calc')}", rule="left-out")
+        return places, shapes
+    if stay and not places:
         warn(f"{table.source}: not moved: {listing(stay, 3)}; the columns of a covariance are c11, c12 ..")
-    if places and request.operation.formula is not None:
-        warn(f"{table.source}: {LEFT_OUT.format('calc')}", rule="left-out")
-    if not places or request.operation.formula is not None:
+    if not places:
         return (), shapes
     if len(shapes) != 1:
         raise ValueInvalid("a covariance beside several poses in a row: whose it is nobody can tell")
-    sigma = _with_unit(sigma, degrees=request.rows.degrees)
+    sigma = tuple((at, unit or "deg" * (request.rows.degrees and axis > 2)) for axis, (at, unit) in enumerate(sigma))
     return places, (shape._replace(covariance=(len(places),), sigma=sigma),)
 
 

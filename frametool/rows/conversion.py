@@ -130,7 +130,8 @@ class FormatConverter:
         self.tally = Diagnostics()
         self.is_table = FORMATS[fmt].is_table
         self.style = style.changed()
-        self.request = request.with_results(all_numbers=True, notations=(QUATERNION,), keep_sign=True, place=None)
+        in_ecef = request.with_results(place=None, last_place=request.results.place)
+        self.request = in_ecef.with_results(all_numbers=True, notations=(QUATERNION,), keep_sign=True)
         # whose TARGET each row was checked for
         self.looks_up_places = request.results.place is not None and not request.rows.poses
         has_nulls = style.format in LEARNED or holds(style.format, "arrays")

@@ -95,7 +95,7 @@ def plan_table(table: Table, request: Request) -> tuple[Plan, Layout]:
 
         extra, shapes = covariance_columns(table, request, shapes)
     request = request.for_kind(shapes[0].kind) if shapes else request
-    places += extra
+    places += extra * bool(shapes and shapes[0].covariance)  # an expression has none
     if len({*places}) < len(places):
         twice = sorted({table.name(place) for place in places if places.count(place) > 1})
         raise Misused(f"--columns: {', '.join(twice)} appears twice")

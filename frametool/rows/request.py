@@ -386,7 +386,7 @@ class ResultOptions(NamedTuple):
     unwrap: angles continue beyond half a turn
     all_numbers: write all numbers of a result, also unchanged ones
     rewrite_records: write results as new records, not into the text of the old ones
-    place: the format of positions on the Earth
+    place: the format of positions on the Earth; last_place: that which they get later, of another format
     """
 
     notations: tuple[Notation, ...] = ()
@@ -399,6 +399,7 @@ class ResultOptions(NamedTuple):
     all_numbers: bool = False
     rewrite_records: bool = False
     place: Place | None = None
+    last_place: Place | None = None
 
 
 class Request(NamedTuple):

@@ -337,3 +337,18 @@ def test_a_pose_seen_from_itself_is_exact(run: Run, option: str) -> None:
     start, previous = ((B, DIAGONAL), (B, DIAGONAL)) if option == "--first" else ((B, DIAGONAL), (ROW, WHOLE))
     seen: list[Any] = [np.ravel(compose(a.inverse(), invert(a, sure), b, own)) for (a, sure), b, own in ((start, ROW, WHOLE), (previous, B, DIAGONAL))]
     assert np.allclose(found, [[0.0] * 36, *seen], rtol=1e-14, atol=1e-17)
+
+
+@pytest.mark.parametrize("form", ["csv", "json"])
+def test_a_table_of_calc_has_no_covariance_of_what_was_moved(run: Run, form: str) -> None:
+    """It says that it leaves covariances out: so it does, also of columns; it adds results to rows as they are."""
+    for names, cells in (("sigma_x", "1"), (",".join(f"c{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)), "1,0,0,0,1,0,0,0,1")):
+        table = f"id,x,y,z,{names},note\n7,1,2,3,{cells},n\n"
+        moved = run("calc", "{rpy: [0, 0, 1]} * row", "-f", form, stdin=table)
+        assert moved.err == "frametool: warning: stdin: covariances left out: calc has none\n"
+        assert names.partition(",")[0] not in moved.out
+        assert "id" in moved.out
+        assert "note" in moved.out
+        added = run("calc", "-e", "a=norm(row)", stdin=table)
+        assert added.err == ""
+        assert names.partition(",")[0] in added.out

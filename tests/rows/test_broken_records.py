@@ -59,7 +59,7 @@ def test_a_pose_is_compared_with_one_before_that_has_another_covariance() -> Non
     lines = [json.loads(line) for line in result.text.splitlines()]
     assert [each["distance"] for each in lines] == [0.0, 2.0, 0.0]
     assert [each.get("covariance", [0.0])[0] for each in lines] == [0.0, 0.25, 0.0]
-    assert result.told[0] == "in:3: what it is compared with has a covariance or a scale, which this one has not (row skipped)"
+    assert result.told[0] == "in:3: what it is compared with has a covariance, which this one has not (row skipped)"
 
 
 def test_angles_of_records_go_on_beyond_half_a_turn() -> None:

@@ -701,6 +701,48 @@ def test_a_covariance_beside_a_place_is_along_its_axes_or_left_out(run: Callable
         assert "the covariance stays along enu at each position, which far from the origin differ" in stays.err
 
 
+FIX_RECORD = '{%s"latitude": 10, "longitude": 20, "altitude": 5, "position_covariance": [1, 0, 0, 0, 4, 0, 0, 0, 9], "position_covariance_type": 2}\n'
+OF_FIX = [f"field.position_covariance{at}" for at in range(9)]
+FIX_ROWS = f"field.latitude,field.longitude,field.altitude,{','.join(OF_FIX)}\n10,20,5,1,0,0,0,4,0,0,0,9\n"
+
+
+@pytest.mark.parametrize("before", ["", '"header": {"frame_id": "gps"}, ', '"axes": "ned", '])
+def test_that_of_a_fix_turns_with_its_axes_or_is_told(run: Callable[..., Any], before: str) -> None:
+    """It is along east, north, up there, with a header and without, whatever axes a rotation would have."""
+    record = FIX_RECORD % before
+    turn = frametool.earth_pose(10.0, 20.0, 5.0).rotation.as_matrix()
+    at_ecef = run("convert", "-f", "json", stdin=record)
+    found = json.loads(at_ecef.out)
+    assert found["covariance"] == pytest.approx((turn @ np.diag([1.0, 4.0, 9.0]) @ turn.T).ravel(), rel=1e-14)
+    assert not any(key.startswith("position_cov") for key in found)
+    assert at_ecef.err == ""
+    for command in (("convert", "--to", "utm"), ("calc", "row"), ("apply", "--transform", "{parent: ecef, name: ecef, rpy: [0, 1, 0]}", "--to", "lla")):
+        left = run(*command, stdin=record)
+        assert "covariances left out" in left.err
+        assert "covariance" not in left.out
+    there = run("convert", "--to", "enu", "--origin", "48,11,0", stdin=record)
+    assert there.err.endswith("the covariance stays along enu at each position, which far from the origin differ from those there\n")
+    assert json.loads(run("convert", "--to", "lla", stdin=record).out)["position_covariance"] == [1, 0, 0, 0, 4, 0, 0, 0, 9]
+    assert "position_covariance" in run("calc", "-e", "a=norm(row)", stdin=record).out
+
+
+@pytest.mark.parametrize("fmt", ["csv", "json"])
+def test_columns_of_that_of_a_fix_are_told_where_they_stay_and_left_out_of_calc(run: Callable[..., Any], fmt: str) -> None:
+    for to, stays in (("lla", True), ("ecef", False), ("utm", False), ("enu", False)):
+        origin = ["--origin", "48,11,0"] if to == "enu" else []
+        told = run("convert", "--to", to, *origin, "-f", fmt, stdin=FIX_ROWS)
+        assert ("and 6 more stay along east, north, up at each position" in told.err) != stays
+        assert OF_FIX[8] in told.out
+    assert OF_FIX[0] not in run("calc", "row", "-f", fmt, stdin=FIX_ROWS).out
+    added = run("calc", "-e", "a=norm(row)", stdin=FIX_ROWS)
+    assert OF_FIX[0] in added.out
+    assert added.err == ""
+    along_enu = FIX_ROWS.replace("field.position_covariance", "c").replace(",".join(f"c{at}" for at in range(9)), "c11,c12,c13,c21,c22,c23,c31,c32,c33")
+    stays = run("convert", "--to", "lla", "--local-axes", "enu", "-f", fmt, stdin=along_enu)
+    assert (stays.status, stays.err) == (0, "")
+    assert "c33" in stays.out
+
+
 def test_a_trajectory_of_positions_is_resampled_at_places(run: Callable[..., Any]) -> None:
     rows = "t,lat,lon,alt\n0,48,11,500\n1,48,11,500\n2,48,11,500\n"
     found = run("resample", "gps.csv", "--rate", "1", "--to", "utm", "-f", "csv", files={"gps.csv": rows}).out.splitlines()

@@ -38,7 +38,7 @@ from frametool.rows.batch import (
 from frametool.rows.columns import has_pose_column, listed
 from frametool.rows.evaluate import Run, State
 from frametool.rows.faults import Fault, Outcome, RowNote
-from frametool.rows.plan import Layout, Named, New, plan_table
+from frametool.rows.plan import Kept, Layout, Named, New, plan_table
 from frametool.rows.request import SOME
 from frametool.rows.shapes import NORMAL, POSE, RATE, Shape
 from frametool.rows.sinks import In, Out
@@ -328,7 +328,7 @@ class PlannedRows:
         rows, numbers = run.settled(run.end)
         self.inputs = np.reshape(run.columns, (len(run.columns), run.count))[:, rows]
         used = {*layout.times, *layout.places, *layout.named}
-        others = [place for place in range(self.table.width) if place not in used]
+        others = [each.place for each in layout.columns if isinstance(each, Kept) and each.place not in used]
         extras = {self.table.name(place): taken(column(place), rows) for place in others}
         own = numbers.shape[1]
         if plan.shapes and plan.shapes[-1].kind in (NORMAL, RATE):  # vectors that turn along come last
@@ -337,8 +337,8 @@ class PlannedRows:
             if isinstance(each, New) and isinstance(each.piece, Out) and each.piece.first >= own:
                 extras[each.name] = numbers[:, each.piece.first]
         stamps = block.stamps[0][rows] if layout.times else None
-        rename, earth = self.rename, self.earth
-        unnamed = (earth, None) if rename is None else rename(earth, None)  # known of places, and of an expression
+        # known of places, and of an expression
+        unnamed = (self.earth, None) if self.rename is None else self.rename(self.earth, None)
         parents, names = (
             [name] if place is None else block.names.texts(role, rows)
             for role, (place, name) in enumerate(zip(layout.named, unnamed, strict=True))
