@@ -368,6 +368,7 @@ class RowPoses(NamedTuple):
         return _place().Unmoved(parts, _place().spot_of(np.ascontiguousarray(self.read.T)))  # type: ignore[no-any-return]
 
 
+SOME_STAMPS = "some poses have a stamp and some have none; add it, or leave it out of all"
 NO_ROWS = RowPoses(np.empty((0, 7)), None, np.empty(0, np.int64), (None,), (None,), {})
 
 
@@ -432,7 +433,7 @@ def block_of(results: BlockResults, *, timed: bool = True, as_poses: bool = Fals
     columns = {key: [other.get(key) for other in others] for key in keys}
     stamps, read = columns.get("stamp_ns", [None]), columns.pop(AS_READ, [None])
     if timed and None in stamps and "stamp_ns" in columns:
-        raise ValueInvalid("some poses have a stamp and some have none; add it, or leave it out of all")
+        raise ValueInvalid(SOME_STAMPS)
     stamps_ns = np.array(columns.pop("stamp_ns"), np.int64) if all(type(stamp) is int for stamp in stamps) else None
     return RowPoses(
         np.array(numbers, np.float64) + 0.0, stamps_ns, np.array(places, np.int64), parents, names,  # none is -0.0

@@ -98,6 +98,17 @@ def test_poses_of_which_some_have_a_stamp_are_no_trajectory(run: Run) -> None:
     assert "some poses have a stamp and some have none" in done.err
 
 
+@pytest.mark.parametrize(("first", "second"), [({"stamp": 1}, {}), ({}, {"stamp": 1})])
+@pytest.mark.parametrize("fmt", ["tum", "euroc"])
+def test_poses_of_two_blocks_of_which_one_has_stamps_are_none(
+    run: Run, monkeypatch: pytest.MonkeyPatch, fmt: str, first: dict[str, int], second: dict[str, int]
+) -> None:
+    monkeypatch.setattr("frametool.sizes.BLOCK", 1)
+    done = run("convert", "-f", fmt, stdin=lines(first | POSE, second | POSE))
+    assert (done.status, len([line for line in done.out.splitlines() if line[0] != "#"])) == (1, 1)
+    assert "some poses have a stamp and some have none" in done.err
+
+
 THINGS: dict[str, tuple[dict[str, Any], str, str]] = {
     "point": ({"point": [1, 2, 3]}, "x,y,z", "1,2,3"),
     "pose": ({"xyz": [1, 2, 3], "rpy": [0, 0, 0]}, NAMES, "1,2,3,0,0,0,1"),

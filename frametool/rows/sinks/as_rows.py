@@ -30,6 +30,7 @@ from frametool.grammar.pose import SCALE
 from frametool.grammar.readers import EARTH_FRAMES
 from frametool.grammar.result import Result, Style
 from frametool.rows.batch import (
+    SOME_STAMPS,
     RowPoses,
     assemble,
     constant,
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
 
 LEARNED = ("csv", "json", "yaml")
 LOSABLE = ("names of frames", "stamps")
+NUMBERED = "without stamps, poses are numbered in seconds: 0, 1, 2 .."
 
 
 class PoseWriter(ResultWriter):
@@ -96,8 +98,7 @@ class SingleWriter(PoseWriter):
             raise ValueInvalid(f"{style.format} is not written of rows of a {kind}; write csv, json or yaml")
         if kind != POSE and "points" not in FORMATS[style.format].writes:
             raise ValueInvalid(f"{style.format} holds poses; a {kind} has no rotation")
-        self.dropped: dict[str, None] = {}
-        self.made_up: dict[str, None] = {}
+        self.dropped, self.made_up = dict[str, None](), dict[str, None]()
         self.first: Any = None
 
     def of_block(self, block: RowPoses) -> bytes:
@@ -134,9 +135,8 @@ class TextWriter(SingleWriter):
         super().__init__(style, first)
         if any(each.spec != "quaternion" for each in style.notations):
             raise ValueInvalid(f"{style.format} writes rotations in its own way; leave --to out")
-        self.fixed = rows_of(style.format) or RowForm(())
+        self.fixed, self.count = rows_of(style.format) or RowForm(()), 0
         self.made_up |= dict.fromkeys(filter(None, [self.fixed.constants]))
-        self.count = 0
 
     def end(self) -> Iterator[bytes]:
         """Yield what comes behind the last pose, and warn."""
@@ -162,8 +162,10 @@ class TextWriter(SingleWriter):
         left = any(block.parents) or any(block.names), counted and has_stamps and NUMBER not in block.extras
         self.dropped |= {words: None for words, is_left in zip(LOSABLE, left, strict=True) if is_left}
         self.dropped |= dict.fromkeys(name for name in (*self.extras, *block.extras) if name not in (IMAGE, NUMBER))
+        if before and not counted and has_stamps == (NUMBERED in self.made_up):  # those of another block
+            raise ValueInvalid(SOME_STAMPS)
         if not (counted or has_stamps):
-            self.made_up["without stamps, poses are numbered in seconds: 0, 1, 2 .."] = None
+            self.made_up[NUMBERED] = None
         if IMAGE in fmt.row and images is None:
             self.made_up["pictures are named by their stamps"] = None
         tx, ty, tz, x, y, z, w = self.columns(block)[:7]
@@ -177,8 +179,7 @@ class TextWriter(SingleWriter):
         if NUMBER in block.extras:
             numbers = [int(text) for text in texts_of(block.extras[NUMBER])]
         pieces: list[Piece] = [Const(fmt.between)] if fmt.between else []
-        parts: list[Spans] = []
-        first = 0
+        parts, first = list[Spans](), 0
         for piece in fmt.row:
             if isinstance(piece, bytes):
                 pieces.append(Const(piece))
