@@ -18,7 +18,7 @@ from frametool.cli.sink import encoded
 from frametool.errors import SHOWN, FormatError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
 from frametool.geometry.euler import AXES
-from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, WORLDS, Notation, notations
+from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, WORLDS, Notation, notation, notations
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
@@ -58,6 +58,13 @@ def _read_notations(text: str) -> tuple[Notation, ...]:
     return chosen
 
 
+def _read_notation(text: str) -> Notation:
+    """Parse one representation."""
+    chosen = notation(text.strip())
+    chosen.bound_axes()
+    return chosen
+
+
 def _offer_notations(_ctx: click.Context, incomplete: str) -> Mapping[str, str]:
     """Offer names behind the last comma, and the axes behind a colon."""
     done, comma, begun = incomplete.rpartition(",")
@@ -69,7 +76,7 @@ def _offer_notations(_ctx: click.Context, incomplete: str) -> Mapping[str, str]:
     return dict.fromkeys((done + comma + name for name in names), "")
 
 
-NOTATIONS = Text(_read_notations, _offer_notations)
+NOTATIONS, NOTATION = Text(_read_notations, _offer_notations), Text(_read_notation, _offer_notations)
 
 
 def format_among(choices: Collection[str], are: str) -> Text:
@@ -193,16 +200,12 @@ reading_options = together(
 )  # fmt: skip
 
 
-def input_formats(inputs: Inputs, *, streams: bool = False) -> tuple[list[str], str]:
-    """Return the formats of --in for files of frames, in order, and that of the stream.
-
-    streams: there is a stream; its format is the last one that can be streamed, "" without such
-    """
-    formats = list(inputs.input_formats)
-    for at in reversed(range(len(formats) * streams)):
+def take_stream_format(formats: list[str]) -> str:
+    """Remove the format of the stream from those of --in and return it: the last that can be streamed, "" if none."""
+    for at in reversed(range(len(formats))):
         if not {*STREAMED}.isdisjoint(FORMATS[formats[at]].reads):
-            return formats, formats.pop(at)
-    return formats, ""
+            return formats.pop(at)
+    return ""
 
 
 def for_each(formats: Sequence[str], files: int) -> list[str]:
@@ -325,11 +328,6 @@ def _offset(text: str) -> Any:
     from frametool.frames.stamps import FromFirst
 
     return FromFirst() if text == "first" else read_limit(text)
-
-
-def at_ns(chosen: int | str | None) -> int | None:
-    """Return the nanoseconds of an option; None for the latest."""
-    return chosen if isinstance(chosen, int) else None
 
 
 # of a tree: more files, and the meaning of moving frames

@@ -107,11 +107,12 @@ class Output:
         self.notations: tuple[Notation, ...] = notations
         self._format_is_default = not (self.chosen or otherwise)
         fmt = self.chosen or otherwise or ("text" if self.path is None and sys.stdout.isatty() else "yaml")
-        holds_arrays = table.holds(fmt, "arrays")
-        self.is_trajectory = table.is_trajectory(fmt)  # the poses of one frame over time
-        self._in_blocks = self.is_trajectory or holds_arrays or table.holds(fmt, "recording")
+        row = table.FORMATS.get(fmt, table.Format("of people"))
+        self.is_trajectory = "trajectory" in row.reads  # the poses of one frame over time
+        self._is_text = {"arrays", "recording"}.isdisjoint(row.writes)
+        self._in_blocks = self.is_trajectory or not self._is_text
         self.holds_all = self._in_blocks or fmt == "csv"  # formats for many rows
-        if holds_arrays and self.path is None and sys.stdout.isatty():
+        if "arrays" in row.writes and self.path is None and sys.stdout.isatty():
             raise ValueInvalid(f"{fmt} is no text for a terminal; give -o FILE, or pipe it")
         usual = () if fmt in ("text", "dot", "mermaid") else QUATERNION  # drawings have defaults of their own
         digits = inputs.peek("precision")
@@ -120,7 +121,7 @@ class Output:
             full=digits is not None, keep_sign=bool(inputs.keep_sign),
             screen=self.chosen in (None, "text") and self.path is None and sys.stdout.isatty(),
         ).changed(place=place)  # fmt: skip
-        if table.holds(fmt, "recording"):
+        if "recording" in row.writes:
             folder = folder_of(_recording_path(fmt, self.path))
             frames = inputs.recorded_frames or next(iter(inputs.named_frames), ())
             is_pair = len(frames) in (0, 2) and len({*frames}) == len(frames)
@@ -298,7 +299,7 @@ class Output:
 
     def pieces(self, pieces: Iterable[str | bytes]) -> None:
         """Write pieces of text as they arrive; a file is written atomically."""
-        if not table.holds(self.style.format, "arrays", "recording"):
+        if self._is_text:
             self._inputs.use("precision")
         with self.opened() as write:
             for piece in pieces:

@@ -332,6 +332,5 @@ def system_message(error: Exception) -> str:
 
 def wants_json(arguments: Sequence[str]) -> bool:
     """Return True if the arguments of a command ask for JSON."""
-    if "--format=json" in arguments or "-fjson" in arguments:
-        return True
-    return any(option in ("-f", "--format") and value == "json" for option, value in pairwise(arguments))
+    is_one_word = "--format=json" in arguments or "-fjson" in arguments
+    return is_one_word or any(name in ("-f", "--format") and value == "json" for name, value in pairwise(arguments))

@@ -47,7 +47,7 @@ KEPT_FORMAT = "--unwrap is for rows that keep their format; convert them first"
 _of_rows = partial(option, under="Rows")
 _ROWS = together(
     options.in_option,
-    option("--from REP", "representation of bare numbers", options.NOTATIONS, name="from_rep", under="Rotations"),
+    option("--from REP", "representation of bare numbers", options.NOTATION, name="from_rep", under="Rotations"),
     _of_rows("--columns NAME,..", "pose columns by name or number, once per pose; or one key of records, a.b",
              options.COLUMN, multiple=True),
     _of_rows("--keep", "append result columns, keep the input's"),
@@ -94,9 +94,7 @@ class Task:
         self.name: str = self.path or "stdin"  # of the stream, in messages
         # these options are only for tables
         self._is_table = any(map(inputs.peek, ("columns", "keep", "prefix", "no_header")))
-        notations: Any = inputs.peek("from_rep") or (None,)
-        refuse(len(notations) > 1, "--from takes one representation")
-        self.notation: Any = notations[0]
+        self.notation: Any = inputs.peek("from_rep")
         if self.notation is not None and self.notation.representation.is_place:
             self.notation, self.place = None, self.notation.representation.name
         self.window = options.window_of(inputs)
@@ -145,9 +143,7 @@ class Task:
         from frametool.formats.detect import by_sign
 
         opened = self.opened()
-        begin, fmt = opened.peek(), "" if self.within else self.chosen_format()
-        if not self.within and begin:
-            fmt = fmt or by_sign(begin, *options.STREAMED, name=self.name) or ""
+        fmt = self.within or self.chosen_format() or by_sign(opened.peek(), *options.STREAMED, name=self.name) or ""
         if holds(fmt, "arrays"):
             from frametool.text.lines import Pieces
 
@@ -192,7 +188,8 @@ class Task:
 
     def chosen_format(self) -> str:
         """Return the format of the stream by --in, "" if it is not set."""
-        others, fmt = options.input_formats(self.inputs, streams=True)
+        others = [*self.inputs.input_formats]
+        fmt = options.take_stream_format(others)
         if others and not self.inputs.reads_trees:
             both = f"--in {others[0]} and --in {fmt}: there is one stream"
             streams = ", ".join(readers(*options.STREAMED))
@@ -349,8 +346,8 @@ class Task:
         from frametool.rows.sources.column_files import OtherColumns, run_columns
 
         output = self.output
-        on_terminal = output.path is None and sys.stdout.isatty()
-        refuse(on_terminal, f"{fmt} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
+        instead = "give -o FILE, or -f csv, or pipe it"
+        refuse(output.path is None and sys.stdout.isatty(), f"{fmt} is no text for a terminal; {instead}")
         columns = open_columns(InputFile(self.path or "-", stream), fmt)
         style = output.style.changed(format=output.chosen or fmt)
         request = request.with_results(default_notation=not output.notations)

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import Inputs, Text, marking_use, refuse, refuse_two_readers, say_if_typed
-from frametool.cli.options import input_formats, tree_on_the_line
-from frametool.cli.poses import is_inline, source_of
+from frametool.cli.options import take_stream_format, tree_on_the_line
 from frametool.cli.sink import say
-from frametool.documents.source import ReadCache
+from frametool.documents.source import ReadCache, Source
 from frametool.errors import bare, shown, warn
 from frametool.formats.table import FORMATS, ORDERS
 from frametool.grammar.edges import Answers
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
     from frametool.formats.robots.model import Robot
     from frametool.frames.lookups import Frames
 
+INLINE = ("{", "[")  # a tree on the command line begins with one of these
 # field of Answers -> its parameters; whether the others have an effect depends on formats and moving frames
 USED_ELSEWHERE = ("time_offset", "frames", "camera_axes")
 ANSWER_OPTIONS: dict[str, tuple[str, ...]] = {name: (name,) for name in Answers._fields if name not in USED_ELSEWHERE}
@@ -85,9 +85,9 @@ def _load(
     if cache is None:
         return read()[0]
     inputs.reads_trees = True
-    named = [each if is_inline(each) else tree_file(each) for each in arguments]
+    named = [each if each.startswith(INLINE) else tree_file(each) for each in arguments]
     key = tuple(named), f"{rules!r} {how} {[inputs.peek(name) for name in OF_FILES]}"
-    paths = [each for each in named if not is_inline(each) and os.path.exists(each)]
+    paths = [each for each in named if not each.startswith(INLINE) and os.path.exists(each)]
     found, used = cache.read(key, paths, sum(map(len, {*named} - {*paths})), read)
     inputs.use(*used)
     return found
@@ -128,7 +128,9 @@ def opened(
     refuse_two_readers(arguments)
     say_if_typed("-" if "-" in arguments else "")
     inputs.reads_trees = True
-    formats, named = input_formats(inputs, streams=streams)[0], [*inputs.peek("named_frames")]
+    formats, named = [*inputs.input_formats], [*inputs.peek("named_frames")]
+    if streams:
+        take_stream_format(formats)
     reads = ("tree", "drawing") if drawings else ("tree",)
     for fmt in formats:
         is_other = {*reads}.isdisjoint(FORMATS[fmt].reads)
@@ -139,8 +141,8 @@ def opened(
         refuse(not streams and len(values) > files, more)
     format_of_next, general = iter(formats[behind:] or formats), answers(inputs)
     found = opened_together(
-        FrameFile.inline(source_of(each))
-        if is_inline(each)
+        FrameFile.inline(Source("argument", each))
+        if each.startswith(INLINE)
         else FrameFile(
             tree_file(each), fmt=next(format_of_next, None), topics=inputs.peek("topics"), answers=general, reads=reads
         )
@@ -171,9 +173,8 @@ def answers(inputs: Inputs) -> Answers:
         refuse(name in joints, f"--joint {shown(name)} has two values, {joints.get(name)} and {value}; leave one out")
         joints[name] = value
     named: dict[str, Any] = {"joints": joints}
-    for each in inputs.peek("from_rep") or ():
-        if each.spec in ORDERS:
-            named["order"] = each.spec
+    if (given := inputs.peek("from_rep")) and given.spec in ORDERS:
+        named["order"] = given.spec
     for name in Answers._fields:
         if name not in ("joints", "frames") and (value := inputs.peek(name)):
             named[name] = value
@@ -203,6 +204,11 @@ def frame_name(name: str, tree: Frames | Robot) -> str:
     if name in EARTH_FRAMES and name not in tree.frames:
         return next((other for other in EARTH_FRAMES if other in tree.frames), name)
     return name if name in tree.frames else without_slash(name)
+
+
+def lookup_time_ns(chosen: int | str | None) -> int | None:
+    """Return the nanoseconds of --at; None for the latest."""
+    return chosen if isinstance(chosen, int) else None
 
 
 def without_slash(name: str) -> str:

@@ -97,10 +97,7 @@ class FrameFile(InputFile):
     def edges(self, report: Report = stop, *, tell: bool = True, normalize: bool = False) -> Iterator[Edge]:
         """Yield the edges in the order of the file, then emit warnings; otherwise as `pieces`."""
         for piece in self.pieces(report, tell=tell, normalize=normalize):
-            if isinstance(piece, Edge):
-                yield piece
-            else:
-                yield from piece.edges()
+            yield from (piece,) if isinstance(piece, Edge) else piece.edges()
 
     def pieces(
         self, report: Report = stop, *, tell: bool = True, normalize: bool = False

@@ -15,7 +15,7 @@ from frametool.cli import options, streaming
 from frametool.cli.command import Inputs, argument, command_named, option, refuse, together
 from frametool.cli.poses import inline_misuse, is_inline, is_pasted, one_pose, pose_source, values_of
 from frametool.cli.sink import say_warning, writing
-from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in
+from frametool.cli.trees import FRAME, frame_name, load_tree, lookup_time_ns, lookups_in
 from frametool.documents.source import InputFile, Source
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, heard_by, shown, warn
 from frametool.formats.table import FORMATS, holds, writers
@@ -239,7 +239,7 @@ def _derived(task: streaming.Task, plan: Style, mover: Mover, record: str | Sour
 
     request, timeless = task.request(operation=Operation(moves=True)), task.inputs.at is not None
     if isinstance(mover, TreeMover):
-        derived_by: ByTree | WrittenPose = ByTree(mover.tree, mover.target, mover.source, options.at_ns(mover.at))
+        derived_by: ByTree | WrittenPose = ByTree(mover.tree, mover.target, mover.source, lookup_time_ns(mover.at))
     else:
         derived_by = task.read_written(mover.read, warned=True)
     with inline_misuse():
@@ -344,7 +344,7 @@ class TreeMover(Mover):
 
     def from_frame(self, own: str | None, own_ns: int | None = None) -> Components:
         """Return the transform of records from a frame, at the time of all, at their own, or the latest."""
-        return self.lookups.one(self.target, self.start(own), own_ns if self.at is None else options.at_ns(self.at))
+        return self.lookups.one(self.target, self.start(own), own_ns if self.at is None else lookup_time_ns(self.at))
 
     def at_times(self, own: str | None, times_ns: Any) -> Components:
         """Return columns of these transforms at many times; nan where there is no data."""

@@ -11,7 +11,7 @@ from frametool.cli import options
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, refuse_two_readers
 from frametool.cli.output import Output
 from frametool.cli.sink import folded, in_colour, say, say_error, say_first, show, writing
-from frametool.cli.trees import FRAME, frame_name, load_sides, opened, report_files
+from frametool.cli.trees import FRAME, frame_name, load_sides, lookup_time_ns, opened, report_files
 from frametool.errors import Finding, FormatError, listing, warn
 from frametool.formats.table import FORMATS, format_entry
 from frametool.lint.monitor import monitor
@@ -154,7 +154,7 @@ def diff_command(inputs: Inputs) -> int:
     sides = (inputs.a, *inputs.with_a), (inputs.b, *inputs.with_b)
     (one, of_one), (other, of_other) = load_sides(inputs, *sides)
     start = inputs.seen_from and frame_name(inputs.seen_from, one)
-    comparison = diff(one, other, at_ns=options.at_ns(inputs.at), seen_from=start, tolerance=inputs.tolerance)
+    comparison = diff(one, other, at_ns=lookup_time_ns(inputs.at), seen_from=start, tolerance=inputs.tolerance)
     inputs.note(*comparison.notes)
     differences = [*comparison.differences, *(comparison.unmoved if inputs.everything else ())]
     if output.style.format == "github":

@@ -13,7 +13,7 @@ from frametool.cli.command import FILE, Inputs, argument, command_named, option,
 from frametool.cli.output import QUATERNION, Output
 from frametool.cli.sink import say_error
 from frametool.cli.streaming import EXPLAIN, Task, stream_options
-from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, opened, report_files
+from frametool.cli.trees import FRAME, frame_name, load_tree, lookup_time_ns, lookups_in, opened, report_files
 from frametool.errors import FrametoolError, NoDataAt, UnknownFrame, warn
 from frametool.formats.table import holds
 from frametool.geometry.rigid import EXACT, UNCERTAIN
@@ -98,8 +98,7 @@ def lookup_command(inputs: Inputs) -> int:
     TREE is a file, -, or . for FRAMETOOL_TREE's (help time).
     Trajectories and tables (-f tum, csv ..) hold all samples, those from --start to --stop.
     """
-    task = Task(inputs, "poses")
-    output, target, source = task.output, inputs.target, inputs.source
+    output, target, source = Output(inputs, "poses"), inputs.target, inputs.source
     by_row = {inputs.target_column, inputs.source_column, inputs.time_column} != {None}
     refuse(not by_row and source is None, f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
     if covariance := inputs.covariance:
@@ -108,32 +107,36 @@ def lookup_command(inputs: Inputs) -> int:
         has_none = not (fmt in (None, "text", *WITH_COVARIANCE) or holds(fmt, "arrays"))
         refuse(has_none, f"{fmt} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")
     tree = load_tree(inputs, inputs.tree, inputs.more, streams=by_row)
-    lookups, at = lookups_in(inputs, tree, carried=covariance), options.at_ns(inputs.at)
-    if by_row:
-        status = _by_row(task, lookups, target, source)
-        inputs.note(lookups.assumptions())
-        return status
-    target, source = frame_name(target, tree), frame_name(source, tree)
-    source_at, fixed = options.at_ns(inputs.source_at), inputs.fixed and frame_name(inputs.fixed, tree)
-    if task.plan:
-        return task.derive("lookup", tree, target, source, at_ns=at, source_at_ns=source_at, fixed=fixed)
-    output.set_camera_axes_of(tree, source)
-    status, every = 0, output.holds_all or task.window is not None
-    every = every and inputs.at is None and fixed is None and tree.latest(target, source) is not None
-    if inputs.times is not None or every:
-        status = _many(task, lookups, target, source)
-    elif fixed is not None:
-        output.values([algebra.looked_up_across(tree, target, at, source, source_at, fixed)])
-    else:
-        output.values([lookups.result(target, source, at)])
+    lookups = lookups_in(inputs, tree, carried=covariance)
+    status = (_by_row if by_row else _of_two)(inputs, output, lookups, target, source)
     inputs.note(lookups.assumptions())
     return status
 
 
-def _many(task: Task, lookups: algebra.Lookups, target: str, source: str) -> int:
+def _of_two(inputs: Inputs, output: Output, lookups: algebra.Lookups, target: str, source: str) -> int:
+    """Print the pose of one frame in another, or its derivation."""
+    tree, at, source_at = lookups.tree, lookup_time_ns(inputs.at), lookup_time_ns(inputs.source_at)
+    target, source, fixed = frame_name(target, tree), frame_name(source, tree), inputs.fixed
+    fixed = fixed and frame_name(fixed, tree)
+    if inputs.explain:
+        task = Task(inputs, output=output)
+        return task.derive("lookup", tree, target, source, at_ns=at, source_at_ns=source_at, fixed=fixed)
+    output.set_camera_axes_of(tree, source)
+    every = output.holds_all or {inputs.peek("start"), inputs.peek("stop")} != {None}
+    every = every and inputs.at is None and fixed is None and tree.latest(target, source) is not None
+    if inputs.times is not None or every:
+        return _many(inputs, output, lookups, target, source)
+    if fixed is not None:
+        output.values([algebra.looked_up_across(tree, target, at, source, source_at, fixed)])
+    else:
+        output.values([lookups.result(target, source, at)])
+    return 0
+
+
+def _many(inputs: Inputs, output: Output, lookups: algebra.Lookups, target: str, source: str) -> int:
     """Print the results at --times, or at all samples; with --on-error skip report times without a result."""
-    inputs, tree, window = task.inputs, lookups.tree, task.window
-    times, skipped = inputs.times, Skipped(in_json=task.output.chosen == "json")
+    tree, window, times = lookups.tree, options.window_of(inputs), inputs.times
+    skipped = Skipped(in_json=output.chosen == "json")
     skip = times is not None and inputs.on_error == SKIP
     refuse(times and inputs.on_error == NULL, "--on-error null is for tables; with --times it is stop or skip")
     report = skipped.add if skip else stop
@@ -150,18 +153,18 @@ def _many(task: Task, lookups: algebra.Lookups, target: str, source: str) -> int
 
     unread = skipped.count
     try:
-        task.output.stream_poses(lookups.results(target, source, stamps, miss if skip else None))
+        output.stream_poses(lookups.results(target, source, stamps, miss if skip else None))
     except NoDataAt as error:
         error.remedy = "; --on-error skip goes on" * (len(stamps) > 1)  # type: ignore[attr-defined]
         raise
     return skipped.finish(len(stamps) + unread - skipped.count)
 
 
-def _by_row(task: Task, lookups: algebra.Lookups, target: str | None, source: str | None) -> int:
+def _by_row(inputs: Inputs, output: Output, lookups: algebra.Lookups, target: str | None, source: str | None) -> int:
     """Add the pose of SOURCE in TARGET to every row; a frame on the command line applies to all rows."""
     from frametool.rows.request import Operation, Timed
 
-    inputs, tree, place = task.inputs, lookups.tree, task.output.style.place
+    task, tree, place = Task(inputs, output=output), lookups.tree, output.style.place
     columns = inputs.target_column, inputs.source_column
     if columns[0] is not None and source is None:
         target, source = None, target
@@ -173,7 +176,7 @@ def _by_row(task: Task, lookups: algebra.Lookups, target: str | None, source: st
 
         check_in_ecef(fixed_target or EARTH_FRAMES[0], place)
     frames = tuple(each for each in columns if each is not None)
-    at = None if inputs.time_column else options.at_ns(inputs.at)
+    at = None if inputs.time_column else lookup_time_ns(inputs.at)
 
     def ends_of(names: str | None) -> tuple[str, str]:
         cells = (names or "").split("\0") if len(frames) == 2 else [names or ""]
@@ -193,7 +196,7 @@ def _by_row(task: Task, lookups: algebra.Lookups, target: str | None, source: st
     width = UNCERTAIN if lookups.carried else EXACT
     timed = None if inputs.time_column is None else Timed(inputs.time_column, many, edge_of, width=width)
     request = task.request(
-        poses=0, pose_from_frame=edge_of, notations=task.output.notations or QUATERNION,
+        poses=0, pose_from_frame=edge_of, notations=output.notations or QUATERNION,
         operation=Operation(uncertain=lookups.carried), timed=timed, frames=frames,
     )  # fmt: skip
     return task.run(request)

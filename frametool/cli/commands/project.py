@@ -15,7 +15,7 @@ from frametool.cli.output import Output
 from frametool.cli.poses import is_inline, values_of
 from frametool.cli.sink import refuse_existing, say, writing
 from frametool.cli.streaming import Task, is_bag, stream_options
-from frametool.cli.trees import FRAME, frame_name
+from frametool.cli.trees import FRAME, frame_name, lookup_time_ns
 from frametool.documents.source import InputFile, Source
 from frametool.errors import FormatError, ValueInvalid, listing, shown
 from frametool.geometry.rigid import EXACT
@@ -242,7 +242,7 @@ class GroundMover(apply.TreeMover):
 
     def from_frame(self, _own: str | None, own_ns: int | None = None) -> Components:
         """Return both poses at a time, or at the latest common one."""
-        stamp_ns, tree = own_ns if self.at is None else options.at_ns(self.at), self.tree
+        stamp_ns, tree = own_ns if self.at is None else lookup_time_ns(self.at), self.tree
         if stamp_ns is None:
             stamp_ns = min((each for pair in self.pairs if (each := tree.latest(*pair)) is not None), default=None)
         return tuple(part for pair in self.pairs for part in tree.lookup(*pair, stamp_ns).components)

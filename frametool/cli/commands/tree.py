@@ -14,7 +14,7 @@ from frametool.cli import options
 from frametool.cli.command import FILE, Inputs, argument, command_named, misuse, option, refuse, together
 from frametool.cli.output import Output
 from frametool.cli.sink import refuse_existing, say, writing
-from frametool.cli.trees import FRAME, frame_name, load_tree, opened, tree_file
+from frametool.cli.trees import FRAME, frame_name, load_tree, lookup_time_ns, opened, tree_file
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
 from frametool.frames.lookups import FrameTree
@@ -56,7 +56,7 @@ def tree_command(inputs: Inputs) -> None:
     is_wrong = place is not None and (not drawn or place.origin is not None)
     refuse(is_wrong, f"--to {place and place.name}: trees say places by lla or utm, in yaml, json, text and drawings")
     frames = load_tree(inputs, inputs.tree, inputs.more, drawings=True)
-    stamp = options.at_ns(inputs.at)
+    stamp = lookup_time_ns(inputs.at)
     output.tree(frames if stamp is None else frames.tree_at(stamp), inputs.color)
 
 
@@ -191,7 +191,7 @@ def _scenes(inputs: Inputs, frames: Frames, *, overlay: bool) -> tuple[FrameScen
     ends = {} if overlay else {"target": inputs.target, "source": inputs.source}
     names = ends | {"fixed": inputs.fixed, "below": inputs.below}
     named: Any = {key: name and frame_name(name, frames) for key, name in names.items()}
-    scene = FrameScene(frames, at_ns=options.at_ns(inputs.at), only=inputs.only, path_only=inputs.path_only, **named)
+    scene = FrameScene(frames, at_ns=lookup_time_ns(inputs.at), only=inputs.only, path_only=inputs.path_only, **named)
     if not overlay:
         return scene, None
     before = load_tree(inputs, str(inputs.target))
