@@ -50,19 +50,15 @@ FULL = -1  # --precision full: as many digits as the number has
 OF_EARTH = ("origin", "local_axes", "zone")  # options on geodetic positions
 
 
-def _read_notations(text: str) -> tuple[Notation, ...]:
-    """Parse representations separated by commas."""
-    chosen = tuple(each for spec in text.split(",") for each in notations(spec.strip()))
-    for each in chosen:
-        each.bound_axes()  # raises for euler without axes, before anything is read
-    return chosen
-
-
-def _read_notation(text: str) -> Notation:
-    """Parse one representation."""
-    chosen = notation(text.strip())
+def _with_axes(chosen: Notation) -> Notation:
+    """Return a representation; raises ValueInvalid for euler without axes, before anything is read."""
     chosen.bound_axes()
     return chosen
+
+
+def _read_notations(text: str) -> tuple[Notation, ...]:
+    """Parse representations separated by commas."""
+    return tuple(_with_axes(each) for spec in text.split(",") for each in notations(spec.strip()))
 
 
 def _offer_notations(_ctx: click.Context, incomplete: str) -> Mapping[str, str]:
@@ -76,7 +72,8 @@ def _offer_notations(_ctx: click.Context, incomplete: str) -> Mapping[str, str]:
     return dict.fromkeys((done + comma + name for name in names), "")
 
 
-NOTATIONS, NOTATION = Text(_read_notations, _offer_notations), Text(_read_notation, _offer_notations)
+NOTATIONS = Text(_read_notations, _offer_notations)
+NOTATION = Text(lambda text: _with_axes(notation(text.strip())), _offer_notations)
 
 
 def format_among(choices: Collection[str], are: str) -> Text:

@@ -173,8 +173,8 @@ def answers(inputs: Inputs) -> Answers:
         refuse(name in joints, f"--joint {shown(name)} has two values, {joints.get(name)} and {value}; leave one out")
         joints[name] = value
     named: dict[str, Any] = {"joints": joints}
-    if (given := inputs.peek("from_rep")) and given.spec in ORDERS:
-        named["order"] = given.spec
+    if (chosen := inputs.peek("from_rep")) and chosen.spec in ORDERS:
+        named["order"] = chosen.spec
     for name in Answers._fields:
         if name not in ("joints", "frames") and (value := inputs.peek(name)):
             named[name] = value

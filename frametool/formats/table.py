@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from functools import cache
 from typing import Any
 
 from frametool.errors import NamedTuple
@@ -417,7 +416,6 @@ FORMATS = {
 FOLDERS = {name: str(what) for name, row in FORMATS.items() for kind, what in row.magic if kind == "folder"}
 
 
-@cache
 def readers(*what: str) -> tuple[str, ...]:
     """Return the formats from which any of `tree`, `records` and `rows` is read."""
     return tuple(name for name, row in FORMATS.items() if not set(what).isdisjoint(row.reads))
