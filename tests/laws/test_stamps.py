@@ -104,3 +104,11 @@ def test_a_column_is_called_as_it_stands_in_its_header(run: Run) -> None:
     text = f"{HASHED},frame,x,y,z\n500,base,0,0,0\n"
     done = run("apply", "drive.yaml", "map", "--time-column", HASHED, stdin=text, files={"drive.yaml": DRIVE})
     assert (done.status, done.out) == (0, text.replace("base,0,0,0", "map,0.5,0.0,0.0"))
+
+
+def test_a_cloud_of_poses_keeps_the_stamps_that_were_written_into_it(run: Run) -> None:
+    table = two_poses("stamp_ns", "1500000000")
+    at = run("convert", "-f", "tum", stdin=table).out
+    assert run("convert", "-o", "poses.pcd", stdin=table).status == 0
+    assert run("convert", "-i", "poses.pcd", "-f", "tum").out == at
+    assert run("resample", "poses.pcd", "--rate", "1", "-f", "tum").out == run("resample", "poses.csv", "--rate", "1", "-f", "tum", files={"poses.csv": table}).out

@@ -22,7 +22,7 @@ from frametool.formats.rows.pose_rows import IMAGE, NUMBER
 from frametool.formats.table import FORMATS
 from frametool.geometry.representations import ROTATIONS
 from frametool.geometry.rigid import EXACT
-from frametool.grammar.readers import NORMALS, in_nanoseconds
+from frametool.grammar.readers import NORMALS, STAMP_KEYS, in_nanoseconds
 from frametool.rows.batch import Block, RowPoses, coded_texts, is_typed, objects, taken
 from frametool.rows.faults import SKIP, STOP, Fault, Outcome
 from frametool.rows.plan import Kept, Named, New
@@ -94,8 +94,8 @@ class ColumnRows(PlannedRows):
         names = file.names
         header = tuple(quoted(name).encode() for name in names or ())
         table = Table(b",", names, file.width, header=header, source=source, normals=file.vectors)
-        try:  # `t` or `time` of a cloud is what its sensor counts, in whatever unit
-            super().__init__(table._replace(stamped=not file.vectors), request)
+        try:  # `t` or `time` of a cloud is what its sensor counts, in whatever unit; what we write there says it
+            super().__init__(table._replace(stamped=not file.vectors or STAMP_KEYS[0] in (names or ())), request)
         except FormatError as error:
             error.line = 0  # the names of columns are in no line here
             raise
