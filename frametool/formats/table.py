@@ -200,7 +200,8 @@ FORMATS = {
     ),
     "tsv": Format(
         "tab-separated values with a header", (".tsv", ".tab"), reads=("tree", "rows"), reader=_TABLE,
-        required_options=("frames", "stamps"), magic=(("header", r".*\t"),), rows=Rows("\t"),
+        required_options=("frames", "stamps"), rows=Rows("\t"),
+        magic=(("line", r'(?:"?[A-Za-z_][^\t,;:{]*\t)+(?:"?[A-Za-z_][^\t,;:{]*)?$'), ("header", r".*\t")),
     ),
     "semicolon": Format(
         "CSV with semicolons and a header", reads=("tree", "rows"), reader=_TABLE,

@@ -247,6 +247,14 @@ def test_a_name_without_a_suffix_tells_nothing() -> None:
         assert by_suffix(path, tuple(FORMATS)) is None
 
 
+@pytest.mark.parametrize(
+    ("text", "form"),
+    [("x\ty\tz\n1\t2\t3\n", "tsv"), ('"x [m]"\t"y"\t\r\n1\t2\t\r\n', "tsv"), ("x;y;z\n1;2;3\n", "semicolon"), ("a\tb,x,y\n1\t2,3,4\n", "csv")],
+)
+def test_rows_with_the_suffix_of_csv_are_parted_by_what_is_between_their_names(text: str, form: str) -> None:
+    assert detect(text.encode(), "rows", "records", name="a.csv") == form
+
+
 @pytest.mark.parametrize("output", [("-f", "csv"), ("-o", "x.csv"), ("-f", "json"), ()])
 @pytest.mark.parametrize(("text", "form"), [("1 2 3\n4 5 6\n", "columns"), ("x,y,z\n1,2,3\n", "csv"), ("x\ty\tz\n1\t2\t3\n", "tsv")])
 def test_the_form_of_the_result_does_not_steer_how_the_input_is_read(
