@@ -140,14 +140,43 @@ def test_python_is_never_run(tmp_path: Path) -> None:
 def test_a_call_with_a_substitution_is_listed_and_the_others_are_read(
     tmp_path: Path, arguments: str, found: str
 ) -> None:
-    default = "<arg name='z' default='1'/>"
-    xml = f"<launch>{default}\n{NODE.format(arguments)}\n{NODE.format(POSITIONAL)}\n{NODE.format(arguments)}</launch>"
+    xml = f"<launch><arg name='z'/>\n{NODE.format(arguments)}\n{NODE.format(POSITIONAL)}\n{NODE.format(arguments)}</launch>"
     tree, said = read(tmp_path, xml)
     assert set(tree.frames) == {"base", "cam"}
     told = f"static_transform_publisher not read: its arguments have '{found}'"
     assert said == [f"a.launch:2: {told}", f"a.launch:4: {told}"]
     tree, said = read(tmp_path, f"{YAML.format(arguments)}{YAML[8:].format(POSITIONAL)}", "a.yaml")
     assert (set(tree.frames), said) == ({"base", "cam"}, [f"a.yaml:5: {told}"])
+
+
+def test_arguments_of_which_the_file_says_one_value_have_it(tmp_path: Path) -> None:
+    called = "0 0 $(arg z) $(var yaw) 0 0 base $(arg child)"
+    xml = (
+        "<launch><arg name='z' default='0.35'/><let name='yaw' value='1.5'/><arg name='child' default='$(arg z)'/>\n"
+        f"<include file='a.launch'><arg name='z' value='9'/></include><group>{NODE.format(called)}</group></launch>"
+    )
+    tree, said = read(tmp_path, xml)
+    pose = [0.0, 0.0, 0.35, *Rotation.from_euler("z", 1.5).as_quat()]
+    assert tree.lookup("base", "0.35").components == pytest.approx(pose, abs=1e-15)
+    arguments = "static_transform_publisher read with the file's own arguments: z 0.35, yaw 1.5, child 0.35"
+    assert said[1:] == [f"a.launch:2: {arguments}"]
+    assert said[0].startswith("a.launch:2: include 'a.launch' is not followed")
+
+
+@pytest.mark.parametrize(
+    "defined",
+    [
+        "<arg name='z' value='1' if='$(arg a)'/>",
+        "<arg name='z' value='1'/><group><let name='z' value='2'/></group>",
+        "<group if='$(arg a)'><let name='z' value='1'/></group>",
+        "<include file='a.launch'><arg name='z' value='9'/></include>",
+        "<arg name='z' default='$(env Z)'/>",
+    ],
+)
+def test_arguments_that_may_have_another_value_are_not_filled_in(tmp_path: Path, defined: str) -> None:
+    tree, said = read(tmp_path, f"<launch>{defined}{NODE.format('0 0 $(arg z) 0 0 0 a b')}{NODE.format(FLAGS)}</launch>")
+    assert set(tree.frames) == {"base", "cam"}
+    assert "static_transform_publisher not read: its arguments have '$(" in said[-1]
 
 
 def test_what_starts_under_a_condition_is_read_and_said_with_its_line(tmp_path: Path) -> None:

@@ -110,16 +110,14 @@ def write_tree(tree: Frames, style: Style) -> str:
         ) or "{}\n"
     if style.format == "mermaid":  # nodes are numbered, because its ids allow few characters
         ids = {frame: f"n{index}" for index, frame in enumerate(tree.frames)}
-        lines = ["flowchart TD"]
-        lines += [f'  {ids[frame]}["{_escaped(frame)}"]' for frame in tree.frames]
+        lines = ["flowchart TD", *(f'  {ids[frame]}["{_escaped(frame)}"]' for frame in tree.frames)]
         for parent, child, transform in tree.edges():
             label = "<br>".join(map(_escaped, edge_label(transform, style, parent)))
             lines.append(f'  {ids[parent]} -->|"{label}"| {ids[child]}')
         return "\n".join([*lines, ""])
     if tree.moves:
         return _view_frames(tree)
-    lines = ["digraph frames {", "  node [shape=ellipse];"]
-    lines += [f'  "{graphviz(frame)}";' for frame in tree.frames]
+    lines = ["digraph frames {", "  node [shape=ellipse];", *(f'  "{graphviz(frame)}";' for frame in tree.frames)]
     for parent, child, transform in tree.edges():
         label = "\\n".join(map(graphviz, edge_label(transform, style, parent)))
         lines.append(f'  "{graphviz(parent)}" -> "{graphviz(child)}" [label="{label}"];')
@@ -144,8 +142,7 @@ def _view_frames(tree: Frames) -> str:
         )
         lines.append(f'"{graphviz(parent)}" -> "{graphviz(child)}"[label=" {label}"];')
         last = max(last, newest) if number else newest
-    lines += ["edge [style=invis];"]
-    lines += [' subgraph cluster_legend { style=bold; color=black; label ="view_frames Result";']
+    lines += ["edge [style=invis];", ' subgraph cluster_legend { style=bold; color=black; label ="view_frames Result";']
     lines += [f'"Recorded at time: {last:.6f}"[ shape=plaintext ] ;']
     lines += [f'}}->"{graphviz(root)}";' for root in tree.roots[:1]] or ["}"]
     return "\n".join([*lines, "}", ""])

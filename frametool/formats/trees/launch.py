@@ -9,9 +9,9 @@ XML of either ROS, YAML below `launch:`, and Python with `generate_launch_descri
     ExecuteProcess(cmd=["ros2", "run", "tf2_ros", "static_transform_publisher", ..])
 
 anywhere and under another name; `arguments` may be `"..".split()`.  The pose of the child in its parent, metres,
-radians; the arguments are those of `frametool.ros.publisher`.  Only literal values are read: a call with `$(arg x)`,
-`LaunchConfiguration("x")`, names or arithmetic is listed as not read, included files are named, and calls that start
-under a condition are read and listed.
+radians; the arguments are those of `frametool.ros.publisher`.  Only literal values are read, and in XML `$(arg x)` or
+`$(var x)` whose one value, its default, is in the file: a call with `$(env X)`, `LaunchConfiguration("x")`, names or
+arithmetic is listed as not read, included files are named, and calls that start under a condition are read and listed.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from frametool.grammar.edges import Edge, Options
 
 _PYTHON = re.compile(r"(?m)^ *(?:def |import |from \w[\w.]* import )")
-_SUBSTITUTION = re.compile(r"\$\([^()]*\)?")
+_SUBSTITUTION, _ARGUMENT = re.compile(r"\$\([^()]*\)?"), re.compile(r"\$\((?:arg|var)\s+([^\s()]+)\s*\)")
 _NO, _YES = ("0", "false"), ("1", "true")
 # arguments of Python's calls -> the fields of XML; fields -> kinds of actions
 FIELDS = {
@@ -64,13 +64,8 @@ class Action(NamedTuple):
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the edge of each call, and record what could not be read."""
     begin = Beginning(file.head())
-    actions: Iterable[Action]
-    if begin.xml:
-        actions = _of_xml(file)
-    elif file.path.endswith(".py") or _PYTHON.search(begin.text):
-        actions = _of_python(file.source)
-    else:
-        actions = _of_yaml(file.source)
+    of_text = _of_python if file.path.endswith(".py") or _PYTHON.search(begin.text) else _of_yaml
+    actions: Iterable[Action] = _of_xml(file, options) if begin.xml else of_text(file.source)
     for action in filter(_is_reported, actions):
         try:
             arguments, conditions = _call(action)
@@ -94,12 +89,11 @@ def _is_reported(action: Action) -> bool:
     fields = action.fields
     if action.kind == "executable":
         command = fields.get("cmd")
-        words = command.split() if isinstance(command, str) else command if isinstance(command, list) else []
+        words = command if isinstance(command, list) else str(command).split()
         return isinstance(command, Misfit) or any(str(word).rsplit("/", 1)[-1] == publisher.CALL for word in words)
-    if action.kind == "composable_node":
-        return bool(fields.get("plugin") == "tf2_ros::StaticTransformBroadcasterNode")
     is_call = fields.get("pkg") in ("tf", "tf2_ros") and fields.get("exec", fields.get("type")) == publisher.CALL
-    return action.kind == "include" or (action.kind == "node" and is_call)
+    is_component = fields.get("plugin") == "tf2_ros::StaticTransformBroadcasterNode"
+    return {"include": True, "node": is_call, "composable_node": is_component}.get(action.kind, False)
 
 
 def _call(action: Action) -> tuple[str | Sequence[str], list[str]]:
@@ -132,18 +126,27 @@ def _call(action: Action) -> tuple[str | Sequence[str], list[str]]:
     return arguments if isinstance(arguments, str) else [str(word) for word in arguments or ()], found
 
 
-def _of_xml(file: InputFile) -> Iterator[Action]:
-    """Yield the actions of XML, each under the conditions of the groups around it."""
+def _of_xml(file: InputFile, options: Options) -> Iterator[Action]:
+    """Yield the actions of XML, each under the conditions of the groups around it, with the defaults of arguments."""
     pending: list[tuple[Element, list[str]]] = [(read_xml(file, "launch"), [])]
+    values: dict[str, str | None] = {}  # of arguments and variables; None: not the same everywhere
     while pending:
         element, groups = pending.pop()
-        conditions = groups + _conditions(element.attributes)
-        action = Action(element.tag, element.attributes, conditions)
+        written = element.attributes
+        conditions = groups + _conditions(written)
+        fields = {key: _ARGUMENT.sub(lambda at: values.get(at[1]) or at[0], text) for key, text in written.items()}
+        if element.tag in ("arg", "let"):
+            name = fields.get("name", "")
+            values[name] = None if name in values or conditions else fields.get("default", fields.get("value"))
+        action = Action(element.tag, fields, conditions)
         if _is_reported(action):
-            line, column = element.place(_key(action))
+            line, column = element.place(key := _key(action))
+            own = ", ".join(f"{name} {values.get(name)}" for name in _ARGUMENT.findall(written.get(key, "")))
+            if own and "$(" not in fields[key]:
+                options.tally.note_each(f"{publisher.CALL} read with the file's own arguments: {own}", line)
             yield action._replace(line=line, column=column)
         inner = conditions if element.tag == "group" else groups
-        pending += [(child, inner) for child in reversed(element.children)]
+        pending += [(child, inner) for child in reversed(element.children) if element.tag != "include"]
 
 
 def _of_yaml(source: Source) -> Iterator[Action]:
