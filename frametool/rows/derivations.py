@@ -13,7 +13,7 @@ from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result
 from frametool.rows.plain import read_text
 from frametool.rows.record import Record, pose_of
-from frametool.rows.request import Operation, Request, RowOptions
+from frametool.rows.request import COMBINED, Operation, Request, RowOptions
 from frametool.rows.shapes import POINT, POSE, VECTOR
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class ByTree(NamedTuple):
 
 def written_poses(source: Source, *, degrees: bool = False, normalize: bool = False) -> list[WrittenPose]:
     """Read the poses of a text as they are written; raises as `read_poses` does."""
-    request = Request(rows=RowOptions(kind=POSE, degrees=degrees, normalize=normalize))
+    request = Request(COMBINED, RowOptions(kind=POSE, degrees=degrees, normalize=normalize))
     return [_written_pose(record, request) for record in read_text(source, request).records]
 
 

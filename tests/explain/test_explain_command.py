@@ -83,6 +83,18 @@ def test_a_warning_is_told_once(run: Callable[..., Outcome]) -> None:
         assert run(*arguments, "--explain").err.count("normalised") == 1
 
 
+def test_a_covariance_is_not_derived_and_that_is_told(run: Callable[..., Outcome]) -> None:
+    entries = f"{{xyz: [1, 2, 3], covariance: {[0.01 * (i == j) for i in range(6) for j in range(6)]}}}"
+    for unsure in ("{xyz: [1, 2, 3], sigma: {xyz: 0.1}}", entries, "{xyz: [1, 2, 3], sigma: {xyz: 0.1}, inverse: true}"):
+        for arguments in (["convert", unsure], ["invert", unsure], ["compose", POSE, unsure], ["relative", unsure, POSE]):
+            told = run(*arguments, "--explain")
+            assert (told.status, told.err) == (0, "frametool: warning: argument: --explain derives the pose alone; its covariance is left out\n")
+
+
+def test_a_place_without_a_rotation_is_no_pose_to_derive(run: Callable[..., Outcome]) -> None:
+    assert "--explain derives one pose, found 0 among 1 records" in run("convert", "{lat: 1, lon: 2, alt: 3}", "--explain").err
+
+
 def loaded(*arguments: str) -> set[str]:
     """Name the modules that a command loads."""
     code = f"import sys; from frametool.cli import run; run({list(arguments)!r}); print(*sys.modules, file=sys.stderr)"
