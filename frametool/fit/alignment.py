@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 ALIGNMENTS = ("none", "origin", "yaw", "se3", "sim3")
 SCALED = ("sim3", "origin+scale")
-FEWEST = 3  # pairs; and poses with a clock: two speeds are the shortest signal
+FEWEST = 3  # pairs of an alignment, and poses for a clock offset, which needs two speeds at least
 STILL = 1e-9  # rms, relative to 1 + the largest coordinate: the effect of rounding
-THIN = 1e-5  # ratio of the second axis to the first: a straight line
+THIN = 1e-5  # ratio of the second principal axis to the first below which positions are on a straight line
 
 
 class Unaligned(ValueInvalid):
@@ -30,13 +30,13 @@ class Unaligned(ValueInvalid):
 
 
 class Fit(NamedTuple):
-    """An alignment: ref_from_est, and the scale applied before it."""
+    """An alignment: the transform ref_from_est, and the scale applied before it."""
 
     transform: Transform
     scale: float = 1.0
 
     def moved(self, est: Trajectory) -> Trajectory:
-        """Return the aligned estimate."""
+        """Return the estimate after the alignment, in the reference's world."""
         rotation, shift = self.transform.rotation, self.transform.xyz
         xyz = self.scale * rotation.apply(est.xyz) + shift
         if est.rotation is None:
@@ -48,10 +48,13 @@ def fitted(
     kind: str, ref: Trajectory, est: Trajectory, up: Array, names: tuple[str, str] = ("ref", "est"), *,
     tied: bool = False,
 ) -> Fit:
-    """Fit paired poses; raises Unaligned, with the name of the trajectory, if they do not determine the alignment.
+    """Fit the alignment of paired poses.
 
+    kind: one of ALIGNMENTS, or origin+scale: the scale of sim3, then the first pose, as evo does with
+        --correct_scale --align_origin
+    up: the axis of `yaw`; names: of the trajectories, for messages
     tied: the first position of the estimate is aligned exactly with that of the reference
-    `origin+scale` uses the scale of sim3, then the first pose, as evo does with --correct_scale --align_origin.
+    Raises Unaligned, which names the trajectory, if the poses do not determine the alignment.
     """
     if kind == "none":
         return Fit(Transform.identity())
@@ -106,15 +109,15 @@ def centre(xyz: Array, mass: Array | None = None) -> Array:
 
 
 ARM_STEPS = 50
-SEEN = 1e-6  # rms of metres per metre of the arm: a direction that is observable from the rotations
-DONE = 1e-13
+SEEN = 1e-6  # rms of metres per metre of the arm above which a direction is observable from the rotations
+DONE = 1e-13  # relative size of a step at convergence
 
 
 def lever_arm(kind: str, ref: Trajectory, est: Trajectory, up: Array) -> Array:
-    """Return the lever arm l of p_ref = c R (p_i + R_i l) + t estimated jointly with the alignment, metres.
+    """Return the lever arm l of p_ref = c R (p_i + R_i l) + t, metres, estimated jointly with the alignment.
 
-    Unobservable directions are 0.  Gauss-Newton: the alignment is fitted again after each step, and the step is
-    the least-squares one of what the alignment parameters cannot explain (variable projection, Golub and Pereyra 1973).
+    Unobservable directions are 0.  Gauss-Newton with variable projection (Golub and Pereyra 1973): the alignment is
+    fitted again after each step, and a step fits only the residuals that the alignment's parameters cannot explain.
     Raises ValueInvalid without rotations of the estimate.
     """
     if est.rotation is None:

@@ -1,4 +1,4 @@
-"""Measurements of frames in one another, the common mistakes in them, and their differences from a known tree."""
+"""Measured poses between frames, the common mistakes in them, and their differences from a known tree."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 
 class Measurement(NamedTuple):
-    """The pose of a child in its parent, as somebody measured it.
+    """The measured pose of a child in its parent.
 
     components: tx, ty, tz, x, y, z, w; metres
     covariance: 36 numbers as ROS orders them, in the parent's axes; None if unknown
-    place: where it is, `m.yaml:12`, and its column behind that where several are on a line
-    written: how its rotation was written, "rpy" or "rotvec", with the three numbers as read, in radians
+    place: file and line, `m.yaml:12`, followed by the column if the line has several measurements
+    written: representation of its rotation, "rpy" or "rotvec", and the three numbers as read, in radians
     """
 
     parent: str
@@ -44,16 +44,16 @@ class Measurement(NamedTuple):
         return Transform.of(*self.components)
 
     def with_rotation(self, x: float, y: float, z: float, w: float) -> Transform:
-        """Return it with another quaternion."""
+        """Return the transform with another rotation, a quaternion."""
         return Transform.of(*self.components[:3], x, y, z, w)
 
     def rescaled(self, factor: float) -> Transform:
-        """Return it with its translation times a factor."""
+        """Return the transform with its translation times a factor."""
         x, y, z, *turn = self.components
         return Transform.of(x * factor, y * factor, z * factor, *turn)
 
     def with_angles(self, change: Callable[[Array], Array], *kinds: str) -> Transform | None:
-        """Return it with its angles changed; None where its rotation was not written in one of these kinds."""
+        """Return the transform with changed angles; None if its rotation was not written in one of these `kinds`."""
         kind, angles = self.written or ("", ())
         if kind not in kinds:
             return None
@@ -61,14 +61,14 @@ class Measurement(NamedTuple):
         return self.with_rotation(*read(change(np.array(angles))).components)
 
 
-NEAR = Tolerance(0.01, math.radians(1.0))  # the tolerance without any sigmas
-FITTING = 4.0  # sigmas: a mistake explains a measurement that it brings this near
-ALIKE = 0.5  # sigmas: mistakes with so similar results are equally good
+NEAR = Tolerance(0.01, math.radians(1.0))  # the tolerance of measurements without a covariance
+FITTING = 4.0  # sigmas: a mistake explains a measurement if undoing it leaves at most this residual
+ALIKE = 0.5  # sigmas: mistakes whose results differ by less than this are equally good
 TIE = 1e-9  # of u: an improvement below this does not count
 O = Transform(axes_change("flu", "optical"), (0.0, 0.0, 0.0))  # body_from_optical, in the notation of papers
 
 
-# the intended measurement, if this mistake was made
+# each mistake and the function that undoes it; None if it does not apply to the measurement
 BLUNDERS: dict[str, Callable[[Measurement], Transform | None]] = {
     "inverted": lambda m: m.transform.inverse(),
     "rotation inverted": lambda m: m.with_rotation(*m.transform.rotation.inverse().components),
@@ -86,11 +86,11 @@ BLUNDERS: dict[str, Callable[[Measurement], Transform | None]] = {
 
 
 def best_blunder(measurement: Measurement, pose: Transform, information: Array) -> str | None:
-    """Return the mistake that best explains a measurement of a pose; None if none does.
+    """Return the mistake that best explains the difference between a measurement and a pose; None if none does.
 
     pose: of the child in the parent; information: the inverse covariance (6, 6) of the measurement
-    It must bring the measurement within 4 sigmas, and nearer than it is.  If noise cannot distinguish several, the
-    first of BLUNDERS is returned: a rotation by 180 degrees is its own inverse.
+    Undoing the mistake must bring the measurement within 4 sigmas of the pose, and nearer than it was.  If noise cannot
+    distinguish several, the first of BLUNDERS is returned: a rotation by 180 degrees is its own inverse.
     """
     meant = {words: made for words, blunder in BLUNDERS.items() if (made := blunder(measurement)) is not None}
     tried = [*meant.values(), measurement.transform]
@@ -104,7 +104,7 @@ def best_blunder(measurement: Measurement, pose: Transform, information: Array) 
 
 
 def split_place(place: str) -> tuple[str, int, int]:
-    """Split a place into file, line and column; 0 if it has none."""
+    """Split `file:line:column` into its parts; a missing line or column is 0."""
     file, line, column = re.fullmatch(r"(?s)(.*?)(?::(\d+))?(?::(\d+))?", place).groups("0")  # type: ignore[union-attr]
     return file, int(line), int(column)
 
@@ -112,9 +112,11 @@ def split_place(place: str) -> tuple[str, int, int]:
 def disagreements(
     tree: FrameTree, measurements: Sequence[Measurement], tolerance: Tolerance | None
 ) -> tuple[list[Finding], list[str], int]:
-    """Compare measurements with a tree: findings for those that differ, missing frames, number of unconnected rows.
+    """Compare measurements with a tree.
 
-    tolerance: of agreement; None: 3 sigmas if a measurement has a covariance, else 10 mm and 1 deg
+    tolerance: largest difference; None: 3 sigmas if a measurement has a covariance, else 10 mm and 1 deg
+    Returns a finding for each measurement that differs, the frames missing in the tree, and the number of measurements
+    whose frames the tree does not connect.
     """
     findings, missing, unconnected = [], dict[str, None](), 0
     for each in measurements:
@@ -136,7 +138,7 @@ def disagreements(
         else:
             near = tolerance or NEAR
             agrees, sigmas = metres <= near.metres and radians <= near.radians, ""
-            # `FITTING` sigmas are reached if both parts reach the tolerance
+            # scaled so that u is `FITTING` sigmas where both metres and radians reach the tolerance
             sigma = np.maximum(np.repeat([near.metres, near.radians], 3), lsq.LEAST) / FITTING / 3**0.5
             information = np.diag(sigma**-2.0)
         if not agrees:

@@ -1,4 +1,4 @@
-"""Compare a trajectory with a reference: settings, hints, and the numbers found, as a mapping and as rows."""
+"""Compare a trajectory with a reference: settings, hints, and the results as a mapping and as rows."""
 
 from __future__ import annotations
 
@@ -28,22 +28,25 @@ if TYPE_CHECKING:
     from frametool.geometry import Array
 
 AUTO = "auto"
-CLEAR = 0.5  # score of a reliable clock offset
-SURE = 0.8  # score of one that is reported without being requested
-MOST_TRIED = 20_000  # points of its grid then
-FEW = 0.5  # of the possible pairs
-NOTABLE = radians(2.0)  # a rotation between bodies that is reported, if it is also
+CLEAR = 0.5  # lowest score of a reliable clock offset
+SURE = 0.8  # score above which a clock offset is reported that was not requested
+MOST_TRIED = 20_000  # grid points up to which it is estimated without being requested
+FEW = 0.5  # share of the possible pairs below which a hint is added
+NOTABLE = radians(2.0)  # a common rotation is reported above this, if it is also
 STEADY = 5.0  # this many times as large as its spread
-NEAR_A_LINE = 3.0  # residuals that the second axis of positions must exceed
-SLENDER = 0.1  # of the first axis: what is wider is not a line
+NEAR_A_LINE = 3.0  # residuals: positions whose second axis is shorter are on a line, if it is also shorter than
+SLENDER = 0.1  # this share of the first axis
 
 
 class Pairing(NamedTuple):
     """How poses are paired.
 
-    match: "interpolate" or "nearest"; max_gap_ns, max_diff_ns, min_match (a share): conditions for a pair
-    offset: nanoseconds by which EST's clock lags, or "auto" within offset_limit_s; None: none, but one may be reported
-    start, stop: (True, nanoseconds) after the first pair, or (False, a stamp on REF's clock)
+    match: "interpolate" or "nearest"
+    max_gap_ns, max_diff_ns: longest gap to interpolate over, largest difference of nearest stamps
+    min_match: least share of the possible pairs
+    offset: nanoseconds by which EST's clock lags; "auto": estimated within offset_limit_s; None: 0, but a hint is added
+        if the clocks seem to differ
+    start, stop: (True, nanoseconds after the first pair), or (False, a stamp on REF's clock)
     """
 
     match: str = "interpolate"
@@ -59,8 +62,8 @@ class Pairing(NamedTuple):
 class Fitting(NamedTuple):
     """How pairs are aligned.
 
-    align, up: one of ALIGNMENTS or origin+scale, and the axis of yaw; align_first: the fit uses only the first pairs;
-        tie_first: it aligns the first positions exactly
+    align: one of ALIGNMENTS or origin+scale; up: the axis of yaw
+    align_first: only the pairs up to this delta are used; tie_first: the first positions are aligned exactly
     mount: pose of REF's body in EST's, or "auto"
     """
 
@@ -74,8 +77,10 @@ class Fitting(NamedTuple):
 class Reporting(NamedTuple):
     """Which errors are computed.
 
-    deltas: None for 1m, 10m and 100m up to the length of the path; all_pairs, tolerance, pairs_from: which poses
-    segments: of KITTI, in metres, from every segment_step-th pair
+    deltas: of relative errors; None for 1m, 10m and 100m up to the length of the path
+    all_pairs, tolerance: from every pose to the one about a delta further, within this share of it, not end to end
+    pairs_from: "reference" or "estimate": the path along which deltas are measured
+    segments: lengths of KITTI's segments, metres, starting at every segment_step-th pair
     evo: evo's defaults, and its two additional numbers
     """
 
@@ -96,7 +101,7 @@ class Settings(NamedTuple):
     reporting: Reporting = Reporting()
 
     def changed(self, **values: Any) -> Settings:
-        """Return settings with other values of some fields of the three groups."""
+        """Return settings with new values for some fields of the three groups; other names are ignored."""
         groups: tuple[Any, ...] = self
         own = [{name: values[name] for name in each._fields if name in values} for each in groups]
         return Settings(*(each._replace(**new) for each, new in zip(groups, own, strict=True)))
@@ -112,8 +117,8 @@ DELTAS = (Delta(1.0, "m"), Delta(10.0, "m"), Delta(100.0, "m"))
 class Comparison(NamedTuple):
     """The errors of an estimate relative to its reference.
 
-    names: of the two
-    ref, est: all of them, as they were read; pairs: as they were compared, in their own worlds
+    names: of reference and estimate, for messages
+    ref, est: all poses as read; pairs: the compared ones, each trajectory in its own world
     moved: the aligned poses of the estimate
     ate_by_alignment: the rmse under each of ALIGNMENTS, None if it is not determined
     relative: relative errors for each delta; segments: KITTI's, None without rotations
@@ -134,7 +139,7 @@ class Comparison(NamedTuple):
     hints: list[str]
 
     def _repr_html_(self) -> str | None:
-        """Show it in a notebook as a terminal does."""
+        """Return the comparison for a notebook, formatted as on a terminal."""
         return in_notebook(self)
 
     def whole_estimate(self) -> Trajectory:
@@ -148,7 +153,7 @@ class Comparison(NamedTuple):
         """Return every setting and number, as `frametool compare -f json` prints them; inapplicable ones are None."""
         pairs, ate, (_, fitting, reporting) = self.pairs, self.ate, self.settings
         stamps, (parent, name) = pairs.ref.stamps_ns, worlds(self)
-        scale = {"scale": self.fit.scale} if fitting.align in SCALED else {}  # only if one was estimated
+        scale = {"scale": self.fit.scale} if fitting.align in SCALED else {}  # only if a scale was estimated
         relative = []
         for delta, errors in self.relative:
             summed = _errors(errors.m, errors.rad, evo=reporting.evo)
@@ -231,7 +236,7 @@ def compared(
 def _in_local_axes(
     both: tuple[Trajectory, Trajectory], names: tuple[str, str], hints: list[str]
 ) -> tuple[Trajectory, Trajectory]:
-    """Return trajectories of the Earth's frame along east, north, up of the first position, so that z is up."""
+    """Convert trajectories in Earth-centred frames to east, north, up at the first position, so that z is up."""
     on_earth = [each.world in EARTH_FRAMES and each.size > 0 for each in both]
     if not any(on_earth):
         return both
@@ -253,7 +258,7 @@ def _in_local_axes(
 
 
 def _paired(ref: Trajectory, est: Trajectory, settings: Settings, names: tuple[str, str], hints: list[str]) -> Pairs:
-    """Return the pairs, with the offset of the clocks, and with its score if it was estimated."""
+    """Return the pairs, with the offset of the clocks, and its score if it was estimated."""
     pairing, is_nearest = settings.pairing, settings.pairing.match == "nearest"
     if ref.stamps_ns is None or est.stamps_ns is None:
         if (ref.stamps_ns is None) != (est.stamps_ns is None):
@@ -297,7 +302,7 @@ def _time_span(each: Trajectory, name: str) -> str:
 
 
 def _hint_at_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]) -> None:
-    """Add a hint at an offset that is clearly larger than half an interval, if estimating it is cheap."""
+    """Add a hint if the clock offset is clearly larger than half an interval, provided that estimating it is cheap."""
     intervals = [interval(each.stamps_ns) for each in (ref, est)]
     span = max(ref.stamps_ns[-1], est.stamps_ns[-1]) - min(ref.stamps_ns[0], est.stamps_ns[0])
     if span > MOST_TRIED * min(intervals) / 2:
@@ -310,7 +315,7 @@ def _hint_at_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]
 
 
 def _in_window(pairs: Pairs, pairing: Pairing) -> Pairs:
-    """Keep the pairs from the start to the end, both inclusive."""
+    """Return the pairs between `start` and `stop`, both inclusive."""
     if pairing.start is pairing.stop is None:
         return pairs
     stamps = pairs.ref.stamps_ns
@@ -328,13 +333,13 @@ def _in_window(pairs: Pairs, pairing: Pairing) -> Pairs:
 
 
 def _mounted(pairs: Pairs, fitting: Fitting) -> Pairs:
-    """Replace EST's body by REF's body: est_i X."""
+    """Multiply EST's poses by the mount X, est_i X: the poses of REF's body; "auto" estimates X."""
     ref, est, mount = pairs.ref, pairs.est, fitting.mount
     if mount is None:
         return pairs
     if est.rotation is None:
         raise ValueInvalid("a mount needs rotations of the estimate")
-    if isinstance(mount, str):  # the lever arm from the fit, and a rotation common to all pairs
+    if isinstance(mount, str):  # "auto": the lever arm from the fit, and a rotation common to all pairs
         up, shared = np.array(fitting.up), None
         arm = lever_arm(fitting.align, ref, est, up)
         shifted = est.with_poses(est.poses @ Transform(Rotation.identity(), arm))
@@ -351,7 +356,7 @@ def _spread(rotations: Rotation) -> float:
 
 
 def _hint_at_rotation(ref: Trajectory, moved: Trajectory, fitting: Fitting, hints: list[str]) -> None:
-    """Add a hint at a constant rotation between the two bodies, or between worlds that were not aligned."""
+    """Add a hint if there is a constant rotation between the bodies, or between worlds that were not aligned."""
     if ref.rotation is None or moved.rotation is None:
         return
     of_bodies, of_worlds = moved.rotation.inverse() @ ref.rotation, moved.rotation @ ref.rotation.inverse()
@@ -368,7 +373,7 @@ def _hint_at_rotation(ref: Trajectory, moved: Trajectory, fitting: Fitting, hint
 
 
 def _common_rotation(rotations: Rotation) -> Rotation | None:
-    """Return the mean of rotations if it is significant and about the same for all."""
+    """Return the mean of rotations if it is large, and large relative to their spread; else None."""
     mean = rotations.mean()
     return mean if float(mean.angle()) > max(NOTABLE, STEADY * _spread(rotations)) else None
 
@@ -376,7 +381,7 @@ def _common_rotation(rotations: Rotation) -> Rotation | None:
 def _relative(
     ref: Trajectory, est: Trajectory, path_of: Trajectory, reporting: Reporting, hints: list[str]
 ) -> Iterator[tuple[Delta, RelativeErrors]]:
-    """Yield the relative errors for every delta that the path is long enough for."""
+    """Yield the relative errors of every delta that the path is long enough for."""
     for delta in reporting.deltas or DELTAS:
         along = delta.along(path_of)
         if along is None:
@@ -431,7 +436,7 @@ def _settings(found: Comparison) -> dict[str, Any]:
 
 
 def _errors(m: Array | None, rad: Array | None, *, evo: bool) -> dict[str, Any]:
-    """Return the statistics of distances and angles, and as evo does the norm of R - I and of the whole matrix."""
+    """Return the statistics of distances and angles; with `evo` also of the norms of R - I and of the whole matrix."""
     found = {"m": statistics(m), "deg": statistics(None if rad is None else np.degrees(rad))}
     if evo and m is not None and rad is not None:
         rot = SQRT8 * half_sincos(rad, arrays)[0]
@@ -460,7 +465,7 @@ def _kitti(found: Comparison) -> dict[str, Any] | None:
 
 
 def rows(found: Comparison, which: str = "ate") -> Iterator[dict[str, Any]]:
-    """Yield one row per pair (`ate`), two poses of a delta (`rpe`) or path segment (`kitti`)."""
+    """Yield one row per pair (`ate`), per two poses a delta apart (`rpe`), or per path segment (`kitti`)."""
     ref, est, ate, segments = found.pairs.ref, found.moved, found.ate, found.segments
     counted: Any = np.arange(ref.size) if ref.stamps_ns is None else ref.stamps_ns
     tables: list[dict[str, Any]] = []

@@ -30,26 +30,26 @@ if TYPE_CHECKING:
 NAMES = ("base", "gripper", "camera", "target")
 FEWEST_APART = 4  # with three, rotations alone can fit all positions: the closed form is the result
 FEWEST_CERTAIN = 6  # with fewer the sigmas are rough: with 8 they are within a few per cent on average
-DRAWS, DRAWN = 60, 5
-MOST_PAIRS = 10_000  # pairs that are used, or one of each sample
+DRAWS, DRAWN = 60, 5  # random subsets for initial models, and samples of each
+MOST_PAIRS = 10_000  # pairs that are used, but at least one of each sample
 STEPS, ROUGH_STEPS = 100, 4
-CONVERGED = 1e-12  # of the extent, and radians
+CONVERGED = 1e-12  # size of a step relative to the extent, and in radians
 MOST_DAMPED = 1e9  # damping
 UNDAMPED = 1e-12
-OBSERVABLE = 1e-8  # of the largest singular value
-CLEARLY_BETTER = 2.0  # ratio by which both metres and radians must be better
-LEAST_TURN, LEAST_SHARE = radians(0.5), 0.02  # about the second axis: none, also relative to the first
+OBSERVABLE = 1e-8  # singular values below this share of the largest are zeros
+CLEARLY_BETTER = 2.0  # ratio by which both metres and radians of the other setting must be better
+LEAST_TURN, LEAST_SHARE = radians(0.5), 0.02  # smallest rotation about the second axis, also as a share of the first
 SMALL_TURN = radians(5.0)
-CERTAIN_AXIS = (radians(1.0), radians(175.0))  # rotations of a pair whose axis is certain
+CERTAIN_AXIS = (radians(1.0), radians(175.0))  # angles between which the axis of a pair's rotation is certain
 
 
 class HandEye(NamedTuple):
     """X and Z with their covariances (6x6, as in ROS), and the fit of the samples.
 
-    noise_at: the frame in which errors are equal, None if there are none
+    noise_at: the frame in which the noise most likely is, None if the samples fit exactly
     used: the inliers; u: the residual of each sample in sigmas; residuals: (n, 6), metres and radians
     sigma: of each axis, metres and radians; dof: 3 n - 6 for each of them; rms: of the inliers, metres and radians
-    turns: rms about the two main axes of the pairs of inliers, radians
+    turns: rms rotation about the two main axes of the pairs of inliers, radians
     """
 
     x: Transform
@@ -123,7 +123,7 @@ def solve_hand_eye(
 
 
 class _Model(NamedTuple):
-    """X and Z, the location of the noise, and what a fit found: Hessian (12, 12) and 2 ln s_t + 2 ln s_r."""
+    """X and Z, the frame of the noise; of a fit also the Hessian (12, 12), and the cost 2 ln s_t + 2 ln s_r."""
 
     x: Transform
     z: Transform
@@ -132,7 +132,7 @@ class _Model(NamedTuple):
     misfit: float = 0.0
 
 
-# the errors E = left X right = before inv(Z) after, by the location of the noise: the factors around X and Z
+# the errors E = left X right = before inv(Z) after for each frame of the noise: the factors around X and Z
 Factors = tuple[Transform, Transform, Transform, Transform]
 FACTORS: dict[str, Callable[[Transform, Transform, Transform, Transform], Factors]] = {
     "target": lambda g, c, x, z: (z.inverse() @ g, c, ONE, g @ x @ c),
@@ -151,7 +151,7 @@ class _Samples(NamedTuple):
         return _Samples(self.gripper[index], self.camera[index])
 
     def residuals(self, model: _Model) -> Array:
-        """Return [t(E), Log R(E)] of a model."""
+        """Return the errors [t(E), Log R(E)] of a model, (n, 6)."""
         left, right, _, _ = FACTORS[model.noise_at](*self, model.x, model.z)
         off = left @ model.x @ right
         return np.concatenate([off.xyz, off.rotation.as_rotvec()], 1)
@@ -176,7 +176,7 @@ class _Samples(NamedTuple):
         return now
 
     def _linear(self, model: _Model, weights: Array) -> tuple[_Model, Array]:
-        """Return a model with its Hessian and its cost, and the gradient."""
+        """Return the model with its Hessian and its cost, and the gradient."""
         left, right, before, after = FACTORS[model.noise_at](*self, model.x, model.z)
         errors = self.residuals(model)
         turn, back = left.rotation.as_matrix(), (before.rotation @ model.z.rotation.inverse()).as_matrix()
@@ -197,7 +197,7 @@ class _Samples(NamedTuple):
 
 
 def _initial_model(samples: _Samples, *, robust: bool) -> tuple[_Model, Array]:
-    """Return the best closed form of all samples and of small random subsets, with the medians of its errors."""
+    """Return the closed-form model with the least median errors, of all samples or of a random subset, and the medians."""
     count = len(samples.gripper)
     best = (np.inf, _Model(ONE, ONE), np.full(2, np.inf))
     fives: Iterable[Rows] = lsq.draws(DRAWS * robust, min(DRAWN, count - 1), count)
@@ -235,7 +235,7 @@ def _motions(gripper: Transform, camera: Transform) -> tuple[Transform, Transfor
 
 
 def _refuse_other_setting(medians: Array, others: Array, setting: str, names: Sequence[str]) -> None:
-    """Raise ValueInvalid if the samples fit the other setting clearly better, by the medians of the errors of both."""
+    """Raise ValueInvalid if the samples fit the other setting (eye-to-hand or not) clearly better, by median errors."""
     if (CLEARLY_BETTER * others <= medians).all() and BETTER**2 * others.prod() <= medians.prod():
         raise ValueInvalid(
             f"the samples do not fit ({lsq.off_text(*medians)}); they do ({lsq.off_text(*others)}) "
@@ -244,7 +244,10 @@ def _refuse_other_setting(medians: Array, others: Array, setting: str, names: Se
 
 
 def _warn_of_limits(samples: _Samples, x: Transform, turns: tuple[float, float, str], holder: str, both: str) -> None:
-    """Warn of what limits the result; both: of a few samples that another setting fits too, else ""."""
+    """Warn of what limits the result: small rotations, few samples, a scale of the target's translations.
+
+    both: text for the warning of few samples, if they fit the other setting too, else ""
+    """
     if turns[1] < SMALL_TURN:
         small = f"{degrees(turns[1]):.1f} deg rms, first axis {turns[2]} in {holder}"
         warn(f"turns about a second axis are small ({small}): turn more")
@@ -260,13 +263,13 @@ def _warn_of_limits(samples: _Samples, x: Transform, turns: tuple[float, float, 
 
 
 def _least_squares(slopes: Array, wanted: Array) -> tuple[Array, float]:
-    """Return the least-squares solution, and the norm of the residuals."""
+    """Return the least-squares solution of slopes x = wanted, and the norm of the residuals."""
     found: Any = np.linalg.lstsq(slopes, wanted, rcond=OBSERVABLE)[0]  # unobservable components are 0
     return found, float(lsq.length(slopes @ found - wanted))
 
 
 def _pairs(count: int) -> tuple[Indices, Indices]:
-    """Return all pairs of samples; of many, each with others at some random distances."""
+    """Return the indices of all pairs of samples; of many samples, each paired with those at some random distances."""
     if count * count <= 2 * MOST_PAIRS:
         return np.triu_indices(count, 1)
     lags = np.array(next(lsq.draws(1, max(MOST_PAIRS // count, 1), count - 1))) + 1

@@ -1,7 +1,7 @@
 """Common parts of all fits: normal equations, errors and steps of poses, and robust outlier rejection.
 
-An error or a step is (n, 6): metres and a rotation vector, both
-along the fixed axes of the parent frame, as in the covariances of ROS: t + d[:3], Exp(d[3:]) R.
+An error or a step is (n, 6): metres and a rotation vector, both along the fixed axes of the parent frame, as in the
+covariances of ROS: t + d[:3], Exp(d[3:]) R.
 u is the residual of a measurement in sigmas, the root mean square of its components; sigmas that the user does not
 state are estimated from medians.
 """
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 class Undetermined(ValueInvalid):
-    """Equations that have no solution."""
+    """Equations without a unique finite solution."""
 
     def __init__(self) -> None:
         """Set the message."""
@@ -39,7 +39,7 @@ class Undetermined(ValueInvalid):
 
 
 def solve_normal(matrix: Array, right: Array) -> Array:
-    """Return inv(matrix) right, (n, k), of a symmetric positive definite matrix; its rows may differ in units.
+    """Return inv(matrix) right, (n, k), for a symmetric positive definite matrix, whose rows may differ in units.
 
     Raises Undetermined if there is no solution.
     """
@@ -65,7 +65,10 @@ def inverse(matrix: Array) -> Array:
 
 
 def align_vectors(source: Array, target: Array) -> Rotation:
-    """Return the R of the least sum of |target - R source|^2 over vectors (n, 3); source: Kabsch 1976, Umeyama 1991."""
+    """Return the R that minimises the sum of |target - R source|^2 of vectors (n, 3).
+
+    Source: Kabsch 1976, Umeyama 1991.
+    """
     u, _, vt = np.linalg.svd(target.T @ source)
     proper = np.array([1.0, 1.0, np.linalg.det(u) * np.linalg.det(vt)])
     return Rotation.from_matrix((u * proper) @ vt).canonical()
@@ -94,24 +97,24 @@ NEAR = 1e-4  # radians: below, the series of J^-1 is exact to the last bits
 
 
 def stepped(poses: Transform, steps: Array) -> Transform:
-    """Add small steps: t + d[:3], Exp(d[3:]) R."""
+    """Return poses after small steps (.., 6): t + d[:3], Exp(d[3:]) R."""
     turned = Rotation.from_rotvec(steps[..., 3:]) @ poses.rotation
     return Transform(Rotation.from_quaternion(turned.as_quaternion(), normalize=True), poses.xyz + steps[..., :3])
 
 
 def errors(poses: Transform, measured: Transform) -> Array:
-    """Return [t - measured t, Log(R measured R')], (.., 6)."""
+    """Return the errors of poses, [t - measured t, Log(R measured R')], (.., 6)."""
     turned = (poses.rotation @ measured.rotation.inverse()).as_rotvec()
     return np.concatenate([poses.xyz - measured.xyz, turned], -1)
 
 
 def off_text(metres: float, radians: float, *, digits: int = 1) -> str:
-    """Format the lengths of both halves of an error for messages."""
+    """Format the translation and the angle of an error for messages."""
     return f"{1e3 * metres:.1f} mm {degrees(radians):.{digits}f} deg"
 
 
 def skew(v: Array) -> Array:
-    """Return [v]x of vectors (.., 3): [v]x a = v x a."""
+    """Return the matrices [v]x of vectors (.., 3): [v]x a = v x a."""
     x, y, z = np.moveaxis(v, -1, 0)
     zero = np.zeros_like(x)
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*v.shape, 3)
@@ -132,9 +135,9 @@ def inverse_left_jacobian(rotvecs: Array) -> Array:
 
 
 def batch_of(argument: Any, name: str) -> Transform:
-    """Return transforms (n,), a sequence of single ones, or matrices (n, 4, 4) as transforms.
+    """Convert single transforms or matrices (n, 4, 4) to one batch of transforms (n,); a batch is returned as it is.
 
-    Raises ValueInvalid with the shape, and for what is too far away.
+    name: for messages.  Raises ValueInvalid for another shape, which it names, and for translations above 1e100 m.
     """
     if not isinstance(argument, Transform) and len(argument) and all(isinstance(each, Transform) for each in argument):
         if many := next((each.shape for each in argument if each.shape), ()):
@@ -153,31 +156,31 @@ def batch_of(argument: Any, name: str) -> Transform:
 
 
 def stacked(transforms: Iterable[Transform]) -> Transform:
-    """Return single transforms as one batch."""
+    """Combine single transforms into one batch."""
     return Transform.of(*map(np.array, zip(*(each.components for each in transforms), strict=True)))
 
 
 Model = TypeVar("Model")
 
 KEPT = 3.0  # sigmas: a larger residual is an outlier
-CERTAIN = 2.5  # sigmas: up to here a first weight is 1
+CERTAIN = 2.5  # sigmas: smaller residuals have the weight 1 in the first fit
 MEDIAN_OF_THREE = 1.538  # the median of |r| of three numbers of deviation 1: the root of that of chi2 with 3 degrees
 MEDIAN_OF_SIX = 0.944  # the median of u of six numbers: the root of that of chi2 with 6 degrees, over 6
 LEAST = 1e-9  # metres, radians: the minimum of a sigma
 FARTHEST = 1e100  # metres: sums of squares stay finite
-STEADY = 1e-4  # change of a first weight at convergence
+STEADY = 1e-4  # largest change of a weight of the first fit at convergence
 FIRST_ROUNDS = 50
-ROUNDS = 20  # of rejecting and readmitting; in the second half nothing more is rejected, so that it terminates
+ROUNDS = 20  # of rejecting and readmitting; the second half rejects nothing more, so that it terminates
 
 
 def require_near(translations: Array, name: str) -> None:
-    """Refuse translations whose squares would overflow."""
+    """Raise ValueInvalid for translations whose squares would overflow."""
     if (farthest := np.abs(translations).max(initial=0.0)) > FARTHEST:
         raise ValueInvalid(f"{name}: a place at {farthest:.3g} m; at most {FARTHEST:.0e} m can be fitted")
 
 
 def draws(count: int, size: int, among: int) -> Iterator[list[int]]:
-    """Yield this many random choices of rows, seeded and reproducible.
+    """Yield `count` random choices of `size` rows out of `among`, sorted; reproducible.
 
     Of Python's generators only `random()` guarantees its sequence between versions, and numpy's none.
     """
@@ -190,7 +193,11 @@ def draws(count: int, size: int, among: int) -> Iterator[list[int]]:
 
 
 class RobustFit(NamedTuple, Generic[Model]):
-    """A fit of the inliers: residuals of all (n, 3 or 6), a sigma for each three of them, and u of each row."""
+    """A fit of the inliers.
+
+    kept: the inliers; residuals: of all rows, (n, 3) or (n, 6); sigmas: one for each three columns of them
+    u: the residual of each row in sigmas
+    """
 
     model: Model
     kept: Mask
@@ -205,7 +212,7 @@ def robust_fit(
 ) -> RobustFit[Model]:  # fmt: skip
     """Fit, reject rows beyond 3 sigmas, and fit the rest again until the inliers do not change.
 
-    residuals: (count, 3) or (count, 6) of a model; unknown: the number of unknowns that each three of them share
+    residuals: those of a model, (count, 3) or (count, 6); unknown: the number of unknowns behind each three columns
     rough, fit: return an improved model and the best one, for a weight per row
     """
     kept, share = np.ones(count, bool), np.sqrt(1.0 - unknown / (3.0 * count))
@@ -228,7 +235,7 @@ def robust_fit(
 def first_inliers(
     model: Model, u_of: Callable[[Model], Array], rough: Callable[[Model, Array], Model]
 ) -> tuple[Model, Mask]:
-    """Improve a model with weights min(1, 2.5 / u)^2 until these converge; return it and the rows within 3 sigmas."""
+    """Improve a model with weights min(1, 2.5 / u)^2 until they converge; return it and the mask of rows within 3 sigmas."""
     weights = None
     for _ in range(FIRST_ROUNDS):
         before, u = weights, u_of(model)
@@ -242,9 +249,9 @@ def first_inliers(
 def refit_inliers(
     found: RobustFit[Model], fit: Callable[[RobustFit[Model], Mask], RobustFit[Model]], *, robust: bool
 ) -> RobustFit[Model]:
-    """Fit the rows that are kept, and those within 3 sigmas of that fit again, until they do not change.
+    """Fit the inliers, and again those within 3 sigmas of the new fit, until they do not change.
 
-    fit: returns a better fit of some rows, with the rows that it used as `kept`, and `u` of all
+    fit: returns a better fit of some rows, with `kept`, the rows it used, and `u` of all rows
     """
     kept = found.kept
     for at in range(ROUNDS):
@@ -256,24 +263,24 @@ def refit_inliers(
 
 
 def lengths(residuals: Array) -> Array:
-    """Return the length of each three of the numbers of a row."""
+    """Return the length of each three columns of residuals, (n, columns / 3)."""
     return length(residuals.reshape(len(residuals), -1, 3))
 
 
 def deviations(residuals: Array, sigmas: Array) -> Array:
-    """Return u of rows: the root mean square of their numbers in sigmas."""
+    """Return u of each row: the root mean square of its columns in sigmas."""
     off = lengths(residuals) / sigmas
     u: Array = np.sqrt((off**2).sum(-1) / (3.0 * off.shape[1]))
     return u
 
 
 def fitted_sigmas(residuals: Array, weights: Array | Mask, unknown: int) -> Array:
-    """Return the sigma of each three numbers of weighted rows that share this many unknowns."""
+    """Return the sigma of each three columns of weighted residuals, which share `unknown` unknowns."""
     dof = max(3.0 * float(weights.sum()) - unknown, 1.0)
     squares = (weights[:, None] * lengths(residuals) ** 2).sum(0)
     return np.array([max(float(np.sqrt(each / dof)), LEAST) for each in squares.tolist()])
 
 
 def median_sigma(lengths: Array, share: float = 1.0) -> float:
-    """Return the sigma of three numbers each from their median length; share q: the noise left by a fit."""
+    """Return the sigma of vectors of three numbers from their median length; share: of the noise that a fit leaves."""
     return max(float(np.median(lengths)) / (MEDIAN_OF_THREE * share), LEAST)

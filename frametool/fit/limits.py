@@ -23,7 +23,11 @@ _LIMIT = r"([\w:.]+?)\s*(>=|<=|>|<)\s*([-+]?(?:\d++\.?\d*+|\.\d++)(?:e[-+]?\d+)?
 
 
 class Limit(NamedTuple):
-    """A number by its name or its path in the JSON, and its limit."""
+    """A limit on a number of a comparison.
+
+    text: as written; name: one of SHORT, `rpe:DELTA`, or the path in the JSON
+    bound: in metres, degrees, seconds or percent
+    """
 
     text: str
     name: str
@@ -32,7 +36,7 @@ class Limit(NamedTuple):
     unit: str
 
     def passed(self, found: dict[str, Any]) -> float | None:
-        """Return the number of a comparison if it exceeds the limit, else None.
+        """Return the number of a comparison (its `as_dict()`) if it exceeds the limit, else None.
 
         Raises ValueInvalid if there is no such number.
         """
@@ -50,9 +54,9 @@ class Limit(NamedTuple):
 
 
 def parse_limits(text: str) -> list[Limit]:
-    """Parse limits separated by commas: a name or path, > >= < or <=, a number with its unit.
+    """Parse limits separated by commas: a name or path, one of > >= < <=, and a number with its unit.
 
-    Bare numbers are metres, degrees, poses, and percent of KITTI.  Raises ValueInvalid.
+    Without a unit numbers are metres, degrees, poses, or percent of KITTI.  Raises ValueInvalid.
     """
     found = []
     for part in filter(None, map(str.strip, text.split(","))):
@@ -69,7 +73,7 @@ def parse_limits(text: str) -> list[Limit]:
 
 
 def number_at(value: Any, path: str) -> Any:
-    """Follow a path of keys and indices into a mapping; None if it ends."""
+    """Return the value at a path of keys and indices, `ate.m.rmse`, in a mapping; None if there is none."""
     for step in path.split("."):
         try:
             value = value[int(step) if isinstance(value, list) else step]

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 FEWEST_ROBUST = 5  # three points always fit, so that with four the outlier cannot be identified
 TRIPLES = 500
 MOST = 2000  # points on which a triple is tested
-ROUNDING = 1e-12  # relative to the largest coordinate: no distance is more accurate
-BETTER = 5.0  # ratio: an alternative that fits this much better was meant
+ROUNDING = 1e-12  # accuracy of distances relative to the largest coordinate
+BETTER = 5.0  # ratio: an alternative with residuals this much smaller is reported
 UNITS = {1000.0: "millimetres?", 100.0: "centimetres?"}
-ABOUT = 0.05  # of a scale: still a unit conversion
+ABOUT = 0.05  # relative difference from a unit's scale up to which the unit is named
 ONE = Transform.identity()
 MIRROR = np.array([1.0, 1.0, -1.0])
 
@@ -34,9 +34,9 @@ MIRROR = np.array([1.0, 1.0, -1.0])
 class PointsFit(NamedTuple):
     """target_from_source and the scale c, with their covariance (6x6, as in ROS) and the scale's sigma.
 
-    used: the inliers; left_out: outliers with a weight
+    used: the inliers; left_out: the outliers, without the points of weight 0
     residuals: target - (c R source + t), (n, 3); u: the residual of each in sigmas; sigma: of each axis for weight 1
-    dof: 3 n - 6, with a scale 3 n - 7; rms: of the inliers, metres and None
+    dof: 3 n - 6, with a scale 3 n - 7; rms: of the inliers in metres, and None, as there is no angle
     """
 
     transform: Transform
@@ -126,7 +126,7 @@ class _Pairs(NamedTuple):
         return found
 
     def start(self, *, with_scale: bool, robust: bool) -> tuple[Fit, float]:
-        """Return the fit of all or of a triple with the least typical distance, and that distance.
+        """Return the fit, of all points or of a triple, with the least typical distance, and that distance.
 
         The typical distance is the median, but at least the fourth: three always fit.  It is never below rounding.
         """
@@ -145,7 +145,7 @@ class _Pairs(NamedTuple):
         return best[1], max(sqrt(best[0]), ROUNDING * max(np.abs(self.target).max(), np.abs(self.source).max()))
 
     def is_line(self) -> bool:
-        """Return True if target or source are on a line, or in one point."""
+        """Return True if the target or the source points are on a line, or at one point."""
         for xyz in self[:2]:
             first, second, _ = principal_axes(xyz)
             if second <= max(THIN * first, STILL * np.abs(xyz).max()):
@@ -157,7 +157,7 @@ class _Pairs(NamedTuple):
             raise ValueInvalid("the points lie on a line: the turn about it cannot be known")
 
     def covariance(self, fit: Fit, sigma: float, *, with_scale: bool) -> tuple[Array, float | None]:
-        """Return the inverse Hessian of pose and scale: the pose's part, and the scale's sigma if it is estimated.
+        """Return the covariance of the pose (6, 6), and the scale's sigma if it is estimated, from the inverse Hessian.
 
         At the points' centre position, rotation and scale are independent; the lever arm transforms it to the source's
         origin.

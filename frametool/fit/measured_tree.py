@@ -1,10 +1,10 @@
 """Estimate a tree from measurements: the pose of each frame in the root, its covariance, and the outliers.
 
-Frames that are fixed to each other form bodies, numbered, 0 is the root.  A row measures a frame of one body in a frame
-of another: r = [t(P) - t(M), Log(R(P) R(M)')], P = inv(X_a) X_b.  The poses of the bodies are robust least squares:
-Gauss-Newton, outlier rejection.  Outliers are explained by common mistakes; if another row of the loop has one, that
-row is rejected instead; a loop whose outlier cannot be identified is an error.  Covariances are first order, the
-inverse of the normal equations.
+Frames that are fixed to each other form a body; bodies are numbered, 0 is the root's.  A row measures a frame of one
+body in a frame of another: r = [t(P) - t(M), Log(R(P) R(M)')], P = inv(X_a) X_b.  The poses of the bodies are robust
+least squares: Gauss-Newton, outlier rejection.  Outliers are explained by common mistakes; if another row of the loop
+has one, that row is rejected instead; a loop whose outlier cannot be identified is an error.  Covariances are first
+order, the inverse of the normal equations.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class TreeFit:
-    """A fit with its inliers: residuals, rows in no loop, covariances; and the verdicts on its outliers."""
+    """A fit and its inliers: residuals, rows in no loop, covariances, and explanations of the outliers."""
 
     def __init__(self, problem: TreeProblem, found: lsq.RobustFit[TreeModel]) -> None:
         """Store a fit; covariances are not computed yet."""
@@ -49,9 +49,10 @@ class TreeFit:
             self._known.join(*problem.pairs[row])
 
     def covariance(self, target: tuple[int, Transform], source: tuple[int, Transform]) -> Array | None:
-        """Return the covariance (6, 6) of source in target, along its axes, each a body and the pose of a frame of it.
+        """Return the covariance (6, 6) of the pose of source in target, along target's axes.
 
-        None if it depends on rows whose noise is neither stated nor observable from a loop.
+        target, source: a frame each: the number of its body, and its pose in the root
+        Returns None if it depends on rows whose noise is neither stated nor observable from a loop.
         """
         if target[0] == source[0]:
             return np.zeros((6, 6))
@@ -75,8 +76,9 @@ class TreeFit:
         return whole
 
     def explain_outliers(self) -> tuple[TreeFit, list[str | None]]:
-        """Explain the rejected rows; if a rival has a mistake instead, reject the rival.
+        """Explain the rejected rows by mistakes; where a rival has a mistake instead, reject the rival and fit again.
 
+        Returns the fit, and the mistake of each row or None.
         Raises ValueInvalid if none of a row and its rivals, or more than one, has a mistake that fits.
         """
         fit, problem = self, self.problem
@@ -104,10 +106,10 @@ class TreeFit:
         return fit, fits
 
     def try_blunders(self) -> tuple[list[str | None], list[int], list[tuple[int, int]], tuple[int, list[int]] | None]:
-        """Try the mistakes on each rejected row, and on its rivals: used rows that only it checks.
+        """Try the mistakes on each rejected row, and on its rivals: used rows that only this row checks.
 
-        Returns the mistake of each row; rows without one that the uncertainty of the fit explains; rows to exchange,
-        (rejected, rival); and the first row whose loop does not identify the outlier, with its rivals.
+        Returns the mistake of each row; the rows without one that the uncertainty of the fit explains; the rows to
+        exchange, (rejected, rival); and the first row whose loop does not identify the outlier, with its rivals.
         """
         measurements, noise_found = self.problem.measurements, self.found.model.noise
         information = self.problem.information(noise_found, noise_found.factor)
@@ -137,13 +139,13 @@ class TreeFit:
         return fits, noise, swaps, undecided
 
     def _with_fit_uncertainty(self, row: int, information: Array) -> Array:
-        """Return the information of a row relative to the fit, whose own uncertainty between the frames is included."""
+        """Return the information (6, 6) of a row, reduced by the uncertainty of the fit between the row's frames."""
         parent, child = self.problem.pairs[row]
         uncertainty = self.covariance((parent, self.parents[row]), (child, self.children[row]))
         return information if uncertainty is None else lsq.inverse(lsq.inverse(information) + uncertainty)
 
     def _pose_without(self, rival: int, row: int) -> Transform:
-        """Return the pose that a rival would measure if the rejected row placed the bodies below it."""
+        """Return the pose that a rival would measure if the rejected row placed the bodies beyond the rival."""
         measured, pairs, below = self.problem.measured[row], self.problem.pairs, set[int]()
         for body in self.tree.order:
             if self.tree.row[body] == rival or self.tree.parent[body] in below:
@@ -158,7 +160,7 @@ class TreeFit:
         return parent.inverse() @ child
 
 
-FEW_LOOPS = 6  # with fewer the sigmas are rough if rotations can close them
+FEW_LOOPS = 6  # with fewer loops the sigmas are rough if rotations can close them
 
 
 def solve_tree(
@@ -192,13 +194,13 @@ class TreeSolution:
     """A tree of measured frames, and the results for the measurements.
 
     root, frames: the reference frame; all frames, in order of first mention
-    residuals (n, 6), u, used, checked, fits: of each measurement
-    sigma: estimated (metres, radians) of those without a covariance, or None; sigma_factor: 1, or the factor by which
-        the stated sigmas are too small, without changing them
+    residuals (n, 6), u, used, checked, fits: of each measurement; checked: it is in a loop; fits: its mistake
+    sigma: estimated (metres, radians) of measurements without a covariance, or None
+    sigma_factor: 1, or the factor by which the stated sigmas are too small; they are not changed
     dof: degrees of freedom of metres and of radians; rms: of the inliers, metres and radians
-    tree: all of that as a tree with covariances: frames in the root, or in the frame that they are fixed in
+    tree: the result as a tree with covariances: frames in the root, or in the frame that they are fixed in
     poses: of all frames in the root; rows: the number of used measurements of each frame
-    frame_checked: whether its pose in the root depends only on loops
+    frame_checked: True if every measurement between a frame and the root is in a loop
     """
 
     def __init__(self, fit: TreeFit, fits: list[str | None], bodies: Bodies, fixed: Frames) -> None:

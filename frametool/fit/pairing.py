@@ -1,6 +1,6 @@
-"""Two trajectories in time: pairs of poses, at common stamps or the nearest ones; stamps to resample at; clock offsets.
+"""Two trajectories in time: pairs of poses at common or nearest stamps, stamps to resample at, and clock offsets.
 
-The offset between the clocks of one motion is that of t_ref = t_est + offset.
+The offset between the clocks of two recordings of one motion is t_ref - t_est.
 """
 
 from __future__ import annotations
@@ -23,26 +23,27 @@ if TYPE_CHECKING:
     from frametool.geometry import Array, Indices
     from frametool.geometry.transform import Transform
 
-GAP = 3  # median intervals between two neighbours that may be interpolated
+GAP = 3  # median intervals: the longest gap to interpolate over by default
 MOST = 100_000_000  # poses
 LIMIT_S = 10.0
 REFINED_S = 1e-7
 STEPS = 8
-NEARBY = 1.2  # of a step: the largest error of the best of all lags and its neighbours
-DOUBT = 0.25  # of a step: the largest acceptable standard error of least squares
+NEARBY = 1.2  # steps of the grid: the largest error of the best lag
+DOUBT = 0.25  # steps of the grid: the largest acceptable standard error of least squares
 TINY = 1e-12
-AS_GOOD = 0.99  # of the best score: another lag may be the true one
-DIGITS = 9  # of a score, and of seconds: stamps are whole nanoseconds
+AS_GOOD = 0.99  # share of the best score from which another lag may be the true one
+DIGITS = 9  # decimals of a score, and of seconds: stamps are whole nanoseconds
 
 
 class Pairs(NamedTuple):
     """Paired poses of the reference and of the estimate, at the stamps of the reference's clock.
 
-    possible: the possible number of pairs: poses of the sampled trajectory within the time of the other
-    shared: the number of poses of one trajectory with more than one partner
-    interpolated: "ref", "est" or None; max_gap_s: the maximum interval for interpolation
-    offset_ns: what was added to the estimate's stamps; offset_score: of an estimated one
-    mount: by which the estimate's poses were multiplied
+    possible: the largest possible number of pairs: all poses of the estimate, or if the reference is the one whose
+        stamps are used, its poses within the time of the estimate
+    shared: the number of pairs whose partner is already that of another pair
+    interpolated: "ref", "est" or None; max_gap_s: the longest gap to interpolate over
+    offset_ns: what was added to the estimate's stamps; offset_score: its score if it was estimated
+    mount: the pose by which the estimate's poses were multiplied
     """
 
     ref: Trajectory
@@ -56,17 +57,19 @@ class Pairs(NamedTuple):
     mount: Transform | None = None
 
     def at(self, index: Array | slice) -> Pairs:
-        """Select pairs as numpy does."""
+        """Select pairs by a numpy index, mask or slice."""
         return self._replace(ref=self.ref.at(index), est=self.est.at(index))
 
 
 def paired(
     ref: Trajectory, est: Trajectory, max_gap_ns: float | None = None, max_diff_ns: float | None = None
 ) -> Pairs:
-    """Pair the stamps of one trajectory with interpolated poses of the other, the denser one: linear and slerp.
+    """Pair poses of two trajectories: one is interpolated, that with the shorter intervals, at the stamps of the other.
 
-    Never beyond its ends, nor in gaps longer than the maximum; equal stamps need no interpolation.
-    max_diff_ns: pair each pose of the shorter one with the nearest stamp of the other instead, the earlier one of a tie
+    Interpolation is linear and slerp, never beyond the ends, nor over gaps longer than max_gap_ns (None: 3 median
+    intervals); equal stamps need none.
+    max_diff_ns: instead pair each pose of the trajectory with fewer poses with the nearest stamp of the other, at most
+        this far away; of two equally near ones the earlier
     Poses without stamps are paired by index.
     """
     if ref.stamps_ns is None or est.stamps_ns is None:
@@ -93,9 +96,10 @@ def paired(
 
 
 def between(dense: Trajectory, stamps_ns: Array, max_gap_ns: float | None = None) -> tuple[Trajectory, Array]:
-    """Return poses at the stamps within a trajectory and not in a gap, and the mask of these stamps.
+    """Interpolate a trajectory at stamps, linearly and by slerp; stamps outside of it or in a gap are left out.
 
-    Interpolated linearly and by slerp; by default a gap is longer than 3 median intervals.
+    max_gap_ns: the longest gap to interpolate over; None: 3 median intervals
+    Returns the poses, and the mask of the stamps that have one.
     """
     own = dense.stamps_ns
     max_gap_ns = GAP * interval(own) if max_gap_ns is None else max_gap_ns
@@ -113,7 +117,10 @@ def between(dense: Trajectory, stamps_ns: Array, max_gap_ns: float | None = None
 
 
 def nearest(own: Array, stamps_ns: Array) -> tuple[Indices, Array]:
-    """Return the index of the nearest of some sorted stamps, the earlier one of a tie, and how far off it is."""
+    """Return the index of the sorted stamp nearest to each stamp, the earlier of two equally near, and the difference.
+
+    own: the sorted stamps; stamps_ns: those to look up
+    """
     after = np.searchsorted(own, stamps_ns).clip(0, len(own) - 1)
     before = (after - 1).clip(0)
     index = np.where(stamps_ns - own[before] <= np.abs(own[after] - stamps_ns), before, after)
@@ -126,7 +133,7 @@ def interval(stamps_ns: Array) -> float:
 
 
 def stamps_at_rate(each: Trajectory, rate_hz: float) -> Array:
-    """Return stamps from the first pose on at a rate, each rounded independently."""
+    """Return stamps at a rate from the first pose to the last, each rounded to nanoseconds independently."""
     first, last = int(each.stamps_ns[0]), int(each.stamps_ns[-1])
     count = _count((last - first) * rate_hz / BILLION)
     stamps: Array = first + np.rint(np.arange(count) * (BILLION / rate_hz)).astype(np.int64)
@@ -134,7 +141,7 @@ def stamps_at_rate(each: Trajectory, rate_hz: float) -> Array:
 
 
 def _count(steps: float) -> int:
-    """Return the number of poses at whole steps."""
+    """Return the number of poses at whole steps, the first at 0; raises ValueInvalid for too many."""
     count = int(steps * (1 + 1e-12)) + 1
     if count > MOST:
         raise ValueInvalid(f"{count} poses are more than {MOST}; give a lower rate or longer steps")
@@ -142,7 +149,10 @@ def _count(steps: float) -> int:
 
 
 def stamps_every(each: Trajectory, delta: Delta) -> Array:
-    """Return the stamps at which a trajectory has covered whole multiples of a step of path or rotation."""
+    """Return the stamps at which a trajectory has covered whole multiples of a step of path or rotation.
+
+    Raises ValueInvalid if the step needs rotations and there are none.
+    """
     require_near(each.xyz, each.body)
     along = delta.along(each)
     if along is None:
@@ -158,7 +168,7 @@ def stamps_every(each: Trajectory, delta: Delta) -> Array:
 
 
 class ClockOffset(NamedTuple):
-    """The offset in seconds, the correlation of speeds there (1 is perfect), and another offset about as good."""
+    """The offset in seconds, the correlation of speeds at it (1 is perfect), and another offset that fits as well."""
 
     seconds: float
     score: float
@@ -168,9 +178,10 @@ class ClockOffset(NamedTuple):
 def clock_offset(
     ref: Trajectory, est: Trajectory, *, limit_s: float = LIMIT_S, kind: str = "sim3", by_turning: bool = False
 ) -> ClockOffset:
-    """Find the lag at which angular speeds, or else speeds, correlate best; refine it by least squares.
+    """Estimate a clock offset: the lag at which angular speeds or speeds correlate best, refined by least squares.
 
-    by_turning: use angular speeds only if both rotate, because they do not depend on the sensor's position
+    limit_s: the largest lag that is tried; kind: alignment for the refinement
+    by_turning: use angular speeds only, if both rotate, because they do not depend on the sensor's position
     If the two spans do not overlap, their first stamps are aligned and every lag is tried.
     """
     if min(ref.size, est.size) < FEWEST:
@@ -185,7 +196,7 @@ def clock_offset(
     step = min(float(np.median(np.diff(each))) for each in times) / 2
     best = ClockOffset(0.0, -1.0)
     for turning in (True, False):
-        speeds: list[tuple[Array, Array]] = []  # the intervals between poses, and the angular speed or speed there
+        speeds: list[tuple[Array, Array]] = []  # the middle of each interval, and the angular speed or speed there
         for each, at in zip((ref, est), times, strict=True):
             rotation = each.rotation if turning else None
             if turning and rotation is None:
@@ -208,7 +219,8 @@ def clock_offset(
 def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit_s: float) -> ClockOffset:
     """Return the lag of the highest correlation, normalised over the overlap, refined between samples by a parabola.
 
-    At least half of the shorter signal overlaps.  All sums are correlations of signals, masks and squares, by FFT.
+    a, b: times in seconds and speeds of the two; step: of the grid.  At least half of the shorter signal overlaps.
+    All sums are correlations of signals, masks and squares, by FFT.
     """
     low, high = min(a[0][0], b[0][0]), max(a[0][-1], b[0][-1])
     grid = low + step * np.arange(int((high - low) / step) + 1)
@@ -238,17 +250,17 @@ def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit
     part = 0.5 * (before - after) / bend if bend < 0 and min(before, after) > -1 else 0.0
     score, middle, rival = np.fft.fftshift(score), size // 2, None
     near = score >= AS_GOOD * here
-    peaks = np.cumsum(~near)  # the number of each: between two valleys it is the same
+    peaks = np.cumsum(~near)  # numbers the peaks: the lags of one peak have the same number
     near &= peaks != peaks[(at + middle) % size]
-    if near.any() and here > 0:  # another one is as good
+    if near.any() and here > 0:  # another peak is about as high
         rival = round(float((np.argmax(np.where(near, score, -np.inf)) - middle) * step), DIGITS)
     return ClockOffset(round(float((lags[at] + part) * step), DIGITS), float(here), rival)
 
 
 def _newton(start: float, step: float, change_of: Callable[[float], float]) -> float:
-    """Refine a lag until it does not change: Gauss-Newton on one number, at most a step of the grid at a time.
+    """Refine a lag by Gauss-Newton until it does not change, by at most one step of the grid at a time.
 
-    A lag that leaves the neighbourhood of the start is not believed: the start is returned.
+    change_of: returns the change of a lag.  If the lag leaves the neighbourhood of the start, the start is returned.
     """
     seconds = start
     for _ in range(STEPS):
@@ -260,7 +272,7 @@ def _newton(start: float, step: float, change_of: Callable[[float], float]) -> f
 
 
 def _refined_by_speeds(a: tuple[Array, Array], b: tuple[Array, Array], seconds: float, step: float) -> float:
-    """Refine a lag until the speeds a match the speeds b best."""
+    """Refine a lag by least squares between the speeds a and the shifted speeds b."""
 
     def change_of(found: float) -> float:
         at = b[0] + found
@@ -273,11 +285,11 @@ def _refined_by_speeds(a: tuple[Array, Array], b: tuple[Array, Array], seconds: 
 
 
 def _refined_by_path(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step: float, kind: str) -> float:
-    """Refine the offset from the residuals along the velocity after the fit.
+    """Refine a lag from the residuals along the velocity after the fit.
 
-    Drift is along the velocity too, but correlated from pose to pose: if the residuals are so correlated that they are
-    less accurate than the correlation, or require a lag outside of its uncertainty (as with a lever arm), it is
-    unchanged.
+    Drift is along the velocity too, but correlated from pose to pose.  The lag is returned unchanged if the residuals
+    are so correlated that they are less accurate than the correlation, or if they require a lag outside of its
+    uncertainty (as with a lever arm).
     """
     plain, doubt = ref._replace(xyzw=None), np.inf
     half, gap_ns = round(step * 1e9), GAP * interval(ref.stamps_ns)

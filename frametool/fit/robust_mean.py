@@ -1,4 +1,4 @@
-"""The mean of poses, without the outliers among them."""
+"""The mean of poses, with outliers rejected."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from frametool.geometry import Array, Numbers
     from frametool.geometry.transform import Transform
 
-FEWEST = 3  # of two poses that disagree neither is the outlier
-MOST_TRIED = 200  # poses that are tried as the middle of the others
+FEWEST = 3  # poses for outlier rejection: of two that disagree neither is the outlier
+MOST_TRIED = 200  # poses that are tried as the start of the fit
 LEAST_GAP = 1e-9  # between the two largest eigenvalues, relative to their sum
 
 
@@ -27,7 +27,7 @@ class MeanFit(NamedTuple):
     """The mean of the inliers and their distances from it.
 
     rms, most: the weighted root mean square and the largest distance of the inliers, metres and radians
-    used: the inliers; left_out: outliers with a weight; u: the residual of each in sigmas
+    used: the inliers; left_out: the outliers, without the poses of weight 0; u: the residual of each in sigmas
     residuals: [t_i - t, Log(R_i R')], (n, 6); sigma: of each axis of a pose of weight 1, metres and radians
     dof: 3 n - 3 of the inliers, for each sigma; covariance: of one pose, 6x6 as in ROS, None for a single pose
     """
@@ -59,7 +59,7 @@ def solve_mean(
     own, weight, robust = poses[counts], mass[counts], robust and counts.sum() >= FEWEST
 
     def apart(at: int) -> float:
-        """Return how far a pose is from the others, by the medians of metres and radians."""
+        """Return the distance of a pose from the others: the sum of the logarithms of the median metres and radians."""
         return sum(log(max(np.median(roots[counts, 0] * off), lsq.LEAST)) for off in own[at].distance(own))
 
     def mean_of(_: Transform, kept: Array) -> Transform:

@@ -1,4 +1,4 @@
-"""Errors of an aligned trajectory: absolute, relative over a distance between poses, and over segments as of KITTI."""
+"""Errors of an aligned trajectory: absolute, relative over a distance between poses, and over segments as in KITTI."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from frametool.geometry import Array, Indices
 
 CHORD = 0.1  # metres of path before and after a pose that define its direction
-ROUNDING = 1e-9  # of a delta
+ROUNDING = 1e-9  # share of a delta by which a distance may be shorter
 X = np.array([1.0, 0.0, 0.0])
 
 
@@ -30,11 +30,11 @@ class Delta(NamedTuple):
     unit: str
 
     def __str__(self) -> str:
-        """Format it as it is parsed."""
+        """Return it as `parse_delta` reads it."""
         return f"{self.amount:g}{self.unit}"
 
     def along(self, each: Trajectory) -> Array | None:
-        """Return the cumulative distance at each pose of a trajectory, in the unit; None if it is not known."""
+        """Return the cumulative distance at each pose, in `unit`; None if the stamps or rotations it needs are missing."""
         if self.unit == "frames":
             return np.arange(each.size, dtype=float)
         if self.unit == "m":
@@ -46,7 +46,7 @@ class Delta(NamedTuple):
 
 
 def parse_delta(text: str, units: Sequence[str] = ("m", "s", "deg", "frames")) -> Delta:
-    """Read `1m`, `10frames`, `1s`, `5deg`; raises ValueInvalid."""
+    """Parse `1m`, `10frames`, `1s` or `5deg`; raises ValueInvalid."""
     found = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+)\s*([a-z]+)", text.strip())
     if not found or found[2] not in units or not float(found[1]) > 0:
         raise ValueInvalid(f"{shown(text)} is not a distance between poses; write a number with {', '.join(units)}")
@@ -56,7 +56,7 @@ def parse_delta(text: str, units: Sequence[str] = ("m", "s", "deg", "frames")) -
 
 
 def statistics(values: Array | None) -> Any:
-    """Return the statistics of numbers, if any: std is the population's (n), p95 the linear percentile."""
+    """Return the statistics of numbers; None for None; std is the population's (n), p95 the linear percentile."""
     if values is None:
         return None
     sse = float((values**2).sum())
@@ -68,7 +68,7 @@ def statistics(values: Array | None) -> Any:
 
 
 class AbsoluteErrors(NamedTuple):
-    """Absolute errors, one per pair: the distance and, signed, its parts along, across and above the path, metres.
+    """Absolute errors of each pair, metres: the distance, and its signed parts along, across and above the path.
 
     rad: the angle of inv(ref) est, None without rotations of both
     """
@@ -92,7 +92,7 @@ def absolute_errors(ref: Trajectory, est: Trajectory, up: Array) -> AbsoluteErro
     if len(moving):
         last = moving[(np.searchsorted(moving, np.arange(len(path)), "right") - 1).clip(0)]
         along = chord[last] / size[last, None]
-    above = up - (along @ up)[:, None] * along  # normal to the path; if up is parallel to it, x is made so
+    above = up - (along @ up)[:, None] * along  # normal to the path; if up is parallel to it, from x instead
     parallel = length(above) < ROUNDING
     above[parallel] = X - along[parallel, :1] * along[parallel]
     above /= length(above)[:, None]
@@ -102,7 +102,7 @@ def absolute_errors(ref: Trajectory, est: Trajectory, up: Array) -> AbsoluteErro
 
 
 class RelativeErrors(NamedTuple):
-    """Relative errors from pose `start` to pose `end`: of translation and angle, and of the distance covered.
+    """Relative errors from pose `start` to pose `end`: of translation (m), angle (rad) and distance covered (metres).
 
     m and rad are None without rotations of both.
     """
@@ -126,7 +126,7 @@ def relative_errors(ref: Trajectory, est: Trajectory, start: Indices, end: Indic
 
 
 def chained(along: Array, delta: float) -> tuple[Indices, Indices]:
-    """Return pairs (i, j), each from the end of the previous one: j is the first that is delta further along."""
+    """Return pairs (i, j) end to end: j is the first pose that is delta further along than i."""
     following = np.searchsorted(along, along + delta * (1 - ROUNDING)).tolist()
     found = [0]
     while (after := following[found[-1]]) < len(along):
@@ -136,7 +136,7 @@ def chained(along: Array, delta: float) -> tuple[Indices, Indices]:
 
 
 def all_pairs(along: Array, delta: float, tolerance: float) -> tuple[Indices, Indices]:
-    """Return for each i the first j whose distance from there is the nearest to delta, within a share of it."""
+    """Return for each i the first j whose distance from i is nearest to delta; only those within `tolerance` * delta."""
     wanted = along + delta
     after = np.searchsorted(along, wanted).clip(1, len(along) - 1)
     nearest = np.where(wanted - along[after - 1] <= along[after] - wanted, after - 1, after)
@@ -146,7 +146,10 @@ def all_pairs(along: Array, delta: float, tolerance: float) -> tuple[Indices, In
 
 
 class SegmentErrors(NamedTuple):
-    """Errors over path segments of some lengths: the ends and length of each, and its errors per metre."""
+    """Errors over path segments: the first and last pose and the length of each, and its errors per metre.
+
+    share: metres per metre
+    """
 
     start: Indices
     end: Indices
@@ -156,9 +159,9 @@ class SegmentErrors(NamedTuple):
 
 
 def segment_errors(ref: Trajectory, est: Trajectory, lengths: Sequence[float], step: int) -> SegmentErrors | None:
-    """Compare path segments from every n-th pair, as the KITTI benchmark does; None without rotations.
+    """Compare path segments from every `step`-th pair, as the KITTI benchmark does; None without rotations.
 
-    Source: Geiger, Lenz, Urtasun 2012, and its devkit: up to the first pose that is more than the length further.
+    Source: Geiger, Lenz, Urtasun 2012, and its devkit: a segment ends at the first pose beyond the length.
     """
     if not lengths or ref.xyzw is None or est.xyzw is None:
         return None

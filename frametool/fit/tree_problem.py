@@ -1,6 +1,6 @@
-"""Measurements between bodies, frames that are fixed to each other: their graph, and the least-squares problem.
+"""The least-squares problem of measurements between bodies, which are groups of frames fixed to each other.
 
-The graph has spanning trees and bridges; the problem initial poses, Gauss-Newton steps, noise and inliers.
+The graph: spanning trees and bridges.  The problem: initial poses, Gauss-Newton steps, noise and inliers.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
     Pairs = Sequence[tuple[int, int]]
 
 MOST = 1000  # frames
-TREES = 200
-SINGULAR = 1e-12  # of the correlations: the least eigenvalue of a valid covariance
+TREES = 200  # spanning trees that are tried for initial poses
+SINGULAR = 1e-12  # least eigenvalue of the correlations of a valid covariance
 STEPS = 100
 MOST_DAMPED = 1e12
-CONVERGED = 1e-12  # of the extent, radians, and of a sigma: convergence of steps
+CONVERGED = 1e-12  # size of the last step relative to the extent, in radians, and relative to a sigma
 BORROWED = 0.3  # degrees of freedom of metres that radians add, and vice versa, if loops are few
-LEAST_SHARE = 0.04  # of the rows in loops, relative to the unknowns
+LEAST_SHARE = 0.04  # least share of the variance that a fit leaves in the rows in loops
 
 
 class SpanningTree(NamedTuple):
@@ -50,7 +50,7 @@ class SpanningTree(NamedTuple):
     depth: list[int]
 
     def rows_between(self, a: int, b: int) -> list[int]:
-        """Return the rows between two bodies."""
+        """Return the rows on the path between two bodies."""
         rows = []
         while a != b:
             if self.depth[a] < self.depth[b]:
@@ -61,7 +61,7 @@ class SpanningTree(NamedTuple):
 
 
 def spanning_tree(count: int, pairs: Pairs, rows: Iterable[int]) -> SpanningTree:
-    """Return the tree of the first rows that close no loop (Kruskal); together the rows join all bodies."""
+    """Return the tree of the first rows that close no loop (Kruskal); the rows must connect all bodies."""
     groups = Groups[int]()
     near: list[list[tuple[int, int]]] = [[] for _ in range(count)]
     for row in rows:
@@ -89,8 +89,8 @@ def bridges(tree: SpanningTree, pairs: Pairs, rows: Iterable[int]) -> set[int]:
 class Bodies(NamedTuple):
     """The bodies formed by measured and fixed frames.
 
-    frames: in order of first mention; number: the body of each, 0 for the root's
-    pose: of each frame in its body; in the root's body, in the root
+    frames: in order of first mention; number: the body of each frame, 0 for the root's
+    pose: of each frame in the first frame of its body, which is the root for body 0
     """
 
     root: str
@@ -119,7 +119,7 @@ def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Fram
         texts = [first_of(sorted(group), 3, quote=bare) for group in groups.values()]
         raise ValueInvalid(f"no measurement connects {first_of(texts, 3, gap=' | ')}")
     tops = {name: name for name in frames} | Snapshot(fixed).roots
-    first: dict[str, str] = {}  # of each body, by the top of its tree
+    first: dict[str, str] = {}  # the first frame of each body, by the root of its fixed tree
     for name in (root, *frames):
         first.setdefault(tops[name], name)
     number = {top: at for at, top in enumerate(first)}
@@ -129,25 +129,25 @@ def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Fram
 
 
 class Noise(NamedTuple):
-    """The sigmas of measurements without their own, and the factor by which stated ones are too small."""
+    """The sigmas of measurements without a covariance (metres, radians), and the factor by which stated ones are too low."""
 
     translation: float = 0.01
     rotation: float = math.radians(1.0)
     factor: float = 1.0
 
     def at_least(self, other: Noise) -> Noise:
-        """Return sigmas that are at least those of another."""
+        """Return the larger of both sigmas each, with this factor."""
         return Noise(*map(max, self, other._replace(factor=self.factor)))
 
 
-LOWEST = Noise(0.001, math.radians(0.1))  # medians if loops are few: most rows of a tree have no residual
+LOWEST = Noise(0.001, math.radians(0.1))  # of medians if loops are few: most rows of a tree have no residual
 
 
 class TreeModel(NamedTuple):
     """The poses of the bodies, and the noise of measurements.
 
-    estimated: whether the used rows determine their own noise
-    few_loops: whether rotations can close all loops, so that metres alone do not determine their sigma
+    estimated: True if the noise was estimated from the used rows
+    few_loops: True if rotations can close all loops, so that metres alone do not determine their sigma
     """
 
     bodies: Transform
@@ -157,7 +157,10 @@ class TreeModel(NamedTuple):
 
 
 def jacobians(parent: Transform, child: Transform, turned: Array) -> tuple[Array, Array]:
-    """Return dr/da, dr/db, (n, 6, 6), of rows between frames at a and b; turned: the errors of the rotations."""
+    """Return dr/da, dr/db, (n, 6, 6), of rows between frames a and b.
+
+    parent, child: the poses of a and b in the root; turned: the rotation part of the errors, (n, 3)
+    """
     back = parent.rotation.inverse().as_matrix()
     turn = lsq.inverse_left_jacobian(turned) @ back
     by_parent, by_child = np.zeros((2, *turned.shape[:-1], 6, 6))
@@ -168,17 +171,20 @@ def jacobians(parent: Transform, child: Transform, turned: Array) -> tuple[Array
 
 
 def by_body_step(jacobian: Array, body: Transform, frame: Transform) -> Array:
-    """Return the Jacobian by the step of a body from that by the step of a frame in it, by its lever arm."""
+    """Convert the Jacobian by the step of a frame to that by the step of the body it is fixed to, by its lever arm."""
     moved = jacobian.copy()
     moved[..., 3:] -= jacobian[..., :3] @ lsq.skew(frame.xyz - body.xyz)
     return moved
 
 
 class TreeProblem:
-    """Rows between bodies, and the poses that fit them."""
+    """The measurements between bodies, and the poses of the bodies that fit them."""
 
     def __init__(self, measurements: Sequence[Measurement], bodies: Bodies) -> None:
-        """Store measurements as arrays: of bodies, of the poses of the measured frames in them, of covariances."""
+        """Store the measurements as arrays: body numbers, poses of measured frames in the bodies, inverse covariances.
+
+        Raises ValueInvalid for a singular covariance.
+        """
         self.measurements, self.size, self.unknown = measurements, len(measurements), max(bodies.number.values())
         self.count = self.unknown + 1
         sides = [[each.parent for each in measurements], [each.child for each in measurements]]
@@ -186,7 +192,7 @@ class TreeProblem:
         self.in_parent, self.in_child = (lsq.stacked(bodies.pose[name] for name in side) for side in sides)
         self.measured = lsq.stacked(each.transform for each in measurements)
         self.stated = np.array([each.covariance is not None for each in measurements])
-        self._stated = np.zeros((self.size, 6, 6))  # the inverses of their covariances
+        self._stated = np.zeros((self.size, 6, 6))  # inverses of the stated covariances
         for row in np.flatnonzero(self.stated).tolist():
             covariance = np.array(measurements[row].covariance, float).reshape(6, 6)
             sigmas = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
@@ -201,11 +207,11 @@ class TreeProblem:
         self._has_effect = (self.parent != self.child)[:, None, None]  # a row within a body has no effect
 
     def place(self, row: int) -> str:
-        """Return the place of a measurement, else its number."""
+        """Return the file and line of a measurement, else its number, for messages."""
         return printable(self.measurements[row].place) or f"measurement {row + 1}"
 
     def ends(self, bodies: Transform) -> tuple[Transform, Transform]:
-        """Return the poses of the frames of each row."""
+        """Return the poses of the parent and of the child frame of each row in the root."""
         return bodies[self.parent] @ self.in_parent, bodies[self.child] @ self.in_child
 
     def errors(self, bodies: Transform) -> Array:
@@ -214,7 +220,7 @@ class TreeProblem:
         return lsq.errors(parent.inverse() @ child, self.measured)
 
     def information(self, noise: Noise, factor: float = 1.0) -> Array:
-        """Return the inverse covariances, (n, 6, 6); factor: of stated sigmas."""
+        """Return the inverse covariances, (n, 6, 6); factor: that of stated sigmas."""
         diagonal = [noise.translation**-2] * 3 + [noise.rotation**-2] * 3
         return np.where(self.stated[:, None, None], self._stated / factor**2, np.diag(diagonal))
 
@@ -229,10 +235,10 @@ class TreeProblem:
     # initial values
 
     def initial_bodies(self, trees: int) -> Transform:
-        """Place the bodies by the spanning tree with which most other rows, including outliers, agree.
+        """Return the poses of the bodies by the spanning tree with which most other rows agree.
 
-        The rows are tried in their order, shuffled, and last sorted by how well each ever closed a loop: outliers never
-        do.
+        trees: the number of trees to try: of the rows in their order, then shuffled, and last sorted by the least
+        residual that each row had in any tree; that of outliers is never small.
         """
         shuffled = random.Random(0)  # noqa: S311 - random() gives the same numbers in every Python
         rows = range(self.size)
@@ -249,12 +255,12 @@ class TreeProblem:
             off = np.log1p(self.u(self.errors(placed), Noise()) ** 2)
             if (sum_off := float(off.sum())) < least:
                 best, least = placed, sum_off
-            off[tree.row[1:]] = math.inf  # a tree agrees with its own rows
+            off[tree.row[1:]] = math.inf  # the rows of the tree itself have no residual
             closest = np.minimum(closest, off)
         return best
 
     def poses_along(self, tree: SpanningTree) -> Transform:
-        """Return the poses of the bodies in a tree of rows."""
+        """Return the poses of the bodies, composed from the measurements along a tree."""
         poses = [IDENTITY] * self.count
         for body in tree.order[1:]:
             row = tree.row[body]
@@ -264,7 +270,7 @@ class TreeProblem:
     # Gauss-Newton
 
     def normal_equations(self, bodies: Transform, information: Array) -> tuple[Array, Array, float]:
-        """Return J'LJ and J'Lr, six rows for each unknown body, and r'Lr."""
+        """Return J'LJ and J'Lr, with six rows for each unknown body, and r'Lr."""
         (parent, child), count = self.ends(bodies), self.count
         off = lsq.errors(parent.inverse() @ child, self.measured)
         by_parent, by_child = (self._has_effect * by for by in jacobians(parent, child, off[:, 3:]))
@@ -283,7 +289,7 @@ class TreeProblem:
         return matrix, gradient[1:].reshape(size), float((off * weighed).sum())
 
     def damped_step(self, bodies: Transform, information: Array, damping: float) -> tuple[Transform, float, float]:
-        """Take one step, damped until it helps; return the bodies, the size of the step and the damping."""
+        """Take one Gauss-Newton step, damped until it helps; return the bodies, the step's size and the damping."""
         normal, gradient, before = self.normal_equations(bodies, information)
         diagonal = np.diagonal(normal).copy()
         extent = max(float(np.abs(bodies.xyz).max()), lsq.LEAST)
@@ -302,7 +308,11 @@ class TreeProblem:
     # noise, and selection of rows
 
     def estimated_noise(self, bodies: Transform, kept: Any, noise: Noise, *, estimate: bool, few_loops: bool) -> Noise:
-        """Return the noise of the used rows: sums of squares over their degrees of freedom."""
+        """Estimate the noise of the used rows: sums of squares over their degrees of freedom.
+
+        noise: the previous estimate; few_loops: as in TreeModel
+        estimate: also the sigmas of measurements without a covariance
+        """
         dof = 3.0 * (kept.sum() - self.unknown)
         if dof <= 0:
             return Noise()
@@ -332,7 +342,7 @@ class TreeProblem:
 
     def median_noise(self, errors: Array, looped: Any) -> Noise:
         """Return the noise from the medians of the rows in loops."""
-        unknown = self.unknown - (self.size - looped.sum())  # every row in no loop determines one
+        unknown = self.unknown - (self.size - looped.sum())  # every row in no loop determines one body
         share = math.sqrt(max(1 - unknown / looped.sum(), LEAST_SHARE))
         free, stated = looped & ~self.stated, looped & self.stated
         noise = Noise()
@@ -345,7 +355,7 @@ class TreeProblem:
         return noise.at_least(LOWEST) if looped.sum() <= 2 * unknown else noise
 
     def fitted(self, *, robust: bool) -> lsq.RobustFit[TreeModel]:
-        """Select the rows that agree, or all, and fit them by plain least squares."""
+        """Fit the bodies by least squares, to the inliers if robust, else to all rows."""
         every = range(self.size)
         bodies, noise = self.initial_bodies(TREES if robust and self.size > self.unknown else 1), Noise()
         kept = np.ones(self.size, bool)
@@ -366,9 +376,9 @@ class TreeProblem:
         return lsq.refit_inliers(lsq.RobustFit(TreeModel(bodies, noise), kept), self.refitted, robust=robust)
 
     def refitted(self, found: lsq.RobustFit[TreeModel], kept: Any) -> lsq.RobustFit[TreeModel]:
-        """Fit the used rows, and the nearest of the others if frames would be disconnected.
+        """Fit the used rows, and the best of the others that are needed to connect all frames.
 
-        Bodies and noise are those of the least-squares solution, both converged.
+        Bodies and noise are iterated until both converge.
         """
         bodies, noise, *_ = found.model
         u = self.u(self.errors(bodies), noise)
@@ -392,5 +402,5 @@ class TreeProblem:
 
 
 def _odd_count(values: Array) -> Array:
-    """Return an odd number of values, without the largest if necessary: of two rows that disagree one is wrong."""
+    """Return the values, an even number of them without the largest: of two rows that disagree one is wrong."""
     return values if len(values) % 2 else np.sort(values)[:-1]
